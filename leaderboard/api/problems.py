@@ -1,0 +1,74 @@
+"""Errors of the API, in one shape: RFC 9457 `application/problem+json`."""
+
+from http import HTTPStatus
+from typing import Any
+
+from django.core.exceptions import PermissionDenied
+from django.http import Http404
+from rest_framework import exceptions, renderers
+from rest_framework.response import Response
+from rest_framework.views import exception_handler as default_handler
+
+from leaderboard import standings, submissions
+
+
+class JSONRenderer(renderers.JSONRenderer):
+    """JSON, labelled as a problem where it is one."""
+
+    def render(
+        self, data: Any, accepted_media_type: str | None = None, renderer_context: Any = None
+    ) -> bytes:
+        """Render, and set the media type of problems."""
+        response = (renderer_context or {}).get("response")
+        if response is not None and response.status_code >= HTTPStatus.BAD_REQUEST:
+            response.content_type = "application/problem+json"
+        return super().render(data, accepted_media_type, renderer_context)
+
+
+def problem(
+    *, status: int, code: str, detail: str, where: str = "", headers: dict[str, str] | None = None
+) -> Response:
+    """One problem as a response."""
+    return Response(
+        {
+            "type": "about:blank",
+            "title": HTTPStatus(status).phrase,
+            "status": status,
+            "code": code,
+            "detail": detail,
+            "problems": [{"code": code, "message": detail, "where": where}],
+        },
+        status=status,
+        headers=headers,
+    )
+
+
+def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | None:
+    """Translate what the verbs raise; everything else keeps the framework's status."""
+    match exc:
+        case submissions.TooLarge():
+            return problem(status=413, code=exc.code, detail=str(exc), where=exc.field)
+        case submissions.Refused():
+            status = 409 if exc.code in {"split-not-open", "split-closed"} else 422
+            return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
+        case standings.UnknownColumn():
+            return problem(status=400, code="unknown-column", detail=str(exc), where="sort")
+        case Http404():
+            exc = exceptions.NotFound("There is nothing at this address that you may see.")
+        case PermissionDenied():
+            exc = exceptions.PermissionDenied()
+    response = default_handler(exc, context)
+    if response is None:
+        return None
+    code = getattr(exc, "default_code", "error").replace("_", "-")
+    headers = {name: value for name, value in response.items() if name != "Content-Type"}
+    return problem(status=response.status_code, code=code, detail=_sentence(exc), headers=headers)
+
+
+def _sentence(exc: Exception) -> str:
+    detail = getattr(exc, "detail", "")
+    return (
+        str(detail)
+        if isinstance(detail, str)
+        else "; ".join(f"{key}: {text}" for key, text in dict(detail).items())
+    )

@@ -1,0 +1,142 @@
+"""The API's doors: each view calls one verb."""
+
+from typing import cast
+
+from django.http import FileResponse, Http404, HttpResponseBase
+from django.shortcuts import get_object_or_404
+from django.utils import timezone
+from drf_spectacular.utils import OpenApiParameter, OpenApiResponse, extend_schema
+from rest_framework.parsers import MultiPartParser
+from rest_framework.permissions import AllowAny
+from rest_framework.request import Request
+from rest_framework.response import Response
+from rest_framework.views import APIView
+
+from leaderboard import files, standings, submissions
+from leaderboard.api.serializers import (
+    BoardSerializer,
+    ErrorSerializer,
+    NewSubmissionSerializer,
+    SplitSerializer,
+    SubmissionSerializer,
+    absolute,
+)
+from leaderboard.models import Split, Submission, User
+
+TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
+
+
+class SubmissionsView(APIView):
+    """Submit a prediction file; list one's own submissions."""
+
+    parser_classes = [MultiPartParser]
+
+    @extend_schema(
+        operation_id="submit",
+        request={"multipart/form-data": NewSubmissionSerializer},
+        responses={
+            201: SubmissionSerializer,
+            200: OpenApiResponse(
+                SubmissionSerializer, "The same bytes had come before: the first submission."
+            ),
+            (409, "application/problem+json"): ErrorSerializer,
+            (413, "application/problem+json"): ErrorSerializer,
+            (422, "application/problem+json"): ErrorSerializer,
+        },
+    )
+    def post(self, request: Request) -> Response:
+        """Send one file for one split. Answered when it is safely stored; the scores follow."""
+        upload = request.FILES.get("file")
+        submitted = submissions.submit(
+            user=cast("User", request.user),
+            split_name=str(request.data.get("split", "")),
+            method_name=str(request.data.get("method", "")),
+            upload=upload,
+            via=Submission.Via.API,
+            now=timezone.now(),
+            filename=getattr(upload, "name", "") or "",
+            **{name: str(request.data.get(name, "")) for name in TEXT_FIELDS},
+        )
+        return Response(
+            SubmissionSerializer(submitted.submission).data,
+            status=201 if submitted.is_new else 200,
+            headers={"Location": absolute("api-submission", submitted.submission.pk)},
+        )
+
+    @extend_schema(operation_id="list_submissions", responses=SubmissionSerializer(many=True))
+    def get(self, request: Request) -> Response:
+        """The newest hundred submissions of one's own team."""
+        rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")[:100]
+        return Response(SubmissionSerializer(rows, many=True).data)
+
+
+class SubmissionView(APIView):
+    """One submission."""
+
+    @extend_schema(
+        operation_id="submission",
+        responses={200: SubmissionSerializer, (404, "application/problem+json"): ErrorSerializer},
+    )
+    def get(self, request: Request, submission_id: str) -> Response:
+        """State, then scores or problems. What is not one's own does not exist."""
+        rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
+        return Response(SubmissionSerializer(get_object_or_404(rows, pk=submission_id)).data)
+
+
+class SplitsView(APIView):
+    """The splits."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(operation_id="list_splits", responses=SplitSerializer(many=True))
+    def get(self, request: Request) -> Response:
+        """Every split with its published edition."""
+        return Response(
+            SplitSerializer(Split.objects.select_related("published_edition__ground_truth"), many=True).data
+        )
+
+
+class BoardView(APIView):
+    """The board of a split."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(
+        operation_id="board",
+        parameters=[OpenApiParameter("sort", str, description="A column's name; '-' before it reverses.")],
+        responses={
+            200: BoardSerializer,
+            (400, "application/problem+json"): ErrorSerializer,
+            (404, "application/problem+json"): ErrorSerializer,
+        },
+    )
+    def get(self, request: Request, split: str) -> Response:
+        """Submissions and published rows, ranked by published MiD."""
+        found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+        board = standings.board(
+            split=found, viewer=request.user, sort=request.query_params.get("sort", "rank")
+        )
+        return Response(BoardSerializer(board).data)
+
+
+class ManifestView(APIView):
+    """The public manifest of a split's published ground truth."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(
+        operation_id="manifest",
+        responses={(200, "text/csv"): str, (404, "application/problem+json"): ErrorSerializer},
+    )
+    def get(self, request: Request, split: str) -> HttpResponseBase:
+        """All columns of the ground truth but the time to contact, as CSV."""
+        found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+        if found.published_edition is None:
+            raise Http404
+        digest = found.published_edition.ground_truth.manifest_digest
+        return FileResponse(
+            files.store().open(files.manifest_name(digest), "rb"),
+            as_attachment=True,
+            filename=f"tsttc-{found.pk}-manifest.csv",
+            content_type="text/csv",
+        )

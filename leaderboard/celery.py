@@ -1,0 +1,21 @@
+"""The Celery application; all its settings live in `leaderboard/settings.py` under `CELERY_`."""
+
+import os
+import random
+
+from celery import Celery
+from celery.signals import worker_process_init
+
+os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
+
+app = Celery("leaderboard")
+app.config_from_object("django.conf:settings", namespace="CELERY")
+app.autodiscover_tasks()
+
+
+@worker_process_init.connect  # Celery has no other door into the processes that run tasks
+def look_for_work_unasked(**_: object) -> None:
+    """Start this process's poller, so that queued work is found with no broker at all."""
+    from leaderboard.queue import Poller  # noqa: PLC0415 - the app registry is ready only now
+
+    Poller(rng=random.Random()).start()  # noqa: S311 - jitter, not a secret

@@ -1,0 +1,113 @@
+"""The file store: everything in it is named by the digest of its bytes and never changes.
+
+It goes through Django's storages, so that workers and web on several machines can share an S3-compatible one.
+"""
+
+import hashlib
+import os
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+from django.core.files.base import ContentFile, File
+from django.core.files.storage import FileSystemStorage, Storage, storages
+
+CHUNK_BYTES = 1 << 20
+
+
+class DurableFileSystemStorage(FileSystemStorage):
+    """A local directory whose files are whole or absent, and on the disk before `save` returns."""
+
+    def get_available_name(self, name: str, max_length: int | None = None) -> str:
+        """The name itself: equal names hold equal bytes here."""
+        return name
+
+    def _save(self, name: str, content: File) -> str:
+        target = Path(self.path(name))
+        target.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".incoming-")
+        try:
+            with os.fdopen(handle, "wb") as out:
+                for chunk in content.chunks(CHUNK_BYTES):
+                    out.write(chunk)
+                out.flush()
+                os.fsync(out.fileno())
+            Path(temporary).replace(target)
+        except BaseException:
+            Path(temporary).unlink(missing_ok=True)
+            raise
+        # The rename itself is only durable once the directory is on the disk, and so are new directories.
+        for directory in (target.parent, target.parent.parent):
+            descriptor = os.open(directory, os.O_RDONLY)
+            try:
+                os.fsync(descriptor)
+            finally:
+                os.close(descriptor)
+        return name
+
+
+@dataclass(frozen=True)
+class StoredFile:
+    """What the store knows of a file."""
+
+    digest: str
+    size_bytes: int
+
+
+def store() -> Storage:
+    """The configured file store."""
+    return storages["files"]
+
+
+def predictions_name(digest: str) -> str:
+    """Where a prediction file of this digest is kept."""
+    hexadecimal = digest.removeprefix("sha256:")
+    return f"predictions/{hexadecimal[:2]}/{hexadecimal}.json"
+
+
+def manifest_name(digest: str) -> str:
+    """Where the public manifest of this digest is kept."""
+    return f"manifests/{digest.removeprefix('sha256:')}.csv"
+
+
+def keep_predictions(upload: File) -> StoredFile:
+    """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once."""
+    digest = hashlib.sha256()
+    size_bytes = 0
+    for chunk in upload.chunks(CHUNK_BYTES):
+        digest.update(chunk)
+        size_bytes += len(chunk)
+    kept = StoredFile(digest=f"sha256:{digest.hexdigest()}", size_bytes=size_bytes)
+    name = predictions_name(kept.digest)
+    if not store().exists(name):
+        upload.seek(0)
+        store().save(name, upload)
+    return kept
+
+
+def keep_manifest(*, digest: str, csv: bytes) -> None:
+    """Keep a public manifest."""
+    if not store().exists(manifest_name(digest)):
+        store().save(manifest_name(digest), ContentFile(csv))
+
+
+@contextmanager
+def opened_predictions(digest: str) -> Iterator[IO[bytes]]:
+    """A prediction file with a file descriptor, whatever the store is.
+
+    Raises `OSError` if the store does not have it or does not answer.
+    """
+    with store().open(predictions_name(digest), "rb") as kept:
+        try:
+            kept.fileno()
+        except (AttributeError, OSError):
+            with tempfile.TemporaryFile() as local:
+                for chunk in kept.chunks(CHUNK_BYTES):
+                    local.write(chunk)
+                local.seek(0)
+                yield local
+        else:
+            yield kept  # type: ignore[misc]  # a File over a real file reads like one

@@ -1,0 +1,318 @@
+"""The life of an evaluation. Nothing else in the system writes a status.
+
+    QUEUED -> RUNNING -> SCORED           scores, report and status in one transaction
+                      -> REJECTED         the file is at fault
+                      -> QUEUED           a strike: the lease ran out, or the parsing child died
+                      -> SYSTEM_ERROR     strikes exhausted: our fault
+    QUEUED | RUNNING  -> CANCELLED        by its team
+    SYSTEM_ERROR      -> QUEUED           retried by a maintainer
+
+The database is the queue. A worker claims with an attempt number, a lease token and a deadline; renews the
+lease while it works; and finishes by compare-and-set on all three, so the result of a worker that was thought
+dead (a zombie) changes nothing. All times are the database's: `Now()` is evaluated there, never here.
+"""
+
+import random
+import uuid
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from enum import Enum
+from typing import Any
+
+import structlog
+from celery import current_app
+from django.conf import settings
+from django.db import transaction
+from django.db.models import DateTimeField, ExpressionWrapper, F, Q, QuerySet, Value
+from django.db.models.functions import Least, Now
+from kombu.exceptions import OperationalError
+
+from leaderboard import audit
+from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
+
+log = structlog.get_logger(__name__)
+
+MAX_POISON_STRIKES = 3
+MAX_INFRASTRUCTURE_STRIKES = 10
+MAX_BACKOFF_S = 60.0
+
+
+class LostRace(Exception):
+    """Somebody else decided this evaluation meanwhile; what was computed here is discarded."""
+
+
+class Strike(Enum):
+    """Why a run came to nothing."""
+
+    POISON = "POISON"  # the process died or overran on this very file
+    INFRASTRUCTURE = "INFRASTRUCTURE"  # the worker, the database or the disk failed; the file may be innocent
+
+
+@dataclass(frozen=True)
+class Lease:
+    """The right to decide one evaluation: valid while the row still names this attempt and token."""
+
+    evaluation_id: uuid.UUID
+    attempt: int
+    token: uuid.UUID
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a run found, ready to be written.
+
+    `scores` maps (metric, interval) to a published value; `problems` is the list shown to the submitter.
+    """
+
+    status: Status
+    scores: Mapping[tuple[str, str], float]
+    report: Mapping[str, Any] | None = None
+    report_digest: str = ""
+    problems: Sequence[Mapping[str, str]] = ()
+    n_problems: int = 0
+
+
+def _after(seconds: float) -> ExpressionWrapper:
+    """`seconds` from now, by the database's clock."""
+    return ExpressionWrapper(Now() + Value(timedelta(seconds=seconds)), output_field=DateTimeField())
+
+
+def database_now() -> datetime:
+    """The database's clock, for whoever compares with times written here."""
+    row = Edition.objects.annotate(now=Now()).values_list("now", flat=True).first()
+    if row is None:
+        from django.utils import timezone  # noqa: PLC0415 - only an empty database comes here
+
+        return timezone.now()
+    return row
+
+
+# --- into the queue --------------------------------------------------------------------------------------
+
+
+def enqueue(
+    *, submission: Submission, edition: Edition, priority: int = Evaluation.PRIORITY_LIVE
+) -> Evaluation:
+    """Queue a submission for an edition, once: asked again, the first evaluation is the answer.
+
+    Must run inside the transaction that makes the submission; the nudge follows its commit.
+    """
+    evaluation, is_new = Evaluation.objects.get_or_create(
+        submission=submission,
+        edition=edition,
+        defaults={"priority": priority, "queued_at": Now(), "due_at": Now()},
+    )
+    if is_new:
+        transaction.on_commit(lambda: nudge(evaluation.pk))
+    return evaluation
+
+
+def nudge(evaluation_id: uuid.UUID) -> None:
+    """Tell the workers that something waits. A lost nudge costs seconds: they also look by themselves."""
+    try:
+        current_app.send_task("leaderboard.tasks.nudge", args=[str(evaluation_id)], ignore_result=True)
+    except (OperationalError, OSError) as fault:
+        log.warning("nudge_not_sent", evaluation_id=str(evaluation_id), reason=str(fault)[:200])
+
+
+# --- a worker's verbs ------------------------------------------------------------------------------------
+
+
+def claim(*, lease_s: float, wall_s: float, limit: int = 1) -> list[Lease]:
+    """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
+
+    Two workers never get the same one: PostgreSQL skips rows that another claim holds, SQLite has one writer.
+    """
+    token = uuid.uuid4()
+    with transaction.atomic():
+        waiting = (
+            Evaluation.objects.select_for_update(skip_locked=True)
+            .filter(status=Status.QUEUED, due_at__lte=Now())
+            .order_by("priority", "queued_at")
+        )
+        ids = list(waiting.values_list("pk", flat=True)[:limit])
+        if not ids:
+            return []
+        Evaluation.objects.filter(pk__in=ids, status=Status.QUEUED).update(
+            status=Status.RUNNING,
+            attempt=F("attempt") + 1,
+            lease_token=token,
+            started_at=Now(),
+            deadline_at=_after(wall_s),
+            leased_until=_after(min(lease_s, wall_s)),
+        )
+        rows = Evaluation.objects.filter(pk__in=ids, lease_token=token).values_list("pk", "attempt")
+        return [Lease(evaluation_id=pk, attempt=attempt, token=token) for pk, attempt in rows]
+
+
+def _held(lease: Lease) -> QuerySet[Evaluation]:
+    """The row, if it is still this lease's to decide."""
+    return Evaluation.objects.filter(
+        pk=lease.evaluation_id, status=Status.RUNNING, attempt=lease.attempt, lease_token=lease.token
+    )
+
+
+def heartbeat(lease: Lease, *, lease_s: float) -> bool:
+    """Renew the lease, never beyond the deadline. False: stop work, it is somebody else's now."""
+    renewed = (
+        _held(lease)
+        .filter(deadline_at__gt=Now())
+        .update(leased_until=Least(_after(lease_s), F("deadline_at")))
+    )
+    return renewed == 1
+
+
+def finalise(lease: Lease, outcome: Outcome) -> bool:
+    """Write the outcome: status, scores, report and audit row, all or nothing.
+
+    Returns True if this call wrote it, False if an earlier call of the same lease had (its COMMIT succeeded
+    and the answer was lost). Raises `LostRace` if the lease is no longer valid: nothing is written then.
+    """
+    if outcome.status not in (Status.SCORED, Status.REJECTED):
+        raise ValueError(f"a run ends as SCORED or REJECTED, not as {outcome.status}")
+    with transaction.atomic():
+        written = _held(lease).update(
+            status=outcome.status,
+            finished_at=Now(),
+            finished_attempt=F("attempt"),
+            report=outcome.report,
+            report_digest=outcome.report_digest,
+            problems=list(outcome.problems),
+            n_problems=outcome.n_problems,
+            last_error="",
+        )
+        if written:
+            Score.objects.bulk_create(
+                Score(evaluation_id=lease.evaluation_id, metric=metric, interval=interval, value=value)
+                for (metric, interval), value in outcome.scores.items()
+            )
+            audit.record(
+                verb=outcome.status.lower(),
+                noun="Evaluation",
+                noun_id=lease.evaluation_id,
+                details={"attempt": lease.attempt},
+            )
+            return True
+    if Evaluation.objects.filter(
+        pk=lease.evaluation_id, finished_attempt=lease.attempt, lease_token=lease.token, status=outcome.status
+    ).exists():
+        return False
+    raise LostRace(f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer the valid one")
+
+
+def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> Status:
+    """End a run that came to nothing, with a strike. Returns the state it left: QUEUED or SYSTEM_ERROR.
+
+    Raises `LostRace` if the lease is no longer valid.
+    """
+    with transaction.atomic():
+        evaluation = _held(lease).select_for_update().first()
+        if evaluation is None:
+            raise LostRace(
+                f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer the valid one"
+            )
+        return _strike(evaluation, strike=strike, reason=reason, rng=rng)
+
+
+# --- the sweeper's verbs ---------------------------------------------------------------------------------
+
+
+def release_expired(*, rng: random.Random) -> int:
+    """Take back what dead workers hold. Returns how many were taken back.
+
+    A run that reached its own deadline overran on this file: poison. One whose lease ran out earlier lost its
+    worker: infrastructure.
+    """
+    with transaction.atomic():
+        expired = list(
+            Evaluation.objects.select_for_update(skip_locked=True)
+            .filter(status=Status.RUNNING, leased_until__lt=Now())
+            .annotate(overran=Q(deadline_at__lte=Now()))
+        )
+        for evaluation in expired:
+            overran: bool = evaluation.overran
+            _strike(
+                evaluation,
+                strike=Strike.POISON if overran else Strike.INFRASTRUCTURE,
+                reason="the run reached its time limit" if overran else "the worker stopped answering",
+                rng=rng,
+            )
+    return len(expired)
+
+
+def waiting_ids(*, limit: int) -> list[uuid.UUID]:
+    """Evaluations that are queued and due, most urgent first: what a sweep nudges again."""
+    return list(
+        Evaluation.objects.filter(status=Status.QUEUED, due_at__lte=Now())
+        .order_by("priority", "queued_at")
+        .values_list("pk", flat=True)[:limit]
+    )
+
+
+def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.Random) -> Status:
+    """Count a strike against a locked RUNNING row and send it back, or give up on it."""
+    n_poison = evaluation.n_poison_strikes + (strike is Strike.POISON)
+    n_infrastructure = evaluation.n_infrastructure_strikes + (strike is Strike.INFRASTRUCTURE)
+    exhausted = n_poison >= MAX_POISON_STRIKES or n_infrastructure >= MAX_INFRASTRUCTURE_STRIKES
+    changes: dict[str, Any] = {
+        "n_poison_strikes": n_poison,
+        "n_infrastructure_strikes": n_infrastructure,
+        "last_error": reason[:500],
+    }
+    if exhausted:
+        status = Status.SYSTEM_ERROR
+        changes |= {"finished_at": Now(), "finished_attempt": F("attempt")}
+    else:
+        status = Status.QUEUED
+        backoff_s = min(settings.BACKOFF_S * 2 ** (n_poison + n_infrastructure - 1), MAX_BACKOFF_S)
+        changes |= {"due_at": _after(backoff_s * rng.uniform(0.5, 1.0)), "leased_until": None}
+    Evaluation.objects.filter(pk=evaluation.pk, status=Status.RUNNING, attempt=evaluation.attempt).update(
+        status=status, **changes
+    )
+    log.warning(
+        "evaluation_struck",
+        submission_id=str(evaluation.submission_id),
+        evaluation_id=str(evaluation.pk),
+        strike=strike.value,
+        reason=reason,
+        status=status.value,
+    )
+    if exhausted:
+        audit.record(
+            verb="system_error", noun="Evaluation", noun_id=evaluation.pk, details={"reason": reason}
+        )
+    return status
+
+
+# --- people's verbs --------------------------------------------------------------------------------------
+
+
+def cancel(*, submission: Submission, actor: User) -> int:
+    """Cancel what is not decided yet of a submission. Returns how many evaluations that were."""
+    with transaction.atomic():
+        n_cancelled = Evaluation.objects.filter(
+            submission=submission, status__in=[Status.QUEUED, Status.RUNNING]
+        ).update(status=Status.CANCELLED, finished_at=Now())
+        if n_cancelled:
+            audit.record(verb="cancelled", noun="Submission", noun_id=submission.pk, actor=actor)
+    return n_cancelled
+
+
+def retry(*, evaluation: Evaluation, actor: User, reason: str = "") -> None:
+    """Queue a system error again with a clean slate. Raises `LostRace` if it is no system error any more."""
+    with transaction.atomic():
+        changed = Evaluation.objects.filter(pk=evaluation.pk, status=Status.SYSTEM_ERROR).update(
+            status=Status.QUEUED,
+            due_at=Now(),
+            finished_at=None,
+            finished_attempt=None,
+            n_poison_strikes=0,
+            n_infrastructure_strikes=0,
+        )
+        if not changed:
+            raise LostRace(f"evaluation {evaluation.pk} is not a system error; there is nothing to retry")
+        audit.record(
+            verb="retried", noun="Evaluation", noun_id=evaluation.pk, actor=actor, details={"reason": reason}
+        )
+        transaction.on_commit(lambda: nudge(evaluation.pk))

@@ -1,0 +1,44 @@
+"""`manage.py import_truth SPLIT PATH`."""
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+from django.utils import timezone
+
+from evaluator import Rejected
+from leaderboard import ground_truth
+
+
+class Command(BaseCommand):
+    """Opens a split with its ground truth."""
+
+    help = "Validate a ground truth (CSV, or the toolkit's annotation folder), keep it, and open an edition."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """SPLIT, PATH and the protocol."""
+        parser.add_argument("split", help="val, test or demo")
+        parser.add_argument("path", type=Path, help="a CSV file or a folder of annotation files")
+        parser.add_argument("--protocol", default="tsttc-1", choices=["tsttc-1", "toolkit"])
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Import, and say what came of it."""
+        try:
+            edition = ground_truth.import_truth(
+                split_name=options["split"],
+                path=options["path"],
+                protocol=options["protocol"],
+                now=timezone.now(),
+            )
+        except Rejected as rejected:
+            raise CommandError(
+                f"{options['path']} was refused; nothing was changed.\n{rejected}"
+            ) from rejected
+        except ground_truth.Refused as refused:
+            raise CommandError(str(refused)) from refused
+        truth = edition.ground_truth
+        self.stdout.write(
+            f"{edition}: {truth.n_sequences:,} sequences in {truth.n_recordings:,} recordings, "
+            f"ground truth {truth.digest}, protocol {edition.protocol}."
+        )

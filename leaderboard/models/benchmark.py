@@ -1,0 +1,104 @@
+"""What is competed on: splits, revisions of their ground truth, editions, and rows printed in papers."""
+
+from django.db import models
+from django.utils import timezone
+
+from leaderboard.models.people import User
+
+
+class Split(models.Model):
+    """A part of the dataset with its own policy and its own board."""
+
+    name = models.SlugField(max_length=32, primary_key=True)
+    title = models.CharField(max_length=80)
+    description = models.TextField(blank=True)
+    position = models.PositiveSmallIntegerField(default=0, help_text="Order in which splits are listed.")
+    is_hidden = models.BooleanField(
+        default=True, help_text="Hidden ground truth: nothing finer than interval aggregates is shown."
+    )
+    is_simulated = models.BooleanField(default=False, help_text="Ground truth made by a simulation.")
+    opens_at = models.DateTimeField(null=True, blank=True)
+    closes_at = models.DateTimeField(null=True, blank=True)
+    published_edition = models.ForeignKey(
+        "Edition", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
+    )
+
+    class Meta:
+        ordering = ["position", "name"]
+
+    def __str__(self) -> str:
+        return self.name
+
+    def accepts_submissions(self) -> bool:
+        """Whether there is ground truth to score against."""
+        return self.published_edition_id is not None
+
+
+class GroundTruth(models.Model):
+    """One revision of the hidden values, named by its digest. The values themselves are never here."""
+
+    digest = models.CharField(max_length=80, primary_key=True)
+    manifest_digest = models.CharField(max_length=80, db_index=True)
+    split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="ground_truths")
+    source = models.CharField(max_length=200, blank=True, help_text="Name of the file it was read from.")
+    n_sequences = models.PositiveIntegerField()
+    n_recordings = models.PositiveIntegerField()
+    counts = models.JSONField(help_text="Sequences per interval, and out of range.")
+    imported_at = models.DateTimeField(default=timezone.now)
+    imported_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
+
+    def __str__(self) -> str:
+        return f"{self.split_id} {self.short_digest}"
+
+    @property
+    def short_digest(self) -> str:
+        """The first eight digits of the digest, for people."""
+        return self.digest.removeprefix("sha256:")[:8]
+
+
+class Edition(models.Model):
+    """Ground truth and protocol of a split: the frame in which a ranking lives."""
+
+    split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="editions")
+    number = models.PositiveIntegerField()
+    ground_truth = models.ForeignKey(GroundTruth, on_delete=models.PROTECT, related_name="editions")
+    protocol = models.CharField(max_length=32)
+    opened_at = models.DateTimeField(default=timezone.now)
+    opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
+    published_at = models.DateTimeField(null=True, blank=True)
+
+    class Meta:
+        ordering = ["split", "number"]
+        constraints = [
+            models.UniqueConstraint(fields=["split", "number"], name="edition_number_once_per_split"),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.split_id} edition {self.number}"
+
+
+class PublishedResult(models.Model):
+    """A row printed in a paper: ranked beside the submissions, marked, never re-scored."""
+
+    split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="published_results")
+    slug = models.SlugField(max_length=64)
+    method_name = models.CharField(max_length=80)
+    description = models.TextField(blank=True)
+    authors = models.CharField(max_length=300)
+    source_title = models.CharField(max_length=300)
+    source_url = models.URLField()
+    source_table = models.CharField(max_length=200)
+    code_url = models.URLField(blank=True)
+    year = models.PositiveSmallIntegerField()
+    uses_nerf = models.BooleanField(default=False)
+    latency_ms = models.FloatField(null=True, blank=True)
+    hardware = models.CharField(max_length=120, blank=True)
+    scores = models.JSONField(help_text="The ten published numbers by name.")
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["split", "slug"], name="published_result_once_per_split"),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.method_name} ({self.split_id}, published)"

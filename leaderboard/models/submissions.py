@@ -1,0 +1,220 @@
+"""What was sent, and what it scored."""
+
+import uuid
+from typing import ClassVar, Self
+
+from django.contrib.auth.models import AnonymousUser
+from django.db import models
+from django.db.models import F, Q
+from django.utils import timezone
+
+from leaderboard.models.benchmark import Edition, Split
+from leaderboard.models.people import Team, User
+
+# Larger than any error can be; what lies beyond is NaN or an infinity, which PostgreSQL sorts above it.
+FINITE = 1e300
+
+
+class Visibility(models.TextChoices):
+    """Who may see a method: its team, everybody under a pseudonym, or everybody."""
+
+    PRIVATE = "PRIVATE", "private"
+    ANONYMOUS = "ANONYMOUS", "anonymous"
+    PUBLIC = "PUBLIC", "public"
+
+
+class MethodQuerySet(models.QuerySet["Method"]):
+    """Questions about methods."""
+
+    def visible_to(self, user: User | AnonymousUser) -> Self:
+        """Public methods, and those of the person's own team; maintainers see all."""
+        if not user.is_authenticated:
+            return self.filter(visibility=Visibility.PUBLIC)
+        if user.is_maintainer:
+            return self
+        return self.filter(Q(visibility=Visibility.PUBLIC) | Q(team__memberships__user=user))
+
+
+class Method(models.Model):
+    """A team's named approach."""
+
+    id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
+    team = models.ForeignKey(Team, on_delete=models.PROTECT, related_name="methods")
+    name = models.CharField(max_length=80)
+    description = models.TextField(blank=True, max_length=2000)
+    paper_url = models.URLField(blank=True, max_length=500)
+    code_url = models.URLField(blank=True, max_length=500)
+    visibility = models.CharField(max_length=12, choices=Visibility, default=Visibility.PUBLIC)
+    created_at = models.DateTimeField(default=timezone.now)
+
+    objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["team", "name"], name="method_name_once_per_team"),
+        ]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+class SubmissionQuerySet(models.QuerySet["Submission"]):
+    """Questions about submissions."""
+
+    def visible_to(self, user: User | AnonymousUser) -> Self:
+        """The person's own team's submissions; maintainers see all, strangers none."""
+        if not user.is_authenticated:
+            return self.none()
+        if user.is_maintainer:
+            return self
+        return self.filter(method__team__memberships__user=user)
+
+    def standing(self) -> Self:
+        """Submissions that their team has not withdrawn."""
+        return self.filter(withdrawn_at=None)
+
+
+class Submission(models.Model):
+    """One file for one split, kept for ever as the bytes that came in."""
+
+    class Via(models.TextChoices):
+        """The door it came through."""
+
+        WEB = "WEB", "web"
+        API = "API", "API"
+
+    id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
+    split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="submissions")
+    method = models.ForeignKey(Method, on_delete=models.PROTECT, related_name="submissions")
+    submitted_by = models.ForeignKey(User, on_delete=models.PROTECT, related_name="submissions")
+    submitted_at = models.DateTimeField(default=timezone.now, db_index=True)
+    via = models.CharField(max_length=4, choices=Via)
+    digest = models.CharField("digest of the file", max_length=80)
+    size_bytes = models.PositiveBigIntegerField()
+    filename = models.CharField(max_length=200, blank=True)
+    note = models.CharField(max_length=500, blank=True)
+    commit = models.CharField("commit of the code", max_length=64, blank=True)
+    withdrawn_at = models.DateTimeField(null=True, blank=True)
+
+    objects: ClassVar[SubmissionQuerySet] = SubmissionQuerySet.as_manager()  # type: ignore[assignment]
+
+    class Meta:
+        ordering = ["-submitted_at"]
+        constraints = [
+            # A method belongs to one team, so this is also once per team.
+            models.UniqueConstraint(
+                fields=["split", "method", "digest"],
+                condition=Q(withdrawn_at=None),
+                name="same_bytes_once_per_split_and_method",
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.method} on {self.split_id} ({self.id})"
+
+
+class Status(models.TextChoices):
+    """The states of an evaluation; only `leaderboard.lifecycle` writes them."""
+
+    QUEUED = "QUEUED", "queued"
+    RUNNING = "RUNNING", "running"
+    SCORED = "SCORED", "scored"
+    REJECTED = "REJECTED", "rejected"
+    SYSTEM_ERROR = "SYSTEM_ERROR", "failed by our fault"
+    CANCELLED = "CANCELLED", "cancelled"
+
+
+FINAL_STATUSES = (Status.SCORED, Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
+
+
+class Evaluation(models.Model):
+    """One submission scored in one edition: the unit of work, and the only status of the system."""
+
+    # Smaller goes first.
+    PRIORITY_LIVE = 0
+    PRIORITY_RESCORE = 10
+
+    id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
+    submission = models.ForeignKey(Submission, on_delete=models.PROTECT, related_name="evaluations")
+    edition = models.ForeignKey(Edition, on_delete=models.PROTECT, related_name="evaluations")
+    status = models.CharField(max_length=12, choices=Status, default=Status.QUEUED)
+    priority = models.SmallIntegerField(default=PRIORITY_LIVE)
+
+    queued_at = models.DateTimeField(default=timezone.now)
+    due_at = models.DateTimeField(default=timezone.now, help_text="Not to be claimed before.")
+    started_at = models.DateTimeField(null=True, blank=True)
+    finished_at = models.DateTimeField(null=True, blank=True)
+
+    attempt = models.PositiveIntegerField(default=0)
+    finished_attempt = models.PositiveIntegerField(null=True, blank=True)
+    lease_token = models.UUIDField(null=True, blank=True)
+    leased_until = models.DateTimeField(null=True, blank=True)
+    deadline_at = models.DateTimeField(null=True, blank=True)
+    n_poison_strikes = models.PositiveSmallIntegerField(default=0)
+    n_infrastructure_strikes = models.PositiveSmallIntegerField(default=0)
+    last_error = models.CharField(max_length=500, blank=True)
+
+    report = models.JSONField(
+        null=True, blank=True, help_text="Counts and truncations; the values are in Score."
+    )
+    report_digest = models.CharField(max_length=80, blank=True)
+    problems = models.JSONField(default=list, blank=True)
+    n_problems = models.PositiveIntegerField(default=0)
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(
+                fields=["submission", "edition"], name="one_evaluation_per_submission_and_edition"
+            ),
+            models.CheckConstraint(
+                condition=~Q(status="RUNNING")
+                | Q(lease_token__isnull=False, leased_until__isnull=False, deadline_at__isnull=False),
+                name="running_has_a_lease",
+            ),
+            models.CheckConstraint(
+                condition=~Q(status__in=["SCORED", "REJECTED"])
+                | Q(finished_at__isnull=False, finished_attempt=F("attempt")),
+                name="final_names_its_attempt",
+            ),
+        ]
+        indexes = [
+            models.Index(
+                fields=["priority", "queued_at"],
+                condition=Q(status="QUEUED"),
+                name="evaluation_queue",
+            ),
+            models.Index(fields=["leased_until"], condition=Q(status="RUNNING"), name="evaluation_leases"),
+            models.Index(fields=["edition", "status"], name="evaluation_by_edition"),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.submission_id} in {self.edition}"
+
+    @property
+    def is_final(self) -> bool:
+        """Whether nothing will change any more."""
+        return self.status in FINAL_STATUSES
+
+
+class Score(models.Model):
+    """One published value: evaluation × metric × interval, rounded as the protocol says."""
+
+    evaluation = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="scores")
+    metric = models.CharField(max_length=8)
+    interval = models.CharField(max_length=12)
+    value = models.FloatField()
+    low = models.FloatField(null=True, blank=True)
+    high = models.FloatField(null=True, blank=True)
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(
+                fields=["evaluation", "metric", "interval"], name="one_score_per_metric_and_interval"
+            ),
+            models.CheckConstraint(
+                condition=Q(value__gte=0, value__lt=FINITE), name="score_is_finite_and_not_negative"
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.metric} {self.interval} = {self.value}"

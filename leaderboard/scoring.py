@@ -1,0 +1,133 @@
+"""A worker's work: claim an evaluation, parse its file in quarantine, score it, write the outcome."""
+
+import hashlib
+import random
+import time
+from collections.abc import Callable
+
+import structlog
+from django.conf import settings
+from django.db import InterfaceError, OperationalError, connection
+
+import evaluator
+from evaluator import Rejected, Report, published
+from evaluator.protocol import get_protocol
+from leaderboard import files, ground_truth, lifecycle, quarantine
+from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
+from leaderboard.models import Evaluation, Status
+
+log = structlog.get_logger(__name__)
+
+FINALISE_ATTEMPTS = 8
+MAX_STORED_PROBLEMS = 100
+
+
+def run_next(*, rng: random.Random) -> bool:
+    """Claim one evaluation and decide it. False: nothing was waiting."""
+    leases = lifecycle.claim(lease_s=settings.LEASE_S, wall_s=settings.WALL_S)
+    for lease in leases:
+        run(lease, rng=rng)
+    return bool(leases)
+
+
+def run(lease: Lease, *, rng: random.Random) -> None:
+    """Decide one claimed evaluation. Whatever happens, the lease ends: decided, given back, or lost."""
+    evaluation = Evaluation.objects.select_related("submission", "edition").get(pk=lease.evaluation_id)
+    context = log.bind(submission_id=str(evaluation.submission_id), evaluation_id=str(lease.evaluation_id))
+    started_s = time.monotonic()
+    try:
+        outcome = _outcome(evaluation, heartbeat=lambda: lifecycle.heartbeat(lease, lease_s=settings.LEASE_S))
+        _persist(lambda: lifecycle.finalise(lease, outcome))
+    except quarantine.ChildDied as fault:
+        _give_back(lease, strike=Strike.POISON, reason=str(fault), rng=rng)
+    except OSError as fault:
+        _give_back(
+            lease, strike=Strike.INFRASTRUCTURE, reason=f"{type(fault).__name__}: {fault.strerror}", rng=rng
+        )
+    except (LostRace, quarantine.LeaseLost) as race:
+        context.warning("evaluation_lost", attempt=lease.attempt, reason=str(race))
+    else:
+        context.info(
+            "evaluation_finished",
+            status=outcome.status.value,
+            attempt=lease.attempt,
+            duration_s=round(time.monotonic() - started_s, 3),
+        )
+
+
+def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcome:
+    """Read, check and score one submission's file. A pure function of file digest and edition."""
+    edition = evaluation.edition
+    truth = ground_truth.load(edition.ground_truth_id)
+    try:
+        with files.opened_predictions(evaluation.submission.digest) as source:
+            predictions = quarantine.read_predictions(
+                source,
+                manifest=truth.manifest,
+                manifest_path=ground_truth.manifest_path(edition.ground_truth_id),
+                heartbeat=heartbeat,
+                heartbeat_s=settings.HEARTBEAT_S,
+            )
+        report = evaluator.evaluate(predictions, truth, protocol=edition.protocol)
+    except Rejected as rejected:
+        return rejection(rejected)
+    return scored(report)
+
+
+def scored(report: Report) -> Outcome:
+    """A report as it is published: values rounded by the protocol, counts, and nothing finer."""
+    decimals = get_protocol(report.protocol).decimals
+    values = {}
+    for interval, scores in report.scores.items():
+        for metric, value in (("mid", scores.mid), ("rte", scores.rte)):
+            rounded = published(value, decimals=decimals)
+            if rounded is not None:
+                values[metric, interval] = rounded
+    return Outcome(
+        status=Status.SCORED,
+        scores=values,
+        report={
+            "protocol": report.protocol,
+            "n_sequences": report.n_sequences,
+            "n_out_of_range": report.n_out_of_range,
+            "truncated": dict(report.truncated),
+            "counts": {interval: scores.count for interval, scores in report.scores.items()},
+        },
+        report_digest=f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}",
+    )
+
+
+def rejection(rejected: Rejected) -> Outcome:
+    """The outcome for a file that is at fault."""
+    problems = [
+        {"code": problem.code, "message": problem.message, "where": problem.where}
+        for problem in rejected.problems[:MAX_STORED_PROBLEMS]
+    ]
+    return Outcome(status=Status.REJECTED, scores={}, problems=problems, n_problems=rejected.n_problems)
+
+
+def _give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> None:
+    try:
+        _persist(lambda: lifecycle.give_back(lease, strike=strike, reason=reason, rng=rng))
+    except LostRace as race:
+        log.warning("evaluation_lost", evaluation_id=str(lease.evaluation_id), reason=str(race))
+
+
+def _persist(write: Callable[[], object]) -> None:
+    """Write to the database, again after a lost connection: the writes are compare-and-set, so it is safe.
+
+    Raises `LostRace` from the write, or the database's error when it stays away; the lease then runs out and
+    the work is done anew.
+    """
+    for attempt in range(1, FINALISE_ATTEMPTS + 1):
+        try:
+            write()
+        except (OperationalError, InterfaceError) as fault:
+            if attempt == FINALISE_ATTEMPTS:
+                raise
+            log.warning("database_unreachable", attempt=attempt, reason=str(fault)[:200])
+            connection.close()
+            # The server is restarting: there is no event to wait for, only its port to try again.
+            time.sleep(min(0.1 * 2**attempt, 5.0))
+        else:
+            return

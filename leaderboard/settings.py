@@ -1,0 +1,335 @@
+"""All settings, read from the environment.
+
+Two profiles: `embedded` (the default: SQLite, a broker in files, everything below `var/`; what `make demo`
+and the tests use) and `production`, which guesses nothing: what it needs and does not find is an error.
+Every variable is described in `docs/operations.md`.
+"""
+
+import sys
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import environ
+from celery.schedules import schedule
+from csp.constants import NONE, SELF
+from django.core.exceptions import ImproperlyConfigured
+from django.core.management.utils import get_random_secret_key
+
+BASE_DIR = Path(__file__).resolve().parent.parent
+env = environ.Env()
+
+PROFILE: str = env.str("TSTTC_PROFILE", default="embedded")
+if PROFILE not in {"embedded", "production"}:
+    raise ImproperlyConfigured(f"TSTTC_PROFILE is {PROFILE!r}; expected 'embedded' or 'production'.")
+PRODUCTION = PROFILE == "production"
+TESTING = "pytest" in sys.modules
+
+
+def required(name: str, *, embedded: Any) -> Any:
+    """The variable's text; in production its absence is an error, elsewhere `embedded` stands in."""
+    if PRODUCTION and not env.str(name, default=""):
+        raise ImproperlyConfigured(
+            f"{name} is not set. In production it has no default; docs/operations.md describes it."
+        )
+    return env.str(name, default=embedded)
+
+
+# --- where things are kept -------------------------------------------------------------------------------
+
+DATA_DIR = Path(env.str("TSTTC_DATA_DIR", default=str(BASE_DIR / "var")))
+# The hidden values. Only workers and the maintainers' commands read it; the web process needs no access.
+GROUND_TRUTH_DIR = Path(env.str("TSTTC_GROUND_TRUTH_DIR", default=str(DATA_DIR / "ground-truth")))
+FILES_DIR = Path(env.str("TSTTC_FILES_DIR", default=str(DATA_DIR / "files")))
+STATIC_ROOT = Path(env.str("TSTTC_STATIC_ROOT", default=str(BASE_DIR / "staticfiles")))
+if not PRODUCTION:
+    DATA_DIR.mkdir(parents=True, exist_ok=True)
+
+
+def embedded_secret_key() -> str:
+    """A key of this checkout's own, made once, so that sessions survive a restart of the demo."""
+    path = DATA_DIR / "secret-key"
+    if not path.exists():
+        path.touch(mode=0o600)
+        path.write_text(get_random_secret_key())
+    return path.read_text()
+
+
+# --- the frame -------------------------------------------------------------------------------------------
+
+SECRET_KEY = (
+    env.str("TSTTC_SECRET_KEY")
+    if PRODUCTION
+    else env.str("TSTTC_SECRET_KEY", default="") or embedded_secret_key()
+)
+DEBUG = env.bool("TSTTC_DEBUG", default=False)
+ALLOWED_HOSTS = required("TSTTC_ALLOWED_HOSTS", embedded="*").split(",")
+CSRF_TRUSTED_ORIGINS = env.list("TSTTC_CSRF_TRUSTED_ORIGINS", default=[])
+# The address that people quote; also what absolute links in messages are made of.
+SITE_URL = required("TSTTC_SITE_URL", embedded="http://127.0.0.1:8000").rstrip("/")
+SITE_NAME = env.str("TSTTC_SITE_NAME", default="TSTTC leaderboard")
+
+INSTALLED_APPS = [
+    "leaderboard",
+    "django.contrib.admin",
+    "django.contrib.auth",
+    "django.contrib.contenttypes",
+    "django.contrib.sessions",
+    "django.contrib.messages",
+    "whitenoise.runserver_nostatic",
+    "django.contrib.staticfiles",
+    "django.contrib.humanize",
+    "allauth",
+    "allauth.account",
+    "csp",
+    "django_filters",
+    "django_htmx",
+    "drf_spectacular",
+    "drf_spectacular_sidecar",
+    "knox",
+    "rest_framework",
+]
+MIDDLEWARE = [
+    "django.middleware.security.SecurityMiddleware",
+    "whitenoise.middleware.WhiteNoiseMiddleware",
+    "csp.middleware.CSPMiddleware",
+    "django.contrib.sessions.middleware.SessionMiddleware",
+    "django.middleware.common.CommonMiddleware",
+    "django.middleware.csrf.CsrfViewMiddleware",
+    "django.contrib.auth.middleware.AuthenticationMiddleware",
+    "django.contrib.messages.middleware.MessageMiddleware",
+    "django.middleware.clickjacking.XFrameOptionsMiddleware",
+    "allauth.account.middleware.AccountMiddleware",
+    "django_htmx.middleware.HtmxMiddleware",
+    # Last on the way in: its page needs the rest, and nothing before it reads the body.
+    "leaderboard.web.limits.UploadLimitMiddleware",
+]
+ROOT_URLCONF = "leaderboard.urls"
+WSGI_APPLICATION = "leaderboard.wsgi.application"
+TEMPLATES = [
+    {
+        "BACKEND": "django.template.backends.django.DjangoTemplates",
+        "DIRS": [BASE_DIR / "templates"],
+        "APP_DIRS": True,
+        "OPTIONS": {
+            "context_processors": [
+                "django.template.context_processors.request",
+                "django.contrib.auth.context_processors.auth",
+                "django.contrib.messages.context_processors.messages",
+                "leaderboard.web.context.site",
+            ],
+        },
+    }
+]
+LANGUAGE_CODE = "en-gb"
+TIME_ZONE = "UTC"
+USE_TZ = True
+USE_I18N = False
+DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
+
+# --- database, cache, files ------------------------------------------------------------------------------
+
+DATABASES = {
+    "default": env.db_url_config(
+        required("TSTTC_DATABASE_URL", embedded=f"sqlite:///{DATA_DIR / 'leaderboard.sqlite3'}")
+    )
+}
+if "sqlite" in DATABASES["default"]["ENGINE"]:
+    DATABASES["default"]["OPTIONS"] = {
+        # A deferred transaction that turns into a writer fails at once with "database is locked".
+        "transaction_mode": "IMMEDIATE",
+        "timeout": 20,
+        "init_command": "PRAGMA journal_mode=WAL; PRAGMA synchronous=FULL; PRAGMA busy_timeout=20000;",
+    }
+else:
+    DATABASES["default"]["CONN_MAX_AGE"] = env.int("TSTTC_DATABASE_CONN_MAX_AGE", default=60)
+    DATABASES["default"]["CONN_HEALTH_CHECKS"] = True
+    DATABASES["default"].setdefault("OPTIONS", {})["connect_timeout"] = 5
+
+STORAGES: dict[str, dict[str, Any]] = {
+    # Prediction files, aligned arrays and public manifests, all named by their digest.
+    "files": {
+        "BACKEND": "leaderboard.files.DurableFileSystemStorage",
+        "OPTIONS": {"location": str(FILES_DIR)},
+    },
+    "default": {
+        "BACKEND": "django.core.files.storage.FileSystemStorage",
+        "OPTIONS": {"location": str(FILES_DIR)},
+    },
+    "staticfiles": {
+        "BACKEND": "django.contrib.staticfiles.storage.StaticFilesStorage"
+        if TESTING or DEBUG
+        else "whitenoise.storage.CompressedManifestStaticFilesStorage"
+    },
+}
+STATIC_URL = "/static/"
+STATICFILES_DIRS = [BASE_DIR / "static"]
+
+# --- uploads ---------------------------------------------------------------------------------------------
+
+MAX_PREDICTIONS_BYTES = env.int("TSTTC_MAX_PREDICTIONS_BYTES", default=20_000_000)
+DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is streamed to disk
+DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
+FILE_UPLOAD_HANDLERS = ["django.core.files.uploadhandler.TemporaryFileUploadHandler"]
+
+# --- the life of an evaluation (seconds; see leaderboard/lifecycle.py) ----------------------------------
+
+LEASE_S = env.float("TSTTC_LEASE_S", default=60.0)
+HEARTBEAT_S = env.float("TSTTC_HEARTBEAT_S", default=LEASE_S / 4)
+WALL_S = env.float("TSTTC_WALL_S", default=300.0)
+SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
+POLL_S = env.float("TSTTC_POLL_S", default=5.0)
+BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
+# Limits of the child process that parses untrusted bytes.
+CHILD_MEMORY_BYTES = env.int("TSTTC_CHILD_MEMORY_BYTES", default=1_500_000_000)
+CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=60)
+
+# --- Celery: a broker message is only a nudge, the database is the queue ------------------------------------
+
+CELERY_BROKER_URL = required("TSTTC_BROKER_URL", embedded="filesystem://")
+CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any]
+if CELERY_BROKER_URL.startswith("filesystem"):
+    BROKER_DIR = DATA_DIR / "broker"
+    CELERY_BROKER_TRANSPORT_OPTIONS = {
+        "data_folder_in": str(BROKER_DIR / "messages"),
+        "data_folder_out": str(BROKER_DIR / "messages"),
+        "processed_folder": str(BROKER_DIR / "processed"),
+        "control_folder": str(BROKER_DIR / "control"),
+        "store_processed": False,
+        "polling_interval": 0.1,
+    }
+    for folder in ("messages", "processed", "control"):
+        (BROKER_DIR / folder).mkdir(parents=True, exist_ok=True)
+else:
+    CELERY_BROKER_TRANSPORT_OPTIONS = {
+        "visibility_timeout": 900,
+        "unacked_restore_interval": 10,
+        "unacked_restore_throttle": 1,
+        "socket_timeout": 5,
+        "socket_connect_timeout": 2,
+        "socket_keepalive": True,
+        "retry_on_timeout": True,
+        # Publishing happens inside a web request: fail fast, the sweep repeats the nudge.
+        "max_retries": 1,
+        "interval_start": 0,
+        "interval_step": 0.1,
+        "interval_max": 0.2,
+    }
+CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
+CELERY_BROKER_CONNECTION_MAX_RETRIES = None
+CELERY_TASK_PUBLISH_RETRY = False
+CELERY_RESULT_BACKEND = None
+CELERY_TASK_IGNORE_RESULT = True
+CELERY_TASK_SERIALIZER = "json"
+CELERY_ACCEPT_CONTENT = ["json"]
+CELERY_TASK_ACKS_LATE = True
+CELERY_TASK_REJECT_ON_WORKER_LOST = True
+CELERY_TASK_SOFT_TIME_LIMIT = int(WALL_S) + 30
+CELERY_TASK_TIME_LIMIT = int(WALL_S) + 60
+CELERY_WORKER_PREFETCH_MULTIPLIER = 1
+CELERY_WORKER_MAX_MEMORY_PER_CHILD = env.int("TSTTC_WORKER_MAX_MEMORY_KB", default=1_000_000)
+CELERY_WORKER_SOFT_SHUTDOWN_TIMEOUT = 20
+CELERY_WORKER_HIJACK_ROOT_LOGGER = False
+CELERY_BEAT_SCHEDULE_FILENAME = str(DATA_DIR / "celerybeat-schedule")
+CELERY_BEAT_MAX_LOOP_INTERVAL = min(5.0, SWEEP_S)
+CELERY_BEAT_SCHEDULE = {
+    "sweep": {
+        "task": "leaderboard.tasks.sweep",
+        "schedule": schedule(timedelta(seconds=SWEEP_S)),
+        # A sweep that waited longer than its own period has been overtaken by the next one.
+        "options": {"expires": max(2 * SWEEP_S, 5.0)},
+    },
+}
+
+# --- accounts --------------------------------------------------------------------------------------------
+
+AUTH_USER_MODEL = "leaderboard.User"
+AUTHENTICATION_BACKENDS = [
+    "django.contrib.auth.backends.ModelBackend",
+    "allauth.account.auth_backends.AuthenticationBackend",
+]
+AUTH_PASSWORD_VALIDATORS = [
+    {"NAME": "django.contrib.auth.password_validation.UserAttributeSimilarityValidator"},
+    {"NAME": "django.contrib.auth.password_validation.MinimumLengthValidator"},
+    {"NAME": "django.contrib.auth.password_validation.CommonPasswordValidator"},
+    {"NAME": "django.contrib.auth.password_validation.NumericPasswordValidator"},
+]
+LOGIN_URL = "account_login"
+LOGIN_REDIRECT_URL = "/submit/"
+LOGOUT_REDIRECT_URL = "/"
+ACCOUNT_USER_MODEL_USERNAME_FIELD = None
+ACCOUNT_LOGIN_METHODS = {"email"}
+ACCOUNT_SIGNUP_FIELDS = ["email*", "password1*", "password2*"]
+ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.forms.SignupForm"
+ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
+ACCOUNT_SESSION_REMEMBER = True
+EMAIL_CONFIG = env.email_url("TSTTC_EMAIL_URL", default="consolemail://")
+vars().update(EMAIL_CONFIG)
+DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
+# Without a mail server nobody could follow the link; with one, an address counts once it is proved.
+ACCOUNT_EMAIL_VERIFICATION = "mandatory" if env.str("TSTTC_EMAIL_URL", default="") else "none"
+ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key"}
+
+# --- API -------------------------------------------------------------------------------------------------
+
+KNOX_TOKEN_MODEL = "leaderboard.ApiToken"
+REST_KNOX = {
+    "AUTH_HEADER_PREFIX": "Bearer",
+    "TOKEN_PREFIX": "tsttc_",
+    "TOKEN_TTL": timedelta(days=90),
+    "TOKEN_MODEL": KNOX_TOKEN_MODEL,
+}
+REST_FRAMEWORK = {
+    "DEFAULT_AUTHENTICATION_CLASSES": [
+        "leaderboard.api.authentication.BearerAuthentication",
+        "rest_framework.authentication.SessionAuthentication",
+    ],
+    "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
+    "DEFAULT_RENDERER_CLASSES": ["leaderboard.api.problems.JSONRenderer"],
+    "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.MultiPartParser", "rest_framework.parsers.JSONParser"],
+    "DEFAULT_SCHEMA_CLASS": "drf_spectacular.openapi.AutoSchema",
+    "EXCEPTION_HANDLER": "leaderboard.api.problems.exception_handler",
+}
+SPECTACULAR_SETTINGS = {
+    "TITLE": "TSTTC leaderboard API",
+    "DESCRIPTION": "Submit prediction files, follow their evaluation, read the boards.",
+    "VERSION": "1",
+    "OAS_VERSION": "3.1.0",
+    "SERVE_INCLUDE_SCHEMA": False,
+    "SWAGGER_UI_DIST": "SIDECAR",
+    "SWAGGER_UI_FAVICON_HREF": "SIDECAR",
+    "REDOC_DIST": "SIDECAR",
+    "SCHEMA_PATH_PREFIX": "/api/v1",
+}
+
+# --- security --------------------------------------------------------------------------------------------
+
+CONTENT_SECURITY_POLICY = {
+    "DIRECTIVES": {
+        "default-src": [NONE],
+        "script-src": [SELF],
+        "style-src": [SELF],
+        "img-src": [SELF, "data:"],
+        "font-src": [SELF],
+        "connect-src": [SELF],
+        "form-action": [SELF],
+        "base-uri": [NONE],
+        "frame-ancestors": [NONE],
+    }
+}
+X_FRAME_OPTIONS = "DENY"
+SECURE_CONTENT_TYPE_NOSNIFF = True
+SECURE_REFERRER_POLICY = "same-origin"
+SESSION_COOKIE_SAMESITE = "Lax"
+CSRF_COOKIE_SAMESITE = "Lax"
+SESSION_COOKIE_HTTPONLY = True
+CSRF_COOKIE_HTTPONLY = True
+if PRODUCTION and env.bool("TSTTC_HTTPS", default=True):
+    SECURE_SSL_REDIRECT = True
+    SECURE_REDIRECT_EXEMPT = [r"^healthz$", r"^readyz$", r"^metrics$"]
+    SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https")
+    SECURE_HSTS_SECONDS = 365 * 24 * 3600
+    SECURE_HSTS_INCLUDE_SUBDOMAINS = True
+    SECURE_HSTS_PRELOAD = True
+    SESSION_COOKIE_SECURE = True
+    CSRF_COOKIE_SECURE = True

@@ -1,0 +1,299 @@
+"""Submissions: one file for one split, acknowledged only once it can no longer be lost."""
+
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from django.conf import settings
+from django.core.exceptions import ValidationError
+from django.core.files.base import File
+from django.core.validators import URLValidator
+from django.db import IntegrityError, transaction
+from django.db.models import Avg, DurationField, ExpressionWrapper, F, Q
+
+from leaderboard import audit, files, lifecycle, standings, teams
+from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
+
+is_web_address = URLValidator(schemes=["http", "https"])
+
+
+class Refused(Exception):
+    """The submission cannot be taken. `field` names the input at fault, `code` is stable."""
+
+    def __init__(self, code: str, message: str, *, field: str = "") -> None:
+        super().__init__(message)
+        self.code = code
+        self.field = field
+
+
+class TooLarge(Refused):
+    """The file is over the size limit."""
+
+
+@dataclass(frozen=True)
+class Submitted:
+    """The answer to a submission; `is_new` is False when the same bytes had come before."""
+
+    submission: Submission
+    is_new: bool
+
+
+@dataclass(frozen=True)
+class MethodDetails:
+    """What a team says of a method when it names it for the first time, or says anew."""
+
+    description: str = ""
+    paper_url: str = ""
+    code_url: str = ""
+
+
+def submit(
+    *,
+    user: User,
+    split_name: str,
+    method_name: str,
+    upload: File | None,
+    via: str,
+    now: datetime,
+    filename: str = "",
+    description: str = "",
+    paper_url: str = "",
+    code_url: str = "",
+    note: str = "",
+    commit: str = "",
+) -> Submitted:
+    """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
+
+    The same bytes again, for the same split and method, are answered with the first submission. Raises
+    `Refused` (nothing is kept then).
+    """
+    split = _open_split(split_name, now=now)
+    name = _clean_text("method", method_name, limit=80)
+    details = MethodDetails(
+        description=_clean_text("description", description, limit=2000, required=False),
+        paper_url=_clean_url("paper_url", paper_url),
+        code_url=_clean_url("code_url", code_url),
+    )
+    note = _clean_text("note", note, limit=500, required=False)
+    commit = _clean_text("commit", commit, limit=64, required=False)
+    kept = _keep(upload)
+    team = teams.team_of(user=user)
+    with transaction.atomic():
+        method = _method(team=team, name=name, details=details, now=now)
+        standing = Submission.objects.standing().filter(split=split, method=method, digest=kept.digest)
+        first = standing.first()
+        if first is not None:
+            return Submitted(submission=first, is_new=False)
+        try:
+            with transaction.atomic():
+                submission = Submission.objects.create(
+                    split=split,
+                    method=method,
+                    submitted_by=user,
+                    submitted_at=now,
+                    via=via,
+                    digest=kept.digest,
+                    size_bytes=kept.size_bytes,
+                    filename=_clean_filename(filename),
+                    note=note,
+                    commit=commit,
+                )
+        except IntegrityError:
+            # The same bytes came twice at once, and the other request was first.
+            return Submitted(submission=standing.get(), is_new=False)
+        _queue(submission)
+        audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
+    return Submitted(submission=submission, is_new=True)
+
+
+def _queue(submission: Submission) -> None:
+    """Queue the submission for the published edition, and for any that is being prepared beside it."""
+    published = submission.split.published_edition
+    for edition in submission.split.editions.filter(
+        Q(published_at=None) | Q(pk=published.pk if published else None)
+    ):
+        lifecycle.enqueue(submission=submission, edition=edition)
+
+
+def _open_split(name: str, *, now: datetime) -> Split:
+    split = Split.objects.select_related("published_edition").filter(name=name).first()
+    if split is None:
+        known = ", ".join(Split.objects.values_list("name", flat=True))
+        raise Refused(
+            "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
+        )
+    if not split.accepts_submissions():
+        raise Refused(
+            "split-not-open",
+            f"Submissions to {name} are not open yet: it has no ground truth.",
+            field="split",
+        )
+    if split.opens_at and now < split.opens_at:
+        raise Refused(
+            "split-not-open",
+            f"Submissions to {name} open at {split.opens_at:%Y-%m-%d %H:%M} UTC.",
+            field="split",
+        )
+    if split.closes_at and now >= split.closes_at:
+        raise Refused(
+            "split-closed",
+            f"Submissions to {name} closed at {split.closes_at:%Y-%m-%d %H:%M} UTC.",
+            field="split",
+        )
+    return split
+
+
+def _keep(upload: File | None) -> files.StoredFile:
+    if upload is None:
+        raise Refused(
+            "no-file", "No prediction file was sent; expected one in the field 'file'.", field="file"
+        )
+    if upload.size > settings.MAX_PREDICTIONS_BYTES:
+        raise TooLarge("too-large", too_large(found_bytes=upload.size), field="file")
+    return files.keep_predictions(upload)
+
+
+def too_large(*, found_bytes: int) -> str:
+    """The sentence for a file over the limit."""
+    return (
+        f"The file has {found_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
+        f"({settings.MAX_PREDICTIONS_BYTES / 1e6:g} MB)."
+    )
+
+
+def _method(*, team: Team, name: str, details: MethodDetails, now: datetime) -> Method:
+    """The team's method of that name, made if new; what is said of it replaces what was said."""
+    said = {key: value for key, value in vars(details).items() if value}
+    method, is_new = Method.objects.get_or_create(team=team, name=name, defaults={**said, "created_at": now})
+    if not is_new and any(getattr(method, key) != value for key, value in said.items()):
+        Method.objects.filter(pk=method.pk).update(**said)
+    return method
+
+
+def _clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:
+    """The text without surrounding space. Raises `Refused` for control characters, excess or absence."""
+    text = unicodedata.normalize("NFC", text).strip()
+    if required and not text:
+        raise Refused("missing-field", f"The field '{name}' is empty; expected a text.", field=name)
+    if len(text) > limit:
+        raise Refused(
+            "text-too-long",
+            f"The field '{name}' has {len(text)} characters; expected at most {limit}.",
+            field=name,
+        )
+    for character in text:
+        if unicodedata.category(character) in {"Cc", "Cs", "Co", "Cn"} and character not in "\r\n\t":
+            raise Refused(
+                "bad-character",
+                f"The field '{name}' has the character U+{ord(character):04X}; expected printable text.",
+                field=name,
+            )
+    return text
+
+
+def _clean_url(name: str, text: str) -> str:
+    text = _clean_text(name, text, limit=500, required=False)
+    if text:
+        try:
+            is_web_address(text)
+        except ValidationError:
+            raise Refused(
+                "bad-address",
+                f"The field '{name}' is {text[:80]!r}; expected an address that begins with http:// or https://.",
+                field=name,
+            ) from None
+    return text
+
+
+def _clean_filename(name: str) -> str:
+    """The last part of a file's name with printable characters only; it is shown, never used as a path."""
+    last = name.replace("\\", "/").rpartition("/")[2]
+    return "".join(c for c in last if c.isprintable())[:200]
+
+
+# --- how it goes -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Progress:
+    """What its team sees of a submission."""
+
+    state: str
+    state_label: str
+    received_at: datetime
+    queued_at: datetime | None = None
+    started_at: datetime | None = None
+    finished_at: datetime | None = None
+    n_ahead: int | None = None
+    estimate_s: float | None = None
+    scores: Mapping[str, float | None] | None = None
+    counts: Mapping[str, int] = field(default_factory=dict)
+    truncated: Mapping[str, int] = field(default_factory=dict)
+    n_out_of_range: int | None = None
+    problems: list[dict[str, str]] = field(default_factory=list)
+    n_problems: int = 0
+    fault_is_ours: bool = False
+    is_final: bool = False
+    edition_number: int | None = None
+    protocol: str = ""
+
+
+def evaluation_of(submission: Submission) -> Evaluation:
+    """The evaluation that speaks for a submission: in the published edition, else in the latest."""
+    published = submission.split.published_edition_id
+    evaluations = list(submission.evaluations.select_related("edition").order_by("edition__number"))
+    return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
+
+
+def progress(submission: Submission) -> Progress:
+    """How far a submission is, and what came of it."""
+    evaluation = evaluation_of(submission)
+    report = evaluation.report or {}
+    n_ahead, estimate_s = _waiting(evaluation)
+    return Progress(
+        state=evaluation.status,
+        state_label=Status(evaluation.status).label,
+        received_at=submission.submitted_at,
+        queued_at=evaluation.queued_at,
+        started_at=evaluation.started_at,
+        finished_at=evaluation.finished_at,
+        n_ahead=n_ahead,
+        estimate_s=estimate_s,
+        scores=standings.flat_scores(evaluation.scores.all()) if evaluation.status == Status.SCORED else None,
+        counts=report.get("counts", {}),
+        truncated=report.get("truncated", {}),
+        n_out_of_range=report.get("n_out_of_range"),
+        problems=evaluation.problems,
+        n_problems=evaluation.n_problems,
+        fault_is_ours=evaluation.status == Status.SYSTEM_ERROR,
+        is_final=evaluation.is_final,
+        edition_number=evaluation.edition.number,
+        protocol=evaluation.edition.protocol,
+    )
+
+
+def _waiting(evaluation: Evaluation) -> tuple[int | None, float | None]:
+    """How many go first, and about how long that takes by the mean of the last fifty runs."""
+    if evaluation.is_final:
+        return None, None
+    n_ahead = 0
+    if evaluation.status == Status.QUEUED:
+        n_ahead = Evaluation.objects.filter(
+            Q(priority__lt=evaluation.priority)
+            | Q(priority=evaluation.priority, queued_at__lt=evaluation.queued_at),
+            status=Status.QUEUED,
+        ).count()
+    recent = (
+        Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED])
+        .exclude(started_at=None)
+        .order_by("-finished_at")
+        .annotate(took=ExpressionWrapper(F("finished_at") - F("started_at"), output_field=DurationField()))[
+            :50
+        ]
+    )
+    mean = recent.aggregate(mean=Avg("took"))["mean"]
+    if mean is None:
+        return n_ahead, None
+    n_running = Evaluation.objects.filter(status=Status.RUNNING).count()
+    return n_ahead, mean.total_seconds() * (n_ahead + n_running + 1)

@@ -1,0 +1,19 @@
+"""Celery tasks: each is one call of a verb. A message carries no work, only the news that some is waiting."""
+
+import random
+
+from celery import shared_task
+
+from leaderboard import queue, scoring
+
+
+@shared_task(name="leaderboard.tasks.nudge")
+def nudge(evaluation_id: str) -> None:
+    """Decide one waiting evaluation: the most urgent, which need not be the one that the message names."""
+    scoring.run_next(rng=random.Random())  # noqa: S311 - jitter, not a secret
+
+
+@shared_task(name="leaderboard.tasks.sweep")
+def sweep() -> None:
+    """Take back what dead workers hold and nudge again what waits."""
+    queue.sweep(rng=random.Random())  # noqa: S311 - jitter, not a secret

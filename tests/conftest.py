@@ -1,0 +1,31 @@
+"""Fixtures that everybody shares."""
+
+import os
+from pathlib import Path
+
+import pytest
+
+from leaderboard import benchmark as benchmark_verbs
+
+# Playwright's own loop makes Django's guard against blocking calls in async code misfire.
+os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
+
+
+@pytest.fixture
+def benchmark(db: None) -> None:
+    """The splits and published rows, which a transactional test may have flushed since `migrate`."""
+    benchmark_verbs.ensure_splits()
+
+
+@pytest.fixture(autouse=True)
+def private_directories(tmp_path: Path, settings) -> None:
+    """Files and ground truth of each test live in its own directory."""
+    settings.FILES_DIR = tmp_path / "files"
+    settings.GROUND_TRUTH_DIR = tmp_path / "ground-truth"
+    settings.STORAGES = {
+        **settings.STORAGES,
+        "files": {
+            "BACKEND": "leaderboard.files.DurableFileSystemStorage",
+            "OPTIONS": {"location": str(settings.FILES_DIR)},
+        },
+    }
