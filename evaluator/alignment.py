@@ -1,0 +1,183 @@
+"""From parsed members to values in the manifest's order, with every fault in words."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from evaluator.documents import Document, Members, kind_of, parse, read_document
+from evaluator.problems import Findings, listed, pointer, quoted
+from evaluator.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
+from evaluator.truth import Manifest
+
+KeyKind = Literal["anno_id", "natural_key"]
+
+ZERO_MESSAGE: Final = "The value is 0; expected a time to contact other than 0, negative when moving away."
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Aligned:
+    """A document without its predictions, and these as seconds in the manifest's order."""
+
+    document: Document
+    ttc_s: Floats
+    keys: KeyKind
+
+
+def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
+    """Read any file, member by member; raises `Rejected`."""
+    document = read_document(parse(data))
+    findings = Findings()
+    keys = _check_keys(document.predictions, manifest, findings, document.pointer)
+    ttc = document.unit == "ttc"
+    values = _column(
+        document.predictions, manifest, findings, document.pointer, _seconds_fault if ttc else _ratio_fault
+    )
+    if not ttc:
+        fps_hz = read_rates(document, manifest, findings)
+        names = manifest.natural_keys if keys == "natural_key" else manifest.anno_id_keys
+        ratios, values = values, scale_ratio_to_ttc(values, fps_hz=fps_hz)
+        for row in np.flatnonzero(values == 0.0).tolist():
+            message = (
+                f"The scale ratio {ratios[row]!s} is a time to contact of 0; expected one that is not 0."
+            )
+            findings.add("zero", message, document.pointer(names[row]))
+    findings.raise_if_any()
+    return Aligned(document, values, keys)
+
+
+def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:
+    """The pair rates in Hz, (n,) or (); faults are noted."""
+    is_gap = document.rate_name == "frame_gap"
+    fault = _gap_fault if is_gap else _fps_fault
+    if isinstance(document.rate, Members):
+        name = str(document.rate_name)
+
+        def place(key: str) -> str:
+            return pointer(name, key)
+
+        _check_keys(document.rate, manifest, findings, place)
+        rates = _column(document.rate, manifest, findings, place, fault)
+    else:
+        problem = fault(document.rate)
+        if problem:
+            findings.add(problem[0], problem[1], f"/{document.rate_name}")
+        rates = np.array(math.nan if problem else document.rate, dtype=np.float64)
+    return fps_of_gap(rates) if is_gap else rates
+
+
+def _check_keys(
+    members: Members, manifest: Manifest, findings: Findings, place: Callable[[str], str]
+) -> KeyKind:
+    """Note missing, unknown, duplicate and mixed keys; return the kind of most known keys."""
+    by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
+    names = [name for name, _ in members]
+    id_names = [name for name in names if name in by_id]
+    natural_names = [name for name in names if name in by_natural_key]
+    kind: KeyKind = "natural_key" if len(natural_names) > len(id_names) else "anno_id"
+    noun = "natural key" if kind == "natural_key" else "anno_id"
+    unknown = [name for name in names if name not in by_id and name not in by_natural_key]
+    if unknown:
+        message = (
+            f"{_n(len(unknown), 'key names', 'keys name')} no sequence of the manifest: "
+            f"{listed([quoted(name) for name in unknown])}; expected its anno_ids, as plain decimal numbers, "
+            "or its natural keys bag_stamp/cam_id/ts/track_id."
+        )
+        findings.group("unknown-keys", message, place(unknown[0]), n_faults=len(unknown))
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        message = (
+            f"{_n(len(repeated), 'key appears', 'keys appear')} more than once: "
+            f"{listed([quoted(name) for name in repeated])}; expected every key once."
+        )
+        findings.group("duplicate-keys", message, place(repeated[0]), n_faults=len(repeated))
+    if id_names and natural_names:
+        rare = id_names if kind == "natural_key" else natural_names
+        message = (
+            f"The file mixes {len(id_names):,} anno_ids with {len(natural_names):,} natural keys; "
+            f"the odd ones: {listed([quoted(name) for name in rare])}; expected one kind of key."
+        )
+        findings.group("mixed-keys", message, place(rare[0]), n_faults=len(rare))
+    given = {by_id[name] for name in id_names} | {by_natural_key[name] for name in natural_names}
+    n_missing = manifest.n_sequences - len(given)
+    if n_missing:
+        every = manifest.natural_keys if kind == "natural_key" else manifest.anno_id_keys
+        missing = [name for row, name in enumerate(every) if row not in given]
+        message = (
+            f"{_n(n_missing, 'sequence has', 'sequences have')} no value: {listed(missing)}; "
+            f"expected one for each of the manifest's {manifest.n_sequences:,} sequences, by {noun}."
+        )
+        findings.group("missing-keys", message, place(missing[0]), n_faults=n_missing)
+    return kind
+
+
+Fault = Callable[[object], tuple[str, str] | None]
+
+
+def _column(
+    members: Members, manifest: Manifest, findings: Findings, place: Callable[[str], str], fault: Fault
+) -> Floats:
+    """The values by row of the manifest, NaN where none is given or usable; faults are noted."""
+    by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
+    values = np.full(manifest.n_sequences, math.nan)
+    for name, value in members:
+        problem = fault(value)
+        if problem:
+            findings.add(problem[0], problem[1], place(name))
+            continue
+        row = by_id.get(name, by_natural_key.get(name))
+        if row is not None:
+            values[row] = value
+    return values
+
+
+def _seconds_fault(value: object) -> tuple[str, str] | None:
+    if problem := _number_fault(value, "a number of seconds"):
+        return problem
+    if value == 0:
+        return "zero", ZERO_MESSAGE
+    return None
+
+
+def _ratio_fault(value: object) -> tuple[str, str] | None:
+    if problem := _number_fault(value, "a scale ratio greater than 0"):
+        return problem
+    if not value > 0:  # type: ignore[operator]
+        return "not-positive", f"The value is {kind_of(value)}; expected a scale ratio greater than 0."
+    return None
+
+
+def _number_fault(value: object, expected: str) -> tuple[str, str] | None:
+    if not _is_number(value):
+        return "not-a-number", f"The value is {kind_of(value)}; expected {expected}."
+    if value != value:  # noqa: PLR0124 - NaN alone differs from itself
+        return "nan", f"The value is NaN; expected {expected}."
+    return None
+
+
+def _fps_fault(value: object) -> tuple[str, str] | None:
+    if _is_number(value) and 0 < value < math.inf:  # type: ignore[operator]
+        return None
+    return "bad-rate", f"fps is {kind_of(value)}; expected a rate in Hz, a finite number greater than 0."
+
+
+def _gap_fault(value: object) -> tuple[str, str] | None:
+    if _is_number(value) and value in range(1, N_FRAMES):
+        return None
+    return (
+        "bad-rate",
+        f"frame_gap is {kind_of(value)}; expected a whole number of frames from 1 to {N_FRAMES - 1}.",
+    )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _n(count: int, one: str, many: str) -> str:
+    return f"{count:,} {one if count == 1 else many}"

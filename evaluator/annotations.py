@@ -1,0 +1,144 @@
+"""The toolkit's annotation folders: pickles from strangers, read without running them.
+
+An annotation file holds a list of dictionaries, one per camera: timestamp -> list of attribute-dicts with
+`bag_stamp, box2d, cam_id, id, occ_ratio, same_lane, ts, ttc_imu`. A sequence is six frames of one id, exactly
+0.1 s apart, cut without overlap; its target is the last frame.
+
+anno_ids are numbered from 0 over the files **sorted by their path** inside the folder. The toolkit numbers
+in the order in which the file system lists them, which differs between machines; within a file the order is
+the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Final
+
+from evaluator.pickles import Attributes, load_plain
+from evaluator.problems import Findings, quoted, reject
+from evaluator.scale import N_FRAMES
+from evaluator.tables import Table, name_fault
+
+FRAME_STEP_NS: Final = 100_000_000
+MAX_FILE_BYTES: Final = 512 * 1024 * 1024
+
+
+def read_annotations(folder: Path, *, with_ttc: bool) -> Table:
+    """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
+
+    Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
+    Raises `Rejected` for pickles that ask for foreign code and for files of another structure.
+    """
+    files = sorted(
+        (p for p in folder.rglob("*.pkl") if p.is_file()), key=lambda p: p.relative_to(folder).parts
+    )
+    if not files:
+        raise reject(
+            "unreadable", "The folder has no annotation files; expected at least one *.pkl.", folder.name
+        )
+    table, findings, places = Table(), Findings(), list[str]()
+    for file in files:
+        name = file.relative_to(folder).as_posix()
+        for camera in _read_file(file, name):
+            for sequence in cut_sequences(camera):
+                places.append(f"{name}, sequence {len(places)}")
+                _add_row(table, sequence[-1], findings, places[-1], with_ttc=with_ttc)
+    findings.raise_if_any()
+    table.places = places
+    return table
+
+
+def cut_sequences(
+    camera: dict[object, list[Attributes]], *, n_frames: int = N_FRAMES
+) -> Iterator[list[Attributes]]:
+    """The sequences of one camera in the toolkit's order: by the frame that completes them, then by track.
+
+    A track that skips a frame starts anew; a complete sequence starts the next one with an empty hand.
+    """
+    open_tracks: dict[object, list[Attributes]] = {}
+    for stamp in sorted(camera):  # type: ignore[type-var]
+        for seen in camera[stamp]:
+            track = open_tracks.get(seen["id"])
+            if track is not None and seen["ts"] - track[-1]["ts"] == FRAME_STEP_NS:  # type: ignore[operator]
+                track.append(seen)
+            else:
+                open_tracks[seen["id"]] = [seen]
+        complete = [track_id for track_id, track in open_tracks.items() if len(track) == n_frames]
+        for track_id in complete:
+            yield open_tracks.pop(track_id)
+
+
+def _read_file(file: Path, name: str) -> list[dict[object, list[Attributes]]]:
+    """The cameras of one annotation file, with their structure checked."""
+    try:
+        size = file.stat().st_size
+        data = file.read_bytes() if size <= MAX_FILE_BYTES else b""
+    except OSError as error:
+        raise reject("unreadable", f"The file cannot be read: {error.strerror}.", name) from None
+    if size > MAX_FILE_BYTES:
+        raise reject("too-large", f"The file has {size:,} bytes; expected at most {MAX_FILE_BYTES:,}.", name)
+    cameras = load_plain(data, where=name)
+    fault = _structure_fault(cameras)
+    if fault:
+        expected = "a list of dictionaries, one per camera, from timestamp to list of attribute-dicts"
+        raise reject("bad-annotations", f"The file holds {fault}; expected {expected}.", name)
+    return cameras  # type: ignore[return-value]  # _structure_fault has looked at every level
+
+
+def _structure_fault(cameras: object) -> str | None:
+    if not isinstance(cameras, list):
+        return f"a {type(cameras).__name__}"
+    for camera in cameras:
+        if not isinstance(camera, dict):
+            return f"a {type(camera).__name__} in place of a camera"
+        for stamp, seen in camera.items():
+            if not isinstance(stamp, int | float) or not math.isfinite(stamp):
+                return "a timestamp that is no number"
+            if not isinstance(seen, list):
+                return f"a {type(seen).__name__} in place of a frame's objects"
+            if fault := next(filter(None, map(_object_fault, seen)), None):
+                return fault
+    return None
+
+
+def _object_fault(seen: object) -> str | None:
+    if not isinstance(seen, dict):
+        return f"a {type(seen).__name__} in place of an object"
+    for name in ("bag_stamp", "cam_id", "id", "ts"):
+        if name not in seen:
+            return f"an object without {name}"
+    if not isinstance(seen["id"], int | str) or not isinstance(seen["cam_id"], int | str):
+        return "an object whose id or cam_id is neither a whole number nor a text"
+    if not isinstance(seen["bag_stamp"], str):
+        return "an object whose bag_stamp is no text"
+    ts = seen["ts"]
+    if not isinstance(ts, int | float) or not 0 <= ts < 2**63 or ts != int(ts):
+        return "an object whose ts is no whole number of nanoseconds"
+    return None
+
+
+def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *, with_ttc: bool) -> None:
+    names = {
+        # The toolkit takes the last part of a path.
+        "bag_stamp": str(target["bag_stamp"]).rsplit("/", 1)[-1],
+        "cam_id": str(target["cam_id"]),
+        "id": str(target["id"]),
+    }
+    for name, text in names.items():
+        if fault := name_fault(text):
+            findings.add("bad-field", f"{name} is {quoted(text)}: {fault}.", place)
+    table.anno_id.append(len(table.anno_id))
+    table.bag_stamp.append(names["bag_stamp"])
+    table.cam_id.append(names["cam_id"])
+    table.track_id.append(names["id"])
+    table.ts_ns.append(int(target["ts"]))  # type: ignore[call-overload]
+    if not with_ttc:
+        return
+    ttc_s = target.get("ttc_imu")
+    if isinstance(ttc_s, int | float) and abs(ttc_s) < 1e308:
+        table.ttc_s.append(float(ttc_s))
+    else:
+        found = "absent" if ttc_s is None else f"a {type(ttc_s).__name__}"
+        findings.add("bad-field", f"ttc_imu is {found}; expected a number of seconds.", place)

@@ -1,0 +1,224 @@
+"""The strict reading of a prediction file: every object as its list of members, every fault in words.
+
+This path decides what a file means. The columnar path (`evaluator.columns`) is only a faster way to the same
+result for files without surprises; it hands over whatever is unusual.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Final, Literal
+
+import numpy as np
+
+from evaluator.problems import Findings, pointer, quoted, reject
+
+Unit = Literal["ttc", "scale_ratio"]
+
+MAX_DEPTH: Final = 32
+MAX_META_BYTES: Final = 64 * 1024
+FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
+
+_STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+"', re.DOTALL)
+_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
+
+
+class Members(list[tuple[str, object]]):
+    """The members of a JSON object in file order, duplicates included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A parsed file: the predictions as they stand in it, and what the envelope says about them."""
+
+    predictions: Members
+    unit: Unit
+    rate_name: Literal["fps", "frame_gap"] | None
+    rate: object
+    meta: Mapping[str, object] | None
+    enveloped: bool
+
+    def pointer(self, key: str) -> str:
+        """Where the prediction of `key` stands."""
+        return pointer("predictions", key) if self.enveloped else pointer(key)
+
+
+def parse(data: bytes) -> object:
+    """The JSON value in `data`, objects as `Members`; raises `Rejected` unless it is UTF-8, shallow and JSON.
+
+    A byte order mark and Python's `NaN`, `Infinity` and `-Infinity` are accepted. Numbers beyond the range of
+    float64 are ±Infinity, as in IEEE 754.
+    """
+    body = data.removeprefix(_BYTE_ORDER_MARK)
+    try:
+        text = body.decode("utf-8")
+    except UnicodeDecodeError as error:
+        hint = " The file looks like UTF-16." if data[:2] in {b"\xff\xfe", b"\xfe\xff"} else ""
+        start = error.start + len(data) - len(body)
+        message = f"Byte {start:,} of the file is not UTF-8; expected JSON text encoded in UTF-8.{hint}"
+        raise reject("not-utf8", message, f"byte {start}") from None
+    if _depth(body) > MAX_DEPTH:
+        raise reject(
+            "too-deep", f"Objects and lists are nested deeper than {MAX_DEPTH} levels; expected at most 3."
+        )
+    try:
+        return json.loads(text, object_pairs_hook=Members, parse_int=_integer)
+    except json.JSONDecodeError as error:
+        where = f"line {error.lineno}, column {error.colno}"
+        found = quoted(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file"
+        message = f"The text is not JSON: {error.msg[0].lower()}{error.msg[1:]}, found {found}."
+        raise reject("not-json", message, where) from None
+
+
+def read_document(value: object) -> Document:
+    """The parts of a parsed file; raises `Rejected` for a wrong top level or a faulty envelope."""
+    if not isinstance(value, Members):
+        message = (
+            f"The outermost value is {kind_of(value)}; expected an object of predictions or an envelope."
+        )
+        raise reject("wrong-top-level", message)
+    names = {name for name, _ in value}
+    if names.isdisjoint(FIELDS):
+        return Document(value, "ttc", None, None, None, enveloped=False)
+    findings = Findings()
+    fields: dict[str, object] = {}
+    for name, content in value:
+        if name in fields:
+            findings.add(
+                "duplicate-keys", f"The field {quoted(name)} appears twice; expected it once.", pointer(name)
+            )
+        elif name not in FIELDS:
+            expected = f"expected only {', '.join(FIELDS)} (put notes into meta)"
+            findings.add(
+                "unknown-field", f"The envelope has a field {quoted(name)}; {expected}.", pointer(name)
+            )
+        fields[name] = content
+    if "predictions" not in fields:
+        findings.add("missing-predictions", "The envelope has no predictions; expected an object of them.")
+    unit = _unit(fields, findings)
+    rate_name = _rate_name(fields, unit, findings)
+    meta = _meta(fields.get("meta"), findings)
+    predictions = fields.get("predictions", [])
+    if "predictions" in fields and not isinstance(predictions, Members):
+        message = f"predictions is {kind_of(predictions)}; expected an object from key to number."
+        findings.add("wrong-top-level", message, "/predictions")
+    findings.raise_if_any()
+    rate = fields[rate_name] if rate_name else None
+    members = predictions if isinstance(predictions, Members) else Members()
+    return Document(members, unit, rate_name, rate, meta, enveloped=True)
+
+
+def kind_of(value: object) -> str:
+    """What a JSON value is, for messages, with the value where it is short.
+
+    >>> kind_of("5.3"), kind_of(None), kind_of([1])
+    ('the string "5.3"', 'null', 'a list')
+    """
+    match value:
+        case None:
+            return "null"
+        case bool():
+            return f"the boolean {str(value).lower()}"
+        case int() | float():
+            return f"the number {value:.17g}"
+        case str():
+            return f"the string {quoted(value)}"
+        case Members():
+            return "an object"
+        case _:
+            return "a list"
+
+
+def _unit(fields: Mapping[str, object], findings: Findings) -> Unit:
+    unit = fields.get("unit")
+    if unit == "ttc" or unit == "scale_ratio":  # noqa: PLR1714 - two comparisons narrow the type, a set does not
+        return unit
+    found = kind_of(unit) if "unit" in fields else "none"
+    findings.add("unknown-unit", f'The unit is {found}; expected "ttc" or "scale_ratio".', "/unit")
+    return "ttc"
+
+
+def _rate_name(
+    fields: Mapping[str, object], unit: Unit, findings: Findings
+) -> Literal["fps", "frame_gap"] | None:
+    has_fps, has_gap = "fps" in fields, "frame_gap" in fields
+    if has_fps and has_gap:
+        findings.add(
+            "bad-rate", "The envelope has both fps and frame_gap; expected one of them.", "/frame_gap"
+        )
+    elif unit == "ttc" and (has_fps or has_gap) and fields.get("unit") == "ttc":
+        name = "fps" if has_fps else "frame_gap"
+        message = (
+            f'The envelope has {name}, but values of unit "ttc" are seconds and have no rate; expected none.'
+        )
+        findings.add("bad-rate", message, pointer(name))
+    elif unit == "scale_ratio" and not (has_fps or has_gap):
+        message = "Scale ratios need the rate of their frame pairs; expected fps (Hz) or frame_gap (frames)."
+        findings.add("bad-rate", message)
+    if unit == "ttc":
+        return None
+    return "fps" if has_fps else "frame_gap" if has_gap else None
+
+
+def _meta(value: object, findings: Findings) -> dict[str, object] | None:
+    if value is None:
+        return None
+    if not isinstance(value, Members):
+        findings.add("bad-meta", f"meta is {kind_of(value)}; expected an object.", "/meta")
+        return None
+    try:
+        meta = _plain_object(value)
+        size = len(json.dumps(meta, allow_nan=False, ensure_ascii=False).encode("utf-8"))
+        fault = f"it takes {size:,} bytes" if size > MAX_META_BYTES else None
+    except ValueError as error:  # NaN, Infinity, lone surrogates, NUL: no database keeps them
+        fault = f"it cannot be kept ({error})"
+    if fault:
+        expected = f"plain JSON without NaN, NUL or lone surrogates, at most {MAX_META_BYTES:,} bytes"
+        findings.add("bad-meta", f"meta cannot be accepted, {fault}; expected {expected}.", "/meta")
+        return None
+    return meta
+
+
+def _plain(value: object) -> object:
+    match value:
+        case Members():
+            return _plain_object(value)
+        case list():
+            return [_plain(item) for item in value]
+        case str():
+            return _text(value)
+        case _:
+            return value
+
+
+def _plain_object(members: Members) -> dict[str, object]:
+    return {_text(name): _plain(content) for name, content in members}
+
+
+def _text(text: str) -> str:
+    if "\x00" in text:
+        raise ValueError("a text contains NUL")
+    return text
+
+
+def _integer(text: str) -> int | float:
+    """An integer literal; long ones become float64, since Python refuses to read very long ones."""
+    return int(text) if len(text) < 300 else float(text)
+
+
+def _depth(body: bytes) -> int:
+    """Depth of nesting, exact for every JSON prefix, so that the recursive parser cannot be driven deep."""
+    if body.count(b"{") + body.count(b"[") <= MAX_DEPTH:
+        return 0
+    brackets = _STRING.sub(b"", body).translate(None, delete=_NO_BRACKETS)
+    steps = _STEP[np.frombuffer(brackets, dtype=np.uint8)]
+    return int(np.cumsum(steps, dtype=np.int64).max(initial=0))
+
+
+_NO_BRACKETS: Final = bytes(set(range(256)) - set(b"[]{}"))
+_STEP: Final = np.zeros(256, dtype=np.int64)
+_STEP[list(b"[{")] = 1
+_STEP[list(b"]}")] = -1

@@ -1,0 +1,157 @@
+"""What is wrong with a file: `Problem`, and `Rejected` which carries the list.
+
+A problem says what, where, found and expected in one sentence, in the same words on the page, in the API and
+on the command line. Its code is stable and made for programs; `PROBLEM_CODES` is the whole vocabulary.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from typing import Final
+
+MAX_LISTED: Final = 20
+"""At most so many problems of one kind, or keys in one problem, are listed; the rest are counted."""
+
+_MAX_QUOTED: Final = 60
+
+PROBLEM_CODES: Final[dict[str, str]] = {
+    # prediction files
+    "too-large": "The file is larger than the limit.",
+    "not-utf8": "The file is not UTF-8 text.",
+    "too-deep": "Objects and lists are nested deeper than any prediction file needs.",
+    "not-json": "The text is not JSON.",
+    "wrong-top-level": "The outermost value, or `predictions`, is not an object.",
+    "unknown-field": "The envelope has a field that the format does not know.",
+    "unknown-unit": 'The envelope\'s `unit` is absent or neither "ttc" nor "scale_ratio".',
+    "missing-predictions": "The envelope has no `predictions`.",
+    "bad-rate": "`fps` or `frame_gap` is absent, doubled, not wanted, or no valid rate.",
+    "bad-meta": "`meta` is not a plain JSON object of moderate size.",
+    "missing-keys": "Sequences of the manifest have no prediction.",
+    "unknown-keys": "Predictions are given for sequences that the manifest does not have.",
+    "duplicate-keys": "A key appears more than once.",
+    "mixed-keys": "The file mixes anno_ids with natural keys.",
+    "not-a-number": "A value is a string, null, a boolean, a list or an object.",
+    "nan": "A value is NaN.",
+    "zero": "A time to contact is 0 (or too small for a float64), where both errors are meaningless.",
+    "not-positive": "A scale ratio is not greater than 0.",
+    "undefined-error": "The protocol `toolkit` has no MiD for a prediction so close to 0.",
+    # ground truth and manifests
+    "unreadable": "The file or folder cannot be read, or is of no known kind.",
+    "bad-csv": "The text is not a CSV table.",
+    "missing-columns": "The table lacks columns.",
+    "bad-field": "A field of a row is empty, malformed or out of range.",
+    "empty": "The table has no sequences.",
+    "duplicate-ids": "An anno_id appears more than once.",
+    "duplicate-natural-keys": "A natural key appears more than once.",
+    "truth-not-finite": "A true time to contact is NaN or infinite.",
+    "truth-near-zero": "A true time to contact lies where the errors are undefined (−0.1 ≤ τ ≤ 0).",
+    "bad-digest": "The content of a saved file does not match the digest stored in it.",
+    "forbidden-pickle": "A pickle asks for something other than plain containers, numbers and arrays.",
+    "bad-annotations": "An annotation file has another structure than the toolkit's.",
+}
+"""Every code with what it means."""
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """One fault of a file.
+
+    `where` is a JSON pointer (`/predictions/12`), a position (`line 3, column 8`), a file name, or "".
+    """
+
+    code: str
+    message: str
+    where: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.where}: {self.message}" if self.where else self.message
+
+
+class Rejected(Exception):
+    """The file is at fault. `problems` lists why; `n_problems` also counts the faults that are not listed."""
+
+    def __init__(self, problems: Iterable[Problem], *, n_problems: int | None = None) -> None:
+        self.problems: tuple[Problem, ...] = tuple(problems)
+        self.n_problems = len(self.problems) if n_problems is None else n_problems
+        super().__init__(str(self))
+
+    def __str__(self) -> str:
+        title = "1 problem" if self.n_problems == 1 else f"{self.n_problems:,} problems"
+        return "\n".join([f"{title}:", *(f"  {number}. {p}" for number, p in enumerate(self.problems, 1))])
+
+    def as_dict(self) -> dict[str, object]:
+        """`{"n_problems": …, "problems": [{"code", "message", "where"}, …]}`."""
+        return {"n_problems": self.n_problems, "problems": [asdict(problem) for problem in self.problems]}
+
+    def to_json(self) -> str:
+        """The text of `as_dict()`."""
+        return json.dumps(self.as_dict(), ensure_ascii=False)
+
+
+class Findings:
+    """Collects problems while a file is read, so that one answer names them all."""
+
+    def __init__(self) -> None:
+        self._problems: list[Problem] = []
+        self._counts: Counter[str] = Counter()
+        self._n_grouped = 0
+
+    def add(self, code: str, message: str, where: str = "") -> None:
+        """Note one fault; the first `MAX_LISTED` of a kind are kept, all are counted."""
+        self._counts[code] += 1
+        if self._counts[code] <= MAX_LISTED:
+            self._problems.append(Problem(code, message, where))
+
+    def group(self, code: str, message: str, where: str = "", *, n_faults: int) -> None:
+        """Note many faults of one kind as a single problem, whose message gives count and examples."""
+        self._problems.append(Problem(code, message, where))
+        self._n_grouped += n_faults
+
+    def raise_if_any(self) -> None:
+        """Raise `Rejected` when anything was noted."""
+        if not self._problems:
+            return
+        rest = [
+            Problem(code, f"And {count - MAX_LISTED:,} more like these: {count:,} in all.")
+            for code, count in self._counts.items()
+            if count > MAX_LISTED
+        ]
+        raise Rejected([*self._problems, *rest], n_problems=self._counts.total() + self._n_grouped)
+
+
+def reject(code: str, message: str, where: str = "") -> Rejected:
+    """The rejection for a single problem, to be raised."""
+    return Rejected([Problem(code, message, where)])
+
+
+def quoted(text: str) -> str:
+    """`text` for a message: in quotes, escaped to printable ASCII, shortened.
+
+    >>> print(quoted("a\\x00\\ud800b"))
+    "a\\u0000\\ud800b"
+    """
+    shown = json.dumps(text[:_MAX_QUOTED])
+    return shown if len(text) <= _MAX_QUOTED else f'{shown[:-1]}…"'
+
+
+def pointer(*parts: str) -> str:
+    """A JSON pointer (RFC 6901) to the member named by `parts`, in printable ASCII.
+
+    >>> pointer("predictions", "0007/1/500/3")
+    '/predictions/0007~11~1500~13'
+    """
+    escaped = (part[:200].replace("~", "~0").replace("/", "~1") for part in parts)
+    return "".join("/" + json.dumps(part)[1:-1] for part in escaped)
+
+
+def listed(names: Sequence[str]) -> str:
+    """The first `MAX_LISTED` names, for a message.
+
+    >>> listed(["3", "7"])
+    '3, 7'
+    """
+    text = ", ".join(names[:MAX_LISTED])
+    return text if len(names) <= MAX_LISTED else f"{text}, … (the first {MAX_LISTED})"

@@ -1,0 +1,96 @@
+"""The result of one evaluation, and the one way in which a number is rounded."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+
+from evaluator.protocol import METRICS
+from evaluator.scale import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class IntervalScore:
+    """Mean errors over one interval. An interval without sequences has no value: None, never 0."""
+
+    mid: float | None
+    rte: float | None
+    count: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SequenceErrors:
+    """Both errors of every sequence, float64 (n,) in the manifest's order.
+
+    For a hidden split they never leave the worker.
+    """
+
+    mid: Floats
+    rte: Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """What the predictions scored: means per interval, counts, and what was truncated at which boundary.
+
+    `scores` runs overall, crucial, small, large, negative; `n_out_of_range` counts the sequences that lie in
+    no interval. `sequences` is kept only on request and is no part of the JSON.
+    """
+
+    protocol: str
+    truth_digest: str
+    predictions_digest: str
+    n_sequences: int
+    n_out_of_range: int
+    truncated: Mapping[str, int]
+    scores: Mapping[str, IntervalScore]
+    sequences: SequenceErrors | None = None
+
+    def as_dict(self) -> dict[str, object]:
+        """The report as plain data, in the shape of `tsttc score --json`."""
+        return {
+            "protocol": self.protocol,
+            "truth_digest": self.truth_digest,
+            "predictions_digest": self.predictions_digest,
+            "n_sequences": self.n_sequences,
+            "n_out_of_range": self.n_out_of_range,
+            "truncated": dict(self.truncated),
+            "scores": {name: asdict(score) for name, score in self.scores.items()},
+        }
+
+    def to_json(self) -> str:
+        """The text of `as_dict()`, every float64 at full precision."""
+        return json.dumps(self.as_dict(), allow_nan=False)
+
+    def flat(self) -> dict[str, float | None]:
+        """The ten numbers under `SCORE_NAMES`, in that order."""
+        return {
+            metric if name == "overall" else f"{metric}_{name}": getattr(score, metric)
+            for metric in METRICS
+            for name, score in self.scores.items()
+        }
+
+
+def published(value: float | None, *, decimals: int = 2) -> float | None:
+    """`value` as it is published: correctly rounded, half to even on its exact binary value. None stays None.
+
+    >>> published(14.296), published(0.125), published(None)
+    (14.3, 0.12, None)
+    """
+    if value is None:
+        return None
+    if not math.isfinite(value):
+        raise ValueError(f"Only finite numbers are published; found {value}.")
+    return round(float(value), decimals) + 0.0  # adding 0 turns -0.0 into 0.0
+
+
+def format_published(value: float | None, *, decimals: int = 2, missing: str = "–") -> str:
+    """The text of the published value with all its decimals, or `missing`.
+
+    >>> format_published(14.296), format_published(None)
+    ('14.30', '–')
+    """
+    rounded = published(value, decimals=decimals)
+    return missing if rounded is None else f"{rounded:.{decimals}f}"

@@ -1,0 +1,77 @@
+"""Time to contact and scale ratio: two ways to say the same thing.
+
+τ is in seconds and measured from the target (last) frame, as in the dataset's toolkit. The scale ratio α is
+the object's size in the reference frame over its size in the target frame at the pair rate f = 10 Hz / frame
+gap; α < 1 is an approaching object. All functions are elementwise on float64 and accept scalars and arrays.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Floats = NDArray[np.float64]
+
+FRAME_RATE_HZ: Final = 10.0
+N_FRAMES: Final = 6
+"""Frames of a sequence, so that the frame gap of a pair is 1 … 5."""
+
+
+def fps_of_gap(frame_gap: ArrayLike) -> Floats:
+    """The pair rate in Hz of two frames that lie `frame_gap` frames apart.
+
+    >>> float(fps_of_gap(5))
+    2.0
+    """
+    return FRAME_RATE_HZ / np.asarray(frame_gap, dtype=np.float64)
+
+
+def scale_ratio_to_ttc(scale_ratio: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
+    """τ = 1 / (f · (1/α − 1)) in seconds, for α > 0. α = 1, an object that keeps its size, gives +∞.
+
+    >>> float(scale_ratio_to_ttc(0.8, fps_hz=2))
+    2.0
+    >>> float(scale_ratio_to_ttc(1.0, fps_hz=2))
+    inf
+    """
+    alpha = np.asarray(scale_ratio, dtype=np.float64)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return np.asarray(1.0 / (np.asarray(fps_hz, dtype=np.float64) * (1.0 / alpha - 1.0)))
+
+
+def ttc_to_scale_ratio(ttc_s: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
+    """α = 1 / (1 / (f · τ) + 1), the exact inverse of `scale_ratio_to_ttc`; τ = ±∞ gives 1.
+
+    >>> float(ttc_to_scale_ratio(2.0, fps_hz=2))
+    0.8
+    """
+    tau = np.asarray(ttc_s, dtype=np.float64)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return np.asarray(1.0 / (1.0 / (np.asarray(fps_hz, dtype=np.float64) * tau) + 1.0))
+
+
+def convert_rate(scale_ratio: ArrayLike, *, from_fps_hz: ArrayLike, to_fps_hz: ArrayLike) -> Floats:
+    """α_m = 1 / ((f_n / f_m) · (1/α_n − 1) + 1): the same τ as a scale ratio at another rate.
+
+    >>> round(float(convert_rate(0.8, from_fps_hz=2, to_fps_hz=10)), 6)
+    0.952381
+    """
+    alpha = np.asarray(scale_ratio, dtype=np.float64)
+    rate = np.asarray(from_fps_hz, dtype=np.float64) / np.asarray(to_fps_hz, dtype=np.float64)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return np.asarray(1.0 / (rate * (1.0 / alpha - 1.0) + 1.0))
+
+
+def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
+    """α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶), the scale ratio inside MiD, in the toolkit's order of operations.
+
+    Not positive, or not finite, for τ in about (−0.1, 0]: there MiD is undefined.
+
+    >>> round(float(scale_ratio_10hz(2.0)), 9)
+    0.952380045
+    """
+    tau = np.asarray(ttc_s, dtype=np.float64)
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        return np.asarray(1.0 / ((1.0 / (tau * 10.0) + 1.0) + 1e-6))

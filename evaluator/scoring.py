@@ -1,0 +1,184 @@
+"""Scoring: the metric specification of the TSTTC benchmark.
+
+Two errors per sequence, from the true time to contact τ (seconds from the target frame, never truncated) and
+the predicted τ̂ (truncated by the protocol), in float64:
+
+    α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶)
+    MiD    = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴
+    RTE    = |(τ̂ − τ) / τ| · 100 %
+
+A score is the mean over an interval of the *true* τ, closed at both ends: crucial [0, 3], small [3, 6],
+large [6, 20], negative [−20, 0] seconds. `overall` is the mean over all sequences, also those beyond ±20 s.
+An interval without sequences has no value.
+
+`tsttc-1` truncates τ̂ to [−20, −0.15] ∪ [0.05, 20], to the nearest boundary of the same sign, so that
+α₁₀(τ̂) stays within [1/3, 3]. `toolkit` truncates to [−20, 20] only and refuses τ̂ whose α₁₀ is not positive
+and finite, where the dataset's toolkit crashes. Both refuse 0 and NaN, and truncate ±∞ to ±20.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NoReturn
+
+import numpy as np
+
+from evaluator.alignment import ZERO_MESSAGE
+from evaluator.predictions import Predictions
+from evaluator.problems import Findings
+from evaluator.protocol import DEFAULT_PROTOCOL, INTERVAL_NAMES, Protocol, get_protocol
+from evaluator.report import IntervalScore, Report, SequenceErrors
+from evaluator.scale import Floats, scale_ratio_10hz
+from evaluator.truth import GroundTruth
+
+
+def evaluate(
+    predictions: Predictions,
+    truth: GroundTruth,
+    *,
+    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    keep_sequences: bool = False,
+) -> Report:
+    """Score `predictions` against `truth`.
+
+    Raises `Rejected` for values that the protocol forbids, `ValueError` for an unknown protocol and for
+    predictions that were aligned with another manifest. With `keep_sequences` the report carries both errors
+    of every sequence.
+    """
+    return evaluate_many([predictions], truth, protocol=protocol, keep_sequences=keep_sequences)[0]
+
+
+def evaluate_many(
+    batch: Sequence[Predictions],
+    truth: GroundTruth,
+    *,
+    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    keep_sequences: bool = False,
+) -> list[Report]:
+    """Score many predictions against one truth: `evaluate` for each, with the truth's terms shared."""
+    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
+    scorer = Scorer(truth, rules)
+    return [scorer.report(predictions, keep_sequences=keep_sequences) for predictions in batch]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Errors:
+    """Both errors in ascending τ, and how many predictions went to each boundary of the protocol."""
+
+    mid: Floats
+    rte: Floats
+    n_truncated: tuple[int, ...]
+
+
+class Scorer:
+    """One truth under one protocol, ready for many predictions.
+
+    Works on the sequences in ascending τ, where an interval is a slice: the means are sums over contiguous
+    memory, which numpy adds pairwise, fast and accurate, and in the same order on every run.
+    """
+
+    def __init__(self, truth: GroundTruth, protocol: Protocol) -> None:
+        self._truth = truth
+        self._protocol = protocol
+        tau = truth.ascending_ttc_s
+        self._slices = {"overall": slice(0, len(tau))} | {
+            i.name: slice(
+                int(np.searchsorted(tau, i.low_s, side="left")),
+                int(np.searchsorted(tau, i.high_s, side="right")),
+            )
+            for i in protocol.intervals
+        }
+
+    def report(self, predictions: Predictions, *, keep_sequences: bool = False) -> Report:
+        """The report on one set of predictions; raises as `evaluate` does."""
+        predictions = _in_order_of(self._truth, predictions)
+        errors = self._errors(predictions)
+        return Report(
+            protocol=self._protocol.name,
+            truth_digest=self._truth.digest,
+            predictions_digest=predictions.digest,
+            n_sequences=self._truth.n_sequences,
+            n_out_of_range=self._truth.n_out_of_range,
+            truncated=dict(zip(self._protocol.boundaries, errors.n_truncated, strict=True)),
+            scores={name: self._score(errors, self._slices[name]) for name in INTERVAL_NAMES},
+            sequences=self._in_file_order(errors) if keep_sequences else None,
+        )
+
+    def _score(self, errors: _Errors, part: slice) -> IntervalScore:
+        count = part.stop - part.start
+        if count == 0:
+            return IntervalScore(None, None, 0)
+        mid, rte = (float(np.add.reduce(values[part])) / count for values in (errors.mid, errors.rte))
+        return IntervalScore(mid, rte, count)
+
+    def _in_file_order(self, errors: _Errors) -> SequenceErrors:
+        mid, rte = np.empty_like(errors.mid), np.empty_like(errors.rte)
+        mid[self._truth.ascending_rows] = errors.mid
+        rte[self._truth.ascending_rows] = errors.rte
+        return SequenceErrors(mid, rte)
+
+    def _errors(self, predictions: Predictions) -> _Errors:
+        truth = self._truth
+        raw = predictions.ttc_s[truth.ascending_rows]
+        predicted, n_truncated = _truncate(raw, self._protocol)
+        alpha = scale_ratio_10hz(predicted)
+        # One comparison each way: NaN fails both, so NaN, 0 (α₁₀ is 0 or -0 there) and undefined MiD end up
+        # here.
+        if not (alpha.min() > 0.0 and alpha.max() < np.inf):
+            _refuse(predictions, self._protocol)
+        np.log(alpha, out=alpha)
+        np.subtract(truth.ascending_log_scale_ratio, alpha, out=alpha)
+        mid = np.multiply(np.abs(alpha, out=alpha), 1e4, out=alpha)
+        tau = truth.ascending_ttc_s
+        rte = np.subtract(predicted, tau, out=predicted)
+        np.divide(rte, tau, out=rte)
+        np.multiply(np.abs(rte, out=rte), 100.0, out=rte)
+        return _Errors(mid, rte, n_truncated)
+
+
+def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:
+    """The truncated values, a new array, and the number of changed values per boundary. 0 and NaN stay."""
+    limit_s = protocol.limit_s
+    truncated = np.clip(ttc_s, -limit_s, limit_s)
+    n_low, n_high = int(np.count_nonzero(ttc_s < -limit_s)), int(np.count_nonzero(ttc_s > limit_s))
+    if protocol.near_zero_s is None:
+        return truncated, (n_low, n_high)
+    low_s, high_s = protocol.near_zero_s
+    near = np.flatnonzero((ttc_s > low_s) & (ttc_s < high_s))
+    values = ttc_s[near]
+    truncated[near] = np.where(values < 0, low_s, np.where(values > 0, high_s, values))
+    return truncated, (n_low, int(np.count_nonzero(values < 0)), int(np.count_nonzero(values > 0)), n_high)
+
+
+def _in_order_of(truth: GroundTruth, predictions: Predictions) -> Predictions:
+    ours, theirs = truth.manifest, predictions.manifest
+    if theirs is ours:
+        return predictions
+    if theirs.digest != ours.digest:
+        raise ValueError("The predictions are aligned with another manifest than that of this ground truth.")
+    # The same sequences, but the rows of the two files may have another order.
+    ttc_s = np.empty_like(predictions.ttc_s)
+    ttc_s[np.argsort(ours.anno_id)] = predictions.ttc_s[np.argsort(theirs.anno_id)]
+    return replace(predictions, manifest=ours, ttc_s=ttc_s)
+
+
+def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
+    """Name the values that the protocol forbids, in file order."""
+    findings = Findings()
+    ttc_s, _ = _truncate(predictions.ttc_s, protocol)
+    alpha = scale_ratio_10hz(ttc_s)
+    for row in np.flatnonzero(~((alpha > 0.0) & (alpha < np.inf))).tolist():
+        value, where = predictions.ttc_s[row], predictions.where(row)
+        if np.isnan(value):
+            findings.add("nan", "The value is NaN; expected a number of seconds.", where)
+        elif value == 0:
+            findings.add("zero", ZERO_MESSAGE, where)
+        else:
+            message = (
+                f"The value is {value!s} s, where the protocol {protocol.name} has no motion-in-depth error; "
+                "expected a time to contact greater than 0, or at most -0.1."
+            )
+            findings.add("undefined-error", message, where)
+    findings.raise_if_any()
+    raise AssertionError("unreachable: the caller saw a forbidden value")

@@ -1,0 +1,265 @@
+"""The ground truth of a split, and its public half, the manifest.
+
+A `Manifest` says which sequences a split has; a `GroundTruth` adds the true time to contact of each. Both
+are read from CSV (`anno_id,bag_stamp,cam_id,ts,track_id,ttc`, ts in ns), from files written by `save`, and
+from the toolkit's annotation folders.
+
+Both are named by a digest, "sha256:" and the hex SHA-256 of their canonical text: the header line, then one
+line per sequence in ascending anno_id, fields separated by commas, times to contact as the shortest decimal
+that reads back to the same float64, lines ended by a line feed. The order of the rows therefore does not
+change the digest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.annotations import read_annotations
+from evaluator.problems import Findings, quoted, reject
+from evaluator.protocol import INTERVALS
+from evaluator.scale import Floats, scale_ratio_10hz
+from evaluator.tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
+
+Integers = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Manifest:
+    """The sequences of a split in file order, all that participants may know. Arrays are (n,), read-only."""
+
+    anno_id: Integers
+    bag_stamp: tuple[str, ...]
+    cam_id: tuple[str, ...]
+    ts_ns: Integers
+    track_id: tuple[str, ...]
+    digest: str
+
+    @classmethod
+    def from_table(cls, table: Table) -> Manifest:
+        """Check the rows; raises `Rejected` for an empty table and for duplicate ids or natural keys."""
+        if not table.anno_id:
+            raise reject("empty", "The table has no sequences; expected at least one row below the header.")
+        manifest = cls(
+            anno_id=np.array(table.anno_id, dtype=np.int64),
+            bag_stamp=tuple(table.bag_stamp),
+            cam_id=tuple(table.cam_id),
+            ts_ns=np.array(table.ts_ns, dtype=np.int64),
+            track_id=tuple(table.track_id),
+            digest=table.digest(MANIFEST_COLUMNS),
+        )
+        manifest.anno_id.setflags(write=False)
+        manifest.ts_ns.setflags(write=False)
+        findings = Findings()
+        _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
+        _find_duplicates(findings, "duplicate-natural-keys", "natural key", manifest.natural_keys, table)
+        findings.raise_if_any()
+        return manifest
+
+    @property
+    def n_sequences(self) -> int:
+        """Number of sequences."""
+        return len(self.anno_id)
+
+    @cached_property
+    def natural_keys(self) -> tuple[str, ...]:
+        """`bag_stamp/cam_id/ts/track_id` of every target frame."""
+        columns = zip(self.bag_stamp, self.cam_id, self.ts_ns.tolist(), self.track_id, strict=True)
+        return tuple([f"{bag}/{cam}/{ts}/{track}" for bag, cam, ts, track in columns])
+
+    @cached_property
+    def anno_id_keys(self) -> tuple[str, ...]:
+        """The anno_ids as they are written in a prediction file."""
+        return tuple(map(str, self.anno_id.tolist()))
+
+    @cached_property
+    def row_of_id(self) -> dict[str, int]:
+        """The row of every anno_id, by its decimal spelling."""
+        return {key: row for row, key in enumerate(self.anno_id_keys)}
+
+    @cached_property
+    def row_of_natural_key(self) -> dict[str, int]:
+        """The row of every natural key."""
+        return {key: row for row, key in enumerate(self.natural_keys)}
+
+    @cached_property
+    def recordings(self) -> tuple[str, ...]:
+        """The distinct bag_stamps, sorted."""
+        return tuple(sorted(set(self.bag_stamp)))
+
+    @cached_property
+    def recording_index(self) -> Integers:
+        """For every sequence, the index of its recording in `recordings`."""
+        index = {bag: i for i, bag in enumerate(self.recordings)}
+        array = np.array([index[bag] for bag in self.bag_stamp], dtype=np.int64)
+        array.setflags(write=False)
+        return array
+
+    @property
+    def n_recordings(self) -> int:
+        """Number of distinct recordings (bag_stamps)."""
+        return len(self.recordings)
+
+    def to_table(self) -> Table:
+        """The columns as lists, without times to contact."""
+        return Table(
+            anno_id=self.anno_id.tolist(),
+            bag_stamp=list(self.bag_stamp),
+            cam_id=list(self.cam_id),
+            ts_ns=self.ts_ns.tolist(),
+            track_id=list(self.track_id),
+        )
+
+    def to_csv(self) -> bytes:
+        """The public table: a header and one row per sequence in file order, UTF-8, ended by line feeds."""
+        return self.to_table().text(MANIFEST_COLUMNS).encode()
+
+    def save(self, path: str | Path) -> None:
+        """Write a compressed `.npz` that `load` reads back exactly."""
+        save_store(path, table=self.to_table(), manifest_digest=self.digest)
+
+    @classmethod
+    def load(cls, path: str | Path) -> Manifest:
+        """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest.
+
+        The file of a `GroundTruth` serves as well; its values are left aside.
+        """
+        table, digest = load_store(path, with_ttc=False)
+        manifest = cls.from_table(table)
+        _check_digest(stored=digest, found=manifest.digest, path=path)
+        return manifest
+
+
+@dataclass(frozen=True, eq=False)
+class GroundTruth:
+    """One revision of the hidden values: the manifest, and τ in seconds, float64 (n,), read-only."""
+
+    manifest: Manifest
+    ttc_s: Floats
+    digest: str
+
+    @classmethod
+    def from_table(cls, table: Table) -> GroundTruth:
+        """Check rows and values; raises `Rejected` naming the rows at fault."""
+        manifest = Manifest.from_table(table)
+        ttc_s = np.array(table.ttc_s, dtype=np.float64)
+        _check_values(ttc_s, table)
+        ttc_s.setflags(write=False)
+        return cls(manifest=manifest, ttc_s=ttc_s, digest=table.digest(COLUMNS))
+
+    @property
+    def n_sequences(self) -> int:
+        """Number of sequences."""
+        return self.manifest.n_sequences
+
+    @cached_property
+    def ascending_rows(self) -> NDArray[np.intp]:
+        """The rows in ascending τ; equal values in file order."""
+        return np.argsort(self.ttc_s, kind="stable")
+
+    @cached_property
+    def ascending_ttc_s(self) -> Floats:
+        """τ in ascending order."""
+        return self.ttc_s[self.ascending_rows]
+
+    @cached_property
+    def ascending_log_scale_ratio(self) -> Floats:
+        """ln α₁₀(τ) in ascending τ, the truth's part of every MiD."""
+        return np.asarray(np.log(scale_ratio_10hz(self.ascending_ttc_s)))
+
+    @cached_property
+    def interval_counts(self) -> dict[str, int]:
+        """Sequences of each interval, closed at both ends; those at a shared end count twice."""
+        return {i.name: int(np.count_nonzero(_inside(self.ttc_s, i.low_s, i.high_s))) for i in INTERVALS}
+
+    @cached_property
+    def n_out_of_range(self) -> int:
+        """Sequences that lie in no interval."""
+        inside = [_inside(self.ttc_s, i.low_s, i.high_s) for i in INTERVALS]
+        return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
+
+    def to_table(self) -> Table:
+        """The columns as lists."""
+        table = self.manifest.to_table()
+        table.ttc_s = self.ttc_s.tolist()
+        return table
+
+    def to_csv(self) -> bytes:
+        """The whole table with τ, in file order, as `read_truth` reads it."""
+        return self.to_table().text(COLUMNS).encode()
+
+    def save(self, path: str | Path) -> None:
+        """Write a compressed `.npz` that `load` reads back exactly."""
+        save_store(
+            path, table=self.to_table(), manifest_digest=self.manifest.digest, truth_digest=self.digest
+        )
+
+    @classmethod
+    def load(cls, path: str | Path) -> GroundTruth:
+        """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest."""
+        table, digest = load_store(path, with_ttc=True)
+        truth = cls.from_table(table)
+        _check_digest(stored=digest, found=truth.digest, path=path)
+        return truth
+
+
+def read_truth(path: str | Path) -> GroundTruth:
+    """Read ground truth from a CSV file, a saved `.npz`, or a folder of the toolkit's `*.pkl` annotations.
+
+    Rows keep the order of the file. Raises `Rejected`, with line numbers, for duplicate ids or natural keys,
+    malformed fields, non-finite τ and −0.1 ≤ τ ≤ 0, where MiD is undefined.
+    """
+    path = Path(path)
+    if path.suffix == ".npz" and path.is_file():
+        return GroundTruth.load(path)
+    table = read_annotations(path, with_ttc=True) if path.is_dir() else read_csv(path, with_ttc=True)
+    return GroundTruth.from_table(table)
+
+
+def read_manifest(path: str | Path) -> Manifest:
+    """Read a manifest from any source that `read_truth` takes; true times may be absent, and are ignored."""
+    path = Path(path)
+    if path.suffix == ".npz" and path.is_file():
+        return Manifest.load(path)
+    table = read_annotations(path, with_ttc=False) if path.is_dir() else read_csv(path, with_ttc=False)
+    return Manifest.from_table(table)
+
+
+def _inside(ttc_s: Floats, low_s: float, high_s: float) -> NDArray[np.bool_]:
+    return (ttc_s >= low_s) & (ttc_s <= high_s)
+
+
+def _check_values(ttc_s: Floats, table: Table) -> None:
+    findings = Findings()
+    finite = np.isfinite(ttc_s)
+    for row in np.flatnonzero(~finite).tolist():
+        findings.add("truth-not-finite", f"ttc is {ttc_s[row]}; expected a finite number.", table.where(row))
+    alpha = scale_ratio_10hz(ttc_s)
+    # The last two conditions only keep the arithmetic finite; no real value comes near them.
+    undefined = _inside(ttc_s, -0.1, 0.0) | ~(np.isfinite(alpha) & (alpha > 0)) | (np.abs(ttc_s) < 1e-200)
+    for row in np.flatnonzero(finite & undefined).tolist():
+        message = f"ttc is {ttc_s[row]!s}, where the errors are undefined; expected ttc > 0 or ttc < -0.1."
+        findings.add("truth-near-zero", message, table.where(row))
+    findings.raise_if_any()
+
+
+def _find_duplicates(findings: Findings, code: str, noun: str, keys: Sequence[str], table: Table) -> None:
+    if len(set(keys)) == len(keys):
+        return
+    first: dict[str, int] = {}
+    for row, key in enumerate(keys):
+        earlier = first.setdefault(key, row)
+        if earlier != row:
+            message = f"The {noun} {quoted(key)} is already used at {table.where(earlier)}; expected it once."
+            findings.add(code, message, table.where(row))
+
+
+def _check_digest(*, stored: str, found: str, path: str | Path) -> None:
+    if stored != found:
+        message = f"The content has the digest {found}; expected {quoted(stored)}, which is stored with it."
+        raise reject("bad-digest", message, Path(path).name)

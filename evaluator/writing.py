@@ -1,0 +1,101 @@
+"""Writing prediction files from arrays."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from evaluator.problems import Findings, pointer, quoted
+from evaluator.scale import N_FRAMES
+from evaluator.truth import Manifest
+
+
+def write_predictions(
+    path: str | Path | None = None,
+    *,
+    manifest: Manifest | None = None,
+    keys: Sequence[str | int] | None = None,
+    ttc_s: ArrayLike | None = None,
+    scale_ratio: ArrayLike | None = None,
+    fps_hz: float | None = None,
+    frame_gap: int | None = None,
+    meta: Mapping[str, object] | None = None,
+) -> bytes:
+    """The bytes of a valid prediction file, also written to `path` if one is given.
+
+    Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, shape (n,); and either
+    `manifest`, whose order the values have, or their `keys`. Every float64 reads back exactly. Seconds
+    without `meta` are written in the toolkit's flat form, anything else in the envelope.
+
+    Raises `ValueError` for arguments that do not fit together, `Rejected` for values that no file may hold.
+    """
+    values = _values(ttc_s, scale_ratio)
+    names = _names(manifest, keys, n_values=len(values))
+    _check(values, names, is_ratio=ttc_s is None)
+    predictions = dict(zip(names, values.tolist(), strict=True))
+    header = _header(ttc_s is None, fps_hz, frame_gap)
+    document: dict[str, object] = dict(predictions)
+    if ttc_s is None or meta is not None:
+        document = {**header, **({} if meta is None else {"meta": dict(meta)}), "predictions": predictions}
+    data = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
+    if path is not None:
+        Path(path).write_bytes(data)
+    return data
+
+
+def _values(
+    ttc_s: ArrayLike | None, scale_ratio: ArrayLike | None
+) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+    if (ttc_s is None) == (scale_ratio is None):
+        raise ValueError("Give either ttc_s or scale_ratio.")
+    values = np.asarray(ttc_s if ttc_s is not None else scale_ratio, dtype=np.float64)
+    if values.ndim != 1:
+        raise ValueError(f"The values have the shape {values.shape}; expected (n,).")
+    return values
+
+
+def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_values: int) -> Sequence[str]:
+    if (manifest is None) == (keys is None):
+        raise ValueError("Give either manifest or keys.")
+    names = manifest.anno_id_keys if manifest is not None else tuple(map(str, keys or ()))
+    if len(names) != n_values:
+        raise ValueError(f"There are {n_values} values for {len(names)} sequences.")
+    if len(set(names)) != len(names):
+        raise ValueError("The keys are not distinct.")
+    return names
+
+
+def _check(
+    values: np.ndarray[tuple[int], np.dtype[np.float64]], names: Sequence[str], *, is_ratio: bool
+) -> None:
+    findings = Findings()
+    bad = ~(values > 0) if is_ratio else ~(np.abs(values) > 0)
+    for row in np.flatnonzero(bad).tolist():
+        expected = "a scale ratio greater than 0" if is_ratio else "a time to contact other than 0"
+        code = "nan" if np.isnan(values[row]) else "not-positive" if is_ratio else "zero"
+        findings.add(
+            code,
+            f"The value of {quoted(names[row])} is {values[row]!s}; expected {expected}.",
+            pointer(names[row]),
+        )
+    findings.raise_if_any()
+
+
+def _header(is_ratio: bool, fps_hz: float | None, frame_gap: int | None) -> dict[str, object]:
+    if not is_ratio:
+        if fps_hz is not None or frame_gap is not None:
+            raise ValueError("Times to contact have no rate; give fps_hz or frame_gap with scale_ratio only.")
+        return {"unit": "ttc"}
+    if (fps_hz is None) == (frame_gap is None):
+        raise ValueError("Scale ratios need either fps_hz or frame_gap.")
+    if fps_hz is not None:
+        if not 0 < fps_hz < float("inf"):
+            raise ValueError(f"fps_hz is {fps_hz}; expected a finite number greater than 0.")
+        return {"unit": "scale_ratio", "fps": float(fps_hz)}
+    if frame_gap not in range(1, N_FRAMES):
+        raise ValueError(f"frame_gap is {frame_gap}; expected 1 to {N_FRAMES - 1}.")
+    return {"unit": "scale_ratio", "frame_gap": int(frame_gap)}  # type: ignore[arg-type]
