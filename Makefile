@@ -1,0 +1,97 @@
+# What a person types here. `make help` lists it.
+#
+# The environment is made once per content of a lock file and reused until that changes.
+
+SHELL := /bin/bash
+.DEFAULT_GOAL := help
+MAKEFLAGS += --no-print-directory
+
+VENV ?= .venv
+HOST ?= 127.0.0.1
+PORT ?= 8000
+PY := $(VENV)/bin/python
+
+# A stamp is named by the checksum of what it stands for.
+checksum = $(firstword $(shell cat $(1) pyproject.toml | cksum))
+SERVER_STAMP := $(VENV)/.installed-server-$(call checksum,requirements.lock)
+DEV_STAMP := $(VENV)/.installed-dev-$(call checksum,requirements-dev.lock)
+# The development environment has everything that the server needs, in the same versions.
+READY := $(or $(wildcard $(DEV_STAMP)),$(SERVER_STAMP))
+
+.PHONY: help demo test test-fast bench lint format screenshots lock clean
+
+help: ## list what can be made
+	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
+
+demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (PORT=… for another port)
+	@exec $(PY) manage.py demo --host $(HOST) --port $(PORT)
+
+test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
+	@status=0; \
+	$(PY) -m tests.on_postgresql || status=1; \
+	$(PY) -m pytest || status=1; \
+	exit $$status
+
+test-fast: $(DEV_STAMP) ## what takes less than a minute: no services, no browser, nothing slow
+	$(PY) -m pytest -q -m "not slow and not services and not browser"
+
+bench: $(DEV_STAMP) ## measure; one line per figure, `name = value unit`
+	@$(PY) -m benchmarks
+
+lint: $(DEV_STAMP) ## style, types and the direction of imports
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy .
+	$(VENV)/bin/lint-imports
+
+format: $(DEV_STAMP) ## put the code into the house's format
+	$(PY) -m ruff check --fix .
+	$(PY) -m ruff format .
+
+screenshots: $(DEV_STAMP) ## photograph the pages into docs/screenshots/
+	$(PY) -m tests.browser.screenshots
+
+# Universal: one file for every platform and Python; hashes, and no index host. Existing pins stay unless
+# `make lock UPGRADE=--upgrade` asks for newer ones.
+LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra server --extra frames --group build \
+	--universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --no-annotate --quiet $(UPGRADE)
+
+lock: ## pin the dependencies of pyproject.toml anew
+	@$(call find_python) && "$$python" -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip install --quiet uv
+	$(LOCK) --output-file requirements.lock
+	$(LOCK) --group dev --constraint requirements.lock --output-file requirements-dev.lock
+
+clean: ## remove the environment and everything generated, but not var/ (the demo's data)
+	rm -rf $(VENV) $(VENV)-lock staticfiles build .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+
+# --- the environment -------------------------------------------------------------------------------------
+
+# Sets `python` to the first interpreter that is new enough and can make environments.
+define find_python
+python=; for candidate in $(PYTHON) python3.11 python3.12 python3.13 python3 /usr/bin/python3; do \
+	if "$$candidate" -c 'import ensurepip, sys, venv; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then \
+		python="$$candidate"; break; \
+	fi; \
+done; \
+if [ -z "$$python" ]; then \
+	echo "No Python 3.11 or newer with venv was found (on Debian: apt install python3-venv);" >&2; \
+	echo "name one with: make PYTHON=/path/to/python3" >&2; exit 1; \
+fi
+endef
+
+# Installs lock file $(1) and then the package itself, without fetching anything that is not pinned; stamps $@.
+define install
+@$(call find_python); \
+if ! $(PY) -m pip --version >/dev/null 2>&1; then echo "Making $(VENV) with $$python"; "$$python" -m venv --clear $(VENV); fi
+@echo "Installing $(1)"
+@$(PY) -m pip install --quiet --disable-pip-version-check --require-hashes -r $(1)
+@$(PY) -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+@rm -f $(VENV)/.installed-$(2)-*
+@touch $@
+endef
+
+$(SERVER_STAMP):
+	$(call install,requirements.lock,server)
+
+$(DEV_STAMP):
+	$(call install,requirements-dev.lock,dev)
