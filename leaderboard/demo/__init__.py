@@ -1,0 +1,1 @@
+"""The demo: simulated ground truth, invented submissions, and everything in one terminal."""

@@ -1,0 +1,92 @@
+"""`manage.py demo`: everything in one terminal, on SQLite and a broker made of files."""
+
+import io
+import os
+import sys
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.conf import settings
+from django.contrib.staticfiles.finders import get_finders
+from django.core.management import call_command
+from django.core.management.base import BaseCommand, CommandError
+
+from leaderboard.demo.supervisor import Process, StartFailed, port_is_free, supervise
+
+# What a multipart body has beside the file.
+FORM_BYTES = 1_000_000
+
+
+class Command(BaseCommand):
+    """Serves the leaderboard with simulated data."""
+
+    help = "Migrate, seed, and run web server and worker until Ctrl-C."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Where to listen."""
+        parser.add_argument("--host", default="127.0.0.1")
+        parser.add_argument("--port", type=int, default=8000)
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Prepare what is not there yet, then serve."""
+        host, port = options["host"], options["port"]
+        if settings.PRODUCTION:
+            raise CommandError("The demo is for the embedded profile; TSTTC_PROFILE says production.")
+        if not port_is_free(host, port):
+            raise CommandError(
+                f"Port {port} on {host} is in use. "
+                "End what listens there, or choose another: make demo PORT=8010"
+            )
+        call_command("migrate", verbosity=0)
+        if static_files_changed(Path(settings.STATIC_ROOT)):
+            call_command("collectstatic", interactive=False, clear=True, verbosity=0)
+        login = io.StringIO()
+        call_command("seed_demo", stdout=login)
+        address = f"http://{host}:{port}"
+        banner = (
+            f"\nThe leaderboard is at {address}/board/demo/\n{login.getvalue()}"
+            "Its ground truth is simulated. Ctrl-C ends it. "
+            f"Logs and mail are in {settings.DATA_DIR / 'logs'}\n"
+        )
+        try:
+            supervise(
+                _processes(host, port, address=address),
+                host=host,
+                port=port,
+                ready=lambda: self.stdout.write(banner, ending=""),
+            )
+        except StartFailed as fault:
+            raise CommandError(str(fault)) from fault
+
+
+def static_files_changed(root: Path) -> bool:
+    """Whether any static file is newer than what was collected from them."""
+    collected = root / "staticfiles.json"
+    if not collected.exists():
+        return True
+    collected_s = collected.stat().st_mtime
+    return any(
+        Path(storage.path(name)).stat().st_mtime > collected_s
+        for finder in get_finders()
+        for name, storage in finder.list([])
+    )
+
+
+def _processes(host: str, port: int, *, address: str) -> list[Process]:
+    logs = settings.DATA_DIR / "logs"
+    logs.mkdir(parents=True, exist_ok=True)
+    environment = {"TSTTC_SITE_URL": address, "OPENBLAS_NUM_THREADS": "1", **os.environ}
+    web = [
+        *(sys.executable, "-m", "waitress", f"--host={host}", f"--port={port}", "--threads=8"),
+        f"--max-request-body-size={settings.MAX_PREDICTIONS_BYTES + FORM_BYTES}",
+        "leaderboard.wsgi:application",
+    ]
+    worker = [
+        *(sys.executable, "-m", "celery", "-A", "leaderboard", "worker", "-P", "solo", "-B"),
+        *("--without-gossip", "--without-mingle", "--without-heartbeat", "--loglevel=info"),
+    ]
+    return [
+        Process("web", web, logs / "web.log", environment),
+        Process("worker", worker, logs / "worker.log", environment),
+    ]
