@@ -1,0 +1,142 @@
+"""What the leaderboard's API answers, as values, and how it fails to, as exceptions that state facts.
+
+The shapes are lenient about what they do not use: a newer server may say more, and `document` keeps it all.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+
+from evaluator.problems import Problem
+
+FINAL_STATES = frozenset({"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"})
+
+JSON = dict[str, Any]
+
+
+class Queue(msgspec.Struct, frozen=True):
+    """Place in the queue: evaluations ahead of this one, and an estimate in seconds where there is one."""
+
+    ahead: int
+    estimate_s: float | None = None
+
+
+class Submission(msgspec.Struct, frozen=True, kw_only=True):
+    """A submission as the server shows it; `document` is its answer unabridged.
+
+    `is_new` is False for the answer to a file that was sent before.
+    """
+
+    id: str
+    state: str
+    document: JSON
+    split: str = ""
+    method: str = ""
+    url: str | None = None
+    scores: dict[str, float | None] | None = None
+    counts: dict[str, int] | None = None
+    n_out_of_range: int | None = None
+    truncated: dict[str, int] | None = None
+    problems: list[Problem] = []
+    n_problems: int | None = None
+    queue: Queue | None = None
+    is_new: bool = True
+
+    @property
+    def is_final(self) -> bool:
+        """Whether nothing more will happen to this submission by itself."""
+        return self.state in FINAL_STATES
+
+
+class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
+    """One row of a board: scores by their ten names, None where an interval has no value."""
+
+    method: str
+    scores: dict[str, float | None]
+    rank: int | None = None
+    team: str = ""
+    date: str = ""
+    kind: str = "submission"
+
+
+class Board(msgspec.Struct, frozen=True, kw_only=True):
+    """The ranked entries of a split's published edition; `document` is the server's answer unabridged."""
+
+    split: str
+    entries: list[BoardEntry]
+    document: JSON
+    edition: Any = None
+    updated_at: str | None = None
+
+
+class ClientError(Exception):
+    """The leaderboard did not give what was asked for."""
+
+
+class Unreachable(ClientError):
+    """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out.
+
+    `was_connected` says whether the server had been reached at all.
+    """
+
+    def __init__(self, *, url: str, reason: str, was_connected: bool) -> None:
+        super().__init__(f"no answer from {url}: {reason}")
+        self.url = url
+        self.reason = reason
+        self.was_connected = was_connected
+
+
+class Refused(ClientError):
+    """The server answered with an error status. `problems` are listed where the server gave any."""
+
+    def __init__(
+        self,
+        *,
+        url: str,
+        status: int,
+        title: str = "",
+        detail: str = "",
+        code: str = "",
+        problems: tuple[Problem, ...] = (),
+        retry_after_s: float | None = None,
+        document: JSON | None = None,
+    ) -> None:
+        super().__init__(f"{url} answered {status}: {detail or title}")
+        self.url = url
+        self.status = status
+        self.title = title
+        self.detail = detail
+        self.code = code
+        self.problems = problems
+        self.retry_after_s = retry_after_s
+        self.document = document
+
+
+class Redirected(ClientError):
+    """The server points elsewhere. Not followed: a token goes only where its owner sends it."""
+
+    def __init__(self, *, url: str, location: str) -> None:
+        super().__init__(f"{url} redirects to {location}")
+        self.url = url
+        self.location = location
+
+
+class BadAnswer(ClientError):
+    """An answer that is no leaderboard's: not JSON, or not of the documented shape."""
+
+    def __init__(self, *, url: str, found: str) -> None:
+        super().__init__(f"{url} gave an unexpected answer: {found}")
+        self.url = url
+        self.found = found
+
+
+class TimedOut(ClientError):
+    """A submission was not final within the time allowed; `submission` is the last that was seen of it."""
+
+    def __init__(self, *, submission_id: str, timeout_s: float, submission: Submission | None) -> None:
+        super().__init__(f"submission {submission_id} is not final after {timeout_s:g} s")
+        self.submission_id = submission_id
+        self.timeout_s = timeout_s
+        self.submission = submission

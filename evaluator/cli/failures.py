@@ -1,0 +1,88 @@
+"""How the command line fails: one exception with an exit code, in words and, with --json, as a document.
+
+The sentences about a file are the library's and the server's own; here they are only numbered.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import click
+
+from evaluator.cli.layout import printable
+from evaluator.problems import Problem, Rejected
+
+FILE_AT_FAULT = 1
+USAGE = 2
+SERVER = 3
+INTERRUPTED = 130
+
+
+class Failure(Exception):
+    """Ends the command: a sentence, what is wrong in the file where that is known, and what to do next.
+
+    `document` is what --json prints on standard output, by default in the shape of the API's own errors.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        exit_code: int,
+        code: str,
+        problems: Sequence[Problem] = (),
+        n_problems: int | None = None,
+        hint: str = "",
+        document: dict[str, Any] | None = None,
+    ) -> None:
+        super().__init__(message)
+        self.message = message
+        self.exit_code = exit_code
+        self.problems = tuple(problems)
+        self.hint = hint
+        context = click.get_current_context(silent=True)  # gone by the time that show() is called
+        self.as_json = bool(context and context.params.get("as_json"))
+        self.document = document or {
+            "title": message,
+            "code": code,
+            **Rejected(self.problems, n_problems=n_problems).as_dict(),
+        }
+
+    def show(self) -> None:
+        """Words for a person on standard error; with --json the document on standard output as well."""
+        click.echo(f"Error: {printable(self.message)}", err=True)
+        for line in numbered(self.problems):
+            click.echo(line, err=True)
+        if self.hint:
+            click.echo(self.hint, err=True)
+        if self.as_json:
+            echo_json(self.document)
+
+
+def rejected(name: str, fault: Rejected) -> Failure:
+    """The failure for a file that the library found at fault."""
+    return Failure(
+        f"{name} is rejected: {n_problems_in_words(fault.n_problems)}",
+        exit_code=FILE_AT_FAULT,
+        code="rejected",
+        problems=fault.problems,
+        n_problems=fault.n_problems,
+    )
+
+
+def n_problems_in_words(n_problems: int) -> str:
+    """`1 problem`, `2 problems`."""
+    return "1 problem" if n_problems == 1 else f"{n_problems:,} problems"
+
+
+def numbered(problems: Sequence[Problem]) -> Iterator[str]:
+    """The problems as numbered lines."""
+    for number, problem in enumerate(problems, start=1):
+        yield f"{number:>3}. {printable(str(problem))}"
+
+
+def echo_json(document: object) -> None:
+    """One JSON document on standard output, floats at full precision."""
+    click.echo(json.dumps(document, ensure_ascii=False, indent=2))

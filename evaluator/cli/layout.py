@@ -1,0 +1,127 @@
+"""Text tables: columns that line up on the decimal point, plain wherever the output goes.
+
+Bold and underline are ANSI codes, which click leaves out when the output is no terminal.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import click
+
+from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
+
+UNITS = "MiD ×10⁻⁴, RTE in %, lower is better; by true time to contact: c 0–3, s 3–6, l 6–20, n −20–0 s"
+NO_VALUE = "–"
+GAP = "  "
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """The text of one cell and how it stands out on a terminal."""
+
+    text: str
+    is_bold: bool = False
+    is_underlined: bool = False
+
+
+def short_name(score: str) -> str:
+    """The paper's heading for a score's column.
+
+    >>> short_name("mid"), short_name("rte_crucial")
+    ('MiD', 'RTE_c')
+    """
+    metric, _, interval = score.partition("_")
+    heading = {"mid": "MiD", "rte": "RTE"}[metric]
+    return f"{heading}_{interval[0]}" if interval else heading
+
+
+def printable(text: str) -> str:
+    """`text` without the power to move a cursor or to reorder a line: such characters are shown escaped.
+
+    >>> print(printable("Foo\\x1b[2J"))
+    Foo\\x1b[2J
+    """
+    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
+
+
+def aligned(rows: Sequence[Sequence[Cell]], *, align: str) -> list[str]:
+    """Lines in which every column is as wide as its widest cell.
+
+    `align` has one letter per column: `<` left, `>` right, `.` on the decimal point.
+
+    >>> rows = [[Cell("a"), Cell("MiD")], [Cell("bb"), Cell("14.8")], [Cell("c"), Cell("9.25")]]
+    >>> for line in aligned(rows, align="<."):
+    ...     print(line)
+    a     MiD
+    bb  14.8
+    c    9.25
+    """
+    columns = [_padded([row[i].text for row in rows], letter=letter) for i, letter in enumerate(align)]
+    return [
+        GAP.join(map(_styled, row, texts)).rstrip()
+        for row, texts in zip(rows, zip(*columns, strict=True), strict=True)
+    ]
+
+
+def width_of(text: str) -> int:
+    """The cells of a terminal that `text` fills: two for a wide (East Asian) character, none for a mark."""
+    return sum(
+        0 if unicodedata.combining(c) else 2 if unicodedata.east_asian_width(c) in "WF" else 1 for c in text
+    )
+
+
+def _padded(texts: Sequence[str], *, letter: str) -> list[str]:
+    if letter == ".":
+        tails = [len(text) - text.index(".") if "." in text else 0 for text in texts]
+        # Headings, dashes and counts end where the numbers end; only a number is moved by its decimals.
+        texts = [
+            text + " " * (max(tails) - tail) if tail else text
+            for text, tail in zip(texts, tails, strict=True)
+        ]
+    width = max(map(width_of, texts))
+    pads = [" " * (width - width_of(text)) for text in texts]
+    return [text + pad if letter == "<" else pad + text for text, pad in zip(texts, pads, strict=True)]
+
+
+def _styled(cell: Cell, text: str) -> str:
+    if not (cell.is_bold or cell.is_underlined):
+        return text
+    bare = text.strip()  # the padding is not underlined
+    styled = click.style(bare, bold=cell.is_bold, underline=cell.is_underlined)
+    return text.replace(bare, styled, 1)
+
+
+def result_in_words(
+    scores: Mapping[str, float | None],
+    *,
+    counts: Mapping[str, int],
+    n_out_of_range: int,
+    truncated: Mapping[str, int],
+) -> Iterator[str]:
+    """One result as lines: the table, its units, and what was counted and truncated."""
+    yield from score_table(scores, counts=counts)
+    yield ""
+    yield UNITS
+    outside = f", {n_out_of_range:,} of them with |τ| > 20 s, which count in MiD and RTE alone"
+    yield f"{counts.get('overall', 0):,} sequences{outside if n_out_of_range else ''}."
+    cut = [f"{n:,} to {boundary} s" for boundary, n in truncated.items() if n]
+    yield f"Truncated predictions: {', '.join(cut) or 'none'}."
+
+
+def score_table(scores: Mapping[str, float | None], *, counts: Mapping[str, int]) -> list[str]:
+    """One result in the paper's column order with two decimals, the counts of its intervals below it."""
+    from evaluator.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
+
+    n_by_interval = [f"{counts[name]:,}" if name in counts else NO_VALUE for name in INTERVAL_NAMES]
+    rows = [
+        [Cell(""), *(Cell(short_name(name), is_bold=True) for name in SCORE_NAMES)],
+        [
+            Cell("error"),
+            *(Cell(format_published(scores.get(name), missing=NO_VALUE)) for name in SCORE_NAMES),
+        ],
+        [Cell("count"), *map(Cell, n_by_interval * 2)],
+    ]
+    return aligned(rows, align="<" + "." * len(SCORE_NAMES))

@@ -1,0 +1,191 @@
+"""The subcommands that need files alone: check, score, manifest. They run the server's own code."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from evaluator.cli.failures import echo_json, rejected
+from evaluator.cli.layout import result_in_words
+from evaluator.cli.options import json_option, predictions_argument
+from evaluator.problems import Rejected
+from evaluator.protocol import DEFAULT_PROTOCOL, PROTOCOLS
+
+if TYPE_CHECKING:
+    from evaluator import Report
+
+TABLE = click.Path(exists=True, path_type=Path)
+
+
+@click.command(short_help="Say whether a prediction file is complete and well-formed.")
+@predictions_argument
+@click.option(
+    "--manifest",
+    "manifest_path",
+    type=TABLE,
+    required=True,
+    metavar="FILE",
+    help="The split's manifest, which says what sequences there are; its ground truth will do.",
+)
+@json_option
+def check(*, predictions: Path, manifest_path: Path, as_json: bool) -> None:
+    """Say whether PREDICTIONS, a JSON file or - for standard input, is complete and well-formed.
+
+    The rules are the server's; nothing is sent anywhere.
+
+    \b
+    Example:
+      tsttc check predictions.json --manifest manifest.csv
+    """
+    from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- numpy, which --help can do without
+
+    with _naming(manifest_path):
+        sequences = read_manifest(manifest_path)
+    with _naming(predictions):
+        found = read_predictions(_bytes_of(predictions), manifest=sequences)
+    if as_json:
+        echo_json(
+            {
+                "predictions_digest": found.digest,
+                "manifest_digest": sequences.digest,
+                "n_sequences": sequences.n_sequences,
+                "problems": [],
+            }
+        )
+    else:
+        click.echo(f"{_name(predictions)} is good: {sequences.n_sequences:,} sequences, each predicted once.")
+
+
+@click.command(short_help="Score a prediction file against ground truth that you have.")
+@predictions_argument
+@click.option(
+    "--truth",
+    "truth_path",
+    type=TABLE,
+    required=True,
+    metavar="FILE",
+    help="Ground truth: a CSV file, or a folder of the toolkit's annotations.",
+)
+@click.option(
+    "--protocol",
+    type=click.Choice(list(PROTOCOLS)),
+    default=DEFAULT_PROTOCOL,
+    show_default=True,
+    help="The rules: tsttc-1 is the board's, toolkit the dataset's own toolkit to the bit.",
+)
+@json_option
+def score(*, predictions: Path, truth_path: Path, protocol: str, as_json: bool) -> None:
+    """Score PREDICTIONS, a JSON file or - for standard input, against ground truth that you have.
+
+    The numbers are the server's: two decimals as the board publishes them, all of float64 with --json.
+
+    \b
+    Examples:
+      tsttc score predictions.json --truth val.csv
+      tsttc score predictions.json --truth val.csv --json | jq .scores.overall.mid
+    """
+    from evaluator import evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy, as above
+
+    with _naming(truth_path):
+        truth = read_truth(truth_path)
+    with _naming(predictions):
+        found = read_predictions(_bytes_of(predictions), manifest=truth.manifest)
+        report = evaluate(found, truth, protocol=protocol)
+    if as_json:
+        echo_json(report.as_dict())
+        return
+    for line in _in_words(report):
+        click.echo(line)
+
+
+@click.command(short_help="Write the public half of ground truth: what sequences there are.")
+@click.argument("truth", metavar="TRUTH_OR_FOLDER", type=TABLE)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the CSV table here instead of to standard output.",
+)
+@json_option
+def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
+    """Write the manifest of TRUTH_OR_FOLDER: every column of the ground truth but the values.
+
+    TRUTH_OR_FOLDER is a CSV file or a folder of the toolkit's annotations. The manifest is what
+    participants get; it gives the anno_id and the natural key of every sequence.
+
+    \b
+    Examples:
+      tsttc manifest truth.csv -o manifest.csv
+      tsttc manifest annotations/val/ -o manifest.csv
+    """
+    from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
+
+    with _naming(truth):
+        table = read_manifest(truth)
+    if output is not None:
+        if output.exists() and output.samefile(truth):
+            raise click.BadParameter("this is the ground truth itself; name another file.", param_hint="-o")
+        _write(output, table.to_csv())
+    if as_json:
+        echo_json(
+            {
+                "manifest_digest": table.digest,
+                "n_sequences": table.n_sequences,
+                "n_recordings": table.n_recordings,
+                "output": None if output is None else str(output),
+                **({"csv": table.to_csv().decode()} if output is None else {}),
+            }
+        )
+    elif output is None:
+        click.echo(table.to_csv(), nl=False)
+    else:
+        click.echo(f"{output}: {table.n_sequences:,} sequences of {table.n_recordings:,} recordings.")
+
+
+def _in_words(report: Report) -> Iterator[str]:
+    yield from result_in_words(
+        report.flat(),
+        counts={name: interval.count for name, interval in report.scores.items()},
+        n_out_of_range=report.n_out_of_range,
+        truncated=report.truncated,
+    )
+    yield ""
+    yield f"protocol     {report.protocol}"
+    yield f"truth        {report.truth_digest}"
+    yield f"predictions  {report.predictions_digest}"
+
+
+@contextmanager
+def _naming(path: Path) -> Iterator[None]:
+    """Turns the library's rejection into a failure that names the file."""
+    try:
+        yield
+    except Rejected as fault:
+        raise rejected(_name(path), fault) from None
+
+
+def _name(path: Path) -> str:
+    return "standard input" if str(path) == "-" else str(path)
+
+
+def _bytes_of(path: Path) -> bytes:
+    """The bytes of a file or of standard input."""
+    if str(path) == "-":
+        return sys.stdin.buffer.read()
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise click.BadParameter(f"{path} cannot be written: {error.strerror}.", param_hint="-o") from None

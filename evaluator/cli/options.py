@@ -1,0 +1,71 @@
+"""Arguments and options that several subcommands share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+from urllib.parse import urlsplit
+
+import click
+
+DEFAULT_URL = "http://127.0.0.1:8000"
+TOKEN_VARIABLE = "TSTTC_TOKEN"  # noqa: S105 -- the name of a variable, not a token
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def json_option(command: Command) -> Command:
+    """--json: one JSON document on standard output, whatever happens."""
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON document.")(command)
+
+
+def predictions_argument(command: Command) -> Command:
+    """PREDICTIONS: a file, or `-` for standard input."""
+    kind = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
+    return click.argument("predictions", type=kind)(command)
+
+
+def url_option(command: Command) -> Command:
+    """--url: which leaderboard."""
+    return click.option(
+        "--url",
+        envvar="TSTTC_URL",
+        default=DEFAULT_URL,
+        show_default=True,
+        show_envvar=True,
+        callback=_site,
+        help="Address of the leaderboard.",
+    )(command)
+
+
+def timeout_option(command: Command) -> Command:
+    """--timeout: how long to wait for a final state."""
+    return click.option(
+        "--timeout",
+        "timeout_s",
+        type=click.FloatRange(min=0, min_open=True),
+        metavar="SECONDS",
+        default=900.0,
+        show_default=True,
+        help="Stop waiting after this time; the submission itself goes on.",
+    )(command)
+
+
+def slug(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    """A name that stands in an address: letters, digits, hyphens and underscores."""
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", value):
+        raise click.BadParameter(f"found {value!r}, expected letters, digits, hyphens and underscores alone.")
+    return value
+
+
+def _site(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
+    parts = urlsplit(value)
+    if parts.scheme not in {"http", "https"} or not parts.hostname:
+        raise click.BadParameter(f"found {value!r}, expected an address like https://example.org.")
+    if parts.username or parts.password or parts.query or parts.fragment:
+        raise click.BadParameter(
+            f"expected the site's address alone; a token belongs in the variable {TOKEN_VARIABLE}."
+        )
+    return value

@@ -1,0 +1,367 @@
+"""The API client against a real HTTP server, its faults included."""
+
+from __future__ import annotations
+
+import io
+import random
+import socket
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+from email.utils import format_datetime
+from pathlib import Path
+
+import pytest
+
+from evaluator.answers import BadAnswer, Redirected, Refused, TimedOut, Unreachable
+from evaluator.client import Client, Patience
+from evaluator.problems import Problem
+from tests.evaluator.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
+
+SUBMISSIONS = "POST /api/v1/submissions"
+ONE = "GET /api/v1/submissions/abc"
+QUEUED = {"id": "abc", "state": "QUEUED", "split": "val", "method": "Foo++", "url": "/submissions/abc/"}
+SCORED = QUEUED | {
+    "state": "SCORED",
+    "scores": {"mid": 14.21, "mid_crucial": None},
+    "counts": {"overall": 60},
+}
+
+
+class FakeTime:
+    """A clock that only sleeping moves forward."""
+
+    def __init__(self) -> None:
+        self.now_s = 0.0
+        self.slept_s: list[float] = []
+
+    def sleep(self, seconds: float) -> None:
+        self.slept_s.append(seconds)
+        self.now_s += seconds
+
+
+@pytest.fixture
+def site() -> Iterator[RecordedSite]:
+    with RecordedSite() as running:
+        yield running
+
+
+@pytest.fixture
+def clock() -> FakeTime:
+    return FakeTime()
+
+
+@pytest.fixture
+def client(site: RecordedSite, clock: FakeTime) -> Iterator[Client]:
+    with Client(
+        url=site.url + "/",
+        token="secret-token",
+        sleep=clock.sleep,
+        monotonic_s=lambda: clock.now_s,
+        rng=random.Random(0),
+    ) as connected:
+        yield connected
+
+
+def send(client: Client, data: bytes = b'{"0": 5.3}') -> object:
+    return client.submit(io.BytesIO(data), filename="p.json", split="val", method="Foo++")
+
+
+def test_submit_sends_the_file_the_fields_and_the_token(client: Client, site: RecordedSite) -> None:
+    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
+    submission = client.submit(
+        io.BytesIO(b'{"0": 5.3}'),
+        filename="p.json",
+        split="val",
+        method="Foo++",
+        details={"commit": "c0ffee"},
+    )
+    assert (submission.id, submission.state, submission.is_new) == ("abc", "QUEUED", True)
+    assert submission.document == QUEUED
+    request = site.requests[0]
+    assert request.headers["Authorization"] == "Bearer secret-token"
+    assert request.parts() == {
+        "split": (None, b"val"),
+        "method": (None, b"Foo++"),
+        "commit": (None, b"c0ffee"),
+        "file": ("p.json", b'{"0": 5.3}'),
+    }
+
+
+def test_file_is_streamed_in_blocks_with_its_length_told_first(
+    client: Client, site: RecordedSite, tmp_path: Path
+) -> None:
+    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
+    path = tmp_path / "large.json"
+    path.write_bytes(b" " * 5_000_000)
+
+    class Watched(io.FileIO):
+        largest_read = 0
+
+        def read(self, size: int | None = -1, /) -> bytes:
+            data = super().read(size)
+            self.largest_read = max(self.largest_read, len(data or b""))
+            return data or b""
+
+    with Watched(path) as file:
+        client.submit(file, filename="large.json", split="val", method="Foo++")
+    assert 0 < file.largest_read <= 1 << 20
+    assert int(site.requests[0].headers["Content-Length"]) > 5_000_000
+    assert site.requests[0].headers["Transfer-Encoding"] is None
+
+
+def test_bytes_sent_before_give_the_first_submission(client: Client, site: RecordedSite) -> None:
+    site.put(SUBMISSIONS, Reply(QUEUED, status=200))
+    assert send(client).is_new is False  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("fault", [CUT, CUT_SHORT])
+def test_upload_whose_answer_was_cut_is_sent_again_whole(
+    client: Client, site: RecordedSite, clock: FakeTime, fault: str
+) -> None:
+    site.put(SUBMISSIONS, Reply(QUEUED, fault=fault), Reply(QUEUED, status=200))
+    send(client, b'{"0": 1.5}')
+    assert [request.parts()["file"][1] for request in site.requests] == [b'{"0": 1.5}'] * 2
+    assert len(clock.slept_s) == 1
+
+
+def test_server_that_keeps_cutting_is_reported_after_a_few_tries(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(ONE, Reply(fault=CUT))
+    with pytest.raises(Unreachable) as caught:
+        client.submission("abc")
+    assert caught.value.was_connected
+    assert len(site.requests) == 4
+    assert clock.slept_s == sorted(clock.slept_s)
+
+
+def test_address_where_nothing_listens_is_reported_at_once(clock: FakeTime) -> None:
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        url = f"http://127.0.0.1:{unused.getsockname()[1]}"
+        with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
+            client.board("test")
+    assert not caught.value.was_connected
+    assert caught.value.url == url
+    assert clock.slept_s == []
+
+
+def test_busy_server_is_asked_again_when_it_said(client: Client, site: RecordedSite, clock: FakeTime) -> None:
+    site.put(ONE, Reply(status=503, headers={"Retry-After": "7"}), Reply(SCORED))
+    assert client.submission("abc").is_final
+    assert clock.slept_s == [7.0]
+
+
+def test_retry_after_as_a_date_is_understood(client: Client, site: RecordedSite, clock: FakeTime) -> None:
+    when = format_datetime(datetime.now(UTC) + timedelta(seconds=20), usegmt=True)
+    site.put(ONE, Reply(status=503, headers={"Retry-After": when}), Reply(SCORED))
+    client.submission("abc")
+    assert 10 < clock.slept_s[0] <= 20
+
+
+@pytest.mark.parametrize("value", ["soon", "-5", "²", "Fri, 99 Nov 2026 00:00:00 GMT", "1e5"])
+def test_senseless_retry_after_is_ignored(
+    client: Client, site: RecordedSite, clock: FakeTime, value: str
+) -> None:
+    headers = {"Retry-After": value.encode().decode("latin-1")}
+    site.put(ONE, Reply(status=503, headers=headers), Reply(SCORED))
+    client.submission("abc")
+    assert clock.slept_s[0] < 1
+
+
+@pytest.mark.parametrize(
+    "reply",
+    [
+        Reply(status=429, headers={"Retry-After": "86400"}),
+        Reply(status=429),
+        Reply(status=500),
+        Reply(status=401),
+        Reply(status=404),
+    ],
+    ids=["long quota", "quota without a time", "failure", "no token", "unknown"],
+)
+def test_what_waiting_does_not_cure_is_not_tried_again(
+    client: Client, site: RecordedSite, clock: FakeTime, reply: Reply
+) -> None:
+    site.put(ONE, reply)
+    with pytest.raises(Refused) as caught:
+        client.submission("abc")
+    assert caught.value.status == reply.status
+    assert (len(site.requests), clock.slept_s) == (1, [])
+
+
+def test_problem_document_is_read_whole(client: Client, site: RecordedSite) -> None:
+    document = {
+        "type": "about:blank",
+        "title": "Unprocessable",
+        "status": 422,
+        "detail": "The form has a fault.",
+        "code": "invalid",
+        "problems": [{"code": "bad-url", "message": "paper_url is no address.", "where": "paper_url"}],
+    }
+    site.put(SUBMISSIONS, Reply(document, status=422, headers={"Content-Type": "application/problem+json"}))
+    with pytest.raises(Refused) as caught:
+        send(client)
+    fault = caught.value
+    assert (fault.title, fault.detail, fault.code) == ("Unprocessable", "The form has a fault.", "invalid")
+    assert fault.problems == (Problem("bad-url", "paper_url is no address.", "paper_url"),)
+    assert fault.document == document
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"<html>gateway</html>", b"", b"[]", b'{"detail": ["x"], "title": 3, "problems": "none"}', b"\xff"],
+)
+def test_error_answer_of_any_kind_is_still_a_refusal(client: Client, site: RecordedSite, body: bytes) -> None:
+    site.put(ONE, Reply(body, status=404, headers={"Content-Type": "text/html"}))
+    with pytest.raises(Refused) as caught:
+        client.submission("abc")
+    assert (caught.value.title, caught.value.detail, caught.value.problems) == ("Not Found", "", ())
+
+
+@pytest.mark.parametrize(
+    ("body", "found"),
+    [
+        (b"<html>hello</html>", "not JSON (application/json)"),
+        (b"[1, 2]", "JSON, but no object"),
+        (b'{"state": "SCORED"}', "Object missing required field `id`"),
+        (b'{"id": 7, "state": "SCORED"}', "Expected `str`, got `int` - at `$.id`"),
+    ],
+)
+def test_answer_of_another_shape_is_named(
+    client: Client, site: RecordedSite, body: bytes, found: str
+) -> None:
+    site.put(ONE, Reply(body))
+    with pytest.raises(BadAnswer) as caught:
+        client.submission("abc")
+    assert caught.value.found == found
+
+
+def test_redirect_is_reported_and_not_followed(client: Client, site: RecordedSite) -> None:
+    site.put(SUBMISSIONS, Reply(status=301, headers={"Location": "https://elsewhere.example/"}))
+    with pytest.raises(Redirected) as caught:
+        send(client)
+    assert caught.value.location == "https://elsewhere.example/"
+    assert len(site.requests) == 1
+
+
+def test_refusal_before_the_upload_is_over_is_understood(client: Client, site: RecordedSite) -> None:
+    document = {"title": "Too large", "detail": "The file is larger than 20 MB."}
+    site.put(SUBMISSIONS, Reply(document, status=413, fault=REFUSE_EARLY))
+    with pytest.raises(Refused) as caught:
+        send(client, b" " * 3_000_000)
+    assert (caught.value.status, caught.value.detail) == (413, "The file is larger than 20 MB.")
+
+
+def test_names_cannot_lead_out_of_their_place_in_the_address(client: Client, site: RecordedSite) -> None:
+    with pytest.raises(Refused):
+        client.submission("../splits?x=1#y")
+    assert site.requests[0].path == "/api/v1/submissions/..%2Fsplits%3Fx%3D1%23y"
+
+
+def test_board_is_asked_for_with_its_order(client: Client, site: RecordedSite) -> None:
+    entry = {
+        "rank": 1,
+        "method": "Foo++",
+        "team": None,
+        "kind": "submission",
+        "scores": {"mid": 14.2},
+        "new": 1,
+    }
+    site.put("GET /api/v1/splits/test/board", Reply({"split": "test", "edition": 2, "entries": [entry]}))
+    board = client.board("test", sort="rte")
+    assert site.requests[0].path.endswith("?sort=rte")
+    assert (board.entries[0].rank, board.entries[0].scores) == (1, {"mid": 14.2})
+    assert board.document["entries"] == [entry]
+
+
+def test_manifest_is_given_as_it_came(client: Client, site: RecordedSite) -> None:
+    table = b"anno_id,bag_stamp,cam_id,ts,track_id\n0,a,1,5,9\n"
+    site.put("GET /api/v1/splits/val/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
+    assert client.manifest("val") == table
+
+
+def test_watch_gives_every_state_until_the_final_one(client: Client, site: RecordedSite) -> None:
+    queued = QUEUED | {"queue": {"ahead": 2, "estimate_s": 4.5}}
+    site.put(ONE, Reply(queued), Reply(QUEUED | {"state": "RUNNING"}), Reply(SCORED))
+    seen = list(client.watch("abc", timeout_s=60))
+    assert [submission.state for submission in seen] == ["QUEUED", "RUNNING", "SCORED"]
+    assert seen[0].queue is not None
+    assert (seen[0].queue.ahead, seen[0].queue.estimate_s) == (2, 4.5)
+
+
+def test_watch_asks_less_and_less_often(client: Client, site: RecordedSite, clock: FakeTime) -> None:
+    site.put(ONE, *[Reply(QUEUED)] * 12, Reply(SCORED))
+    list(client.watch("abc", timeout_s=600))
+    assert clock.slept_s[0] <= 0.25
+    assert clock.slept_s[8] > 10 * clock.slept_s[0]
+    assert max(clock.slept_s) <= 10
+
+
+def test_watch_outlives_an_absent_and_a_busy_server(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(
+        ONE,
+        Reply(fault=CUT),
+        Reply(status=502),
+        Reply(status=503, headers={"Retry-After": "9"}),
+        Reply(SCORED),
+    )
+    assert [submission.state for submission in client.watch("abc", timeout_s=60)] == ["SCORED"]
+    assert clock.slept_s[2] == 9.0
+
+
+def test_watch_heeds_the_pace_that_a_healthy_server_asks_for(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(ONE, Reply(QUEUED, headers={"Retry-After": "3"}), Reply(SCORED))
+    list(client.watch("abc", timeout_s=60))
+    assert clock.slept_s == [3.0]
+
+
+def test_watch_ends_in_time_with_what_it_saw_last(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(ONE, Reply(QUEUED))
+    with pytest.raises(TimedOut) as caught:
+        list(client.watch("abc", timeout_s=30))
+    assert clock.now_s <= 30
+    assert caught.value.submission is not None
+    assert caught.value.submission.state == "QUEUED"
+
+
+def test_watch_does_not_wait_for_what_never_comes(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(ONE, Reply(status=404))
+    with pytest.raises(Refused):
+        list(client.watch("abc", timeout_s=30))
+    assert clock.slept_s == []
+
+
+def test_state_of_a_newer_server_is_not_taken_for_a_final_one(client: Client, site: RecordedSite) -> None:
+    site.put(ONE, Reply(QUEUED | {"state": "PAUSED"}), Reply(SCORED))
+    assert [submission.state for submission in client.watch("abc", timeout_s=60)] == ["PAUSED", "SCORED"]
+
+
+def test_token_is_not_shown(client: Client) -> None:
+    assert "secret-token" not in repr(client)
+
+
+def test_proxy_of_the_environment_is_not_asked_for_this_machine(
+    site: RecordedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HTTP_PROXY", "http://127.0.0.1:9")
+    monkeypatch.setenv("ALL_PROXY", "http://127.0.0.1:9")
+    site.put(ONE, Reply(SCORED))
+    with Client(url=site.url) as client:
+        assert client.submission("abc").is_final
+
+
+def test_delay_is_never_shorter_than_the_server_asked_for() -> None:
+    patience = Patience()
+    rng = random.Random(1)
+    delays_s = [patience.delay_s(n_failed=n, retry_after_s=4.0, rng=rng) for n in range(1, 30)]
+    assert min(delays_s) == 4.0
+    assert max(delays_s) <= patience.longest_delay_s
