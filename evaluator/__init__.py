@@ -7,13 +7,37 @@
 Arithmetic about files: no network, no clock, no global state.
 """
 
-from evaluator.predictions import Predictions, read_predictions
-from evaluator.problems import PROBLEM_CODES, Problem, Rejected
-from evaluator.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
-from evaluator.report import IntervalScore, Report, format_published, published
-from evaluator.scoring import evaluate, evaluate_many
-from evaluator.truth import GroundTruth, Manifest, read_manifest, read_truth
-from evaluator.writing import write_predictions
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from evaluator.predictions import Predictions, read_predictions
+    from evaluator.problems import PROBLEM_CODES, Problem, Rejected
+    from evaluator.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
+    from evaluator.report import IntervalScore, Report, format_published, published
+    from evaluator.scoring import evaluate, evaluate_many
+    from evaluator.truth import GroundTruth, Manifest, read_manifest, read_truth
+    from evaluator.writing import write_predictions
+else:
+    # Each name is imported when it is first asked for: `tsttc --help` then answers without loading numpy.
+    _HOMES = {
+        "predictions": ("Predictions", "read_predictions"),
+        "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
+        "protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
+        "report": ("IntervalScore", "Report", "format_published", "published"),
+        "scoring": ("evaluate", "evaluate_many"),
+        "truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
+        "writing": ("write_predictions",),
+    }
+    _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}
+
+    def __getattr__(name: str) -> object:
+        """A public name, from the module that defines it."""
+        if name not in _HOME_OF:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        value = globals()[name] = getattr(import_module(_HOME_OF[name]), name)
+        return value
+
 
 __all__ = [
     "INTERVALS",

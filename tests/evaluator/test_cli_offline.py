@@ -1,0 +1,299 @@
+"""check, score and manifest, as a person and as a program call them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from evaluator import Rejected, evaluate, read_predictions, read_truth
+from evaluator.cli import main
+from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+EXAMPLES = REPOSITORY / "examples"
+GOOD = EXAMPLES / "predictions.json"
+RATIOS = EXAMPLES / "predictions.scale_ratio.json"
+BROKEN = EXAMPLES / "broken.json"
+TRUTH = EXAMPLES / "truth.csv"
+MANIFEST = EXAMPLES / "manifest.csv"
+
+Tsttc = Callable[..., Result]
+
+
+@pytest.fixture
+def tsttc() -> Tsttc:
+    """Run the command in this process."""
+
+    def run(*arguments: object, stdin: bytes = b"") -> Result:
+        return CliRunner().invoke(main, list(map(str, arguments)), input=stdin, prog_name="tsttc")
+
+    return run
+
+
+def problems_of(path: Path) -> list[str]:
+    """What the library says of a bad prediction file."""
+    with pytest.raises(Rejected) as caught:
+        read_predictions(path.read_bytes(), manifest=read_truth(TRUTH).manifest)
+    return list(map(str, caught.value.problems))
+
+
+@pytest.mark.parametrize("predictions", [GOOD, RATIOS])
+@pytest.mark.parametrize("protocol", ["tsttc-1", "toolkit"])
+def test_score_as_json_is_the_library_s_report_to_the_last_bit(
+    tsttc: Tsttc, predictions: Path, protocol: str
+) -> None:
+    result = tsttc("score", predictions, "--truth", TRUTH, "--protocol", protocol, "--json")
+    truth = read_truth(TRUTH)
+    report = evaluate(
+        read_predictions(predictions.read_bytes(), manifest=truth.manifest), truth, protocol=protocol
+    )
+    assert result.exit_code == 0
+    assert json.loads(result.stdout) == json.loads(report.to_json())
+    assert result.stderr == ""
+
+
+def test_score_as_json_has_the_documented_members(tsttc: Tsttc) -> None:
+    report = json.loads(tsttc("score", GOOD, "--truth", TRUTH, "--json").stdout)
+    assert list(report) == [
+        "protocol",
+        "truth_digest",
+        "predictions_digest",
+        "n_sequences",
+        "n_out_of_range",
+        "truncated",
+        "scores",
+    ]
+    assert tuple(report["scores"]) == INTERVAL_NAMES
+    assert all(set(interval) == {"mid", "rte", "count"} for interval in report["scores"].values())
+
+
+def test_score_shows_the_paper_s_columns_with_two_decimals(tsttc: Tsttc) -> None:
+    lines = tsttc("score", GOOD, "--truth", TRUTH).stdout.splitlines()
+    report = json.loads(tsttc("score", GOOD, "--truth", TRUTH, "--json").stdout)
+    flat = [report["scores"][name][metric] for metric in ("mid", "rte") for name in INTERVAL_NAMES]
+    counts = [str(report["scores"][name]["count"]) for name in INTERVAL_NAMES]
+    assert lines[0].split() == (
+        ["MiD", "MiD_c", "MiD_s", "MiD_l", "MiD_n", "RTE", "RTE_c", "RTE_s", "RTE_l", "RTE_n"]
+    )
+    assert len(flat) == len(SCORE_NAMES)
+    assert lines[1].split() == ["error", *(f"{value:.2f}" for value in flat)]
+    assert lines[2].split() == ["count", *counts, *counts]
+
+
+def test_score_says_what_was_truncated_and_what_is_out_of_range(tsttc: Tsttc) -> None:
+    result = tsttc("score", GOOD, "--truth", TRUTH)
+    report = json.loads(tsttc("score", GOOD, "--truth", TRUTH, "--json").stdout)
+    assert report["n_out_of_range"] == 2
+    assert "60 sequences, 2 of them with |τ| > 20 s" in result.stdout
+    assert f"{report['truncated']['20']} to 20 s" in result.stdout
+    assert f"{report['truncated']['-20']} to -20 s" in result.stdout
+
+
+def test_empty_interval_is_a_dash_and_not_a_zero(tsttc: Tsttc, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+    truth.write_text("anno_id,bag_stamp,cam_id,ts,track_id,ttc\n0,a,1,100,4,10.0\n")
+    shown = tsttc("score", "-", "--truth", truth, stdin=b'{"0": 9.0}').stdout
+    assert shown.splitlines()[1].split()[2] == "–"
+    report = json.loads(tsttc("score", "-", "--truth", truth, "--json", stdin=b'{"0": 9.0}').stdout)
+    assert report["scores"]["crucial"] == {"mid": None, "rte": None, "count": 0}
+
+
+def test_output_has_no_escape_codes_when_it_is_no_terminal(tsttc: Tsttc) -> None:
+    assert "\x1b" not in tsttc("score", GOOD, "--truth", TRUTH).output
+
+
+@pytest.mark.parametrize("command", ["check", "score"])
+def test_predictions_may_come_from_standard_input(tsttc: Tsttc, command: str) -> None:
+    table = ["--truth", TRUTH] if command == "score" else ["--manifest", MANIFEST]
+    piped = tsttc(command, "-", *table, "--json", stdin=GOOD.read_bytes())
+    assert piped.exit_code == 0
+    assert json.loads(piped.stdout) == json.loads(tsttc(command, GOOD, *table, "--json").stdout)
+
+
+def test_check_accepts_a_good_file(tsttc: Tsttc) -> None:
+    result = tsttc("check", GOOD, "--manifest", MANIFEST)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == f"{GOOD} is good: 60 sequences, each predicted once.\n"
+    described = json.loads(tsttc("check", GOOD, "--manifest", MANIFEST, "--json").stdout)
+    assert (described["n_sequences"], described["problems"]) == (60, [])
+
+
+@pytest.mark.parametrize(
+    "arguments", [("check", BROKEN, "--manifest", MANIFEST), ("score", BROKEN, "--truth", TRUTH)]
+)
+def test_problems_are_numbered_in_the_library_s_words(tsttc: Tsttc, arguments: tuple[object, ...]) -> None:
+    result = tsttc(*arguments)
+    assert result.exit_code == 1
+    assert result.stdout == ""
+    assert result.stderr.splitlines()[0] == f"Error: {BROKEN} is rejected: 7 problems"
+    numbered = [f"{number:>3}. {words}" for number, words in enumerate(problems_of(BROKEN), start=1)]
+    assert result.stderr.splitlines()[1:] == numbered
+
+
+@pytest.mark.parametrize(
+    "arguments", [("check", BROKEN, "--manifest", MANIFEST), ("score", BROKEN, "--truth", TRUTH)]
+)
+def test_problems_as_json_go_to_standard_output_with_code_and_place(
+    tsttc: Tsttc, arguments: tuple[object, ...]
+) -> None:
+    result = tsttc(*arguments, "--json")
+    document = json.loads(result.stdout)
+    assert result.exit_code == 1
+    assert (document["code"], document["n_problems"]) == ("rejected", 7)
+    assert {problem["code"] for problem in document["problems"]} == {
+        "unknown-keys",
+        "duplicate-keys",
+        "missing-keys",
+        "zero",
+        "not-a-number",
+        "nan",
+    }
+    assert all(set(problem) == {"code", "message", "where"} for problem in document["problems"])
+
+
+def test_rejection_names_the_table_when_the_table_is_at_fault(tsttc: Tsttc, tmp_path: Path) -> None:
+    table = tmp_path / "truth.csv"
+    table.write_text("anno_id,ttc\n0,1\n")
+    result = tsttc("score", GOOD, "--truth", table)
+    assert result.exit_code == 1
+    assert result.stderr.startswith(f"Error: {table} is rejected: ")
+
+
+def test_prediction_that_the_toolkit_cannot_score_is_the_file_s_fault(tsttc: Tsttc, tmp_path: Path) -> None:
+    predictions = tmp_path / "near-zero.json"
+    predictions.write_text(json.dumps(json.loads(GOOD.read_text()) | {"0": -0.05}))
+    result = tsttc("score", predictions, "--truth", TRUTH, "--protocol", "toolkit")
+    assert result.exit_code == 1
+    assert str(predictions) in result.stderr
+    assert tsttc("score", predictions, "--truth", TRUTH).exit_code == 0
+
+
+def test_file_name_cannot_steer_the_terminal(tsttc: Tsttc, tmp_path: Path) -> None:
+    predictions = tmp_path / "a\x1b[2Jb.json"
+    predictions.write_text("nonsense")
+    result = tsttc("check", predictions, "--manifest", MANIFEST)
+    assert result.exit_code == 1
+    assert "\x1b" not in result.output
+
+
+def test_manifest_is_the_truth_without_its_values(tsttc: Tsttc) -> None:
+    result = tsttc("manifest", TRUTH)
+    assert result.exit_code == 0
+    assert result.stdout_bytes == MANIFEST.read_bytes()
+    rows = TRUTH.read_text().splitlines()
+    assert result.stdout.splitlines() == [row.rpartition(",")[0] for row in rows]
+
+
+def test_manifest_can_be_written_to_a_file(tsttc: Tsttc, tmp_path: Path) -> None:
+    written = tmp_path / "manifest.csv"
+    result = tsttc("manifest", TRUTH, "-o", written)
+    assert result.stdout == f"{written}: 60 sequences of 6 recordings.\n"
+    assert written.read_bytes() == MANIFEST.read_bytes()
+    described = json.loads(tsttc("manifest", TRUTH, "-o", written, "--json").stdout)
+    assert (described["n_sequences"], described["n_recordings"]) == (60, 6)
+    assert described["output"] == str(written)
+    checked = json.loads(tsttc("check", GOOD, "--manifest", written, "--json").stdout)
+    assert described["manifest_digest"] == checked["manifest_digest"]
+
+
+def test_manifest_as_json_carries_the_table_when_no_file_is_named(tsttc: Tsttc) -> None:
+    document = json.loads(tsttc("manifest", TRUTH, "--json").stdout)
+    assert document["csv"].encode() == MANIFEST.read_bytes()
+
+
+def test_manifest_never_overwrites_the_truth(tsttc: Tsttc, tmp_path: Path) -> None:
+    truth = tmp_path / "truth.csv"
+    truth.write_bytes(TRUTH.read_bytes())
+    result = tsttc("manifest", truth, "-o", tmp_path / "." / "truth.csv")
+    assert result.exit_code == 2
+    assert truth.read_bytes() == TRUTH.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "absent.json", "--manifest", MANIFEST], "'absent.json' does not exist"),
+        (["check", EXAMPLES, "--manifest", MANIFEST], "is a directory"),
+        (["check", GOOD], "Missing option '--manifest'"),
+        (["check", GOOD, "--manifest", "absent.csv"], "'absent.csv' does not exist"),
+        (["score", GOOD, "--truth", TRUTH, "--protocol", "tsttc-9"], "'tsttc-9' is not one of"),
+        (["manifest", TRUTH, "-o", "absent/manifest.csv"], "cannot be written: No such file or directory"),
+        (["mannifest"], "No such command 'mannifest'"),
+        ([], "Usage: tsttc"),
+    ],
+)
+def test_wrong_usage_is_explained_and_ends_with_2(tsttc: Tsttc, arguments: list[object], words: str) -> None:
+    result = tsttc(*arguments)
+    assert result.exit_code == 2
+    assert words in result.stderr
+    assert result.stdout == ""
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may read every file")
+def test_unreadable_file_is_explained(tsttc: Tsttc, tmp_path: Path) -> None:
+    secret = tmp_path / "secret.json"
+    secret.write_text("{}")
+    secret.chmod(0)
+    result = tsttc("check", secret, "--manifest", MANIFEST)
+    assert result.exit_code == 2
+    assert "is not readable" in result.stderr
+
+
+@pytest.mark.parametrize("command", ["check", "score", "manifest", "submit", "status", "board"])
+def test_every_command_explains_itself_with_an_example(tsttc: Tsttc, command: str) -> None:
+    result = tsttc(command, "--help")
+    assert result.exit_code == 0
+    assert f"\n    tsttc {command}" in result.stdout
+    assert "--json" in result.stdout
+
+
+def test_help_loads_none_of_the_heavy_libraries() -> None:
+    program = (
+        "import sys\n"
+        "from evaluator.cli import main\n"
+        "main(['--help'], standalone_mode=False)\n"
+        "print(sorted({'numpy', 'httpx', 'rich', 'msgspec', 'django'} & set(sys.modules)), file=sys.stderr)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=REPOSITORY
+    )
+    assert done.stdout.startswith("Usage: ")
+    assert done.stderr == "[]\n"
+
+
+def test_module_runs_as_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "evaluator", "score", GOOD, "--truth", TRUTH],
+        capture_output=True,
+        check=True,
+        cwd=REPOSITORY,
+        env=os.environ | {"PYTHONIOENCODING": "ascii"},
+    )
+    assert b"MiD" in done.stdout
+    assert b"60 sequences" in done.stdout
+
+
+def test_bad_file_ends_a_real_process_with_1() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "evaluator", "check", BROKEN, "--manifest", MANIFEST],
+        capture_output=True,
+        check=False,
+        cwd=REPOSITORY,
+    )
+    assert done.returncode == 1
+    assert b"Traceback" not in done.stderr
+
+
+def test_public_names_are_there_although_they_load_late() -> None:
+    import evaluator  # noqa: PLC0415 -- the package itself is what is looked at
+
+    assert [name for name in evaluator.__all__ if getattr(evaluator, name, None) is None] == []
+    with pytest.raises(AttributeError, match="no attribute 'absent'"):
+        _ = evaluator.absent  # type: ignore[attr-defined]  # the point of the test
