@@ -50,7 +50,11 @@ def import_truth(
                 "source": path.name[:200],
                 "n_sequences": truth.manifest.n_sequences,
                 "n_recordings": truth.manifest.n_recordings,
-                "counts": {**truth.interval_counts, "out_of_range": truth.n_out_of_range},
+                "counts": {
+                    "overall": truth.n_sequences,
+                    **truth.interval_counts,
+                    "out_of_range": truth.n_out_of_range,
+                },
                 "imported_at": now,
                 "imported_by": actor,
             },

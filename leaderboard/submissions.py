@@ -242,7 +242,8 @@ class Progress:
 def evaluation_of(submission: Submission) -> Evaluation:
     """The evaluation that speaks for a submission: in the published edition, else in the latest."""
     published = submission.split.published_edition_id
-    evaluations = list(submission.evaluations.select_related("edition").order_by("edition__number"))
+    # Sorted here and not by the database, so that a list of submissions can fetch its evaluations at once.
+    evaluations = sorted(submission.evaluations.all(), key=lambda e: e.edition.number)
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
 
 
@@ -279,11 +280,10 @@ def _waiting(evaluation: Evaluation) -> tuple[int | None, float | None]:
         return None, None
     n_ahead = 0
     if evaluation.status == Status.QUEUED:
-        n_ahead = Evaluation.objects.filter(
-            Q(priority__lt=evaluation.priority)
-            | Q(priority=evaluation.priority, queued_at__lt=evaluation.queued_at),
-            status=Status.QUEUED,
-        ).count()
+        earlier = Q(priority__lt=evaluation.priority) | Q(
+            priority=evaluation.priority, queued_at__lt=evaluation.queued_at
+        )
+        n_ahead = Evaluation.objects.filter(earlier, status=Status.QUEUED).exclude(pk=evaluation.pk).count()
     recent = (
         Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED])
         .exclude(started_at=None)

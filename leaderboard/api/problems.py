@@ -5,24 +5,11 @@ from typing import Any
 
 from django.core.exceptions import PermissionDenied
 from django.http import Http404
-from rest_framework import exceptions, renderers
+from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import exception_handler as default_handler
 
 from leaderboard import standings, submissions
-
-
-class JSONRenderer(renderers.JSONRenderer):
-    """JSON, labelled as a problem where it is one."""
-
-    def render(
-        self, data: Any, accepted_media_type: str | None = None, renderer_context: Any = None
-    ) -> bytes:
-        """Render, and set the media type of problems."""
-        response = (renderer_context or {}).get("response")
-        if response is not None and response.status_code >= HTTPStatus.BAD_REQUEST:
-            response.content_type = "application/problem+json"
-        return super().render(data, accepted_media_type, renderer_context)
 
 
 def problem(
@@ -40,6 +27,7 @@ def problem(
         },
         status=status,
         headers=headers,
+        content_type="application/problem+json",
     )
 
 

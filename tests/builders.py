@@ -1,0 +1,60 @@
+"""Small worlds for tests: a made-up ground truth, prediction files for it, people and their submissions."""
+
+import random
+from pathlib import Path
+
+import numpy as np
+from django.core.files.base import ContentFile
+from django.utils import timezone
+
+import evaluator
+from leaderboard import ground_truth, scoring, submissions
+from leaderboard.models import Edition, Submission, User
+
+N_SEQUENCES = 120
+
+
+def truth_csv(path: Path, *, n: int = N_SEQUENCES, seed: int = 0, n_recordings: int = 24) -> Path:
+    """A ground truth with sequences in every interval and a few out of range."""
+    rng = np.random.default_rng(seed)
+    tau = np.concatenate([[1.0, 4.0, 10.0, -10.0, 25.0], rng.uniform(0.3, 20, n - 5)])
+    tau[5::4] *= -1
+    rows = ["anno_id,bag_stamp,cam_id,ts,track_id,ttc"]
+    for i, value in enumerate(tau):
+        rows.append(f"{i},{i % n_recordings:04d},1,{500_000_000 + i * 100_000_000},{i % 7},{value!r}")
+    path.write_text("\n".join(rows).replace("np.float64(", "").replace(")", "") + "\n")
+    return path
+
+
+def import_truth(tmp_path: Path, *, split: str = "test", **options: int) -> Edition:
+    """Open a split with made-up ground truth."""
+    path = truth_csv(tmp_path / f"truth-{split}.csv", **options)
+    return ground_truth.import_truth(split_name=split, path=path, now=timezone.now())
+
+
+def predictions(edition: Edition, *, factor: float = 1.1) -> bytes:
+    """A valid file: the truth times a factor, so that a factor nearer to 1 is a better method."""
+    truth = ground_truth.load(edition.ground_truth_id)
+    return evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * factor)
+
+
+def submit(user: User, data: bytes, *, split: str = "test", method: str = "Foo", **fields: str) -> Submission:
+    """A submission through the verb, as the web form makes it."""
+    return submissions.submit(
+        user=user,
+        split_name=split,
+        method_name=method,
+        upload=ContentFile(data, name="predictions.json"),
+        via=Submission.Via.WEB,
+        now=timezone.now(),
+        filename="predictions.json",
+        **fields,
+    ).submission
+
+
+def score_all() -> int:
+    """Work through the queue in this process. Returns how many evaluations were decided."""
+    n_decided = 0
+    while scoring.run_next(rng=random.Random(0)):
+        n_decided += 1
+    return n_decided

@@ -1,0 +1,41 @@
+"""The cast: an owner, a teammate, and a stranger who must see nothing."""
+
+from pathlib import Path
+
+import pytest
+
+from leaderboard import teams
+from leaderboard.models import Edition, Membership, User
+from tests import builders
+
+
+@pytest.fixture
+def owner(db: None) -> User:
+    """Somebody who submits."""
+    return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
+
+
+@pytest.fixture
+def teammate(owner: User) -> User:
+    """Somebody in the owner's team."""
+    user = User.objects.create_user("teammate@example.org", "correct horse", name="Mate")
+    Membership.objects.create(team=teams.team_of(user=owner), user=user)
+    return user
+
+
+@pytest.fixture
+def stranger(db: None) -> User:
+    """Somebody else, in a team of their own."""
+    return User.objects.create_user("stranger@example.org", "correct horse", name="Strangers")
+
+
+@pytest.fixture
+def maintainer(db: None) -> User:
+    """Somebody who looks after the benchmark."""
+    return User.objects.create_superuser("maintainer@example.org", "correct horse", name="Keepers")
+
+
+@pytest.fixture
+def edition(benchmark: None, tmp_path: Path) -> Edition:
+    """The test split, open, with made-up ground truth."""
+    return builders.import_truth(tmp_path)

@@ -1,0 +1,205 @@
+"""The API's submissions: the shapes that CI jobs rely on."""
+
+import json
+
+import pytest
+from django.core.files.uploadedfile import SimpleUploadedFile
+from rest_framework.test import APIClient
+
+from leaderboard import tokens
+from leaderboard.models import ApiToken, Edition, Submission, User
+from tests import builders
+
+
+def client_of(user: User | None = None) -> APIClient:
+    """A client with a fresh token of that person, or with none."""
+    client = APIClient()
+    if user is not None:
+        client.credentials(HTTP_AUTHORIZATION=f"Bearer {tokens.create(user=user, name='CI')}")
+    return client
+
+
+def post(client: APIClient, data: bytes, **fields: str):
+    form = {"split": "test", "method": "Foo", **fields, "file": SimpleUploadedFile("p.json", data)}
+    return client.post("/api/v1/submissions", form, format="multipart")
+
+
+def test_submit_is_answered_201_with_id_state_and_address(edition: Edition, owner: User) -> None:
+    response = post(client_of(owner), builders.predictions(edition), commit="abc123")
+    body = response.json()
+    assert response.status_code == 201
+    assert body["state"] == "QUEUED"
+    assert (body["split"], body["method"], body["team"]) == ("test", "Foo", "Owls")
+    assert body["commit"] == "abc123"
+    assert body["scores"] is None
+    assert body["queue"]["ahead"] == 0
+    assert response.headers["Location"].endswith(f"/api/v1/submissions/{body['id']}")
+    assert body["url"].endswith(f"/submissions/{body['id']}/")
+    assert Submission.objects.get(pk=body["id"]).via == "API"
+
+
+def test_scored_submission_has_the_ten_names_and_counts(edition: Edition, owner: User) -> None:
+    client = client_of(owner)
+    submitted = post(client, builders.predictions(edition)).json()
+    builders.score_all()
+    body = client.get(f"/api/v1/submissions/{submitted['id']}").json()
+    assert body["state"] == "SCORED"
+    assert list(body["scores"]) == [
+        "mid",
+        "mid_crucial",
+        "mid_small",
+        "mid_large",
+        "mid_negative",
+        "rte",
+        "rte_crucial",
+        "rte_small",
+        "rte_large",
+        "rte_negative",
+    ]
+    assert body["counts"]["overall"] == builders.N_SEQUENCES
+    assert body["problems"] == []
+    assert body["queue"] is None
+
+
+def test_rejected_submission_lists_problems_with_code_message_and_where(
+    edition: Edition, owner: User
+) -> None:
+    client = client_of(owner)
+    good = json.loads(builders.predictions(edition))
+    submitted = post(client, json.dumps({**good, "7": "x"}).encode()).json()
+    builders.score_all()
+    body = client.get(f"/api/v1/submissions/{submitted['id']}").json()
+    assert body["state"] == "REJECTED"
+    assert body["scores"] is None
+    [problem] = body["problems"]
+    assert set(problem) == {"code", "message", "where"}
+    assert (problem["code"], problem["where"]) == ("not-a-number", "/7")
+
+
+def test_same_bytes_again_are_answered_200_with_the_first(edition: Edition, owner: User) -> None:
+    client = client_of(owner)
+    first = post(client, builders.predictions(edition))
+    again = post(client, builders.predictions(edition))
+    assert (first.status_code, again.status_code) == (201, 200)
+    assert first.json()["id"] == again.json()["id"]
+
+
+def test_list_has_the_teams_submissions_newest_first(edition: Edition, owner: User, teammate: User) -> None:
+    ids = [post(client_of(owner), builders.predictions(edition, factor=f)).json()["id"] for f in (1.1, 1.2)]
+    listed = client_of(teammate).get("/api/v1/submissions").json()
+    assert [row["id"] for row in listed] == ids[::-1]
+
+
+def test_others_submissions_do_not_exist_for_a_stranger(
+    edition: Edition, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    address = f"/api/v1/submissions/{post(client_of(owner), builders.predictions(edition)).json()['id']}"
+    absent = "/api/v1/submissions/00000000-0000-4000-8000-000000000000"
+    assert client_of(teammate).get(address).status_code == 200
+    assert client_of(maintainer).get(address).status_code == 200
+    forbidden = client_of(stranger).get(address)
+    assert forbidden.status_code == 404
+    assert forbidden.content == client_of(stranger).get(absent).content
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "Bearer nonsense",
+        "Bearer tsttc_" + "0" * 64,
+        "Bearer",
+        "Bearer a b",
+        "Bearer \xff\xfe",
+        "Bearer tsttc_" + "0" * 10_000,
+    ],
+)
+def test_bad_token_is_a_clear_401(edition: Edition, header: str) -> None:
+    response = APIClient().get("/api/v1/submissions", HTTP_AUTHORIZATION=header)
+    assert response.status_code == 401
+    assert response.headers["WWW-Authenticate"] == "Bearer"
+    assert response.headers["Content-Type"] == "application/problem+json"
+    assert response.json()["detail"]
+
+
+def test_malformed_token_never_reaches_the_database(db: None, django_assert_num_queries) -> None:
+    with django_assert_num_queries(0):
+        APIClient().get("/api/v1/submissions", HTTP_AUTHORIZATION="Bearer ' or 1=1")
+
+
+def test_without_a_token_nothing_is_taken(edition: Edition) -> None:
+    response = post(client_of(), builders.predictions(edition))
+    assert response.status_code == 401
+    assert not Submission.objects.exists()
+
+
+def test_token_is_hashed_at_rest(owner: User) -> None:
+    token = tokens.create(user=owner, name="CI")
+    row = ApiToken.objects.get()
+    assert token.startswith("tsttc_")
+    assert token not in {row.digest, row.token_key}
+    assert len(row.token_key) == 15
+
+
+@pytest.mark.parametrize(
+    ("fields", "status", "code", "where"),
+    [
+        ({"split": "nope"}, 422, "unknown-split", "split"),
+        ({"split": "val"}, 409, "split-not-open", "split"),
+        ({"method": ""}, 422, "missing-field", "method"),
+        ({"paper_url": "javascript:alert(1)"}, 422, "bad-address", "paper_url"),
+    ],
+)
+def test_refusal_is_a_problem_that_names_its_field(
+    edition: Edition, owner: User, fields: dict[str, str], status: int, code: str, where: str
+) -> None:
+    response = post(client_of(owner), builders.predictions(edition), **fields)
+    body = response.json()
+    assert response.status_code == status
+    assert response.headers["Content-Type"] == "application/problem+json"
+    assert (body["code"], body["problems"][0]["where"], body["status"]) == (code, where, status)
+    assert body["detail"] == body["problems"][0]["message"]
+
+
+def test_request_without_a_file_is_refused(edition: Edition, owner: User) -> None:
+    response = client_of(owner).post("/api/v1/submissions", {"split": "test", "method": "Foo"})
+    assert (response.status_code, response.json()["code"]) == (422, "no-file")
+
+
+def test_other_media_types_are_refused(edition: Edition, owner: User) -> None:
+    response = client_of(owner).post("/api/v1/submissions", {"split": "test"}, format="json")
+    assert response.status_code == 415
+    assert response.headers["Content-Type"] == "application/problem+json"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [b"", b"--x", b"--x\r\nContent-Disposition: form-data; name=file; filename=a\r\n\r\n\x00\xff"],
+)
+def test_broken_multipart_body_is_no_server_error(edition: Edition, owner: User, body: bytes) -> None:
+    response = client_of(owner).generic(
+        "POST", "/api/v1/submissions", body, content_type="multipart/form-data; boundary=x"
+    )
+    assert 400 <= response.status_code < 500
+
+
+def test_announced_excess_is_refused_before_the_body_is_read(edition: Edition, owner: User, settings) -> None:
+    settings.MAX_PREDICTIONS_BYTES = 1000
+
+    class Unread:
+        def read(self, *args: int) -> bytes:
+            raise AssertionError("the body was read")
+
+        readline = read
+
+    response = client_of(owner).generic(
+        "POST",
+        "/api/v1/submissions",
+        b"",
+        content_type="multipart/form-data; boundary=x",
+        CONTENT_LENGTH="5000000",
+        **{"wsgi.input": Unread()},
+    )
+    assert response.status_code == 413
+    assert response.json()["code"] == "too-large"
+    assert response.headers["Connection"] == "close"
+    assert not Submission.objects.exists()

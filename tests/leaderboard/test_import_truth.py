@@ -1,0 +1,96 @@
+"""`ground_truth.import_truth` and its command."""
+
+import stat
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pytest
+from django.core.management import CommandError, call_command
+from django.utils import timezone
+
+from evaluator import Rejected, read_truth
+from leaderboard import files, ground_truth
+from leaderboard.models import AuditEvent, Edition, GroundTruth, Split
+from tests import builders
+
+pytestmark = pytest.mark.usefixtures("benchmark")
+
+
+def test_first_import_opens_and_publishes_edition_one(tmp_path: Path) -> None:
+    edition = builders.import_truth(tmp_path)
+    split = Split.objects.get(name="test")
+    assert (edition.number, edition.protocol) == (1, "tsttc-1")
+    assert split.published_edition == edition
+    assert edition.published_at is not None
+    assert edition.ground_truth.n_sequences == builders.N_SEQUENCES
+    assert edition.ground_truth.counts["overall"] == builders.N_SEQUENCES
+    assert edition.ground_truth.counts["out_of_range"] == 1
+    assert set(AuditEvent.objects.values_list("verb", flat=True)) == {"imported", "published"}
+
+
+def test_values_are_kept_in_the_private_directory_for_their_owner_only(tmp_path: Path) -> None:
+    edition = builders.import_truth(tmp_path)
+    path = ground_truth.values_path(edition.ground_truth_id)
+    assert stat.S_IMODE(path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
+    assert np.array_equal(
+        ground_truth.load(edition.ground_truth_id).ttc_s, read_truth(tmp_path / "truth-test.csv").ttc_s
+    )
+
+
+def test_public_manifest_has_every_column_but_the_time_to_contact(tmp_path: Path) -> None:
+    edition = builders.import_truth(tmp_path)
+    with files.store().open(files.manifest_name(edition.ground_truth.manifest_digest)) as kept:
+        lines = kept.read().decode().splitlines()
+    assert lines[0] == "anno_id,bag_stamp,cam_id,ts,track_id"
+    assert len(lines) == 1 + builders.N_SEQUENCES
+
+
+def test_same_truth_again_is_answered_with_the_edition_that_has_it(tmp_path: Path) -> None:
+    first = builders.import_truth(tmp_path)
+    assert builders.import_truth(tmp_path) == first
+    assert Edition.objects.count() == 1
+
+
+def test_other_truth_for_an_open_split_is_refused(tmp_path: Path) -> None:
+    first = builders.import_truth(tmp_path)
+    with pytest.raises(ground_truth.Refused, match="has test edition 1 with other ground truth"):
+        builders.import_truth(tmp_path, seed=1)
+    assert Split.objects.get(name="test").published_edition == first
+
+
+def test_one_truth_belongs_to_one_split(tmp_path: Path) -> None:
+    builders.import_truth(tmp_path)
+    with pytest.raises(ground_truth.Refused, match="belongs to the split 'test' already"):
+        builders.import_truth(tmp_path, split="val")
+    assert not Edition.objects.filter(split="val").exists()
+
+
+def test_faulty_truth_is_refused_with_its_problems_and_changes_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "bad.csv"
+    path.write_text("anno_id,bag_stamp,cam_id,ts,track_id,ttc\n0,a,1,5,1,nan\n0,a,1,5,1,2.0\n")
+    with pytest.raises(Rejected) as caught:
+        ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
+    assert {"duplicate-ids", "duplicate-natural-keys"} <= {problem.code for problem in caught.value.problems}
+    assert not GroundTruth.objects.exists()
+    assert not Path(ground_truth.values_path("x")).parent.exists()
+
+
+def test_command_says_what_it_imported(tmp_path: Path) -> None:
+    out = StringIO()
+    call_command("import_truth", "test", str(builders.truth_csv(tmp_path / "t.csv")), stdout=out)
+    assert "test edition 1: 120 sequences in 24 recordings" in out.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("split", "name", "message"),
+    [
+        ("nope", "t.csv", "There is no split 'nope'"),
+        ("test", "absent.csv", "was refused; nothing was changed"),
+    ],
+)
+def test_command_fails_in_words(tmp_path: Path, split: str, name: str, message: str) -> None:
+    builders.truth_csv(tmp_path / "t.csv")
+    with pytest.raises(CommandError, match=message):
+        call_command("import_truth", split, str(tmp_path / name))

@@ -1,0 +1,143 @@
+"""`standings.board`: who stands where, and who sees whom."""
+
+import pytest
+from django.contrib.auth.models import AnonymousUser
+from django.utils import timezone
+
+from leaderboard import standings
+from leaderboard.models import Edition, Method, PublishedResult, Split, Submission, User, Visibility
+from tests import builders
+
+ANYBODY = AnonymousUser()
+
+
+def split_called(name: str = "test") -> Split:
+    return Split.objects.select_related("published_edition").get(pk=name)
+
+
+def ranks(board: standings.Board) -> list[tuple[int | None, str]]:
+    return [(entry.rank, entry.method) for entry in board.entries]
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_published_rows_stand_in_rank_order_before_any_submission() -> None:
+    board = standings.board(split=split_called(), viewer=ANYBODY)
+    assert ranks(board) == [
+        (1, "Deep Scale"),
+        (2, "Deep Scale (NeRF)"),
+        (3, "Pixel MSE"),
+        (4, "SOT"),
+        (5, "Detection"),
+    ]
+    assert not board.is_open
+    assert all(entry.kind == "published" and entry.source for entry in board.entries)
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_val_and_test_have_five_published_rows_and_demo_none() -> None:
+    counts = {
+        name: len(standings.board(split=split_called(name), viewer=ANYBODY).entries)
+        for name in ("val", "test", "demo")
+    }
+    assert counts == {"val": 5, "test": 5, "demo": 0}
+
+
+def test_best_and_second_of_each_column_are_marked(edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition, factor=1.0000001), method="Near")
+    builders.score_all()
+    near, deep, *_ = standings.board(split=split_called(), viewer=ANYBODY).entries
+    assert (near.method, near.rank) == ("Near", 1)
+    assert "mid" in near.best
+    assert "mid" in deep.second
+
+
+def test_equal_published_values_share_a_rank_and_the_next_is_skipped(edition: Edition, owner: User) -> None:
+    data = builders.predictions(edition, factor=1.0000001)
+    builders.submit(owner, data, method="A")
+    builders.submit(owner, data, method="B")
+    builders.score_all()
+    board = standings.board(split=split_called(), viewer=ANYBODY)
+    assert ranks(board)[:3] == [(1, "A"), (1, "B"), (3, "Deep Scale")]
+
+
+def test_waiting_and_rejected_submissions_are_not_on_the_board(edition: Edition, owner: User) -> None:
+    builders.submit(owner, b"{}", method="Broken")
+    builders.score_all()
+    builders.submit(owner, builders.predictions(edition), method="Waiting")
+    board = standings.board(split=split_called(), viewer=owner)
+    assert board.n_submissions == 0
+    assert len(board.entries) == 5
+
+
+def test_a_method_is_represented_by_its_best_standing_submission(edition: Edition, owner: User) -> None:
+    best = builders.submit(owner, builders.predictions(edition, factor=1.05))
+    builders.submit(owner, builders.predictions(edition, factor=1.5))
+    builders.score_all()
+
+    def shown() -> list[object]:
+        entries = standings.board(split=split_called(), viewer=ANYBODY).entries
+        return [entry.submission_id for entry in entries if entry.kind == "submission"]
+
+    assert shown() == [best.pk]
+    Submission.objects.filter(pk=best.pk).update(withdrawn_at=timezone.now())
+    assert len(shown()) == 1
+    assert shown() != [best.pk]
+
+
+def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_place(
+    edition: Edition, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition, factor=1.0000001), method="Secret")
+    builders.score_all()
+    Method.objects.update(visibility=Visibility.PRIVATE)
+    without = standings.board(split=split_called(), viewer=ANYBODY)
+    for viewer in (stranger, maintainer):
+        assert standings.board(split=split_called(), viewer=viewer).entries == without.entries
+    for viewer in (owner, teammate):
+        board = standings.board(split=split_called(), viewer=viewer)
+        assert ranks(board)[:2] == [(1, "Deep Scale"), (1, "Secret")]
+        secret = next(entry for entry in board.entries if entry.method == "Secret")
+        assert secret.is_mine
+        assert not secret.best
+        others = [entry for entry in board.entries if entry.method != "Secret"]
+        assert others == list(without.entries)
+
+
+@pytest.mark.parametrize("column", [*standings.SORTABLE, *(f"-{name}" for name in standings.SORTABLE)])
+def test_every_column_sorts_and_ranks_do_not_change(edition: Edition, owner: User, column: str) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    board = standings.board(split=split_called(), viewer=ANYBODY, sort=column)
+    assert sorted(ranks(board)) == sorted(ranks(standings.board(split=split_called(), viewer=ANYBODY)))
+    name = column.removeprefix("-")
+    if name in standings.SCORE_NAMES:
+        values = [entry.scores[name] for entry in board.entries]
+        assert values == sorted(values, reverse=column.startswith("-"))  # type: ignore[type-var]  # all have values
+
+
+def test_a_row_without_the_value_is_last_in_either_direction_and_has_no_rank(
+    benchmark: None, tmp_path, owner: User
+) -> None:
+    result = PublishedResult.objects.get(split="test", slug="sot")
+    result.scores = {**result.scores, "mid": None}
+    result.save()
+    for sort in ("mid", "-mid", "rank"):
+        last = standings.board(split=split_called(), viewer=ANYBODY, sort=sort).entries[-1]
+        assert (last.method, last.rank) == ("SOT", None)
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_unknown_column_is_named_with_what_was_expected() -> None:
+    with pytest.raises(standings.UnknownColumn, match=r"cannot be sorted by 'colour'; expected one of rank"):
+        standings.board(split=split_called(), viewer=ANYBODY, sort="colour")
+
+
+def test_a_board_takes_the_same_few_queries_whatever_its_size(
+    edition: Edition, owner: User, django_assert_max_num_queries
+) -> None:
+    for i in range(8):
+        builders.submit(owner, builders.predictions(edition, factor=1 + i / 10), method=f"M{i}")
+    builders.score_all()
+    split = split_called()
+    with django_assert_max_num_queries(3):
+        assert len(standings.board(split=split, viewer=ANYBODY).entries) == 13

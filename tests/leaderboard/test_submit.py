@@ -1,0 +1,142 @@
+"""`submissions.submit`: what is taken, what is refused, what is kept."""
+
+from datetime import timedelta
+
+import pytest
+from django.core.files.base import ContentFile
+from django.utils import timezone
+
+from leaderboard import files, submissions
+from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Split, Status, Submission, Team, User
+from tests import builders
+
+
+def test_submission_is_stored_queued_and_recorded(edition: Edition, owner: User) -> None:
+    data = builders.predictions(edition)
+    submission = builders.submit(owner, data, note="first try", paper_url="https://example.org/p")
+    assert submission.evaluations.get().status == Status.QUEUED
+    assert submission.method.paper_url == "https://example.org/p"
+    with files.opened_predictions(submission.digest) as kept:
+        assert kept.read() == data
+    assert AuditEvent.objects.filter(verb="submitted", noun_id=submission.pk, actor=owner).count() == 1
+
+
+def test_same_bytes_for_same_split_and_method_are_the_first_submission(edition: Edition, owner: User) -> None:
+    data = builders.predictions(edition)
+    first = builders.submit(owner, data)
+    again = submissions.submit(
+        user=owner,
+        split_name="test",
+        method_name="Foo",
+        upload=ContentFile(data, name="x"),
+        via="API",
+        now=timezone.now(),
+    )
+    assert (again.submission, again.is_new) == (first, False)
+    assert Evaluation.objects.count() == 1
+
+
+def test_teammate_sending_the_same_bytes_gets_the_first_submission(
+    edition: Edition, owner: User, teammate: User
+) -> None:
+    data = builders.predictions(edition)
+    assert builders.submit(owner, data) == builders.submit(teammate, data)
+
+
+def test_same_bytes_for_another_method_are_another_submission(edition: Edition, owner: User) -> None:
+    data = builders.predictions(edition)
+    assert builders.submit(owner, data) != builders.submit(owner, data, method="Bar")
+
+
+def test_withdrawn_bytes_may_be_sent_again(edition: Edition, owner: User) -> None:
+    data = builders.predictions(edition)
+    first = builders.submit(owner, data)
+    Submission.objects.filter(pk=first.pk).update(withdrawn_at=timezone.now())
+    assert builders.submit(owner, data) != first
+
+
+def test_strangers_may_use_the_same_method_name(edition: Edition, owner: User, stranger: User) -> None:
+    data = builders.predictions(edition)
+    assert builders.submit(owner, data).method != builders.submit(stranger, data).method
+
+
+def test_somebody_without_a_name_gets_a_team_that_reveals_no_address(edition: Edition, db: None) -> None:
+    nameless = User.objects.create_user("very.private@example.org", "correct horse")
+    team = builders.submit(nameless, builders.predictions(edition)).method.team
+    assert team.name == f"Team {nameless.pk}"
+
+
+def test_two_people_of_one_name_are_two_teams(edition: Edition, owner: User) -> None:
+    namesake = User.objects.create_user("other@example.org", "correct horse", name=owner.name)
+    data = builders.predictions(edition)
+    teams = {builders.submit(owner, data).method.team.name, builders.submit(namesake, data).method.team.name}
+    assert teams == {"Owls", "Owls 2"}
+
+
+def test_what_is_said_of_a_method_later_replaces_what_was_said(edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition), description="old", code_url="https://example.org/c")
+    builders.submit(owner, builders.predictions(edition, factor=1.2), description="new")
+    method = Method.objects.get()
+    assert (method.description, method.code_url) == ("new", "https://example.org/c")
+
+
+@pytest.mark.parametrize(
+    ("fields", "code", "field"),
+    [
+        ({"split": "nope"}, "unknown-split", "split"),
+        ({"split": "val"}, "split-not-open", "split"),
+        ({"method": "   "}, "missing-field", "method"),
+        ({"method": "x" * 81}, "text-too-long", "method"),
+        ({"method": "a\x00b"}, "bad-character", "method"),
+        ({"method": "a\ud800b"}, "bad-character", "method"),
+        ({"paper_url": "javascript:alert(1)"}, "bad-address", "paper_url"),
+        ({"code_url": "ftp://example.org"}, "bad-address", "code_url"),
+        ({"note": "x" * 501}, "text-too-long", "note"),
+    ],
+)
+def test_refused_input_names_its_field_and_leaves_nothing(
+    edition: Edition, owner: User, fields: dict[str, str], code: str, field: str
+) -> None:
+    with pytest.raises(submissions.Refused) as caught:
+        builders.submit(owner, builders.predictions(edition), **fields)
+    assert (caught.value.code, caught.value.field) == (code, field)
+    assert not Submission.objects.exists()
+    assert not Method.objects.exists()
+    assert not Team.objects.exists()
+
+
+def test_absent_file_is_refused(edition: Edition, owner: User) -> None:
+    with pytest.raises(submissions.Refused, match="No prediction file was sent"):
+        submissions.submit(
+            user=owner, split_name="test", method_name="Foo", upload=None, via="API", now=timezone.now()
+        )
+
+
+def test_file_over_the_limit_is_refused_with_both_sizes(edition: Edition, owner: User, settings) -> None:
+    settings.MAX_PREDICTIONS_BYTES = 1000
+    with pytest.raises(submissions.TooLarge, match=r"has 1,001 bytes; expected at most 1,000"):
+        builders.submit(owner, b" " * 1001)
+    assert not Submission.objects.exists()
+
+
+def test_split_outside_its_time_says_so_with_time_and_zone(edition: Edition, owner: User) -> None:
+    now = timezone.now()
+    Split.objects.filter(pk="test").update(closes_at=now - timedelta(days=1))
+    with pytest.raises(submissions.Refused, match=r"closed at \d{4}-\d\d-\d\d \d\d:\d\d UTC"):
+        builders.submit(owner, builders.predictions(edition))
+    Split.objects.filter(pk="test").update(closes_at=None, opens_at=now + timedelta(days=1))
+    with pytest.raises(submissions.Refused, match=r"open at \d{4}-\d\d-\d\d \d\d:\d\d UTC"):
+        builders.submit(owner, builders.predictions(edition))
+
+
+def test_file_name_is_shown_never_used(edition: Edition, owner: User) -> None:
+    submitted = submissions.submit(
+        user=owner,
+        split_name="test",
+        method_name="Foo",
+        upload=ContentFile(builders.predictions(edition), name="x"),
+        via="API",
+        now=timezone.now(),
+        filename="..\\..\\etc/pass\x00wd",
+    )
+    assert submitted.submission.filename == "passwd"
