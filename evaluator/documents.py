@@ -23,7 +23,7 @@ MAX_META_BYTES: Final = 64 * 1024
 FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 
 _STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+"', re.DOTALL)
-_BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
+BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
 
 class Members(list[tuple[str, object]]):
@@ -52,7 +52,7 @@ def parse(data: bytes) -> object:
     A byte order mark and Python's `NaN`, `Infinity` and `-Infinity` are accepted. Numbers beyond the range of
     float64 are ±Infinity, as in IEEE 754.
     """
-    body = data.removeprefix(_BYTE_ORDER_MARK)
+    body = data.removeprefix(BYTE_ORDER_MARK)
     try:
         text = body.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -25,6 +25,7 @@ from evaluator.problems import Findings, quoted, reject
 from evaluator.protocol import INTERVALS
 from evaluator.scale import Floats, scale_ratio_10hz
 from evaluator.tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
+from evaluator.words import KeyWords
 
 Integers = NDArray[np.int64]
 
@@ -86,6 +87,11 @@ class Manifest:
     def row_of_natural_key(self) -> dict[str, int]:
         """The row of every natural key."""
         return {key: row for row, key in enumerate(self.natural_keys)}
+
+    @cached_property
+    def key_words(self) -> KeyWords | None:
+        """The anno_ids as the words of a file, where they are short enough."""
+        return KeyWords.of(self.anno_id)
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:

@@ -1,0 +1,87 @@
+"""The anno_ids of a manifest as the 64-bit words in which they stand in a prediction file."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+Words = NDArray[np.uint64]
+Rows = NDArray[np.intp]
+
+WORD_BYTES: Final = 8
+MAX_DIGITS: Final = 6
+
+
+def _mask(n_digits: int) -> int:
+    n_bytes = min(n_digits + 3, WORD_BYTES)
+    return (2**64 - 1) ^ ((1 << 8 * (WORD_BYTES - n_bytes)) - 1)
+
+
+_MASKS: Final = np.array([0, *map(_mask, range(1, MAX_DIGITS + 1))], dtype=np.uint64)
+"""By number of digits: selects the bytes of a word that belong to the key, the last ones."""
+
+_DIGITS: Final = np.array(
+    [0, *((2**48 - 1) ^ (2 ** (8 * (MAX_DIGITS - n)) - 1) for n in range(1, MAX_DIGITS + 1))], dtype=np.uint64
+)
+"""By number of digits: selects them."""
+
+
+class KeyWords:
+    """Every key with its punctuation, `"123":`, as the last bytes of a little-endian word, zeros before them.
+
+    Keys have up to six digits. One of six leaves no room for its opening quotation mark; `fits` tells whether
+    all marks are in their words.
+    """
+
+    def __init__(self, anno_id: NDArray[np.int64]) -> None:
+        self._anno_id = anno_id
+        texts = [
+            f'"{number}":'.encode()[-WORD_BYTES:].rjust(WORD_BYTES, b"\0") for number in anno_id.tolist()
+        ]
+        self._words: Words = np.frombuffer(b"".join(texts), dtype="<u8")
+        self._n_digits = np.searchsorted(10 ** np.arange(1, MAX_DIGITS), anno_id, side="right") + 1
+        self._masks: Words = _MASKS[self._n_digits]
+        self.fits = int(self._n_digits.max()) < MAX_DIGITS
+
+    @classmethod
+    def of(cls, anno_id: NDArray[np.int64]) -> KeyWords | None:
+        """The words of these ids, or None when one has more than six digits."""
+        return cls(anno_id) if int(anno_id.max()) < 10**MAX_DIGITS else None
+
+    def find(self, windows: Words, n_digits: Rows) -> tuple[Rows | slice, Words] | None:
+        """Match the words that end with the keys of a file, (n,), whose keys have `n_digits` characters.
+
+        Returns the row of each key (a slice when they stand in the manifest's order) and the masks that
+        select the keys; or None unless every row is matched once.
+        """
+        if np.array_equal(n_digits, self._n_digits) and np.array_equal(windows & self._masks, self._words):
+            return slice(None), self._masks
+        if int(n_digits.min()) < 1 or int(n_digits.max()) > MAX_DIGITS:
+            return None
+        masks = _MASKS[n_digits]
+        rows = self._row_of_number[np.minimum(_numbers(windows, n_digits), len(self._row_of_number) - 1)]
+        seen = np.zeros(len(self._words), dtype=bool)
+        seen[rows] = True
+        # Whatever stood in the file, it is a key only if it is the very word of the row it led to.
+        if seen.all() and np.array_equal(windows & masks, self._words[rows]):
+            return rows, masks
+        return None
+
+    @cached_property
+    def _row_of_number(self) -> Rows:
+        rows = np.zeros(int(self._anno_id.max()) + 1, dtype=np.intp)
+        rows[self._anno_id] = np.arange(len(self._anno_id))
+        return rows
+
+
+def _numbers(windows: Words, n_digits: Rows) -> Words:
+    """The decimal numbers in the words, all digits at once; words without a number give any number."""
+    x = (windows & _DIGITS[n_digits]) << np.uint64(16)
+    # Pairs of digits, then of two digits, then of four: each product puts high · base + low into the upper
+    # half.
+    x = ((x & np.uint64(0x0F0F0F0F0F0F0F0F)) * np.uint64(10 * 2**8 + 1)) >> np.uint64(8)
+    x = ((x & np.uint64(0x00FF00FF00FF00FF)) * np.uint64(100 * 2**16 + 1)) >> np.uint64(16)
+    return ((x & np.uint64(0x0000FFFF0000FFFF)) * np.uint64(10_000 * 2**32 + 1)) >> np.uint64(32)
