@@ -1,0 +1,73 @@
+"""How times, counts and sizes are written on every page."""
+
+from datetime import UTC, datetime
+
+from django import template
+from django.utils.html import format_html
+from django.utils.safestring import SafeString
+
+register = template.Library()
+
+
+@register.filter
+def grouped(value: int | None) -> str:
+    """A count with its thousands set apart.
+
+    >>> grouped(28600)
+    '28,600'
+    """
+    return "" if value is None else f"{value:,}"
+
+
+@register.filter
+def size(n_bytes: int) -> str:
+    """A size in the largest fitting unit.
+
+    >>> size(812), size(81_234), size(20_000_000)
+    ('812 bytes', '81.2 KB', '20.0 MB')
+    """
+    if n_bytes < 1000:
+        return f"{n_bytes} bytes"
+    return f"{n_bytes / 1e3:.1f} KB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.1f} MB"
+
+
+@register.filter
+def duration(seconds: float | None) -> str:
+    """A span of time, as exactly as an estimate deserves.
+
+    >>> duration(0.3), duration(41.8), duration(150), duration(9000)
+    ('1 s', '42 s', '3 min', '3 h')
+    """
+    if seconds is None:
+        return ""
+    if seconds < 90:
+        return f"{max(1, round(seconds))} s"
+    return f"{-(-seconds // 60):.0f} min" if seconds < 5400 else f"{-(-seconds // 3600):.0f} h"
+
+
+@register.simple_tag
+def day(at: datetime) -> SafeString:
+    """The day, with time and zone on hover."""
+    return _time(at, "%Y-%m-%d")
+
+
+@register.simple_tag
+def moment(at: datetime) -> SafeString:
+    """Day and minute, with seconds and zone on hover."""
+    return _time(at, "%Y-%m-%d %H:%M UTC")
+
+
+@register.simple_tag
+def clock(at: datetime) -> SafeString:
+    """The time of day to the second, with day and zone on hover."""
+    return _time(at, "%H:%M:%S")
+
+
+def _time(at: datetime, pattern: str) -> SafeString:
+    at = at.astimezone(UTC)
+    return format_html(
+        '<time datetime="{}" title="{}">{}</time>',
+        at.isoformat(timespec="seconds"),
+        f"{at:%Y-%m-%d %H:%M:%S} UTC",
+        f"{at:{pattern}}",
+    )

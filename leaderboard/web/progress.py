@@ -1,0 +1,89 @@
+"""A submission's progress in words: the line of state, the result, and what was truncated."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from leaderboard.models import Status
+from leaderboard.submissions import Progress
+from leaderboard.templatetags.board import duration, grouped
+from leaderboard.web.tables import ResultGroup, result_groups
+
+_ENDS: Final = {
+    Status.SCORED: "Scored",
+    Status.REJECTED: "Rejected",
+    Status.SYSTEM_ERROR: "Failed, by our fault",
+    Status.CANCELLED: "Cancelled",
+}
+
+
+@dataclass(frozen=True)
+class Step:
+    """One station of the line. `state` is "done", "now" or "ahead"."""
+
+    label: str
+    state: str
+    at: datetime | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the template places. `seen` changes exactly when the line of state does."""
+
+    steps: tuple[Step, ...]
+    seen: str
+    groups: tuple[ResultGroup, ...]
+    truncation: str
+
+
+def shown(progress: Progress) -> Shown:
+    """A progress, ready to be drawn."""
+    return Shown(
+        steps=steps(progress),
+        seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}",
+        groups=result_groups(progress.scores, progress.counts) if progress.scores else (),
+        truncation=truncation(progress.truncated),
+    )
+
+
+def steps(progress: Progress) -> tuple[Step, ...]:
+    """Received → queued → running → how it ended (or is going to)."""
+    is_queued, is_running = progress.state == Status.QUEUED, progress.state == Status.RUNNING
+    received = Step("Received", "done", progress.received_at)
+    if is_queued:
+        queued = Step("Queued", "now", progress.queued_at, waiting(progress))
+        return received, queued, Step("Running", "ahead"), Step("Scored", "ahead")
+    queued = Step("Queued", "done", progress.queued_at)
+    running = Step("Running", "now" if is_running else "done", progress.started_at)
+    if is_running:
+        return received, queued, running, Step("Scored", "ahead")
+    end = Step(_ENDS[Status(progress.state)], "now", progress.finished_at)
+    return (received, queued, running, end) if progress.started_at else (received, queued, end)
+
+
+def waiting(progress: Progress) -> str:
+    """How many go first, and about how long that takes."""
+    if progress.n_ahead is None:
+        return ""
+    place = f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
+    return f"{place}, about {duration(progress.estimate_s)}" if progress.estimate_s is not None else place
+
+
+def truncation(truncated: Mapping[str, int]) -> str:
+    """Which predictions were moved to a boundary of the allowed range, in a sentence.
+
+    >>> truncation({"-20": 0, "0.05": 1, "20": 1200})
+    '1,201 predictions lay outside the allowed range and were truncated: 1 to 0.05 s, 1,200 to 20 s.'
+    >>> truncation({"-20": 0})
+    'No prediction was truncated.'
+    """
+    moved = {boundary: n for boundary, n in truncated.items() if n}
+    n_moved = sum(moved.values())
+    if not moved:
+        return "No prediction was truncated."
+    where = ", ".join(f"{grouped(n)} to {boundary.replace('-', '−')} s" for boundary, n in moved.items())
+    subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
+    verb = "was" if n_moved == 1 else "were"
+    return f"{subject} lay outside the allowed range and {verb} truncated: {where}."

@@ -1,0 +1,119 @@
+"""The pages' doors: each view calls one verb and hands what it says to a template."""
+
+from typing import Any, cast
+from uuid import UUID
+
+from django.contrib import messages
+from django.contrib.auth.decorators import login_required
+from django.core.paginator import Paginator
+from django.db.models import Prefetch
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from leaderboard import methods, standings
+from leaderboard import submissions as verbs
+from leaderboard.models import Evaluation, Method, Split, Submission, User
+from leaderboard.web import reference, tables
+from leaderboard.web.forms import SubmissionForm
+from leaderboard.web.progress import shown
+
+HOME_SPLIT = "test"
+PER_PAGE = 50
+# htmx takes this as "do not ask again".
+STOP_POLLING = 286
+
+
+@require_safe
+def home(request: HttpRequest) -> HttpResponse:
+    """The board that papers quote."""
+    return board(request, HOME_SPLIT)
+
+
+@require_safe
+def board(request: HttpRequest, split: str) -> HttpResponse:
+    """A split's board, in the order that `?sort=` asks for."""
+    found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+    try:
+        shown = standings.board(split=found, viewer=request.user, sort=request.GET.get("sort", "rank"))
+    except standings.UnknownColumn as fault:
+        return render(request, "400.html", {"sentence": str(fault)}, status=400)
+    return render(request, "board.html", {"board": shown, "table": tables.board_table(shown)})
+
+
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def submit(request: HttpRequest) -> HttpResponse:
+    """Take a prediction file."""
+    user = cast("User", request.user)
+    form = SubmissionForm.for_user(user, request)
+    if request.method == "POST" and form.is_valid():
+        try:
+            submitted = verbs.submit(user=user, now=timezone.now(), **form.submission())
+        except verbs.Refused as refusal:
+            form.refuse(refusal)
+        else:
+            if not submitted.is_new:
+                messages.info(request, "This very file had been submitted before; this is what came of it.")
+            return redirect("submission", submitted.submission.pk)
+    return render(request, "submit.html", {"form": form}, status=422 if form.errors else 200)
+
+
+@login_required
+@never_cache
+@require_safe
+def submissions(request: HttpRequest) -> HttpResponse:
+    """What the reader's own team has sent."""
+    evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
+    sent = (
+        Submission.objects.filter(method__team__memberships__user=cast("User", request.user))
+        .select_related("method", "split", "submitted_by")
+        .prefetch_related(Prefetch("evaluations", evaluations))
+    )
+    page = Paginator(sent, PER_PAGE).get_page(request.GET.get("page"))
+    return render(request, "submissions.html", {"page": page, "rows": tables.submission_rows(page)})
+
+
+@login_required
+@never_cache
+@require_safe
+def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
+    """One submission: its state, then its result or its problems."""
+    return render(request, "submission.html", _evaluation(request, submission_id))
+
+
+@login_required
+@never_cache
+@require_safe
+def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
+    """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more."""
+    context = _evaluation(request, submission_id)
+    if request.GET.get("seen") == context["shown"].seen:
+        return HttpResponse(status=204)
+    status = STOP_POLLING if context["progress"].is_final else 200
+    return render(request, "submission_state.html", context | {"is_fragment": True}, status=status)
+
+
+@require_safe
+def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
+    """A method: what it is, and what it achieved on each split."""
+    rows = Method.objects.visible_to(request.user).select_related("team").distinct()
+    found = get_object_or_404(rows, pk=method_id)
+    results = methods.results(method=found, viewer=request.user)
+    return render(request, "method.html", {"method": found, "results": tables.method_results(results)})
+
+
+@require_safe
+def docs(request: HttpRequest) -> HttpResponse:
+    """How to submit, the file's format, the errors, the API."""
+    return render(request, "docs.html", reference.docs())
+
+
+def _evaluation(request: HttpRequest, submission_id: UUID) -> dict[str, Any]:
+    rows = Submission.objects.visible_to(request.user).select_related("method__team", "split", "submitted_by")
+    found = get_object_or_404(rows, pk=submission_id)
+    progress = verbs.progress(found)
+    return {"submission": found, "progress": progress, "shown": shown(progress)}
