@@ -11,10 +11,10 @@ import sys
 
 import click
 
-from evaluator.cli.board import board
 from evaluator.cli.connection import version
 from evaluator.cli.failures import INTERRUPTED, Failure
 from evaluator.cli.offline import check, manifest, score
+from evaluator.cli.standings import board
 from evaluator.cli.submissions import status, submit
 
 __all__ = ["main"]

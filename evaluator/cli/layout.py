@@ -44,7 +44,7 @@ def printable(text: str) -> str:
     >>> print(printable("Foo\\x1b[2J"))
     Foo\\x1b[2J
     """
-    return "".join(c if c.isprintable() or c == "\n" else ascii(c)[1:-1] for c in text)
+    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text)
 
 
 def aligned(rows: Sequence[Sequence[Cell]], *, align: str) -> list[str]:
@@ -90,7 +90,7 @@ def _styled(cell: Cell, text: str) -> str:
     if not (cell.is_bold or cell.is_underlined):
         return text
     bare = text.strip()  # the padding is not underlined
-    styled = click.style(bare, bold=cell.is_bold, underline=cell.is_underlined)
+    styled = click.style(bare, bold=cell.is_bold or None, underline=cell.is_underlined or None)
     return text.replace(bare, styled, 1)
 
 

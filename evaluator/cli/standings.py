@@ -66,7 +66,7 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
     lines = _table(found.entries, texts=("team", "date"), scores=SCORE_NAMES)
     if width is not None and max(width_of(click.unstyle(line)) for line in lines) > width:
         lines = _table(found.entries, texts=(), scores=("mid", "rte"))
-        lines += ["", "The terminal is too narrow for all columns; a pipe or --json gets them."]
+        lines += ["", "Too narrow for all columns; a pipe or --json gets them."]
     yield from lines
 
 
