@@ -56,8 +56,8 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     method: str
     scores: dict[str, float | None]
     rank: int | None = None
-    team: str = ""
-    date: str = ""
+    team: str | None = None
+    date: str | None = None
     kind: str = "submission"
 
 

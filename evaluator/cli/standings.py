@@ -78,7 +78,7 @@ def _table(entries: Sequence[BoardEntry], *, texts: Sequence[str], scores: Seque
     marks = {name: best_and_second([entry.scores.get(name) for entry in entries]) for name in scores}
     for i, entry in enumerate(entries):
         row = [Cell(NO_VALUE if entry.rank is None else str(entry.rank)), Cell(printable(entry.method))]
-        row += [Cell(_team(entry) if name == "team" else printable(entry.date)) for name in texts]
+        row += [Cell(_team(entry) if name == "team" else printable(entry.date or "")) for name in texts]
         values = _values(entry, scores=scores)
         for name, value in zip(scores, values, strict=True):
             best, second = marks[name]
@@ -89,10 +89,11 @@ def _table(entries: Sequence[BoardEntry], *, texts: Sequence[str], scores: Seque
 
 def _team(entry: BoardEntry) -> str:
     """The team; for a row printed in a paper its authors, and that it was published."""
+    team = entry.team or ""
     if entry.kind != "published":
-        return printable(entry.team)
-    first, *others = entry.team.split(",")
-    authors = f"{first.split()[-1]} et al." if others and first.split() else entry.team
+        return printable(team)
+    first, *others = team.split(",")
+    authors = f"{first.split()[-1]} et al." if others and first.split() else team
     return printable(f"{authors} (published)")
 
 

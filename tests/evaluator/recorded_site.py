@@ -29,6 +29,16 @@ class Reply:
         return self.body if isinstance(self.body, bytes) else json.dumps(self.body).encode()
 
 
+def problem(detail: str, *, code: str = "x", where: str = "") -> dict[str, Any]:
+    """An error as the API words it: the sentence as detail and as the one problem."""
+    return {
+        "title": "Title",
+        "detail": detail,
+        "code": code,
+        "problems": [{"code": code, "message": detail, "where": where}],
+    }
+
+
 @dataclass(frozen=True)
 class Request:
     method: str

@@ -10,10 +10,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 from evaluator import Rejected, evaluate, read_predictions, read_truth
-from evaluator.cli import main
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -25,16 +24,6 @@ TRUTH = EXAMPLES / "truth.csv"
 MANIFEST = EXAMPLES / "manifest.csv"
 
 Tsttc = Callable[..., Result]
-
-
-@pytest.fixture
-def tsttc() -> Tsttc:
-    """Run the command in this process."""
-
-    def run(*arguments: object, stdin: bytes = b"") -> Result:
-        return CliRunner().invoke(main, list(map(str, arguments)), input=stdin, prog_name="tsttc")
-
-    return run
 
 
 def problems_of(path: Path) -> list[str]:

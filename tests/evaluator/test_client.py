@@ -40,12 +40,6 @@ class FakeTime:
 
 
 @pytest.fixture
-def site() -> Iterator[RecordedSite]:
-    with RecordedSite() as running:
-        yield running
-
-
-@pytest.fixture
 def clock() -> FakeTime:
     return FakeTime()
 

@@ -1,0 +1,35 @@
+"""What the tests of the command line share: the command itself, and a server to speak to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from click.testing import CliRunner, Result
+
+from evaluator.cli import main
+from tests.evaluator.recorded_site import RecordedSite
+
+
+@pytest.fixture
+def tsttc() -> Callable[..., Result]:
+    """Run the command in this process."""
+
+    def run(*arguments: object, stdin: bytes = b"") -> Result:
+        return CliRunner().invoke(main, list(map(str, arguments)), input=stdin, prog_name="tsttc")
+
+    return run
+
+
+@pytest.fixture
+def site() -> Iterator[RecordedSite]:
+    """A server that gives recorded answers."""
+    with RecordedSite() as running:
+        yield running
+
+
+@pytest.fixture
+def at_site(site: RecordedSite, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The command speaks to the recorded site, with a token."""
+    monkeypatch.setenv("TSTTC_URL", site.url)
+    monkeypatch.setenv("TSTTC_TOKEN", "secret-token")
