@@ -12,8 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+import numpy as np
 from django.core.files.base import ContentFile, File
 from django.core.files.storage import FileSystemStorage, Storage, storages
+from numpy.typing import NDArray
 
 CHUNK_BYTES = 1 << 20
 
@@ -86,6 +88,32 @@ def keep_predictions(upload: File) -> StoredFile:
         upload.seek(0)
         store().save(name, upload)
     return kept
+
+
+def aligned_name(*, manifest_digest: str, digest: str) -> str:
+    """Where the values of a prediction file are kept, aligned with a manifest."""
+    manifest = manifest_digest.removeprefix("sha256:")
+    return f"aligned/{manifest[:16]}/{digest.removeprefix('sha256:')}.f8"
+
+
+def keep_aligned(*, manifest_digest: str, digest: str, ttc_s: NDArray[np.float64]) -> None:
+    """Keep a file's values in seconds as little-endian float64, in the manifest's order.
+
+    They were checked when the file was read, so scoring them again needs neither its bytes nor a child.
+    """
+    name = aligned_name(manifest_digest=manifest_digest, digest=digest)
+    if not store().exists(name):
+        store().save(name, ContentFile(ttc_s.astype("<f8", copy=False).tobytes()))
+
+
+def load_aligned(*, manifest_digest: str, digest: str, n_sequences: int) -> NDArray[np.float64] | None:
+    """A file's values in seconds, shape (n_sequences,); None if they are not kept."""
+    try:
+        with store().open(aligned_name(manifest_digest=manifest_digest, digest=digest), "rb") as kept:
+            ttc_s = np.frombuffer(kept.read(), dtype="<f8")
+    except OSError:
+        return None
+    return ttc_s if ttc_s.shape == (n_sequences,) else None
 
 
 def keep_manifest(*, digest: str, csv: bytes) -> None:

@@ -12,6 +12,7 @@ lease while it works; and finishes by compare-and-set on all three, so the resul
 dead (a zombie) changes nothing. All times are the database's: `Now()` is evaluated there, never here.
 """
 
+import logging
 import random
 import uuid
 from collections.abc import Mapping, Sequence
@@ -104,7 +105,8 @@ def enqueue(
         defaults={"priority": priority, "queued_at": Now(), "due_at": Now()},
     )
     if is_new:
-        transaction.on_commit(lambda: nudge(evaluation.pk))
+        # Robust: the rows are committed by then, and nothing may turn that into a failure.
+        transaction.on_commit(lambda: nudge(evaluation.pk), robust=True)
     return evaluation
 
 
@@ -119,10 +121,11 @@ def nudge(evaluation_id: uuid.UUID) -> None:
 # --- a worker's verbs ------------------------------------------------------------------------------------
 
 
-def claim(*, lease_s: float, wall_s: float, limit: int = 1) -> list[Lease]:
+def claim(*, lease_s: float, wall_s: float, limit: int = 1, rescored_in: int | None = None) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
-    Two workers never get the same one: PostgreSQL skips rows that another claim holds, SQLite has one writer.
+    With `rescored_in`, only what is re-scored in the edition of that key. Two workers never get the same one:
+    PostgreSQL skips rows that another claim holds, SQLite has one writer.
     """
     token = uuid.uuid4()
     with transaction.atomic():
@@ -131,6 +134,8 @@ def claim(*, lease_s: float, wall_s: float, limit: int = 1) -> list[Lease]:
             .filter(status=Status.QUEUED, due_at__lte=Now())
             .order_by("priority", "queued_at")
         )
+        if rescored_in is not None:
+            waiting = waiting.filter(edition=rescored_in, priority=Evaluation.PRIORITY_RESCORE)
         ids = list(waiting.values_list("pk", flat=True)[:limit])
         if not ids:
             return []
@@ -142,8 +147,9 @@ def claim(*, lease_s: float, wall_s: float, limit: int = 1) -> list[Lease]:
             deadline_at=_after(wall_s),
             leased_until=_after(min(lease_s, wall_s)),
         )
-        rows = Evaluation.objects.filter(pk__in=ids, lease_token=token).values_list("pk", "attempt")
-        return [Lease(evaluation_id=pk, attempt=attempt, token=token) for pk, attempt in rows]
+        claimed = Evaluation.objects.filter(pk__in=ids, lease_token=token)
+        attempts = dict(claimed.values_list("pk", "attempt"))
+        return [Lease(evaluation_id=pk, attempt=attempts[pk], token=token) for pk in ids if pk in attempts]
 
 
 def _held(lease: Lease) -> QuerySet[Evaluation]:
@@ -169,36 +175,68 @@ def finalise(lease: Lease, outcome: Outcome) -> bool:
     Returns True if this call wrote it, False if an earlier call of the same lease had (its COMMIT succeeded
     and the answer was lost). Raises `LostRace` if the lease is no longer valid: nothing is written then.
     """
-    if outcome.status not in (Status.SCORED, Status.REJECTED):
-        raise ValueError(f"a run ends as SCORED or REJECTED, not as {outcome.status}")
-    with transaction.atomic():
-        written = _held(lease).update(
-            status=outcome.status,
-            finished_at=Now(),
-            finished_attempt=F("attempt"),
-            report=outcome.report,
-            report_digest=outcome.report_digest,
-            problems=list(outcome.problems),
-            n_problems=outcome.n_problems,
-            last_error="",
-        )
-        if written:
-            Score.objects.bulk_create(
-                Score(evaluation_id=lease.evaluation_id, metric=metric, interval=interval, value=value)
-                for (metric, interval), value in outcome.scores.items()
-            )
-            audit.record(
-                verb=outcome.status.lower(),
-                noun="Evaluation",
-                noun_id=lease.evaluation_id,
-                details={"attempt": lease.attempt},
-            )
-            return True
+    written = finalise_many([(lease, outcome)])
+    if written:
+        return True
     if Evaluation.objects.filter(
         pk=lease.evaluation_id, finished_attempt=lease.attempt, lease_token=lease.token, status=outcome.status
     ).exists():
         return False
     raise LostRace(f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer the valid one")
+
+
+def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
+    """Write many outcomes in one transaction. Returns the evaluations that were written.
+
+    Those whose lease is no longer valid are left alone: somebody else decides them, or this worker had
+    already and lost the answer.
+    """
+    for _, outcome in outcomes:
+        if outcome.status not in (Status.SCORED, Status.REJECTED):
+            raise ValueError(f"a run ends as SCORED or REJECTED, not as {outcome.status}")
+    with transaction.atomic():
+        held = _locked([lease for lease, _ in outcomes])
+        decided = [(lease, outcome) for lease, outcome in outcomes if lease.evaluation_id in held]
+        for status in (Status.SCORED, Status.REJECTED):
+            ids = [lease.evaluation_id for lease, outcome in decided if outcome.status is status]
+            Evaluation.objects.filter(pk__in=ids, status=Status.RUNNING).update(
+                status=status, finished_at=Now(), finished_attempt=F("attempt"), last_error=""
+            )
+        Evaluation.objects.bulk_update(
+            [
+                Evaluation(
+                    pk=lease.evaluation_id,
+                    report=outcome.report,
+                    report_digest=outcome.report_digest,
+                    problems=list(outcome.problems),
+                    n_problems=outcome.n_problems,
+                )
+                for lease, outcome in decided
+            ],
+            ["report", "report_digest", "problems", "n_problems"],
+        )
+        Score.objects.bulk_create(
+            Score(evaluation_id=lease.evaluation_id, metric=metric, interval=interval, value=value)
+            for lease, outcome in decided
+            for (metric, interval), value in outcome.scores.items()
+        )
+        audit.record_many(
+            (outcome.status.lower(), "Evaluation", lease.evaluation_id, {"attempt": lease.attempt})
+            for lease, outcome in decided
+        )
+    return {lease.evaluation_id for lease, _ in decided}
+
+
+def _locked(leases: Sequence[Lease]) -> set[uuid.UUID]:
+    """The evaluations that are still these leases' to decide, locked until the transaction ends."""
+    rows = (
+        Evaluation.objects.select_for_update()
+        .filter(pk__in=[lease.evaluation_id for lease in leases], status=Status.RUNNING)
+        .order_by("pk")  # every batch locks in the same order, so that two cannot wait for each other
+        .values_list("pk", "attempt", "lease_token")
+    )
+    valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
+    return {row[0] for row in rows if row in valid}
 
 
 def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> Status:
@@ -221,14 +259,14 @@ def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) 
 def release_expired(*, rng: random.Random) -> int:
     """Take back what dead workers hold. Returns how many were taken back.
 
-    A run that reached its own deadline overran on this file: poison. One whose lease ran out earlier lost its
-    worker: infrastructure.
+    A worker that renewed its lease up to the deadline overran on this file: poison. One whose lease ran out
+    earlier vanished: infrastructure. What the clock says now is no evidence, since a sweep may come late.
     """
     with transaction.atomic():
         expired = list(
             Evaluation.objects.select_for_update(skip_locked=True)
             .filter(status=Status.RUNNING, leased_until__lt=Now())
-            .annotate(overran=Q(deadline_at__lte=Now()))
+            .annotate(overran=Q(leased_until__gte=F("deadline_at")))
         )
         for evaluation in expired:
             overran: bool = evaluation.overran
@@ -270,10 +308,12 @@ def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.
     Evaluation.objects.filter(pk=evaluation.pk, status=Status.RUNNING, attempt=evaluation.attempt).update(
         status=status, **changes
     )
-    log.warning(
+    log.log(
+        logging.ERROR if exhausted else logging.WARNING,
         "evaluation_struck",
         submission_id=str(evaluation.submission_id),
         evaluation_id=str(evaluation.pk),
+        attempt=evaluation.attempt,
         strike=strike.value,
         reason=reason,
         status=status.value,
@@ -315,4 +355,4 @@ def retry(*, evaluation: Evaluation, actor: User, reason: str = "") -> None:
         audit.record(
             verb="retried", noun="Evaluation", noun_id=evaluation.pk, actor=actor, details={"reason": reason}
         )
-        transaction.on_commit(lambda: nudge(evaluation.pk))
+        transaction.on_commit(lambda: nudge(evaluation.pk), robust=True)

@@ -3,36 +3,101 @@
 import hashlib
 import random
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import structlog
 from django.conf import settings
 from django.db import InterfaceError, OperationalError, connection
 
 import evaluator
-from evaluator import Rejected, Report, published
+from evaluator import GroundTruth, Predictions, Rejected, Report, published
 from evaluator.protocol import get_protocol
+from evaluator.scoring import Scorer
 from leaderboard import files, ground_truth, lifecycle, quarantine
 from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
 from leaderboard.models import Evaluation, Status
 
 log = structlog.get_logger(__name__)
 
+RESCORE_BATCH = 50
 FINALISE_ATTEMPTS = 8
 MAX_STORED_PROBLEMS = 100
 
 
 def run_next(*, rng: random.Random) -> bool:
-    """Claim one evaluation and decide it. False: nothing was waiting."""
+    """Claim what is most urgent and decide it: one live submission, or a batch of an edition's re-scoring.
+
+    False: nothing was waiting.
+    """
     leases = lifecycle.claim(lease_s=settings.LEASE_S, wall_s=settings.WALL_S)
+    if not leases:
+        return False
+    first = _evaluations(leases)[0]
+    if first.priority == Evaluation.PRIORITY_RESCORE:
+        leases += lifecycle.claim(
+            lease_s=settings.LEASE_S,
+            wall_s=settings.WALL_S,
+            limit=RESCORE_BATCH - 1,
+            rescored_in=first.edition_id,
+        )
+        leases = rescore(leases)
     for lease in leases:
         run(lease, rng=rng)
-    return bool(leases)
+    return True
+
+
+def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
+    ids = [lease.evaluation_id for lease in leases]
+    found = Evaluation.objects.select_related("submission", "edition__ground_truth").in_bulk(ids)
+    return [found[pk] for pk in ids]
+
+
+def rescore(leases: Sequence[Lease]) -> list[Lease]:
+    """Score a batch of one edition from values that are already aligned with its manifest.
+
+    Returns the leases that need their file read again: those without such values (another manifest), and
+    those that the protocol rejects, so that the problem is worded from the file itself. A store that does not
+    answer is theirs to report as well.
+    """
+    evaluations = _evaluations(leases)
+    edition = evaluations[0].edition
+    try:
+        truth = ground_truth.load(edition.ground_truth_id)
+    except OSError:
+        return list(leases)
+    scorer = Scorer(truth, get_protocol(edition.protocol))
+    outcomes: list[tuple[Lease, Outcome]] = []
+    rest: list[Lease] = []
+    for lease, evaluation in zip(leases, evaluations, strict=True):
+        predictions = _aligned(evaluation, truth)
+        try:
+            if predictions is not None:
+                outcomes.append((lease, scored(scorer.report(predictions))))
+                continue
+        except Rejected:
+            pass  # worded below, from the file
+        rest.append(lease)
+    if outcomes:
+        _persist(lambda: lifecycle.finalise_many(outcomes))
+    log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
+    return rest
+
+
+def _aligned(evaluation: Evaluation, truth: GroundTruth) -> Predictions | None:
+    """The submission's values, if they were aligned with this manifest before."""
+    ttc_s = files.load_aligned(
+        manifest_digest=evaluation.edition.ground_truth.manifest_digest,
+        digest=evaluation.submission.digest,
+        n_sequences=truth.n_sequences,
+    )
+    if ttc_s is None:
+        return None
+    return Predictions(manifest=truth.manifest, ttc_s=ttc_s, digest=evaluation.submission.digest)
 
 
 def run(lease: Lease, *, rng: random.Random) -> None:
     """Decide one claimed evaluation. Whatever happens, the lease ends: decided, given back, or lost."""
-    evaluation = Evaluation.objects.select_related("submission", "edition").get(pk=lease.evaluation_id)
+    evaluation = _evaluations([lease])[0]
     context = log.bind(submission_id=str(evaluation.submission_id), evaluation_id=str(lease.evaluation_id))
     started_s = time.monotonic()
     try:
@@ -71,6 +136,11 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
         report = evaluator.evaluate(predictions, truth, protocol=edition.protocol)
     except Rejected as rejected:
         return rejection(rejected)
+    files.keep_aligned(
+        manifest_digest=edition.ground_truth.manifest_digest,
+        digest=evaluation.submission.digest,
+        ttc_s=predictions.ttc_s,
+    )
     return scored(report)
 
 

@@ -1,9 +1,10 @@
 """What the leaderboard remembers. Constraints live here; verbs live beside this package."""
 
 from leaderboard.models.audit import AuditEvent
-from leaderboard.models.benchmark import Edition, GroundTruth, PublishedResult, Split
+from leaderboard.models.benchmark import Edition, GroundTruth, Publication, PublishedResult, Split
 from leaderboard.models.people import ApiToken, Membership, Team, User
 from leaderboard.models.submissions import Evaluation, Method, Score, Status, Submission, Visibility
+from leaderboard.models.sweep import SweepBeat
 
 __all__ = [
     "ApiToken",
@@ -13,11 +14,13 @@ __all__ = [
     "GroundTruth",
     "Membership",
     "Method",
+    "Publication",
     "PublishedResult",
     "Score",
     "Split",
     "Status",
     "Submission",
+    "SweepBeat",
     "Team",
     "User",
     "Visibility",

@@ -46,6 +46,12 @@ class GroundTruth(models.Model):
     counts = models.JSONField(help_text="Sequences per interval, and out of range.")
     imported_at = models.DateTimeField(default=timezone.now)
     imported_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
+    # What changed since the ground truth that was published when this one came in. Counted at import, where
+    # the values are at hand; the values themselves are told to nobody.
+    compared_with = models.ForeignKey("self", null=True, blank=True, on_delete=models.PROTECT, related_name="+")
+    n_added = models.PositiveIntegerField(default=0)
+    n_removed = models.PositiveIntegerField(default=0)
+    n_changed = models.PositiveIntegerField(default=0)
 
     def __str__(self) -> str:
         return f"{self.split_id} {self.short_digest}"
@@ -65,16 +71,57 @@ class Edition(models.Model):
     protocol = models.CharField(max_length=32)
     opened_at = models.DateTimeField(default=timezone.now)
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
-    published_at = models.DateTimeField(null=True, blank=True)
+    published_at = models.DateTimeField(null=True, blank=True, help_text="When it first was the board.")
+    discarded_at = models.DateTimeField(null=True, blank=True, help_text="Given up before it was published.")
 
     class Meta:
         ordering = ["split", "number"]
         constraints = [
             models.UniqueConstraint(fields=["split", "number"], name="edition_number_once_per_split"),
+            models.UniqueConstraint(
+                fields=["split", "ground_truth", "protocol"],
+                condition=models.Q(discarded_at=None),
+                name="one_edition_per_ground_truth_and_protocol",
+            ),
+            models.CheckConstraint(
+                condition=models.Q(published_at=None) | models.Q(discarded_at=None),
+                name="published_editions_stay",
+            ),
         ]
 
     def __str__(self) -> str:
         return f"{self.split_id} edition {self.number}"
+
+    @property
+    def is_in_preparation(self) -> bool:
+        """Whether it stands beside the board, neither published nor given up."""
+        return self.published_at is None and self.discarded_at is None
+
+
+class Publication(models.Model):
+    """That an edition became the board of its split: the public changelog. Append-only."""
+
+    class Kind(models.TextChoices):
+        """Forward to a new edition, or back to a former one."""
+
+        PUBLISHED = "PUBLISHED", "published"
+        ROLLED_BACK = "ROLLED_BACK", "rolled back"
+
+    split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="publications")
+    edition = models.ForeignKey(Edition, on_delete=models.PROTECT, related_name="publications")
+    replaced = models.ForeignKey(Edition, null=True, blank=True, on_delete=models.PROTECT, related_name="+")
+    kind = models.CharField(max_length=12, choices=Kind)
+    at = models.DateTimeField()
+    by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
+    reason = models.CharField(max_length=1000)
+    left_out = models.JSONField(default=list, blank=True, help_text="Submissions knowingly left unfinished.")
+
+    class Meta:
+        ordering = ["-at", "-id"]
+        indexes = [models.Index(fields=["split", "at"], name="publication_by_time")]
+
+    def __str__(self) -> str:
+        return f"{self.edition} {self.get_kind_display()}"
 
 
 class PublishedResult(models.Model):

@@ -1,0 +1,19 @@
+"""When the queue was last looked after."""
+
+from django.db import models
+from django.db.models import Q
+
+
+class SweepBeat(models.Model):
+    """The one row that says when the last sweep was finished, by the database's clock."""
+
+    THE_ONE = 1
+
+    id = models.PositiveSmallIntegerField(primary_key=True, default=THE_ONE, editable=False)
+    swept_at = models.DateTimeField()
+
+    class Meta:
+        constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]
+
+    def __str__(self) -> str:
+        return f"last sweep {self.swept_at:%Y-%m-%d %H:%M:%S}"
