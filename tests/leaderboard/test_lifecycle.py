@@ -1,0 +1,411 @@
+"""`leaderboard.lifecycle`: every verb, one step at a time."""
+
+import random
+import uuid
+from dataclasses import replace
+from datetime import timedelta
+
+import pytest
+from django.db import IntegrityError, transaction
+from django.db.models.functions import Now
+from pytest_django import DjangoCaptureOnCommitCallbacks, SettingsWrapper
+
+from leaderboard import lifecycle
+from leaderboard.lifecycle import (
+    MAX_INFRASTRUCTURE_STRIKES,
+    MAX_POISON_STRIKES,
+    Lease,
+    LostRace,
+    Outcome,
+    Strike,
+)
+from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
+from tests.leaderboard import queue_rows
+from tests.leaderboard.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
+
+
+def give_back(lease: Lease, strike: Strike = Strike.INFRASTRUCTURE) -> Status:
+    return lifecycle.give_back(lease, strike=strike, reason="the disk failed", rng=random.Random(0))
+
+
+# --- enqueue ---------------------------------------------------------------------------------------------
+
+
+def test_same_submission_and_edition_are_queued_once(edition: Edition, owner: User) -> None:
+    first = queue_rows.queued(edition, owner)
+    assert lifecycle.enqueue(submission=first.submission, edition=edition) == first
+    assert Evaluation.objects.count() == 1
+
+
+def test_the_database_refuses_a_second_evaluation_of_a_submission_in_an_edition(
+    edition: Edition, owner: User
+) -> None:
+    first = queue_rows.queued(edition, owner)
+    with pytest.raises(IntegrityError), transaction.atomic():
+        Evaluation.objects.create(submission=first.submission, edition=edition)
+
+
+def test_nudge_is_sent_after_the_commit_and_its_failure_is_nobodys_problem(
+    edition: Edition,
+    owner: User,
+    monkeypatch: pytest.MonkeyPatch,
+    django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks,
+) -> None:
+    sent: list[uuid.UUID] = []
+
+    def broken_nudge(evaluation_id: uuid.UUID) -> None:
+        sent.append(evaluation_id)
+        raise RuntimeError("the broker's client has a fault of its own")
+
+    monkeypatch.setattr(lifecycle, "nudge", broken_nudge)
+    with django_capture_on_commit_callbacks(execute=True):
+        evaluation = queue_rows.queued(edition, owner)
+        assert not sent
+    assert sent == [evaluation.pk]
+
+
+# --- claim -----------------------------------------------------------------------------------------------
+
+
+def test_claim_gives_attempt_token_lease_and_deadline(edition: Edition, owner: User) -> None:
+    evaluation = queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    evaluation.refresh_from_db()
+    assert (lease.evaluation_id, lease.attempt) == (evaluation.pk, 1)
+    assert (evaluation.status, evaluation.lease_token) == (Status.RUNNING, lease.token)
+    assert evaluation.started_at is not None
+    assert evaluation.leased_until == evaluation.started_at + timedelta(seconds=LEASE_S)
+    assert evaluation.deadline_at == evaluation.started_at + timedelta(seconds=WALL_S)
+
+
+def test_what_is_claimed_is_not_claimed_again(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    queue_rows.claim()
+    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+
+
+def test_most_urgent_then_oldest_goes_first(edition: Edition, owner: User) -> None:
+    rescored = queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
+    older, newer = queue_rows.queued(edition, owner), queue_rows.queued(edition, owner)
+    Evaluation.objects.filter(pk=rescored.pk).update(queued_at=Now() - timedelta(days=2))
+    Evaluation.objects.filter(pk=older.pk).update(queued_at=Now() - timedelta(days=1))
+    assert lifecycle.waiting_ids(limit=10) == [older.pk, newer.pk, rescored.pk]
+    assert [queue_rows.claim().evaluation_id for _ in range(3)] == [older.pk, newer.pk, rescored.pk]
+
+
+def test_claim_takes_no_more_than_its_limit_and_each_has_its_own_lease(edition: Edition, owner: User) -> None:
+    for _ in range(3):
+        queue_rows.queued(edition, owner)
+    leases = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=2)
+    assert len({lease.evaluation_id for lease in leases}) == 2
+    assert len(lifecycle.waiting_ids(limit=10)) == 1
+
+
+def test_what_is_not_due_yet_is_left_alone(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    Evaluation.objects.update(due_at=Now() + timedelta(seconds=30))
+    assert lifecycle.waiting_ids(limit=10) == []
+    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+
+
+def test_the_database_refuses_to_run_without_a_lease(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    with pytest.raises(IntegrityError), transaction.atomic():
+        Evaluation.objects.update(status=Status.RUNNING)
+
+
+# --- heartbeat -------------------------------------------------------------------------------------------
+
+
+def test_heartbeat_renews_the_lease(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    Evaluation.objects.update(leased_until=Now())
+    before = queue_rows.row(lease).leased_until
+    assert before is not None
+    assert lifecycle.heartbeat(lease, lease_s=LEASE_S)
+    after = queue_rows.row(lease).leased_until
+    assert after is not None
+    assert after - before >= timedelta(seconds=LEASE_S)
+
+
+def test_heartbeat_never_renews_beyond_the_deadline(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    Evaluation.objects.update(deadline_at=Now() + timedelta(seconds=5))
+    assert lifecycle.heartbeat(lease, lease_s=LEASE_S)
+    row = queue_rows.row(lease)
+    assert row.leased_until == row.deadline_at
+
+
+def test_heartbeat_after_the_deadline_says_stop(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    queue_rows.expire(lease, overran=True)
+    assert not lifecycle.heartbeat(lease, lease_s=LEASE_S)
+
+
+def stale(lease: Lease) -> dict[str, Lease]:
+    """The lease of an earlier attempt, of another worker, and of another evaluation."""
+    return {
+        "attempt": replace(lease, attempt=lease.attempt - 1),
+        "token": replace(lease, token=uuid.uuid4()),
+        "evaluation": replace(lease, evaluation_id=uuid.uuid4()),
+    }
+
+
+@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
+def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(
+    edition: Edition, owner: User, what: str
+) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    before = queue_rows.row(lease).leased_until
+    assert not lifecycle.heartbeat(stale(lease)[what], lease_s=10 * LEASE_S)
+    assert queue_rows.row(lease).leased_until == before
+
+
+# --- finalise --------------------------------------------------------------------------------------------
+
+
+def test_scores_report_status_and_audit_are_written_together(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    assert lifecycle.finalise(lease, SCORED)
+    row = queue_rows.row(lease)
+    assert (row.status, row.finished_attempt, row.report) == (Status.SCORED, 1, SCORED.report)
+    assert row.finished_at is not None
+    assert {(s.metric, s.interval): s.value for s in row.scores.all()} == SCORED.scores
+    assert (
+        AuditEvent.objects.filter(noun="Evaluation", noun_id=lease.evaluation_id, verb="scored").count() == 1
+    )
+
+
+def test_rejection_keeps_its_problems_and_has_no_scores(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    assert lifecycle.finalise(lease, REJECTED)
+    row = queue_rows.row(lease)
+    assert (row.status, row.problems, row.n_problems) == (Status.REJECTED, list(REJECTED.problems), 1)
+    assert queue_rows.n_scores(lease) == 0
+
+
+@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
+def test_result_of_a_stale_lease_is_discarded(edition: Edition, owner: User, what: str) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    with pytest.raises(LostRace):
+        lifecycle.finalise(stale(lease)[what], SCORED)
+    assert queue_rows.row(lease).status == Status.RUNNING
+    assert not Score.objects.exists()
+    assert lifecycle.finalise(lease, SCORED)
+
+
+def test_finalise_again_recognises_its_own_commit_and_writes_nothing(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    assert lifecycle.finalise(lease, SCORED)
+    before = queue_rows.row(lease).finished_at
+    assert not lifecycle.finalise(lease, SCORED)
+    assert queue_rows.row(lease).finished_at == before
+    assert queue_rows.n_scores(lease) == len(SCORED.scores)
+    assert AuditEvent.objects.filter(noun_id=lease.evaluation_id).count() == 1
+
+
+def test_a_decided_evaluation_is_not_decided_otherwise(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    lifecycle.finalise(lease, SCORED)
+    with pytest.raises(LostRace):
+        lifecycle.finalise(lease, REJECTED)
+    with pytest.raises(LostRace):
+        give_back(lease)
+    assert queue_rows.row(lease).status == Status.SCORED
+
+
+def test_zombie_is_fenced_after_another_worker_took_over(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    zombie = queue_rows.claim()
+    queue_rows.expire(zombie)
+    assert queue_rows.release_expired() == 1
+    queue_rows.make_due()
+    successor = queue_rows.claim()
+    with pytest.raises(LostRace):
+        lifecycle.finalise(zombie, replace(SCORED, scores={("mid", "overall"): 1.0}))
+    assert not lifecycle.heartbeat(zombie, lease_s=LEASE_S)
+    assert lifecycle.finalise(successor, SCORED)
+    with pytest.raises(LostRace):
+        lifecycle.finalise(zombie, REJECTED)
+    assert Score.objects.get(metric="mid").value == 14.25
+    assert queue_rows.row(successor).finished_attempt == 2
+
+
+def test_a_score_that_cannot_be_kept_leaves_the_evaluation_undecided(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    with pytest.raises(IntegrityError), transaction.atomic():
+        lifecycle.finalise(lease, replace(SCORED, scores={("mid", "overall"): -1.0}))
+    assert queue_rows.row(lease).status == Status.RUNNING
+    assert not Score.objects.exists()
+
+
+@pytest.mark.parametrize("status", [Status.QUEUED, Status.RUNNING, Status.SYSTEM_ERROR, Status.CANCELLED])
+def test_a_run_ends_as_scored_or_rejected_only(edition: Edition, owner: User, status: Status) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    with pytest.raises(ValueError, match="SCORED or REJECTED"):
+        lifecycle.finalise(lease, Outcome(status=status, scores={}))
+    assert queue_rows.row(lease).status == Status.RUNNING
+
+
+# --- strikes ---------------------------------------------------------------------------------------------
+
+
+def test_given_back_evaluation_waits_out_a_growing_backoff(
+    edition: Edition, owner: User, settings: SettingsWrapper
+) -> None:
+    settings.BACKOFF_S = 4.0
+    queue_rows.queued(edition, owner)
+    for n_strikes in (1, 2, 3):
+        lease = queue_rows.claim()
+        Evaluation.objects.update(started_at=Now())
+        started_at = queue_rows.row(lease).started_at
+        assert give_back(lease) == Status.QUEUED
+        row = queue_rows.row(lease)
+        assert row.n_infrastructure_strikes == n_strikes
+        assert started_at is not None
+        assert row.due_at - started_at >= timedelta(seconds=4.0 * 2 ** (n_strikes - 1) / 2)
+        assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+        queue_rows.make_due()
+
+
+@pytest.mark.parametrize(
+    ("strike", "limit"),
+    [(Strike.POISON, MAX_POISON_STRIKES), (Strike.INFRASTRUCTURE, MAX_INFRASTRUCTURE_STRIKES)],
+)
+def test_exhausted_strikes_are_a_system_error_without_scores(
+    edition: Edition, owner: User, strike: Strike, limit: int
+) -> None:
+    queue_rows.queued(edition, owner)
+    left = []
+    for _ in range(limit):
+        queue_rows.make_due()
+        lease = queue_rows.claim()
+        left.append(give_back(lease, strike))
+    assert left == [Status.QUEUED] * (limit - 1) + [Status.SYSTEM_ERROR]
+    row = queue_rows.row(lease)
+    assert row.finished_at is not None
+    assert row.last_error == "the disk failed"
+    assert AuditEvent.objects.filter(verb="system_error", noun_id=row.pk).count() == 1
+    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+
+
+@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
+def test_giving_back_a_stale_lease_counts_no_strike(edition: Edition, owner: User, what: str) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    with pytest.raises(LostRace):
+        give_back(stale(lease)[what])
+    row = queue_rows.row(lease)
+    assert (row.status, row.n_infrastructure_strikes) == (Status.RUNNING, 0)
+
+
+# --- the sweep -------------------------------------------------------------------------------------------
+
+
+def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    queue_rows.expire(lease)
+    assert (queue_rows.release_expired(), queue_rows.release_expired()) == (1, 0)
+    row = queue_rows.row(lease)
+    assert (row.status, row.n_infrastructure_strikes, row.n_poison_strikes) == (Status.QUEUED, 1, 0)
+    assert row.last_error == "the worker stopped answering"
+
+
+def test_a_valid_lease_is_not_taken_back(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    assert queue_rows.release_expired() == 0
+    assert queue_rows.row(lease).status == Status.RUNNING
+
+
+def test_a_run_that_held_on_until_its_deadline_is_poison(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    queue_rows.expire(lease, overran=True)
+    assert queue_rows.release_expired() == 1
+    row = queue_rows.row(lease)
+    assert (row.n_infrastructure_strikes, row.n_poison_strikes) == (0, 1)
+    assert row.last_error == "the run reached its time limit"
+
+
+def test_a_sweep_that_comes_after_the_deadline_does_not_blame_the_file_for_a_dead_worker(
+    edition: Edition, owner: User
+) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    Evaluation.objects.update(
+        leased_until=Now() - timedelta(seconds=400), deadline_at=Now() - timedelta(seconds=160)
+    )
+    assert queue_rows.release_expired() == 1
+    assert queue_rows.row(lease).n_poison_strikes == 0
+
+
+# --- people ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("is_running", [False, True])
+def test_cancelled_evaluation_is_final_and_its_run_is_discarded(
+    edition: Edition, owner: User, is_running: bool
+) -> None:
+    evaluation = queue_rows.queued(edition, owner)
+    lease = queue_rows.claim() if is_running else None
+    assert lifecycle.cancel(submission=evaluation.submission, actor=owner) == 1
+    assert lifecycle.cancel(submission=evaluation.submission, actor=owner) == 0
+    assert AuditEvent.objects.filter(verb="cancelled", actor=owner).count() == 1
+    if lease is not None:
+        assert not lifecycle.heartbeat(lease, lease_s=LEASE_S)
+        with pytest.raises(LostRace):
+            lifecycle.finalise(lease, SCORED)
+    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+    evaluation.refresh_from_db()
+    assert evaluation.status == Status.CANCELLED
+
+
+def test_what_is_decided_cannot_be_cancelled(edition: Edition, owner: User) -> None:
+    evaluation = queue_rows.queued(edition, owner)
+    lifecycle.finalise(queue_rows.claim(), SCORED)
+    assert lifecycle.cancel(submission=evaluation.submission, actor=owner) == 0
+    evaluation.refresh_from_db()
+    assert evaluation.status == Status.SCORED
+
+
+def test_maintainer_retries_a_system_error_with_a_clean_slate(
+    edition: Edition, owner: User, maintainer: User
+) -> None:
+    evaluation = queue_rows.queued(edition, owner)
+    for _ in range(MAX_POISON_STRIKES):
+        queue_rows.make_due()
+        last = queue_rows.claim()
+        give_back(last, Strike.POISON)
+    lifecycle.retry(evaluation=evaluation, actor=maintainer, reason="the limit was too tight")
+    lease = queue_rows.claim()
+    assert lease.attempt == last.attempt + 1
+    with pytest.raises(LostRace):
+        lifecycle.finalise(last, SCORED)
+    assert give_back(lease, Strike.POISON) == Status.QUEUED
+    event = AuditEvent.objects.get(verb="retried")
+    assert (event.actor, event.details) == (maintainer, {"reason": "the limit was too tight"})
+
+
+@pytest.mark.parametrize("outcome", [None, SCORED, REJECTED])
+def test_only_a_system_error_can_be_retried(
+    edition: Edition, owner: User, maintainer: User, outcome: Outcome | None
+) -> None:
+    evaluation = queue_rows.queued(edition, owner)
+    if outcome is not None:
+        lifecycle.finalise(queue_rows.claim(), outcome)
+    with pytest.raises(LostRace, match="nothing to retry"):
+        lifecycle.retry(evaluation=evaluation, actor=maintainer)
+    assert not AuditEvent.objects.filter(verb="retried").exists()
