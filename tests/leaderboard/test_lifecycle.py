@@ -8,7 +8,7 @@ from datetime import timedelta
 import pytest
 from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
-from pytest_django import DjangoCaptureOnCommitCallbacks, SettingsWrapper
+from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
 
 from leaderboard import lifecycle
 from leaderboard.lifecycle import (
@@ -262,7 +262,7 @@ def test_a_run_ends_as_scored_or_rejected_only(edition: Edition, owner: User, st
 
 
 def test_given_back_evaluation_waits_out_a_growing_backoff(
-    edition: Edition, owner: User, settings: SettingsWrapper
+    edition: Edition, owner: User, settings: Settings
 ) -> None:
     settings.BACKOFF_S = 4.0
     queue_rows.queued(edition, owner)
