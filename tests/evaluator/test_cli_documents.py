@@ -1,0 +1,48 @@
+"""The documents show what the command prints, and name everything that it can do."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import click
+import pytest
+
+from evaluator.cli import main
+from tests.evaluator.console import DOCUMENTS, REPOSITORY, documented_shell, recorded
+
+GUIDE = REPOSITORY / "docs" / "cli.md"
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
+def test_examples_show_what_the_command_prints(document: Path) -> None:
+    text = document.read_text()
+    assert text.count("```console") >= 3
+    with documented_shell() as run:
+        assert steady(recorded(text, run)) == steady(text)
+
+
+def steady(text: str) -> str:
+    """`text` without the last digits of long numbers, in which processors differ."""
+    return re.sub(r"\d+\.\d{9,}", lambda number: f"{float(number[0]):.9g}", text)
+
+
+def options() -> list[tuple[str, str]]:
+    return [
+        (name, flag)
+        for name, command in main.commands.items()
+        for parameter in command.params
+        if isinstance(parameter, click.Option)
+        for flag in parameter.opts
+    ]
+
+
+@pytest.mark.parametrize("command", main.commands)
+def test_guide_has_a_section_for_every_command(command: str) -> None:
+    assert f"\n## {command}\n" in GUIDE.read_text()
+
+
+@pytest.mark.parametrize(("command", "flag"), options())
+def test_guide_names_every_option_of_every_command(command: str, flag: str) -> None:
+    section = GUIDE.read_text().partition(f"\n## {command}\n")[2].partition("\n## ")[0]
+    assert f"`{flag}" in section
