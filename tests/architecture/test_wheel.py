@@ -1,0 +1,114 @@
+"""What a researcher gets from `pip install .`: the evaluator and its command, and no web framework."""
+
+import re
+import shutil
+import subprocess
+import sys
+import venv
+from collections.abc import Iterator
+from pathlib import Path
+from zipfile import ZipFile
+
+import pytest
+
+from tests.evaluator.console import EXAMPLES, recorded, shell
+from tests.services import ServiceMissing, skip_or_fail
+
+pytestmark = pytest.mark.slow
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+# pip's words for an index that cannot be reached.
+NO_INDEX = ("Could not find a version", "No matching distribution", "Connection", "Temporary failure in name")
+
+
+def pip(python: Path, *arguments: object) -> None:
+    """Run pip; an index out of reach is a missing service, anything else an error."""
+    done = subprocess.run(
+        [python, "-m", "pip", "--disable-pip-version-check", "--quiet", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if done.returncode and any(words in done.stderr for words in NO_INDEX):
+        skip_or_fail(ServiceMissing(f"pip cannot reach a package index: {done.stderr.splitlines()[-1]}"))
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from a copy so that the checkout stays clean."""
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(REPOSITORY / name, source)
+    for name in ("evaluator", "leaderboard"):
+        shutil.copytree(REPOSITORY / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
+    pip(Path(sys.executable), "wheel", "--no-deps", "--wheel-dir", out, source)
+    (built,) = out.glob("tsttc-*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """The programs of an environment that had nothing before the wheel; versions as in the lock file."""
+    home = tmp_path_factory.mktemp("environment")
+    venv.create(home, with_pip=True, symlinks=True)
+    lock = (REPOSITORY / "requirements.lock").read_text()
+    versions = home / "constraints.txt"
+    # Without hashes: with them pip would ask for one of the wheel itself, which was built a moment ago.
+    versions.write_text(re.sub(r" *\\\n +--hash=\S+", "", lock))
+    pip(home / "bin" / "python", "install", "--constraint", versions, wheel)
+    yield home / "bin"
+    shutil.rmtree(home)
+
+
+def test_wheel_holds_the_evaluator_alone(wheel: Path) -> None:
+    with ZipFile(wheel) as archive:
+        names = archive.namelist()
+    tops = {name.partition("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"evaluator"}
+    assert {"evaluator/py.typed", "evaluator/cli/__init__.py", "evaluator/client.py"} <= set(names)
+    present = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "evaluator").rglob("*.py")}
+    assert present <= set(names), "every module of the evaluator is in the wheel"
+
+
+def test_environment_has_no_web_framework(environment: Path) -> None:
+    listed = subprocess.run(
+        [environment / "python", "-m", "pip", "list", "--format=freeze"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.lower()
+    assert "tsttc==" in listed
+    assert not re.search(r"^(django|celery|redis|psycopg|pandas)", listed, re.MULTILINE)
+
+
+def test_installed_command_scores_the_examples(environment: Path) -> None:
+    with shell([str(environment / "tsttc")], {}) as run:
+        assert run("tsttc --version") == f"tsttc {version_of(environment)}\n"
+        assert "60 sequences" in run("tsttc score predictions.json --truth truth.csv")
+        assert run("tsttc check predictions.json --manifest manifest.csv; echo $?").endswith("\n0\n")
+
+
+def test_installed_command_prints_what_the_examples_show(environment: Path) -> None:
+    text = (EXAMPLES / "README.md").read_text()
+    with shell([str(environment / "tsttc")], {}) as run:
+        assert recorded(text, run) == text
+
+
+def test_installed_package_is_typed_for_its_users(environment: Path) -> None:
+    program = (
+        "import evaluator, pathlib; print((pathlib.Path(evaluator.__file__).parent / 'py.typed').exists())"
+    )
+    done = subprocess.run(
+        [environment / "python", "-c", program], capture_output=True, text=True, check=True, cwd=environment
+    )
+    assert done.stdout == "True\n"
+
+
+def version_of(environment: Path) -> str:
+    return subprocess.run(
+        [environment / "python", "-c", "import importlib.metadata as m; print(m.version('tsttc'))"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.strip()
