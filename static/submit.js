@@ -18,7 +18,7 @@ function judge() {
     );
     input.reportValidity();
   }
-  chosen.textContent = `${file.name}, ${found} bytes`;
+  chosen.textContent = `${found} bytes`;
 }
 
 input.addEventListener("change", judge);

@@ -3,7 +3,7 @@
 from datetime import UTC, datetime
 
 from django import template
-from django.utils.html import format_html
+from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
 register = template.Library()
@@ -24,11 +24,11 @@ def size(n_bytes: int) -> str:
     """A size in the largest fitting unit.
 
     >>> size(812), size(81_234), size(20_000_000)
-    ('812 bytes', '81.2 KB', '20.0 MB')
+    ('812 bytes', '81.2 KB', '20 MB')
     """
     if n_bytes < 1000:
         return f"{n_bytes} bytes"
-    return f"{n_bytes / 1e3:.1f} KB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.1f} MB"
+    return f"{n_bytes / 1e3:.3g} KB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.3g} MB"
 
 
 @register.filter
@@ -43,6 +43,18 @@ def duration(seconds: float | None) -> str:
     if seconds < 90:
         return f"{max(1, round(seconds))} s"
     return f"{-(-seconds // 60):.0f} min" if seconds < 5400 else f"{-(-seconds // 3600):.0f} h"
+
+
+@register.filter
+def ticked(text: str) -> SafeString:
+    """A sentence in which `names` are set in backticks, as HTML.
+
+    >>> ticked("The envelope has no `predictions`.")
+    'The envelope has no <code>predictions</code>.'
+    """
+    parts = text.split("`")
+    pieces = (part if i % 2 == 0 else format_html("<code>{}</code>", part) for i, part in enumerate(parts))
+    return format_html_join("", "{}", ((piece,) for piece in pieces))
 
 
 @register.simple_tag

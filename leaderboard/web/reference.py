@@ -1,6 +1,6 @@
 """The facts that the documentation page states, taken from the code that obeys them."""
 
-from typing import Any
+from typing import Any, Final
 
 from django.conf import settings
 
@@ -8,6 +8,24 @@ from evaluator.problems import PROBLEM_CODES
 from evaluator.protocol import DEFAULT_PROTOCOL, get_protocol
 from leaderboard.templatetags.board import size
 from leaderboard.web.tables import interval_facts
+
+# What only maintainers meet, when they import ground truth.
+GROUND_TRUTH_CODES: Final = frozenset(
+    {
+        "unreadable",
+        "bad-csv",
+        "missing-columns",
+        "bad-field",
+        "empty",
+        "duplicate-ids",
+        "duplicate-natural-keys",
+        "truth-not-finite",
+        "truth-near-zero",
+        "bad-digest",
+        "forbidden-pickle",
+        "bad-annotations",
+    }
+)
 
 
 def docs() -> dict[str, Any]:
@@ -18,5 +36,7 @@ def docs() -> dict[str, Any]:
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
         "intervals": interval_facts({}),
         "max_size": size(settings.MAX_PREDICTIONS_BYTES),
-        "problem_codes": PROBLEM_CODES.items(),
+        "problem_codes": [
+            (code, meaning) for code, meaning in PROBLEM_CODES.items() if code not in GROUND_TRUTH_CODES
+        ],
     }

@@ -1,0 +1,82 @@
+"""Doors for those who watch: is it alive, can it work, how is it doing."""
+
+import ipaddress
+import secrets
+
+import structlog
+from django.conf import settings
+from django.db import Error as DatabaseProblem
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_safe
+from prometheus_client import CONTENT_TYPE_LATEST
+
+from leaderboard import health, metrics
+
+log = structlog.get_logger(__name__)
+
+# A proxy adds at least one of these; a client cannot take them away again.
+FORWARDED = (
+    "HTTP_FORWARDED",
+    "HTTP_VIA",
+    "HTTP_X_FORWARDED_FOR",
+    "HTTP_X_FORWARDED_HOST",
+    "HTTP_X_FORWARDED_PROTO",
+    "HTTP_X_REAL_IP",
+)
+
+readiness = health.Recent(health.checks, keep_s=1.0)
+
+
+@never_cache
+@require_safe
+def healthz(request: HttpRequest) -> HttpResponse:
+    """The process answers; nothing else is asked."""
+    return JsonResponse({"status": "alive"})
+
+
+@never_cache
+@require_safe
+def readyz(request: HttpRequest) -> HttpResponse:
+    """Database, broker and sweep; 503 if one of them fails."""
+    checks = readiness()
+    is_ready = all(check.is_ok for check in checks)
+    return JsonResponse(
+        {
+            "status": "ready" if is_ready else "not ready",
+            "checks": {check.name: {"ok": check.is_ok, "detail": check.detail} for check in checks},
+        },
+        status=200 if is_ready else 503,
+    )
+
+
+@never_cache
+@require_safe
+def prometheus(request: HttpRequest) -> HttpResponse:
+    """Figures, for whoever may read them."""
+    if not may_read_metrics(request):
+        return HttpResponse(
+            "Metrics are for the operator's monitoring.\n", status=403, content_type="text/plain"
+        )
+    try:
+        return HttpResponse(metrics.exposition(), content_type=CONTENT_TYPE_LATEST)
+    except DatabaseProblem as fault:
+        log.warning("metrics_unavailable", reason=str(fault)[:200])
+        return HttpResponse("The database does not answer.\n", status=503, content_type="text/plain")
+
+
+def may_read_metrics(request: HttpRequest) -> bool:
+    """With a token set, the token decides; without one, only a direct connection from a listed network may.
+
+    What a request says of its origin is never believed: a forwarding header can only take the right away.
+    """
+    if settings.METRICS_TOKEN:
+        sent = request.headers.get("Authorization", "").removeprefix("Bearer ").encode()
+        return secrets.compare_digest(sent, settings.METRICS_TOKEN.encode())
+    if any(header in request.META for header in FORWARDED):
+        return False
+    try:
+        address = ipaddress.ip_address(request.META.get("REMOTE_ADDR", ""))
+    except ValueError:
+        return False
+    return any(address in network for network in settings.METRICS_NETWORKS)

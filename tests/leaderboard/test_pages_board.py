@@ -1,0 +1,267 @@
+"""The board's page."""
+
+from pathlib import Path
+
+import pytest
+from django.test import Client
+from django.urls import reverse
+
+from leaderboard import teams
+from leaderboard.models import Edition, Method, PublishedResult, Split, User, Visibility
+from tests import builders, pages
+
+RANK, METHOD, TEAM, DATE, MID = range(5)
+N_COLUMNS = 14
+ISSUE_COLUMNS = [
+    *("Rank", "Method", "Team", "Date"),
+    *("MiD", "MiDc", "MiDs", "MiDl", "MiDn"),
+    *("RTE", "RTEc", "RTEs", "RTEl", "RTEn"),
+]
+
+
+def get(client: Client, address: str = "/board/test/") -> pages.Element:
+    response = client.get(address)
+    assert response.status_code == 200
+    return pages.page(response)
+
+
+def row_of(root: pages.Element, name: str) -> pages.Element:
+    rows = root.one("table", class_="board").one("tbody").all("tr")
+    return next(row for row in rows if row.one("div", class_="name").text.startswith(name))
+
+
+def test_columns_are_the_papers_in_its_order(client: Client, benchmark: None) -> None:
+    heads = get(client).one("thead").all("tr")[1].all("th")
+    assert [head.one("a").children[0].text if head.one("a").children else head.text for head in heads] == (
+        ISSUE_COLUMNS
+    )
+
+
+def test_home_is_the_test_board(client: Client, benchmark: None) -> None:
+    assert pages.board_rows(get(client, "/")) == pages.board_rows(get(client, "/board/test/"))
+
+
+def test_published_numbers_stand_as_printed(client: Client, benchmark: None) -> None:
+    first = pages.board_rows(get(client))[0]
+    assert first[RANK] == "1"
+    assert first[METHOD].startswith("Deep Scale")
+    assert first[TEAM:MID] == ["Shi et al.", "2023"]
+    assert first[MID:] == ["14.8", "27.6", "15.6", "11.5", "13.7", "12.3", "6.5", "8.8", "13.1", "15.0"]
+
+
+def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, benchmark: None) -> None:
+    root = get(client)
+    for row in root.one("tbody").all("tr"):
+        tag = row.one("a", class_="tag")
+        assert tag.text == "published"
+        source = root.one("li", id=tag.attributes["href"].removeprefix("#"))
+        assert "Yuheng Shi" in source.text
+        assert source.one("a").attributes["href"] == "https://arxiv.org/abs/2309.01539"
+
+
+def test_every_row_has_every_column(client: Client, edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    assert {len(row) for row in pages.board_rows(get(client))} == {N_COLUMNS}
+
+
+def test_submissions_are_ranked_among_published_rows(client: Client, edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition, factor=1.02), method="Near")
+    builders.submit(owner, builders.predictions(edition, factor=1.9), method="Far")
+    builders.score_all()
+    root = get(client)
+    assert pages.column(root, METHOD)[0].startswith("Near")
+    values = [float(value) for value in pages.column(root, MID)]
+    assert values == sorted(values)
+    assert pages.column(root, RANK) == [str(1 + sum(v < w for v in values)) for w in values]
+
+
+def test_submitted_values_have_two_decimals(client: Client, edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Foo")
+    builders.score_all()
+    cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:]
+    assert all(len(cell.partition(".")[2]) == 2 for cell in cells), cells
+
+
+def test_values_of_fewer_decimals_keep_the_room_of_the_missing_one(client: Client, benchmark: None) -> None:
+    cells = row_of(get(client), "SOT").all("td")[3:]
+    assert all("d1" in cell.classes for cell in cells)
+
+
+def test_equal_values_share_a_rank(client: Client, edition: Edition, owner: User, stranger: User) -> None:
+    for user in (owner, stranger):
+        builders.submit(user, builders.predictions(edition, factor=1.01), method=f"Of {user.name}")
+    builders.score_all()
+    assert pages.column(get(client), RANK)[:3] == ["1", "1", "3"]
+
+
+def test_best_and_second_are_marked_for_eye_and_ear(client: Client, benchmark: None) -> None:
+    root = get(client)
+    best = [(s.text) for s in root.one("tbody").all("strong")]
+    assert len(best) >= 10
+    for row in root.one("tbody").all("tr"):
+        for cell in row.all("td"):
+            if cell.all("strong"):
+                assert cell.text.endswith("best")
+            if cell.all("u"):
+                assert cell.text.endswith("second")
+    first = row_of(root, "Deep Scale")
+    assert first.all("td", class_="primary")[0].text == "14.8 best"
+    assert row_of(root, "Deep Scale (NeRF)").all("td", class_="primary")[0].text == "14.9 second"
+
+
+@pytest.mark.parametrize("name", ["mid", "mid_crucial", "rte", "rte_negative"])
+def test_every_number_sorts_both_ways(client: Client, benchmark: None, name: str) -> None:
+    index = MID + ["mid", "mid_crucial", "mid_small", "mid_large", "mid_negative", "rte"].index("rte") * (
+        name.startswith("rte")
+    )
+    index += {"": 0, "crucial": 1, "negative": 4}[name.partition("_")[2]]
+    up = [float(value) for value in pages.column(get(client, f"/?sort={name}"), index)]
+    down = [float(value) for value in pages.column(get(client, f"/?sort=-{name}"), index)]
+    assert up == sorted(up)
+    assert down == sorted(down, reverse=True)
+
+
+def test_sorting_keeps_the_ranks(client: Client, benchmark: None) -> None:
+    root = get(client, "/?sort=-mid")
+    assert pages.column(root, RANK) == ["5", "4", "3", "2", "1"]
+
+
+def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) -> None:
+    root = get(client, "/?sort=mid_crucial")
+    (decisive,) = [head for head in root.all("th") if "aria-sort" in head.attributes]
+    assert decisive.attributes["aria-sort"] == "ascending"
+    assert decisive.one("a").attributes["href"] == "?sort=-mid_crucial"
+    turned = get(client, "/?sort=-mid_crucial")
+    (decisive,) = [head for head in turned.all("th") if "aria-sort" in head.attributes]
+    assert decisive.attributes["aria-sort"] == "descending"
+    assert decisive.one("a").attributes["href"] == "?sort=mid_crucial"
+
+
+def test_the_newest_come_first_when_sorting_by_date(client: Client, benchmark: None) -> None:
+    date = get(client).one("thead").one("th", class_="date")
+    assert date.one("a").attributes["href"] == "?sort=-date"
+
+
+@pytest.mark.parametrize("sort", ["nothing", "mid;drop", "--mid", "-", "<script>alert(1)</script>"])
+def test_sorting_by_no_column_is_a_clear_400(client: Client, benchmark: None, sort: str) -> None:
+    response = client.get("/", {"sort": sort})
+    assert response.status_code == 400
+    said = pages.page(response).one("main").text
+    assert "cannot be sorted by" in said
+    assert "mid_crucial" in said
+    assert b"<script>alert" not in response.content
+
+
+def test_unknown_split_is_a_404(client: Client, benchmark: None) -> None:
+    assert client.get("/board/nowhere/").status_code == 404
+
+
+def test_split_without_ground_truth_says_that_it_is_not_open(client: Client, benchmark: None) -> None:
+    root = get(client, "/board/val/")
+    assert "not open yet" in root.one("main").text
+    assert len(pages.board_rows(root)) == 5
+
+
+def test_open_split_without_submissions_says_how_to_be_the_first(client: Client, edition: Edition) -> None:
+    notice = get(client).one("p", class_="notice")
+    assert "Nobody has submitted to test yet" in notice.text
+    assert notice.one("a").attributes["href"] == "/submit/?split=test"
+
+
+def test_board_without_any_row_has_no_empty_table(client: Client, benchmark: None) -> None:
+    PublishedResult.objects.filter(split="test").delete()
+    root = get(client)
+    assert root.all("table") == []
+    assert "not open yet" in root.one("main").text
+
+
+def test_demo_says_that_its_ground_truth_is_simulated(
+    client: Client, tmp_path: Path, benchmark: None
+) -> None:
+    builders.import_truth(tmp_path, split="demo")
+    assert "Simulated ground truth" in get(client, "/board/demo/").one("main").text
+    assert "Simulated" not in get(client, "/board/test/").one("main").text
+
+
+def test_head_line_names_sequences_edition_digest_and_protocol(client: Client, edition: Edition) -> None:
+    facts = get(client).one("p", class_="facts")
+    assert f"{builders.N_SEQUENCES} sequences" in facts.text
+    assert f"edition 1 ({edition.ground_truth.short_digest})" in facts.text
+    assert "tsttc-1" in facts.text
+    assert "updated" in facts.text
+    assert reverse("manifest", args=["test"]) in [a.attributes["href"] for a in facts.all("a")]
+
+
+def test_split_tabs_mark_the_current_one(client: Client, benchmark: None) -> None:
+    tabs = get(client, "/board/val/").one("nav", class_="splits").all("a")
+    assert [tab.text for tab in tabs] == ["test", "val", "demo"]
+    assert [tab.text for tab in tabs if "aria-current" in tab.attributes] == ["val"]
+
+
+def test_my_teams_rows_are_marked_for_my_team_alone(
+    client: Client, edition: Edition, owner: User, teammate: User, stranger: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Foo")
+    builders.score_all()
+    marked = {}
+    for user in (owner, teammate, stranger):
+        client.force_login(user)
+        marked[user.name] = "mine" in row_of(get(client), "Foo").classes
+    assert marked == {"Owls": True, "Mate": True, "Strangers": False}
+
+
+def test_private_method_stands_on_its_own_teams_board_only(
+    client: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Secret")
+    builders.score_all()
+    Method.objects.update(visibility=Visibility.PRIVATE)
+    assert b"Secret" not in client.get("/").content
+    client.force_login(stranger)
+    assert b"Secret" not in client.get("/").content
+    client.force_login(owner)
+    assert "private" in row_of(get(client, "/"), "Secret").text
+
+
+def test_names_are_text_never_markup(client: Client, edition: Edition, owner: User) -> None:
+    name = "<img src=x onerror=alert(1)>"
+    team = teams.team_of(user=owner)
+    team.name = "</td><script>alert(2)</script>"
+    team.save()
+    builders.submit(owner, builders.predictions(edition), method=name)
+    builders.score_all()
+    root = get(client)
+    assert root.all("img") == []
+    assert root.one("tbody").all("script") == []
+    assert any(row[METHOD].startswith(name) for row in pages.board_rows(root))
+
+
+def test_links_to_strangers_sites_are_not_endorsed(client: Client, edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Foo", code_url="https://example.org/code")
+    builders.score_all()
+    (link,) = [a for a in row_of(get(client), "Foo").all("a") if a.text == "code"]
+    assert link.attributes["rel"] == "nofollow ugc"
+
+
+def test_interval_without_sequences_has_a_dash(client: Client, benchmark: None) -> None:
+    result = PublishedResult.objects.get(split="test", slug="sot")
+    result.scores = {**result.scores, "mid_crucial": None}
+    result.save()
+    assert pages.board_rows(get(client))[3][MID + 1] == "–"
+
+
+def test_number_of_queries_does_not_grow_with_the_board(
+    client: Client, edition: Edition, owner: User, django_assert_max_num_queries
+) -> None:
+    for i in range(4):
+        builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10), method=f"Foo {i}")
+    builders.score_all()
+    with django_assert_max_num_queries(6):
+        client.get("/")
+
+
+def test_splits_are_listed_in_their_order(client: Client, benchmark: None) -> None:
+    Split.objects.filter(pk="demo").update(position=0)
+    Split.objects.filter(pk="test").update(position=9)
+    assert [a.text for a in get(client).one("nav", class_="splits").all("a")] == ["demo", "val", "test"]
