@@ -48,6 +48,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "duplicate-natural-keys": "A natural key appears more than once.",
     "truth-not-finite": "A true time to contact is NaN or infinite.",
     "truth-near-zero": "A true time to contact lies where the errors are undefined (−0.1 ≤ τ ≤ 0).",
+    "no-overlap": "A correction has no sequence of the ground truth that it is to correct.",
     "bad-digest": "The content of a saved file does not match the digest stored in it.",
     "forbidden-pickle": "A pickle asks for something other than plain containers, numbers and arrays.",
     "bad-annotations": "An annotation file has another structure than the toolkit's.",
@@ -78,6 +79,10 @@ class Rejected(Exception):
         self.n_problems = len(self.problems) if n_problems is None else n_problems
         super().__init__(str(self))
 
+    def __reduce__(self) -> tuple[object, ...]:
+        # An exception is copied by its message; this one is made from its problems.
+        return _restored, (self.problems, self.n_problems)
+
     def __str__(self) -> str:
         title = "1 problem" if self.n_problems == 1 else f"{self.n_problems:,} problems"
         return "\n".join([f"{title}:", *(f"  {number}. {p}" for number, p in enumerate(self.problems, 1))])
@@ -89,6 +94,10 @@ class Rejected(Exception):
     def to_json(self) -> str:
         """The text of `as_dict()`."""
         return json.dumps(self.as_dict(), ensure_ascii=False)
+
+
+def _restored(problems: tuple[Problem, ...], n_problems: int) -> Rejected:
+    return Rejected(problems, n_problems=n_problems)
 
 
 class Findings:

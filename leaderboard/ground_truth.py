@@ -3,8 +3,10 @@
 The database has its digest and counts; the file store has its public manifest; the values are nowhere else.
 """
 
+import dataclasses
 import os
 import tempfile
+from collections.abc import Sequence
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
@@ -15,8 +17,9 @@ from django.db.models import Max
 
 import evaluator
 from evaluator.protocol import get_protocol
+from evaluator.revisions import compare
 from leaderboard import audit, files
-from leaderboard.models import Edition, GroundTruth, Split, User
+from leaderboard.models import Edition, GroundTruth, Publication, Split, User
 
 
 class Refused(Exception):
@@ -26,22 +29,52 @@ class Refused(Exception):
 def import_truth(
     *, split_name: str, path: Path, now: datetime, protocol: str = "tsttc-1", actor: User | None = None
 ) -> Edition:
-    """Validate a ground truth, keep it immutably, and open an edition of the split with it.
+    """Validate a split's first ground truth, keep it immutably, and publish edition 1 with it.
 
-    The split's first edition is published at once. The same ground truth and protocol again is answered with
-    the edition that has them. Raises `evaluator.Rejected` if the file is at fault, `Refused` if the split is
-    unknown or has an edition with other ground truth; nothing is changed then.
+    The same ground truth and protocol again is answered with the edition that has them. Raises
+    `evaluator.Rejected` if the file is at fault, `Refused` if the split is unknown or has an edition with
+    other ground truth (a correction is `rescoring.open_edition`); nothing is changed then.
     """
     get_protocol(protocol)
-    split = Split.objects.filter(name=split_name).first()
+    with transaction.atomic():
+        row = add(split_name=split_name, path=path, now=now, actor=actor)
+        split = Split.objects.select_for_update().get(pk=split_name)
+        existing = Edition.objects.filter(split=split, ground_truth=row, protocol=protocol).first()
+        if existing is not None:
+            return existing
+        if split.published_edition is not None:
+            raise Refused(
+                f"The split {split.pk!r} has {split.published_edition} with other ground truth "
+                f"({split.published_edition.ground_truth.short_digest}) or rules; open a correction beside "
+                f"it with: manage.py open_edition {split.pk} --truth {path.name}"
+            )
+        edition = new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
+        make_board(
+            edition=edition,
+            kind=Publication.Kind.PUBLISHED,
+            reason="The first edition.",
+            now=now,
+            actor=actor,
+        )
+    return edition
+
+
+def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> GroundTruth:
+    """Validate a ground truth and keep it immutably. The same file again is answered with the row it has.
+
+    Raises `evaluator.Rejected` if the file is at fault or has no sequence of the published manifest,
+    `Refused` if the split is unknown or the ground truth belongs to another one.
+    """
+    split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
     if split is None:
         known = ", ".join(Split.objects.values_list("name", flat=True))
         raise Refused(f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
+    old = split.published_edition.ground_truth if split.published_edition else None
+    comparison = _compared(old, truth)
     _keep_values(truth)
     files.keep_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
     with transaction.atomic():
-        split = Split.objects.select_for_update().get(pk=split.pk)
         row, is_new = GroundTruth.objects.get_or_create(
             digest=truth.digest,
             defaults={
@@ -57,40 +90,79 @@ def import_truth(
                 },
                 "imported_at": now,
                 "imported_by": actor,
+                **comparison,
             },
         )
         if row.split_id != split.pk:
             raise Refused(f"This ground truth belongs to the split {row.split_id!r} already.")
         if is_new:
             audit.record(verb="imported", noun="GroundTruth", noun_id=row.pk, actor=actor)
-        return _first_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
+    return row
 
 
-def _first_edition(
+def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> dict[str, object]:
+    """What changed since `old`, as columns of the new row. Raises `evaluator.Rejected` for no overlap."""
+    if old is None:
+        return {}
+    comparison = compare(load(old.digest), truth)
+    if comparison.n_added == truth.n_sequences:
+        message = (
+            f"None of the {truth.n_sequences:,} sequences is in the published manifest of "
+            f"{old.n_sequences:,}; "
+            "expected a correction of it, with the same natural keys (bag_stamp/cam_id/ts/track_id)."
+        )
+        raise evaluator.Rejected([evaluator.Problem("no-overlap", message)])
+    return {"compared_with": old, **dataclasses.asdict(comparison)}
+
+
+def new_edition(
     *, split: Split, row: GroundTruth, protocol: str, now: datetime, actor: User | None
 ) -> Edition:
-    existing = Edition.objects.filter(split=split, ground_truth=row, protocol=protocol).first()
-    if existing is not None:
-        return existing
-    if split.published_edition is not None:
-        raise Refused(
-            f"The split {split.pk!r} has {split.published_edition} with other ground truth "
-            f"({split.published_edition.ground_truth.short_digest}); a correction is a new edition beside it."
-        )
+    """The next edition of a split whose row the caller has locked; not yet its board."""
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(
-        split=split,
-        number=last + 1,
-        ground_truth=row,
-        protocol=protocol,
-        opened_at=now,
-        opened_by=actor,
-        published_at=now,
+        split=split, number=last + 1, ground_truth=row, protocol=protocol, opened_at=now, opened_by=actor
     )
+    audit.record(
+        verb="opened", noun="Edition", noun_id=edition.pk, actor=actor, details={"edition": str(edition)}
+    )
+    return edition
+
+
+def make_board(
+    *,
+    edition: Edition,
+    kind: Publication.Kind,
+    reason: str,
+    now: datetime,
+    actor: User | None,
+    left_out: Sequence[str] = (),
+) -> Publication:
+    """Point the split, whose row the caller has locked, at this edition, and write the changelog."""
+    split = edition.split
+    replaced = split.published_edition
+    if edition.published_at is None:
+        edition.published_at = now
+        edition.save(update_fields=["published_at"])
     split.published_edition = edition
     split.save(update_fields=["published_edition"])
-    audit.record(verb="published", noun="Edition", noun_id=str(edition), actor=actor)
-    return edition
+    audit.record(
+        verb=kind.lower(),
+        noun="Edition",
+        noun_id=edition.pk,
+        actor=actor,
+        details={"edition": str(edition), "reason": reason, "left_out": list(left_out)},
+    )
+    return Publication.objects.create(
+        split=split,
+        edition=edition,
+        replaced=replaced,
+        kind=kind,
+        at=now,
+        by=actor,
+        reason=reason,
+        left_out=list(left_out),
+    )
 
 
 def values_path(digest: str) -> Path:

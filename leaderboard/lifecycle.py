@@ -19,6 +19,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from enum import Enum
+from functools import partial
 from typing import Any
 
 import structlog
@@ -37,6 +38,7 @@ log = structlog.get_logger(__name__)
 MAX_POISON_STRIKES = 3
 MAX_INFRASTRUCTURE_STRIKES = 10
 MAX_BACKOFF_S = 60.0
+NUDGES_PER_EDITION = 8
 
 
 class LostRace(Exception):
@@ -108,6 +110,26 @@ def enqueue(
         # Robust: the rows are committed by then, and nothing may turn that into a failure.
         transaction.on_commit(lambda: nudge(evaluation.pk), robust=True)
     return evaluation
+
+
+def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> None:
+    """Queue many submissions for an edition's re-scoring, each once. A few nudges wake the workers."""
+    Evaluation.objects.bulk_create(
+        [
+            Evaluation(
+                submission_id=pk,
+                edition=edition,
+                priority=Evaluation.PRIORITY_RESCORE,
+                queued_at=Now(),
+                due_at=Now(),
+            )
+            for pk in submission_ids
+        ],
+        batch_size=1000,
+        ignore_conflicts=True,
+    )
+    for pk in waiting_ids(limit=NUDGES_PER_EDITION):
+        transaction.on_commit(partial(nudge, pk))
 
 
 def nudge(evaluation_id: uuid.UUID) -> None:
@@ -326,6 +348,13 @@ def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.
 
 
 # --- people's verbs --------------------------------------------------------------------------------------
+
+
+def cancel_edition(*, edition: Edition) -> int:
+    """Cancel what is not decided yet in an edition that was given up. Returns how many that were."""
+    return Evaluation.objects.filter(edition=edition, status__in=[Status.QUEUED, Status.RUNNING]).update(
+        status=Status.CANCELLED, finished_at=Now()
+    )
 
 
 def cancel(*, submission: Submission, actor: User) -> int:

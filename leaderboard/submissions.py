@@ -109,10 +109,9 @@ def submit(
 
 def _queue(submission: Submission) -> None:
     """Queue the submission for the published edition, and for any that is being prepared beside it."""
-    published = submission.split.published_edition
-    for edition in submission.split.editions.filter(
-        Q(published_at=None) | Q(pk=published.pk if published else None)
-    ):
+    split = Split.objects.lock_shared(submission.split_id)
+    in_preparation = Q(published_at=None, discarded_at=None)
+    for edition in split.editions.filter(in_preparation | Q(pk=split.published_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
 
 
@@ -210,6 +209,23 @@ def _clean_filename(name: str) -> str:
     """The last part of a file's name with printable characters only; it is shown, never used as a path."""
     last = name.replace("\\", "/").rpartition("/")[2]
     return "".join(c for c in last if c.isprintable())[:200]
+
+
+def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
+    """Withdraw a submission for its team: what waits is cancelled, what was published leaves a tombstone.
+
+    Returns False if it had been withdrawn before. Raises `Refused` for somebody outside the team.
+    """
+    if not submission.method.team.memberships.filter(user=actor).exists():
+        raise Refused("not-yours", "Only the team that sent a submission can withdraw it.")
+    with transaction.atomic():
+        changed = Submission.objects.standing().filter(pk=submission.pk).update(withdrawn_at=now)
+        if not changed:
+            return False
+        lifecycle.cancel(submission=submission, actor=actor)
+        audit.record(verb="withdrawn", noun="Submission", noun_id=submission.pk, actor=actor)
+    submission.withdrawn_at = now
+    return True
 
 
 # --- how it goes -----------------------------------------------------------------------------------------

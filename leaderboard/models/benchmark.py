@@ -1,9 +1,27 @@
 """What is competed on: splits, revisions of their ground truth, editions, and rows printed in papers."""
 
-from django.db import models
+from typing import ClassVar
+
+from django.db import connection, models
 from django.utils import timezone
 
 from leaderboard.models.people import User
+
+
+class SplitQuerySet(models.QuerySet["Split"]):
+    """Questions about splits."""
+
+    def lock_shared(self, name: str) -> "Split":
+        """The split as it is, and stays until the transaction ends; others may hold it like this as well.
+
+        A submission holds it so, and whoever opens, publishes or rolls back an edition holds it alone: no
+        submission can slip between an edition's opening and its list of what to score.
+        """
+        if connection.features.has_select_for_update:
+            with connection.cursor() as cursor:
+                cursor.execute("SELECT 1 FROM leaderboard_split WHERE name = %s FOR SHARE", [name])
+        # SQLite has one writer at a time, which holds everything alone.
+        return self.get(pk=name)
 
 
 class Split(models.Model):
@@ -22,6 +40,8 @@ class Split(models.Model):
     published_edition = models.ForeignKey(
         "Edition", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
     )
+
+    objects: ClassVar[SplitQuerySet] = SplitQuerySet.as_manager()  # type: ignore[assignment]
 
     class Meta:
         ordering = ["position", "name"]
@@ -48,7 +68,9 @@ class GroundTruth(models.Model):
     imported_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
     # What changed since the ground truth that was published when this one came in. Counted at import, where
     # the values are at hand; the values themselves are told to nobody.
-    compared_with = models.ForeignKey("self", null=True, blank=True, on_delete=models.PROTECT, related_name="+")
+    compared_with = models.ForeignKey(
+        "self", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
+    )
     n_added = models.PositiveIntegerField(default=0)
     n_removed = models.PositiveIntegerField(default=0)
     n_changed = models.PositiveIntegerField(default=0)

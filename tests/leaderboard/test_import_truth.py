@@ -26,7 +26,7 @@ def test_first_import_opens_and_publishes_edition_one(tmp_path: Path) -> None:
     assert edition.ground_truth.n_sequences == builders.N_SEQUENCES
     assert edition.ground_truth.counts["overall"] == builders.N_SEQUENCES
     assert edition.ground_truth.counts["out_of_range"] == 1
-    assert set(AuditEvent.objects.values_list("verb", flat=True)) == {"imported", "published"}
+    assert set(AuditEvent.objects.values_list("verb", flat=True)) == {"imported", "opened", "published"}
 
 
 def test_values_are_kept_in_the_private_directory_for_their_owner_only(tmp_path: Path) -> None:

@@ -1,0 +1,70 @@
+"""`manage.py preview_edition SPLIT NUMBER`."""
+
+import csv
+import json
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from leaderboard import preview, rescoring
+from leaderboard.management.commands.open_edition import line
+from leaderboard.models import Edition
+
+
+class Command(BaseCommand):
+    """Shows what an edition would change."""
+
+    help = "Show what publishing an edition would change, as a table, CSV or JSON."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """SPLIT, NUMBER and the format."""
+        parser.add_argument("split")
+        parser.add_argument("number", type=int)
+        parser.add_argument("--format", choices=["table", "csv", "json"], default="table")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Print the preview."""
+        edition = Edition.objects.filter(split=options["split"], number=options["number"]).first()
+        if edition is None:
+            raise CommandError(f"There is no edition {options['number']} of {options['split']!r}.")
+        try:
+            found = preview.preview(edition)
+        except rescoring.Refused as refused:
+            raise CommandError(str(refused)) from refused
+        getattr(self, f"_{options['format']}")(found)
+
+    def _json(self, found: preview.Preview) -> None:
+        self.stdout.write(json.dumps(preview.rows(found), indent=2))
+
+    def _csv(self, found: preview.Preview) -> None:
+        rows = preview.rows(found)
+        writer = csv.DictWriter(self.stdout, fieldnames=list(rows[0]) if rows else ["submission"])
+        writer.writeheader()
+        writer.writerows(rows)
+
+    def _table(self, found: preview.Preview) -> None:
+        truth = found.edition.ground_truth
+        self.stdout.write(
+            f"{found.edition} against edition {found.replaces}: {truth.n_added} sequences added, "
+            f"{truth.n_removed} removed, {truth.n_changed} changed; {found.n_changed} entries change, "
+            f"{found.n_moved} change rank, {found.n_newly_rejected} become rejected."
+        )
+        self.stdout.write(line(found.progress))
+        for change in found.changes:
+            delta = change.delta["mid"]
+            self.stdout.write(
+                f"{_rank(change.old_rank)} → {_rank(change.new_rank)}  {change.method} ({change.team})  "
+                f"MiD {_value(change.old['mid'])} → {_value(change.new['mid'])} "
+                f"({'–' if delta is None else f'{delta:+.2f}'})  {change.new_status}"
+            )
+            for problem in change.problems[:1]:
+                self.stdout.write(f"       {problem['message']}")
+
+
+def _rank(rank: int | None) -> str:
+    return f"{rank or '–':>4}"
+
+
+def _value(value: float | None) -> str:
+    return "–" if value is None else f"{value:.2f}"

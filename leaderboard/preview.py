@@ -1,0 +1,175 @@
+"""What an edition in preparation would change, before anything is public."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from uuid import UUID
+
+from django.contrib.auth.models import AnonymousUser
+
+from evaluator.protocol import SCORE_NAMES
+from leaderboard import rescoring, standings
+from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
+
+ABSENT = "ABSENT"  # not evaluated in that edition
+
+
+@dataclass(frozen=True)
+class Change:
+    """One standing submission in the published edition and in the one in preparation.
+
+    Ranks are those of the boards, and given for the submission that represents its method there.
+    """
+
+    submission_id: UUID
+    method: str
+    team: str
+    is_public: bool
+    old_status: str
+    new_status: str
+    old: Mapping[str, float | None]
+    new: Mapping[str, float | None]
+    old_rank: int | None
+    new_rank: int | None
+    problems: tuple[Mapping[str, str], ...] = ()
+    n_problems: int = 0
+
+    @property
+    def delta(self) -> dict[str, float | None]:
+        """New minus old published values; None where either is missing."""
+        return {name: _difference(self.old[name], self.new[name]) for name in SCORE_NAMES}
+
+    @property
+    def rank_change(self) -> int:
+        """How many places the rank moves; entries that leave or join the board come first of all."""
+        if self.old_rank is None or self.new_rank is None:
+            return 0 if self.old_rank == self.new_rank else 10**6
+        return abs(self.new_rank - self.old_rank)
+
+    @property
+    def is_changed(self) -> bool:
+        """Whether anything that people see changes."""
+        return (self.old_status, self.old, self.old_rank) != (self.new_status, self.new, self.new_rank)
+
+
+@dataclass(frozen=True)
+class Preview:
+    """Everything that publishing would change. `replaces` is the number of the published edition."""
+
+    edition: Edition
+    published: Edition
+    changes: tuple[Change, ...]
+    progress: rescoring.Progress
+
+    @property
+    def replaces(self) -> int:
+        """The edition that this was compared with; publishing asks for it again."""
+        return self.published.number
+
+    @property
+    def n_changed(self) -> int:
+        """Entries of which anything changes."""
+        return sum(change.is_changed for change in self.changes)
+
+    @property
+    def n_moved(self) -> int:
+        """Entries whose rank changes."""
+        return sum(change.rank_change > 0 for change in self.changes)
+
+    @property
+    def n_newly_rejected(self) -> int:
+        """Entries that were scored and that the new ground truth or protocol cannot score."""
+        return sum(
+            change.old_status == Status.SCORED and change.new_status == Status.REJECTED
+            for change in self.changes
+        )
+
+
+def preview(edition: Edition) -> Preview:
+    """Compare an edition with the published one of its split, the greatest change of rank first.
+
+    Raises `rescoring.Refused` if the split has no published edition.
+    """
+    published = edition.split.published_edition
+    if published is None:
+        raise rescoring.Refused(f"The split {edition.split_id!r} has no published edition to compare with.")
+    old, new = _evaluations(published), _evaluations(edition)
+    old_ranks, new_ranks = _ranks(published), _ranks(edition)
+    changes = [
+        _change(submission, old.get(submission.pk), new.get(submission.pk), old_ranks, new_ranks)
+        for submission in Submission.objects.standing()
+        .filter(split=edition.split_id)
+        .select_related("method__team")
+    ]
+    changes.sort(
+        key=lambda c: (-c.rank_change, c.new_rank or 10**6, c.method.casefold(), str(c.submission_id))
+    )
+    return Preview(
+        edition=edition, published=published, changes=tuple(changes), progress=rescoring.progress(edition)
+    )
+
+
+def rows(found: Preview) -> list[dict[str, Any]]:
+    """The preview as flat rows for CSV and JSON: one for each submission."""
+    return [
+        {
+            "submission": str(change.submission_id),
+            "method": change.method,
+            "team": change.team,
+            "old_status": change.old_status,
+            "new_status": change.new_status,
+            "old_rank": change.old_rank,
+            "new_rank": change.new_rank,
+            **{f"old_{name}": change.old[name] for name in SCORE_NAMES},
+            **{f"new_{name}": change.new[name] for name in SCORE_NAMES},
+            **{f"delta_{name}": value for name, value in change.delta.items()},
+            "reason": change.problems[0]["message"] if change.problems else "",
+        }
+        for change in found.changes
+    ]
+
+
+def _evaluations(edition: Edition) -> dict[UUID, Evaluation]:
+    rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None).prefetch_related(
+        "scores"
+    )
+    return {evaluation.submission_id: evaluation for evaluation in rows}
+
+
+def _ranks(edition: Edition) -> dict[UUID, int | None]:
+    """Rank on the board of that edition, by the submission that stands for its method."""
+    board = standings.board(split=edition.split, edition=edition, viewer=AnonymousUser())
+    return {entry.submission_id: entry.rank for entry in board.entries if entry.submission_id}
+
+
+def _change(
+    submission: Submission,
+    old: Evaluation | None,
+    new: Evaluation | None,
+    old_ranks: Mapping[UUID, int | None],
+    new_ranks: Mapping[UUID, int | None],
+) -> Change:
+    return Change(
+        submission_id=submission.pk,
+        method=submission.method.name,
+        team=submission.method.team.name,
+        is_public=submission.method.visibility == Visibility.PUBLIC,
+        old_status=old.status if old else ABSENT,
+        new_status=new.status if new else ABSENT,
+        old=_values(old),
+        new=_values(new),
+        old_rank=old_ranks.get(submission.pk),
+        new_rank=new_ranks.get(submission.pk),
+        problems=tuple(new.problems) if new else (),
+        n_problems=new.n_problems if new else 0,
+    )
+
+
+def _values(evaluation: Evaluation | None) -> dict[str, float | None]:
+    scores: list[Score] = list(evaluation.scores.all()) if evaluation else []
+    return standings.flat_scores(scores)
+
+
+def _difference(old: float | None, new: float | None) -> float | None:
+    # Both have two decimals; the subtraction of binary fractions must not show more.
+    return None if old is None or new is None else round(new - old, 2)

@@ -1,0 +1,287 @@
+"""Editions: re-score everything beside the board, look before switching, switch at once, and back.
+
+A correction is a new edition (ground truth × protocol) in which every standing submission is evaluated anew.
+Publishing it moves one pointer; nothing that was ever published is changed.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from django.db import transaction
+from django.db.models import Count, Min, Q
+from django.db.models.functions import Now
+
+from evaluator.protocol import get_protocol
+from leaderboard import audit, ground_truth, lifecycle
+from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status, Submission, User
+
+
+class NotMaintainer(Exception):
+    """Only maintainers open, publish, roll back and discard editions."""
+
+    def __init__(self) -> None:
+        super().__init__("Only maintainers may change editions.")
+
+
+class Refused(Exception):
+    """The edition cannot be changed like that; the text says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far the re-scoring of an edition is."""
+
+    n_total: int
+    n_scored: int
+    n_rejected: int
+    n_failed: int  # by our fault
+    n_cancelled: int
+    rate_per_s: float | None
+    left_s: float | None
+
+    @property
+    def n_done(self) -> int:
+        """How many are decided."""
+        return self.n_scored + self.n_rejected + self.n_failed + self.n_cancelled
+
+    @property
+    def n_waiting(self) -> int:
+        """How many are not."""
+        return self.n_total - self.n_done
+
+    @property
+    def percent(self) -> int:
+        """Of all, rounded down, so that 100 means done."""
+        return 100 if self.n_total == 0 else 100 * self.n_done // self.n_total
+
+
+def open_edition(
+    *,
+    split_name: str,
+    now: datetime,
+    actor: User | None,
+    path: Path | None = None,
+    digest: str | None = None,
+    protocol: str | None = None,
+) -> Edition:
+    """Open an edition beside the published one and queue every standing submission for it.
+
+    The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
+    stays unless given. Asked again for the same, it goes on with what is there, also with
+    an edition that was rolled back: nothing is queued twice. `actor` None is the machine's command line.
+    Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file is at fault; nothing changes then.
+    """
+    _require_maintainer(actor)
+    split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
+    if split is None or split.published_edition is None:
+        raise Refused(
+            f"The split {split_name!r} has no published edition to correct; "
+            f"open it with: manage.py import_truth {split_name} PATH"
+        )
+    protocol = protocol or split.published_edition.protocol
+    get_protocol(protocol)
+    if path is not None:
+        row = ground_truth.add(split_name=split_name, path=path, now=now, actor=actor)
+    else:
+        row = _imported(split, digest)
+    with transaction.atomic():
+        split = Split.objects.select_for_update().get(pk=split.pk)
+        edition = split.editions.filter(ground_truth=row, protocol=protocol, discarded_at=None).first()
+        if edition is None:
+            edition = ground_truth.new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
+        elif edition.pk == split.published_edition_id:
+            raise Refused(f"{edition} has this ground truth and protocol, and is the board already.")
+        queue_standing(edition)
+    return edition
+
+
+def _imported(split: Split, digest: str | None) -> GroundTruth:
+    if digest is None:
+        assert split.published_edition is not None  # noqa: S101 - the caller has looked
+        return split.published_edition.ground_truth
+    row = split.ground_truths.filter(digest=digest).first()
+    if row is None:
+        raise Refused(
+            f"The split {split.pk!r} has no ground truth {digest[:80]!r}; import it with --truth first."
+        )
+    return row
+
+
+def queue_standing(edition: Edition) -> int:
+    """Queue every standing submission that this edition has no evaluation of. Returns how many that were.
+
+    The caller holds the split's row, so that no new submission slips between.
+    """
+    missing = list(
+        Submission.objects.standing()
+        .filter(split=edition.split_id)
+        .exclude(evaluations__edition=edition)
+        .order_by("submitted_at")
+        .values_list("pk", flat=True)
+    )
+    lifecycle.enqueue_many(submission_ids=missing, edition=edition)
+    return len(missing)
+
+
+def progress(edition: Edition) -> Progress:
+    """How far an edition is, by one query."""
+    rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
+
+    def of(*statuses: Status) -> Count:
+        return Count("pk", filter=Q(status__in=statuses))
+
+    counts = rows.aggregate(
+        n_total=Count("pk"),
+        n_scored=of(Status.SCORED),
+        n_rejected=of(Status.REJECTED),
+        n_failed=of(Status.SYSTEM_ERROR),
+        n_cancelled=of(Status.CANCELLED),
+        first=Min("started_at"),
+        now=Now(),
+    )
+    first, now = counts.pop("first"), counts.pop("now")
+    n_done = counts["n_scored"] + counts["n_rejected"] + counts["n_failed"] + counts["n_cancelled"]
+    n_waiting = counts["n_total"] - n_done
+    rate = left_s = None
+    if first is not None and n_done and n_waiting:
+        rate = n_done / max((now - first).total_seconds(), 0.001)
+        left_s = n_waiting / rate
+    return Progress(**counts, rate_per_s=rate, left_s=left_s)
+
+
+def unfinished(edition: Edition) -> list[Submission]:
+    """Standing submissions of the split that this edition has neither scored nor rejected."""
+    done = Evaluation.objects.filter(edition=edition, status__in=[Status.SCORED, Status.REJECTED])
+    return list(
+        Submission.objects.standing()
+        .filter(split=edition.split_id)
+        .exclude(pk__in=done.values("submission"))
+        .select_related("method__team")
+        .order_by("submitted_at")
+    )
+
+
+def publish(
+    *,
+    edition: Edition,
+    reason: str,
+    now: datetime,
+    actor: User | None,
+    replaces: int | None,
+    leave_out: bool = False,
+) -> Publication:
+    """Make an edition the board of its split, in one transaction.
+
+    `replaces` is the number of the edition that the maintainer compared with; if another one has become the
+    board meanwhile, nothing happens. While standing submissions are unfinished it refuses, unless they are
+    knowingly left out (`leave_out`), which the changelog then tells.
+    Raises `NotMaintainer` or `Refused`.
+    """
+    _require_maintainer(actor)
+    reason = _reason(reason)
+    with transaction.atomic():
+        edition, split = _locked(edition)
+        if edition.discarded_at or edition.pk == split.published_edition_id:
+            state = "was discarded" if edition.discarded_at else "is the board already"
+            raise Refused(f"{edition} {state}; there is nothing to publish.")
+        _require_same_board(split, replaces)
+        waiting = unfinished(edition)
+        if waiting and not leave_out:
+            raise Refused(_unfinished_sentence(edition, waiting))
+        return ground_truth.make_board(
+            edition=edition,
+            kind=Publication.Kind.PUBLISHED,
+            reason=reason,
+            now=now,
+            actor=actor,
+            left_out=[str(submission.pk) for submission in waiting],
+        )
+
+
+def roll_back(
+    *, split_name: str, reason: str, now: datetime, actor: User | None, replaces: int | None
+) -> Publication:
+    """Make the edition that the present one replaced the board again, as it was.
+
+    What was submitted since is queued for it. Raises `NotMaintainer` or `Refused`.
+    """
+    _require_maintainer(actor)
+    reason = _reason(reason)
+    with transaction.atomic():
+        split = Split.objects.select_for_update().get(pk=split_name)
+        _require_same_board(split, replaces)
+        latest = split.publications.filter(
+            edition=split.published_edition, kind=Publication.Kind.PUBLISHED
+        ).first()
+        if latest is None or latest.replaced is None:
+            raise Refused(
+                f"{split.published_edition or split.pk} replaced no edition; there is nothing to go back to."
+            )
+        publication = ground_truth.make_board(
+            edition=Edition.objects.select_related("split").get(pk=latest.replaced_id),
+            kind=Publication.Kind.ROLLED_BACK,
+            reason=reason,
+            now=now,
+            actor=actor,
+        )
+        queue_standing(publication.edition)
+    return publication
+
+
+def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None) -> None:
+    """Give up an edition in preparation. Its evaluations stay as they are; what waits is cancelled.
+
+    Raises `NotMaintainer` or `Refused`.
+    """
+    _require_maintainer(actor)
+    reason = _reason(reason)
+    with transaction.atomic():
+        edition, _ = _locked(edition)
+        if not edition.is_in_preparation:
+            raise Refused(f"{edition} is not in preparation; there is nothing to discard.")
+        edition.discarded_at = now
+        edition.save(update_fields=["discarded_at"])
+        lifecycle.cancel_edition(edition=edition)
+        audit.record(
+            verb="discarded", noun="Edition", noun_id=edition.pk, actor=actor, details={"reason": reason}
+        )
+
+
+def _locked(edition: Edition) -> tuple[Edition, Split]:
+    """The edition and its split as they are now, the split locked."""
+    split = Split.objects.select_for_update().get(pk=edition.split_id)
+    edition = Edition.objects.get(pk=edition.pk)
+    edition.split = split
+    return edition, split
+
+
+def _require_maintainer(actor: User | None) -> None:
+    if actor is not None and not actor.is_maintainer:
+        raise NotMaintainer
+
+
+def _require_same_board(split: Split, replaces: int | None) -> None:
+    published = split.published_edition.number if split.published_edition else None
+    if published != replaces:
+        raise Refused(
+            f"The board of {split.pk!r} is edition {published}, not {replaces} as when you looked; "
+            "look again first."
+        )
+
+
+def _reason(text: str) -> str:
+    text = " ".join(text.split())
+    if not text:
+        raise Refused("No reason was given; expected a sentence for the public changelog.")
+    return text[:1000]
+
+
+def _unfinished_sentence(edition: Edition, waiting: Sequence[Submission]) -> str:
+    shown = ", ".join(f"{submission.method.name} ({submission.pk})" for submission in waiting[:20])
+    more = f", and {len(waiting) - 20} more" if len(waiting) > 20 else ""
+    return (
+        f"{edition} is not finished: {len(waiting)} standing submissions are neither scored nor rejected: "
+        f"{shown}{more}. Wait, retry them, or leave them out knowingly."
+    )
