@@ -4,13 +4,21 @@ import os
 import random
 
 from celery import Celery
-from celery.signals import worker_process_init
+from celery.signals import setup_logging, worker_process_init
+from django_structlog.celery.steps import DjangoStructLogInitStep
 
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
 
 app = Celery("leaderboard")
 app.config_from_object("django.conf:settings", namespace="CELERY")
 app.autodiscover_tasks()
+# Lines of a task carry its id, and the id of the request that sent it.
+app.steps["worker"].add(DjangoStructLogInitStep)
+
+
+@setup_logging.connect  # that somebody listens is what keeps Celery from installing its own handlers
+def keep_our_logging(**_: object) -> None:
+    """Leave logging as `leaderboard/logs.py` set it up."""
 
 
 @worker_process_init.connect  # Celery has no other door into the processes that run tasks

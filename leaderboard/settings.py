@@ -5,8 +5,10 @@ and the tests use) and `production`, which guesses nothing: what it needs and do
 Every variable is described in `docs/operations.md`.
 """
 
+import logging
 import sys
 from datetime import timedelta
+from ipaddress import ip_network
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +17,8 @@ from celery.schedules import schedule
 from csp.constants import NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
 from django.core.management.utils import get_random_secret_key
+
+from leaderboard import logs
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environ.Env()
@@ -84,12 +88,15 @@ INSTALLED_APPS = [
     "csp",
     "django_filters",
     "django_htmx",
+    "django_structlog",
     "drf_spectacular",
     "drf_spectacular_sidecar",
     "knox",
     "rest_framework",
 ]
 MIDDLEWARE = [
+    # First, so that every line that a request causes carries its id.
+    "leaderboard.web.request_log.RequestLogMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "csp.middleware.CSPMiddleware",
@@ -275,6 +282,8 @@ ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key"}
 # --- API -------------------------------------------------------------------------------------------------
 
 KNOX_TOKEN_MODEL = "leaderboard.ApiToken"
+# Its migrations make a table of its own model, which stands empty beside ours and hinders every flush.
+MIGRATION_MODULES = {"knox": None}
 REST_KNOX = {
     "AUTH_HEADER_PREFIX": "Bearer",
     "TOKEN_PREFIX": "tsttc_",
@@ -303,6 +312,25 @@ SPECTACULAR_SETTINGS = {
     "REDOC_DIST": "SIDECAR",
     "SCHEMA_PATH_PREFIX": "/api/v1",
 }
+
+# --- what is written down, and who may look --------------------------------------------------------------
+
+LOG_LEVEL = env.str("TSTTC_LOG_LEVEL", default="INFO").upper()
+LOGGING = logs.logging_settings(
+    as_json=env.str("TSTTC_LOG_FORMAT", default="json" if PRODUCTION else "text") == "json", level=LOG_LEVEL
+)
+logs.configure()
+DJANGO_STRUCTLOG_CELERY_ENABLED = True
+DJANGO_STRUCTLOG_IP_LOGGING_ENABLED = False
+DJANGO_STRUCTLOG_STATUS_START_LOG_LEVEL = logging.DEBUG
+# A nudge is worth no line; what came of the evaluation is.
+DJANGO_STRUCTLOG_CELERY_TASK_START_LOG_LEVEL = logging.DEBUG
+DJANGO_STRUCTLOG_CELERY_TASK_SUCCESS_LOG_LEVEL = logging.DEBUG
+# Who may read /metrics; see leaderboard/web/health.py.
+METRICS_TOKEN = env.str("TSTTC_METRICS_TOKEN", default="")
+METRICS_NETWORKS = [
+    ip_network(text) for text in env.list("TSTTC_METRICS_NETWORKS", default=["127.0.0.0/8", "::1/128"])
+]
 
 # --- security --------------------------------------------------------------------------------------------
 
