@@ -11,7 +11,7 @@ import structlog
 from django.conf import settings
 from django.db import DatabaseError, close_old_connections
 
-from leaderboard import lifecycle, scoring
+from leaderboard import health, lifecycle, scoring
 
 log = structlog.get_logger(__name__)
 
@@ -24,6 +24,7 @@ def sweep(*, rng: random.Random) -> int:
     waiting = lifecycle.waiting_ids(limit=MAX_NUDGES_PER_SWEEP)
     for evaluation_id in waiting:
         lifecycle.nudge(evaluation_id)
+    health.record_sweep()
     return len(waiting)
 
 

@@ -1,11 +1,16 @@
-"""Addresses: pages, API, administration, accounts."""
+"""Addresses: pages, API, administration, accounts, and those for monitoring."""
 
 from django.contrib import admin
 from django.urls import include, path
+
+from leaderboard.web import health
 
 urlpatterns = [
     path("", include("leaderboard.web.urls")),
     path("api/v1/", include("leaderboard.api.urls")),
     path("accounts/", include("allauth.urls")),
     path("admin/", admin.site.urls),
+    path("healthz", health.healthz, name="healthz"),
+    path("readyz", health.readyz, name="readyz"),
+    path("metrics", health.prometheus, name="metrics"),
 ]

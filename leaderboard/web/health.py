@@ -62,7 +62,11 @@ def prometheus(request: HttpRequest) -> HttpResponse:
         return HttpResponse(metrics.exposition(), content_type=CONTENT_TYPE_LATEST)
     except DatabaseProblem as fault:
         log.warning("metrics_unavailable", reason=str(fault)[:200])
-        return HttpResponse("The database does not answer.\n", status=503, content_type="text/plain")
+        return _sentence("The database does not answer.", status=503)
+
+
+def _sentence(text: str, *, status: int) -> HttpResponse:
+    return HttpResponse(f"{text}\n", status=status, content_type="text/plain; charset=utf-8")
 
 
 def may_read_metrics(request: HttpRequest) -> bool:

@@ -1,0 +1,186 @@
+"""Whether this installation can do its work: database and broker answer, the queue is looked after.
+
+The checks are for a probe that asks every few seconds: each is bounded in time, and none raises.
+"""
+
+import errno
+import os
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import structlog
+from django.conf import settings
+from django.db import Error as DatabaseProblem
+from django.db import connections
+from django.db.models import DurationField, ExpressionWrapper, F
+from django.db.models.functions import Now
+from django.db.utils import load_backend
+from kombu import Connection
+from kombu.exceptions import KombuError
+
+from leaderboard.models import SweepBeat
+
+log = structlog.get_logger(__name__)
+
+CHECK_TIMEOUT_S = 2
+"""How long one check may take. PostgreSQL's client knows no shorter time for connecting."""
+MAX_SWEEP_AGE_S = 60.0
+PROBE = "probe"
+
+
+@dataclass(frozen=True)
+class Check:
+    """What one check found. `detail` names no host and no account: strangers may read it."""
+
+    name: str
+    is_ok: bool
+    detail: str
+
+
+def record_sweep() -> None:
+    """Write down that a sweep was finished just now, by the database's clock."""
+    SweepBeat.objects.bulk_create(
+        [SweepBeat(id=SweepBeat.THE_ONE, swept_at=Now())],
+        update_conflicts=True,
+        unique_fields=["id"],
+        update_fields=["swept_at"],
+    )
+
+
+def sweep_age_s(*, using: str = "default") -> float | None:
+    """Seconds since the last sweep, by the database's clock; None if there was none."""
+    age: timedelta | None = (
+        SweepBeat.objects.using(using)
+        .annotate(age=ExpressionWrapper(Now() - F("swept_at"), output_field=DurationField()))
+        .values_list("age", flat=True)
+        .first()
+    )
+    return None if age is None else age.total_seconds()
+
+
+def checks() -> tuple[Check, ...]:
+    """Ask database, sweep and broker. Takes at most about three times `CHECK_TIMEOUT_S`; never raises."""
+    return (*_database(), _broker())
+
+
+def _database() -> tuple[Check, Check]:
+    """A new connection and one question over it, which also tells how old the last sweep is."""
+    started_s = time.monotonic()
+    try:
+        with _own_connection() as alias:
+            age_s = sweep_age_s(using=alias)
+    except DatabaseProblem as fault:
+        log.warning("database_not_ready", reason=str(fault)[:200])
+        return (
+            Check("database", is_ok=False, detail="does not answer"),
+            Check("sweep", is_ok=False, detail="unknown: the database does not answer"),
+        )
+    return Check("database", is_ok=True, detail=_answered(started_s)), _sweep(age_s)
+
+
+def _sweep(age_s: float | None) -> Check:
+    if age_s is None:
+        return Check("sweep", is_ok=False, detail="there was none yet")
+    detail = f"the last was {age_s:.0f} s ago, expected less than {MAX_SWEEP_AGE_S:.0f} s"
+    return Check("sweep", is_ok=age_s < MAX_SWEEP_AGE_S, detail=detail)
+
+
+def _broker() -> Check:
+    """A new connection to the broker; for a broker made of files, whether its folder can be written."""
+    started_s = time.monotonic()
+    options: dict[str, Any] = {
+        **settings.CELERY_BROKER_TRANSPORT_OPTIONS,
+        "socket_timeout": CHECK_TIMEOUT_S,
+        "socket_connect_timeout": CHECK_TIMEOUT_S,
+        "retry_on_timeout": False,
+        "max_retries": 0,
+    }
+    try:
+        if settings.CELERY_BROKER_URL.startswith("filesystem"):
+            _check_folder(Path(options["data_folder_out"]))
+        else:
+            with Connection(
+                settings.CELERY_BROKER_URL, connect_timeout=CHECK_TIMEOUT_S, transport_options=options
+            ) as connection:
+                # Asking for the channel is what makes kombu speak to the server.
+                connection.default_channel  # noqa: B018
+    except (KombuError, OSError) as fault:
+        log.warning("broker_not_ready", reason=str(fault)[:200])
+        return Check("broker", is_ok=False, detail="does not answer")
+    return Check("broker", is_ok=True, detail=_answered(started_s))
+
+
+def _check_folder(folder: Path) -> None:
+    """Raise `OSError` unless files can be made in the folder."""
+    if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
+        raise PermissionError(errno.EACCES, "the folder of messages cannot be written")
+
+
+def _answered(started_s: float) -> str:
+    return f"answered in {(time.monotonic() - started_s) * 1000:.0f} ms"
+
+
+@contextmanager
+def _own_connection() -> Iterator[str]:
+    """The alias of a new database connection, closed at the end.
+
+    Not the one that the request would use: that one may wait for a server that has stopped answering, and a
+    new one is what the next worker process will need.
+    """
+    configured: dict[str, Any] = {**connections.settings["default"]}
+    configured["OPTIONS"] = {**configured.get("OPTIONS", {}), **_limits(configured["ENGINE"])}
+    probe = load_backend(configured["ENGINE"]).DatabaseWrapper(configured, PROBE)
+    connections[PROBE] = probe
+    try:
+        yield PROBE
+    finally:
+        del connections[PROBE]
+        if probe.connection is not None:
+            probe.connection.close()
+
+
+def _limits(engine: str) -> dict[str, Any]:
+    """Options that keep a question to the database within `CHECK_TIMEOUT_S`."""
+    if "postgresql" not in engine:
+        return {"timeout": CHECK_TIMEOUT_S, "init_command": ""}
+    milliseconds = CHECK_TIMEOUT_S * 1000
+    return {
+        "connect_timeout": CHECK_TIMEOUT_S,
+        "tcp_user_timeout": milliseconds,
+        "options": f"-c statement_timeout={milliseconds} -c lock_timeout={milliseconds}",
+    }
+
+
+class Recent:
+    """The last answer to a costly question, for a while: whoever asks often costs no more than who asks once.
+
+    One caller at a time asks anew; the others meanwhile get the answer before that.
+    """
+
+    def __init__(self, ask: Callable[[], tuple[Check, ...]], *, keep_s: float) -> None:
+        self._ask = ask
+        self._keep_s = keep_s
+        self._lock = threading.Lock()
+        self.forget()
+
+    def forget(self) -> None:
+        """Ask anew next time."""
+        self._answer: tuple[Check, ...] = ()
+        self._answered_s = float("-inf")
+
+    def __call__(self) -> tuple[Check, ...]:
+        """The answer. Waits only where there is no former one to give."""
+        if self._lock.acquire(blocking=not self._answer):
+            try:
+                if time.monotonic() - self._answered_s >= self._keep_s:
+                    self._answer = self._ask()
+                    self._answered_s = time.monotonic()
+            finally:
+                self._lock.release()
+        return self._answer

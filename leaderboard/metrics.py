@@ -1,0 +1,190 @@
+"""Figures for Prometheus, read from the database when they are asked for.
+
+So they are the same from every process on every machine, and a restart loses nothing. Three statements a
+scrape; the counters are counts of rows that never change again.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import timedelta
+from itertools import accumulate
+from typing import Any, Final
+
+from django.db.models import (
+    Case,
+    Count,
+    DurationField,
+    ExpressionWrapper,
+    F,
+    IntegerField,
+    Min,
+    Sum,
+    Value,
+    When,
+)
+from django.db.models.functions import Now
+from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.registry import Collector
+
+from leaderboard import health
+from leaderboard.models import Evaluation, Status
+
+PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
+BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
+
+
+def exposition() -> bytes:
+    """All figures in Prometheus' text format. Raises the database's error if it does not answer."""
+    registry = CollectorRegistry(auto_describe=False)
+    registry.register(DatabaseCollector())
+    return generate_latest(registry)
+
+
+class DatabaseCollector(Collector):
+    """Reads the queue, the runs and the sweep."""
+
+    def describe(self) -> Iterable[Metric]:
+        """Nothing: registering must not ask the database."""
+        return []
+
+    def collect(self) -> Iterator[Metric]:
+        """Every figure, from three statements."""
+        yield from _queue(list(_by_status()))
+        yield from _durations(list(_by_bucket()))
+        yield _gauge(
+            "tsttc_last_sweep_age_seconds",
+            "Time since the queue was last looked after; NaN if it never was.",
+            {(): _or_nan(health.sweep_age_s())},
+        )
+
+
+# --- the queue and the states ---------------------------------------------------------------------------
+
+
+def _by_status() -> Iterable[Mapping[str, Any]]:
+    return (
+        Evaluation.objects.order_by()
+        .values("status", "priority")
+        .annotate(
+            n=Count("pk"),
+            n_attempts=Sum("attempt"),
+            n_poison=Sum("n_poison_strikes"),
+            n_infrastructure=Sum("n_infrastructure_strikes"),
+            oldest_age=ExpressionWrapper(Now() - Min("queued_at"), output_field=DurationField()),
+        )
+    )
+
+
+def _queue(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
+    queued = [row for row in rows if row["status"] == Status.QUEUED]
+    n_by_status = {status.value: sum(r["n"] for r in rows if r["status"] == status) for status in Status}
+    yield _gauge(
+        "tsttc_queue_depth",
+        "Evaluations that wait for a worker.",
+        {
+            (name,): sum(row["n"] for row in queued if row["priority"] == priority)
+            for priority, name in PRIORITIES.items()
+        },
+        labels=["priority"],
+    )
+    yield _gauge(
+        "tsttc_queue_oldest_age_seconds",
+        "How long the oldest of them has waited since it was queued; 0 if none waits.",
+        {(): max((row["oldest_age"].total_seconds() for row in queued), default=0.0)},
+    )
+    yield _gauge("tsttc_running", "Evaluations that a worker holds.", {(): n_by_status[Status.RUNNING]})
+    yield _gauge(
+        "tsttc_evaluations",
+        "Evaluations by state; SYSTEM_ERROR is what failed by our fault and waits for a maintainer.",
+        {(status,): n for status, n in n_by_status.items()},
+        labels=["status"],
+    )
+    yield _counter("tsttc_runs_started", "Claims by workers.", {(): sum(row["n_attempts"] for row in rows)})
+    yield _counter(
+        "tsttc_runs_finished",
+        "Runs that decided their evaluation; what was started beyond these came to nothing or still runs.",
+        {(status.lower(),): n_by_status[status] for status in (Status.SCORED, Status.REJECTED)},
+        labels=["outcome"],
+    )
+    yield _gauge(
+        "tsttc_strikes",
+        "Runs that came to nothing, by kind; a maintainer's retry wipes those of its evaluation.",
+        {
+            ("poison",): sum(row["n_poison"] for row in rows),
+            ("infrastructure",): sum(row["n_infrastructure"] for row in rows),
+        },
+        labels=["kind"],
+    )
+
+
+# --- how long it takes ----------------------------------------------------------------------------------
+
+
+def _bucket(field: str) -> Case:
+    """The place of a duration among `BUCKETS_S`; beyond the last, their number."""
+    return Case(
+        *(
+            When(**{f"{field}__lte": timedelta(seconds=bound_s)}, then=Value(place))
+            for place, bound_s in enumerate(BUCKETS_S)
+        ),
+        default=Value(len(BUCKETS_S)),
+        output_field=IntegerField(),
+    )
+
+
+def _by_bucket() -> Iterable[Mapping[str, Any]]:
+    """Decided evaluations, counted by run time and turnaround together: one pass gives both histograms."""
+    return (
+        Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED], started_at__isnull=False)
+        .order_by()
+        .annotate(
+            run=ExpressionWrapper(F("finished_at") - F("started_at"), output_field=DurationField()),
+            turnaround=ExpressionWrapper(F("finished_at") - F("queued_at"), output_field=DurationField()),
+        )
+        .annotate(run_bucket=_bucket("run"), turnaround_bucket=_bucket("turnaround"))
+        .values("run_bucket", "turnaround_bucket")
+        .annotate(n=Count("pk"), run_sum=Sum("run"), turnaround_sum=Sum("turnaround"))
+    )
+
+
+def _durations(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
+    for field, documentation in (
+        ("run", "From the last claim to the decision."),
+        ("turnaround", "From queued to decided, with every attempt."),
+    ):
+        counts = [0] * (len(BUCKETS_S) + 1)
+        for row in rows:
+            counts[row[f"{field}_bucket"]] += row["n"]
+        bounds = [*(str(bound_s) for bound_s in BUCKETS_S), "+Inf"]
+        histogram = HistogramMetricFamily(f"tsttc_{field}_seconds", documentation)
+        histogram.add_metric(
+            [],
+            buckets=list(zip(bounds, accumulate(counts), strict=True)),
+            sum_value=sum(row[f"{field}_sum"].total_seconds() for row in rows),
+        )
+        yield histogram
+
+
+# --- Prometheus' words ----------------------------------------------------------------------------------
+
+
+def _gauge(
+    name: str, documentation: str, values: dict[tuple[str, ...], float], *, labels: Iterable[str] = ()
+) -> Metric:
+    return _family(GaugeMetricFamily(name, documentation, labels=list(labels)), values)
+
+
+def _counter(
+    name: str, documentation: str, values: dict[tuple[str, ...], float], *, labels: Iterable[str] = ()
+) -> Metric:
+    return _family(CounterMetricFamily(name, documentation, labels=list(labels)), values)
+
+
+def _family(family: GaugeMetricFamily | CounterMetricFamily, values: dict[tuple[str, ...], float]) -> Metric:
+    for labels, value in values.items():
+        family.add_metric(list(labels), value)
+    return family
+
+
+def _or_nan(value: float | None) -> float:
+    return float("nan") if value is None else value

@@ -1,0 +1,186 @@
+"""`/healthz` and `/readyz`: alive without a database, ready only with database, broker and a recent sweep."""
+
+import random
+import socket
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from django.db import connection, connections
+from django.db.models import DateTimeField, ExpressionWrapper, Value
+from django.db.models.functions import Now
+from django.test import Client
+from django.utils.connection import ConnectionDoesNotExist
+from pytest_django.fixtures import Settings
+
+from leaderboard import health, queue
+from leaderboard.models import SweepBeat
+from leaderboard.web import health as doors
+
+
+@pytest.fixture(autouse=True)
+def _broker_folder(tmp_path: Path, settings: Settings) -> None:
+    """A broker made of files that nobody else touches, and no answer from an earlier test."""
+    settings.CELERY_BROKER_URL = "filesystem://"
+    settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"data_folder_out": str(tmp_path)}
+    doors.readiness.forget()
+
+
+@pytest.fixture
+def silent_port() -> Iterator[int]:
+    """A port that accepts connections and never says a word, like a stopped server."""
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        yield listening.getsockname()[1]
+
+
+def _swept(*, seconds_ago: float) -> None:
+    """A sweep, so long ago by the database's clock."""
+    at = ExpressionWrapper(Now() - Value(timedelta(seconds=seconds_ago)), output_field=DateTimeField())
+    SweepBeat.objects.update_or_create(id=SweepBeat.THE_ONE, defaults={"swept_at": at})
+
+
+def test_alive_needs_no_database() -> None:
+    # Without the mark `django_db`, any question to the database fails the test.
+    response = Client().get("/healthz")
+    assert (response.status_code, response.json()) == (200, {"status": "alive"})
+
+
+def test_alive_with_a_session_cookie_needs_no_database() -> None:
+    client = Client()
+    client.cookies["sessionid"] = "x" * 32
+    assert client.get("/healthz").status_code == 200
+
+
+@pytest.mark.django_db(transaction=True)
+def test_ready_when_database_broker_and_sweep_are_well() -> None:
+    queue.sweep(rng=random.Random(0))
+    response = Client().get("/readyz")
+    assert response.status_code == 200
+    assert response.json()["status"] == "ready"
+    assert {name: check["ok"] for name, check in response.json()["checks"].items()} == {
+        "database": True,
+        "sweep": True,
+        "broker": True,
+    }
+
+
+@pytest.mark.django_db(transaction=True)
+@pytest.mark.parametrize(("seconds_ago", "is_ok"), [(1, True), (55, True), (65, False), (3600, False)])
+def test_sweep_older_than_a_minute_is_not_ready(seconds_ago: float, is_ok: bool) -> None:
+    _swept(seconds_ago=seconds_ago)
+    response = Client().get("/readyz")
+    assert response.json()["checks"]["sweep"]["ok"] is is_ok
+    assert response.status_code == (200 if is_ok else 503)
+
+
+@pytest.mark.django_db(transaction=True)
+def test_installation_that_was_never_swept_is_not_ready() -> None:
+    response = Client().get("/readyz")
+    assert response.status_code == 503
+    assert response.json()["checks"]["sweep"] == {"ok": False, "detail": "there was none yet"}
+
+
+@pytest.mark.django_db(transaction=True)
+def test_every_sweep_moves_the_one_beat() -> None:
+    _swept(seconds_ago=100)
+    queue.sweep(rng=random.Random(0))
+    queue.sweep(rng=random.Random(0))
+    age_s = health.sweep_age_s()
+    assert age_s is not None
+    assert age_s < 50
+    assert SweepBeat.objects.count() == 1
+
+
+@pytest.mark.django_db(transaction=True)
+def test_broker_whose_folder_is_gone_is_not_ready(settings: Settings, tmp_path: Path) -> None:
+    _swept(seconds_ago=1)
+    settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"data_folder_out": str(tmp_path / "gone")}
+    response = Client().get("/readyz")
+    assert response.status_code == 503
+    assert response.json()["checks"]["broker"] == {"ok": False, "detail": "does not answer"}
+
+
+@pytest.mark.django_db(transaction=True)
+def test_broker_that_accepts_but_never_answers_is_given_up(
+    settings: Settings, silent_port: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 0.2)
+    settings.CELERY_BROKER_URL = f"redis://:swordfish@127.0.0.1:{silent_port}/0"
+    settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"socket_timeout": 300}
+    _swept(seconds_ago=1)
+    response = Client().get("/readyz")
+    assert response.status_code == 503
+    assert response.json()["checks"]["broker"]["ok"] is False
+    assert "swordfish" not in response.text
+    assert str(silent_port) not in response.text
+
+
+def test_database_that_accepts_but_never_answers_is_given_up(
+    silent_port: int, monkeypatch: pytest.MonkeyPatch, db: None
+) -> None:
+    elsewhere = {
+        **connections.settings["default"],
+        "ENGINE": "django.db.backends.postgresql",
+        "HOST": "127.0.0.1",
+        "PORT": str(silent_port),
+        "USER": "nobody",
+        "PASSWORD": "swordfish",
+        "OPTIONS": {"connect_timeout": 60},
+    }
+    monkeypatch.setitem(connections.settings, "default", elsewhere)
+    response = Client().get("/readyz")
+    assert response.status_code == 503
+    checks = response.json()["checks"]
+    assert checks["database"] == {"ok": False, "detail": "does not answer"}
+    assert checks["sweep"] == {"ok": False, "detail": "unknown: the database does not answer"}
+    assert checks["broker"]["ok"] is True
+    assert "swordfish" not in response.text
+    with pytest.raises(ConnectionDoesNotExist):
+        connections[health.PROBE]
+
+
+@pytest.mark.django_db(transaction=True)
+def test_probe_leaves_the_requests_own_connection_alone() -> None:
+    with connection.cursor() as cursor:
+        cursor.execute("CREATE TEMPORARY TABLE mine (x integer)")
+    health.checks()
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT count(*) FROM mine")
+        assert cursor.fetchone() == (0,)
+        cursor.execute("DROP TABLE mine")
+
+
+def test_asking_often_costs_what_asking_once_does() -> None:
+    asked: list[int] = []
+
+    def ask() -> tuple[health.Check, ...]:
+        asked.append(len(asked))
+        return (health.Check("it", is_ok=True, detail=str(len(asked))),)
+
+    recent = health.Recent(ask, keep_s=60)
+    assert {recent()[0].detail for _ in range(50)} == {"1"}
+    recent.forget()
+    assert recent()[0].detail == "2"
+
+
+def test_whoever_asks_while_another_asks_gets_the_former_answer() -> None:
+    answers: list[str] = []
+
+    def ask() -> tuple[health.Check, ...]:
+        if answers:
+            # While the second question is under way, a third comes.
+            answers.append(recent()[0].detail)
+        else:
+            answers.append("")
+        return (health.Check("it", is_ok=True, detail="first" if len(answers) == 1 else "second"),)
+
+    recent = health.Recent(ask, keep_s=0)
+    assert recent()[0].detail == "first"
+    assert recent()[0].detail == "second"
+    assert answers == ["", "first"]
+
+
+@pytest.mark.parametrize("path", ["/healthz", "/readyz", "/metrics"])
+def test_doors_take_no_posts(path: str) -> None:
+    assert Client().post(path).status_code == 405
