@@ -1,0 +1,225 @@
+"""`tsttc` against the leaderboard itself: the same file, numbers and words on both sides."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from django.utils import timezone
+from pytest_django.live_server_helper import LiveServer
+
+from evaluator.client import Client
+from evaluator.protocol import SCORE_NAMES
+from leaderboard import ground_truth, tokens
+from leaderboard.models import Submission, User
+from tests import builders
+from tests.journeys.people import Visitor
+from tests.journeys.production import REPOSITORY, Site
+
+EXAMPLES = REPOSITORY / "examples"
+
+Done = subprocess.CompletedProcess[str]
+Tsttc = Callable[..., Done]
+
+
+def command(url: str, token: str) -> Tsttc:
+    """The command as a process of its own, with that token for that address."""
+    environment = os.environ | {"TSTTC_URL": url, "TSTTC_TOKEN": token, "PYTHONPATH": str(REPOSITORY)}
+
+    def run(*arguments: str) -> Done:
+        return subprocess.run(
+            [sys.executable, "-m", "evaluator", *arguments],
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=False,
+            cwd=EXAMPLES,
+            env=environment,
+            timeout=90,
+        )
+
+    return run
+
+
+@pytest.fixture
+def owner(transactional_db: None) -> User:
+    """Somebody who submits."""
+    return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
+
+
+@pytest.fixture
+def tsttc(live_server: LiveServer, owner: User, benchmark: None) -> Tsttc:
+    """The owner's command; the split `val` has the truth of the examples."""
+    ground_truth.import_truth(split_name="val", path=EXAMPLES / "truth.csv", now=timezone.now())
+    return command(live_server.url, tokens.create(user=owner, name="CI"))
+
+
+def submit(tsttc: Tsttc, predictions: str, *more: str, method: str = "Foo++") -> Done:
+    return tsttc("submit", predictions, "--split", "val", "--method", method, *more)
+
+
+def submitted(tsttc: Tsttc, predictions: str, *more: str, method: str = "Foo++") -> str:
+    """The id of a submission that was taken."""
+    done = submit(tsttc, predictions, "--json", *more, method=method)
+    assert done.returncode == 0, done.stderr
+    return str(json.loads(done.stdout)["id"])
+
+
+@pytest.mark.parametrize("predictions", ["predictions.json", "predictions.scale_ratio.json"])
+def test_submission_scores_what_score_says_offline(tsttc: Tsttc, predictions: str) -> None:
+    offline = tsttc("score", predictions, "--truth", "truth.csv").stdout.splitlines()
+    identity = submitted(tsttc, predictions)
+    assert tsttc("status", identity).stdout.startswith("QUEUED, 0 ahead")
+    assert builders.score_all() == 1
+    done = tsttc("status", identity, "--watch")
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[0] == "SCORED: Foo++ on val"
+    assert done.stdout.splitlines()[2:] == offline[: offline.index("", 4)]
+
+
+def test_rejection_has_the_words_of_check(tsttc: Tsttc) -> None:
+    offline = tsttc("check", "broken.json", "--manifest", "manifest.csv")
+    identity = submitted(tsttc, "broken.json")
+    builders.score_all()
+    done = tsttc("status", identity)
+    assert (offline.returncode, done.returncode) == (1, 1)
+    numbered = offline.stderr.splitlines()[1:]
+    assert len(numbered) == 6
+    assert done.stderr.splitlines()[1:7] == numbered
+    assert "7 problems" in offline.stderr.splitlines()[0]
+    assert "7 problems" in done.stderr.splitlines()[0]
+
+
+def test_same_file_again_is_the_first_submission(tsttc: Tsttc) -> None:
+    first = submitted(tsttc, "predictions.json")
+    again = submit(tsttc, "predictions.json")
+    assert again.returncode == 0
+    assert again.stdout.splitlines()[0].startswith(f"Submission {first}  http")
+    assert "sent before" in again.stdout
+    assert Submission.objects.count() == 1
+
+
+def test_what_is_said_of_a_method_arrives(tsttc: Tsttc) -> None:
+    said = {"description": "A try", "paper-url": "https://p.example/", "code-url": "https://c.example/"}
+    said |= {"note": "third", "commit": "c0ffee"}
+    submitted(
+        tsttc, "predictions.json", *[part for name, text in said.items() for part in (f"--{name}", text)]
+    )
+    submission = Submission.objects.select_related("method").get()
+    method = submission.method
+    assert (method.name, method.description) == ("Foo++", "A try")
+    assert (method.paper_url, method.code_url) == ("https://p.example/", "https://c.example/")
+    assert (submission.note, submission.commit) == ("third", "c0ffee")
+    assert submission.filename == "predictions.json"
+
+
+def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
+    submitted(tsttc, "predictions.json")
+    builders.score_all()
+    offline = json.loads(tsttc("score", "predictions.json", "--truth", "truth.csv", "--json").stdout)
+    done = tsttc("board", "val")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0].startswith("val · edition 1 · updated ")
+    first = lines[4].split()
+    assert first[:3] == ["1", "Foo++", "Owls"]
+    assert first[4] == f"{offline['scores']['overall']['mid']:.2f}"
+    assert "Shi et al. (published)  2023" in done.stdout
+    document = json.loads(tsttc("board", "val", "--sort", "-rte", "--json").stdout)
+    assert document["sort"] == "-rte"
+    errors = [entry["scores"]["rte"] for entry in document["entries"]]
+    assert errors == sorted(errors, reverse=True)
+    assert tuple(document["entries"][0]["scores"]) == SCORE_NAMES
+
+
+def test_manifest_of_the_server_checks_files_like_the_local_one(
+    live_server: LiveServer, tsttc: Tsttc
+) -> None:
+    with Client(url=live_server.url) as client:
+        assert client.manifest("val") == (EXAMPLES / "manifest.csv").read_bytes()
+
+
+def test_stranger_s_submission_does_not_exist(live_server: LiveServer, tsttc: Tsttc) -> None:
+    identity = submitted(tsttc, "predictions.json")
+    stranger = User.objects.create_user("stranger@example.org", "correct horse", name="Strangers")
+    done = command(live_server.url, tokens.create(user=stranger, name="CI"))("status", identity)
+    assert (done.returncode, done.stdout) == (3, "")
+    assert "The server knows no such thing" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "words"),
+    [
+        (
+            ["submit", "predictions.json", "--split", "trial", "--method", "Foo"],
+            2,
+            "There is no split 'trial'",
+        ),
+        (["submit", "predictions.json", "--split", "test", "--method", "Foo"], 3, "are not open yet"),
+        (["submit", "predictions.json", "--split", "val", "--method", " "], 2, "method"),
+        (["submit", "predictions.json", "--split", "val", "--method", "F", "--code-url", "x"], 2, "code_url"),
+        (["board", "val", "--sort", "x"], 2, "cannot be sorted by 'x'"),
+        (["board", "trial"], 3, "The server knows no such thing"),
+        (["status", "00000000-0000-4000-8000-000000000000"], 3, "The server knows no such thing"),
+    ],
+)
+def test_refusal_of_the_server_is_told_by_whose_fault_it_is(
+    tsttc: Tsttc, arguments: list[str], code: int, words: str
+) -> None:
+    done = tsttc(*arguments)
+    assert done.returncode == code, done.stderr
+    assert words in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_token_that_the_server_does_not_know_is_told(live_server: LiveServer, tsttc: Tsttc) -> None:
+    done = submit(command(live_server.url, "tsttc_" + "0" * 64), "predictions.json")
+    assert done.returncode == 3
+    assert "The server does not accept the token" in done.stderr
+
+
+@pytest.mark.services
+@pytest.mark.slow
+def test_ci_job_waits_for_its_scores_on_the_real_thing(
+    site: Site, people: Callable[[Site], Visitor], tmp_path: Path
+) -> None:
+    """Real web server, worker, PostgreSQL and Redis; the job checks, submits, waits and reads the board."""
+    people(site).sign_up(email="ci@example.org", name="Team CI")
+    tsttc = command(site.url, site.manage("create_token", "ci@example.org", "--name", "CI").strip())
+    truth = site.directory / "truth.csv"
+    guess = tmp_path / "guess.json"
+    rows = truth.read_text().splitlines()[1:]
+    guess.write_text(json.dumps({row.split(",")[0]: float(row.split(",")[-1]) * 1.02 for row in rows}))
+
+    waited = tsttc("submit", str(guess), "--split", "test", "--method", "Job", "--wait", "--json")
+    assert waited.returncode == 0, waited.stderr
+    scored = json.loads(waited.stdout)
+    offline = json.loads(tsttc("score", str(guess), "--truth", str(truth), "--json").stdout)
+    assert scored["state"] == "SCORED"
+    assert scored["scores"]["mid"] == round(offline["scores"]["overall"]["mid"], 2)
+
+    rejected = tsttc("submit", "predictions.json", "--split", "test", "--method", "Job", "--wait")
+    assert rejected.returncode == 1
+    assert "The file is rejected" in rejected.stderr
+    assert "  1. " in rejected.stderr
+    entries = json.loads(tsttc("board", "--json").stdout)["entries"]
+    assert [entry["method"] for entry in entries if entry["team"] == "Team CI"] == ["Job"]
+
+
+@pytest.mark.services
+@pytest.mark.slow
+def test_file_over_the_limit_is_the_file_s_fault_and_told_while_it_is_sent(
+    site: Site, people: Callable[[Site], Visitor], tmp_path: Path
+) -> None:
+    people(site).sign_up(email="large@example.org", name="Team Large")
+    tsttc = command(site.url, site.manage("create_token", "large@example.org", "--name", "CI").strip())
+    large = tmp_path / "large.json"
+    large.write_bytes(b" " * 30_000_000)
+    done = tsttc("submit", str(large), "--split", "test", "--method", "Large")
+    assert done.returncode == 1, done.stderr
+    assert "The file is too large" in done.stderr
