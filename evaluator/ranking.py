@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 
@@ -12,7 +13,7 @@ def rank(values: Sequence[float | None]) -> list[int | None]:
     [2, 1, None, 2, 4]
     """
     first_rank: dict[float, int] = {}
-    for position, value in enumerate(sorted(v for v in values if v is not None), 1):
+    for position, value in enumerate(_ascending(values), 1):
         first_rank.setdefault(value, position)
     return [None if value is None else first_rank[value] for value in values]
 
@@ -24,7 +25,14 @@ def best_and_second(values: Sequence[float | None]) -> tuple[frozenset[int], fro
     >>> sorted(best), sorted(second)
     ([1], [0, 3])
     """
-    distinct = sorted({value for value in values if value is not None})
+    distinct = sorted(set(_ascending(values)))
     marks = [frozenset(i for i, value in enumerate(values) if value == wanted) for wanted in distinct[:2]]
     marks += [frozenset()] * (2 - len(marks))
     return marks[0], marks[1]
+
+
+def _ascending(values: Sequence[float | None]) -> list[float]:
+    given = [value for value in values if value is not None]
+    if any(math.isnan(value) for value in given):
+        raise ValueError("NaN has no rank; a missing value is None.")
+    return sorted(given)

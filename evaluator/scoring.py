@@ -25,6 +25,7 @@ from typing import NoReturn
 import numpy as np
 
 from evaluator.alignment import ZERO_MESSAGE
+from evaluator.metrics import depth_error, relative_ttc_error
 from evaluator.predictions import Predictions
 from evaluator.problems import Findings
 from evaluator.protocol import DEFAULT_PROTOCOL, INTERVAL_NAMES, Protocol, get_protocol
@@ -127,13 +128,8 @@ class Scorer:
         # here.
         if not (alpha.min() > 0.0 and alpha.max() < np.inf):
             _refuse(predictions, self._protocol)
-        np.log(alpha, out=alpha)
-        np.subtract(truth.ascending_log_scale_ratio, alpha, out=alpha)
-        mid = np.multiply(np.abs(alpha, out=alpha), 1e4, out=alpha)
-        tau = truth.ascending_ttc_s
-        rte = np.subtract(predicted, tau, out=predicted)
-        np.divide(rte, tau, out=rte)
-        np.multiply(np.abs(rte, out=rte), 100.0, out=rte)
+        mid = depth_error(truth.ascending_log_scale_ratio, alpha)
+        rte = relative_ttc_error(predicted, truth.ascending_ttc_s)
         return _Errors(mid, rte, n_truncated)
 
 

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.annotations import read_annotations
+from evaluator.metrics import exact_log
 from evaluator.problems import Findings, quoted, reject
 from evaluator.protocol import INTERVALS
 from evaluator.scale import Floats, scale_ratio_10hz
@@ -45,7 +46,7 @@ class Manifest:
     def from_table(cls, table: Table) -> Manifest:
         """Check the rows; raises `Rejected` for an empty table and for duplicate ids or natural keys."""
         if not table.anno_id:
-            raise reject("empty", "The table has no sequences; expected at least one row below the header.")
+            raise reject("empty", "There are no sequences; expected at least one.")
         manifest = cls(
             anno_id=np.array(table.anno_id, dtype=np.int64),
             bag_stamp=tuple(table.bag_stamp),
@@ -176,7 +177,7 @@ class GroundTruth:
     @cached_property
     def ascending_log_scale_ratio(self) -> Floats:
         """ln α₁₀(τ) in ascending τ, the truth's part of every MiD."""
-        return np.asarray(np.log(scale_ratio_10hz(self.ascending_ttc_s)))
+        return exact_log(scale_ratio_10hz(self.ascending_ttc_s))
 
     @cached_property
     def interval_counts(self) -> dict[str, int]:
