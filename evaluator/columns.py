@@ -171,7 +171,7 @@ def _numbers(text: bytearray, n: int) -> Floats | None:
     try:
         # Packing refuses lists, objects, strings and null; it is the fastest way into an array.
         return np.frombuffer(struct.pack(f"{n}d", *orjson.loads(text)))
-    except (orjson.JSONDecodeError, struct.error, OverflowError, TypeError):
+    except (ValueError, struct.error, OverflowError, TypeError):
         return None
 
 
@@ -179,7 +179,8 @@ def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None
     """Read any keys through a dictionary."""
     try:
         members = _OBJECT.decode(text)
-    except (msgspec.DecodeError, RecursionError):
+    except (msgspec.MsgspecError, ValueError, RecursionError):
+        # Invalid UTF-8 in a text is a UnicodeDecodeError, which is a ValueError.
         return None
     n = manifest.n_sequences
     # Keys of the manifest hold no comma. So if every key is one of them, the commas count the members, and a

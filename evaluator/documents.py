@@ -7,6 +7,7 @@ result for files without surprises; it hands over whatever is unusual.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -62,14 +63,16 @@ def parse(data: bytes) -> object:
         raise reject("not-utf8", message, f"byte {start}") from None
     if _depth(body) > MAX_DEPTH:
         raise reject(
-            "too-deep", f"Objects and lists are nested deeper than {MAX_DEPTH} levels; expected at most 3."
+            "too-deep",
+            f"Objects and lists are nested deeper than {MAX_DEPTH} levels; expected 2, or a few in meta.",
         )
     try:
         return json.loads(text, object_pairs_hook=Members, parse_int=_integer)
     except json.JSONDecodeError as error:
         where = f"line {error.lineno}, column {error.colno}"
         found = quoted(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file"
-        message = f"The text is not JSON: {error.msg[0].lower()}{error.msg[1:]}, found {found}."
+        fault = error.msg[0].lower() + error.msg[1:].removesuffix(" at").removesuffix(" starting")
+        message = f"The text is not JSON: {fault}, found {found}."
         raise reject("not-json", message, where) from None
 
 
@@ -123,7 +126,8 @@ def kind_of(value: object) -> str:
         case bool():
             return f"the boolean {str(value).lower()}"
         case int() | float():
-            return f"the number {value:.17g}"
+            text = repr(value)
+            return f"the number {text if len(text) < 30 else format(value, '.17g')}"
         case str():
             return f"the string {quoted(value)}"
         case Members():
@@ -171,13 +175,13 @@ def _meta(value: object, findings: Findings) -> dict[str, object] | None:
         return None
     try:
         meta = _plain_object(value)
-        size = len(json.dumps(meta, allow_nan=False, ensure_ascii=False).encode("utf-8"))
+        size = len(json.dumps(meta, ensure_ascii=False).encode())
         fault = f"it takes {size:,} bytes" if size > MAX_META_BYTES else None
-    except ValueError as error:  # NaN, Infinity, lone surrogates, NUL: no database keeps them
-        fault = f"it cannot be kept ({error})"
+    except ValueError as error:
+        fault = str(error)
     if fault:
-        expected = f"plain JSON without NaN, NUL or lone surrogates, at most {MAX_META_BYTES:,} bytes"
-        findings.add("bad-meta", f"meta cannot be accepted, {fault}; expected {expected}.", "/meta")
+        expected = f"an object of finite numbers and whole texts, at most {MAX_META_BYTES:,} bytes"
+        findings.add("bad-meta", f"meta cannot be kept: {fault}; expected {expected}.", "/meta")
         return None
     return meta
 
@@ -190,17 +194,25 @@ def _plain(value: object) -> object:
             return [_plain(item) for item in value]
         case str():
             return _text(value)
+        case float() if not math.isfinite(value):
+            raise ValueError("a number is not finite")
         case _:
             return value
 
 
 def _plain_object(members: Members) -> dict[str, object]:
-    return {_text(name): _plain(content) for name, content in members}
+    plain = {_text(name): _plain(content) for name, content in members}
+    if len(plain) != len(members):
+        raise ValueError("a name appears twice in an object")
+    return plain
 
 
 def _text(text: str) -> str:
+    # What follows is allowed in JSON, but no database keeps it.
     if "\x00" in text:
         raise ValueError("a text contains NUL")
+    if any("\ud800" <= character <= "\udfff" for character in text):
+        raise ValueError("a text contains half of a surrogate pair")
     return text
 
 
