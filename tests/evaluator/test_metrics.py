@@ -1,0 +1,133 @@
+"""What must hold for every metric, whatever it is."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evaluator import evaluate
+from evaluator.metrics import METRIC_FUNCTIONS, motion_in_depth_error, relative_ttc_error
+from evaluator.predictions import Predictions
+from evaluator.protocol import METRICS
+from tests.evaluator.worlds import errors_of_the_toolkit, make_truth, means_of_the_toolkit
+
+Metric = Callable[..., np.ndarray]
+
+every_metric = pytest.mark.parametrize("metric", METRIC_FUNCTIONS.values(), ids=list(METRIC_FUNCTIONS))
+
+RNG = np.random.default_rng(20230901)
+TRUE_S = np.concatenate([RNG.uniform(0.3, 19, 60), RNG.uniform(-19, -0.3, 40)])
+PREDICTED_S = TRUE_S * RNG.lognormal(0, 0.1, 100)
+
+times = st.floats(0.2, 20) | st.floats(-20, -0.2)
+
+
+def test_every_metric_of_a_score_has_its_function() -> None:
+    assert tuple(METRIC_FUNCTIONS) == METRICS
+
+
+@every_metric
+def test_a_perfect_prediction_has_no_error(metric: Metric) -> None:
+    assert metric(TRUE_S, TRUE_S).tolist() == [0.0] * 100
+
+
+@every_metric
+def test_errors_are_finite_and_not_negative(metric: Metric) -> None:
+    errors = metric(PREDICTED_S, TRUE_S)
+    assert np.isfinite(errors).all()
+    assert (errors > 0).all()
+
+
+@every_metric
+def test_order_of_the_sequences_does_not_matter(metric: Metric) -> None:
+    order = RNG.permutation(100)
+    assert metric(PREDICTED_S[order], TRUE_S[order]).tolist() == metric(PREDICTED_S, TRUE_S)[order].tolist()
+
+
+@every_metric
+def test_a_sequence_is_scored_alone_as_among_others(metric: Metric) -> None:
+    alone = [float(metric(p, t)) for p, t in zip(PREDICTED_S, TRUE_S, strict=True)]
+    assert metric(PREDICTED_S, TRUE_S).tolist() == alone
+
+
+@every_metric
+def test_scalars_and_arrays_broadcast(metric: Metric) -> None:
+    assert metric(5.0, TRUE_S).tolist() == metric(np.full(100, 5.0), TRUE_S).tolist()
+    assert metric(PREDICTED_S, 5.0).tolist() == metric(PREDICTED_S, np.full(100, 5.0)).tolist()
+
+
+@every_metric
+def test_inputs_are_left_as_they_were(metric: Metric) -> None:
+    predicted, true = PREDICTED_S.copy(), TRUE_S.copy()
+    metric(predicted, true)
+    assert (predicted == PREDICTED_S).all()
+    assert (true == TRUE_S).all()
+
+
+@every_metric
+@given(true_s=times, nearer=st.floats(0.01, 0.2), farther=st.floats(0.25, 0.9))
+def test_a_prediction_further_off_on_the_same_side_is_worse(
+    metric: Metric, true_s: float, nearer: float, farther: float
+) -> None:
+    for direction in (1, -1):
+        near, far = true_s * (1 + direction * nearer), true_s * (1 + direction * farther)
+        if min(near, far) > 0.15 or max(near, far) < -0.15:
+            assert metric(near, true_s) < metric(far, true_s)
+
+
+@given(predicted_s=times, true_s=times)
+def test_mid_is_symmetric(predicted_s: float, true_s: float) -> None:
+    there, back = motion_in_depth_error(predicted_s, true_s), motion_in_depth_error(true_s, predicted_s)
+    assert float(there) == pytest.approx(float(back), rel=1e-12, abs=0)
+
+
+@given(predicted_s=times, between_s=times, true_s=times)
+def test_mid_obeys_the_triangle_inequality(predicted_s: float, between_s: float, true_s: float) -> None:
+    direct = float(motion_in_depth_error(predicted_s, true_s))
+    detour = float(motion_in_depth_error(predicted_s, between_s) + motion_in_depth_error(between_s, true_s))
+    assert direct <= detour * (1 + 1e-9) + 1e-9
+
+
+@given(predicted_s=times, true_s=times, unit=st.floats(0.1, 10))
+def test_rte_does_not_depend_on_the_unit_of_time(predicted_s: float, true_s: float, unit: float) -> None:
+    scaled = relative_ttc_error(predicted_s * unit, true_s * unit)
+    assert float(scaled) == pytest.approx(float(relative_ttc_error(predicted_s, true_s)), rel=1e-9, abs=1e-9)
+
+
+@given(predicted_s=times, true_s=times)
+def test_single_sequences_equal_the_toolkits_arithmetic(predicted_s: float, true_s: float) -> None:
+    expected = errors_of_the_toolkit(predicted_s, true_s)
+    for name, metric in METRIC_FUNCTIONS.items():
+        assert float(metric(predicted_s, true_s)) == pytest.approx(expected[name], rel=1e-12, abs=0)
+
+
+def test_mid_keeps_its_accuracy_where_the_logarithms_cancel() -> None:
+    # On processors where numpy's logarithm differs from the C library's in its last bit, this is where it
+    # shows.
+    true_s = RNG.uniform(0.3, 20, 50_000)
+    predicted_s = true_s * (1 + RNG.normal(0, 1e-6, 50_000))
+    expected = [
+        errors_of_the_toolkit(p, t)["mid"] for p, t in zip(predicted_s.tolist(), true_s.tolist(), strict=True)
+    ]
+    found = motion_in_depth_error(np.minimum(predicted_s, 20), true_s)
+    np.testing.assert_allclose(found, expected, rtol=1e-12, atol=0)
+
+
+def test_mid_is_nan_where_the_scale_ratio_is_not_positive() -> None:
+    assert math.isnan(motion_in_depth_error(-0.05, 3.0))
+
+
+@given(pairs=st.lists(st.tuples(times, times), min_size=1, max_size=40))
+def test_reports_equal_a_plain_loop(pairs: list[tuple[float, float]]) -> None:
+    predicted_s, true_s = zip(*pairs, strict=True)
+    truth = make_truth(true_s)
+    predictions = Predictions.from_arrays(ttc_s=predicted_s, manifest=truth.manifest)
+    report = evaluate(predictions, truth, protocol="toolkit")
+    for name, expected in means_of_the_toolkit(predicted_s, true_s).items():
+        score = report.scores[name]
+        assert score.count == expected["count"]
+        assert score.mid == (None if score.count == 0 else pytest.approx(expected["mid"], rel=1e-12, abs=0))
+        assert score.rte == (None if score.count == 0 else pytest.approx(expected["rte"], rel=1e-12, abs=0))

@@ -1,0 +1,107 @@
+"""Every fault of a prediction file: its code, its place, its words. Wording is part of the interface."""
+
+import math
+
+import pytest
+
+from evaluator import PROBLEM_CODES, Manifest, Problem, Rejected, read_predictions
+from tests.evaluator.faulty_files import CASES, GOOD, MANIFEST
+from tests.evaluator.worlds import flat, make_truth
+
+
+def rejection(data: bytes, *, manifest: Manifest = MANIFEST, max_bytes: int | None = None) -> Rejected:
+    with pytest.raises(Rejected) as rejected:
+        read_predictions(data, manifest=manifest, max_bytes=max_bytes)
+    return rejected.value
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_faulty_file_is_rejected_in_these_words(name: str) -> None:
+    data, problem = CASES[name]
+    rejected = rejection(data)
+    assert rejected.problems[0] == problem
+    assert all(found.code in PROBLEM_CODES for found in rejected.problems)
+
+
+def test_a_missing_prediction_is_a_problem_not_a_zero() -> None:
+    assert [problem.code for problem in rejection(flat({"0": 1.0, "1": 1.0, "2": 1.0})).problems] == [
+        "missing-keys"
+    ]
+
+
+def test_an_empty_object_misses_everything() -> None:
+    assert rejection(b"{}").n_problems == 4
+
+
+def test_a_file_over_the_limit_is_not_looked_at() -> None:
+    problem = rejection(b"\xff" * 101, max_bytes=100).problems[0]
+    assert problem == Problem("too-large", "The file has 101 bytes; expected at most 100.")
+
+
+def test_all_faults_are_told_at_once() -> None:
+    rejected = rejection(b'{"0": NaN, "1": 0, "2": "x", "7": null, "1": 2}')
+    assert [(problem.code, problem.where) for problem in rejected.problems] == [
+        ("unknown-keys", "/7"),
+        ("duplicate-keys", "/1"),
+        ("missing-keys", "/3"),
+        ("nan", "/0"),
+        ("zero", "/1"),
+        ("not-a-number", "/2"),
+        ("not-a-number", "/7"),
+    ]
+    assert rejected.n_problems == 7
+
+
+def test_many_missing_and_unknown_keys_are_counted_and_twenty_are_named() -> None:
+    manifest = make_truth([4.0] * 100).manifest
+    unknown, missing = rejection(flat({f"x{row}": 1.0 for row in range(30)}), manifest=manifest).problems
+    assert "x19" in unknown.message
+    assert "x20" not in unknown.message
+    assert unknown.message.startswith("30 keys name no sequence of the manifest: ")
+    assert missing.message.startswith("100 sequences have no value: 0, 1, 2, ")
+    assert "18, 19, … (the first 20); expected" in missing.message
+
+
+def test_many_faulty_values_are_counted_and_twenty_are_named() -> None:
+    manifest = make_truth([4.0] * 100).manifest
+    rejected = rejection(flat([math.nan] * 100), manifest=manifest)
+    assert rejected.n_problems == 100
+    assert [p.where for p in rejected.problems] == [*(f"/{row}" for row in range(20)), ""]
+    assert rejected.problems[-1] == Problem("nan", "And 80 more like these: 100 in all.")
+
+
+@pytest.mark.parametrize(
+    "meta",
+    [
+        b'{"a": NaN}',
+        b'{"a": [1e999]}',
+        b'{"a": "\\u0000"}',
+        b'{"\\u0000": 1}',
+        b'{"a": "\\ud800"}',
+        b'{"a": "' + b"x" * 70_000 + b'"}',
+        b'{"a": 1, "a": 2}',
+        b"[]",
+        b"true",
+    ],
+)
+def test_meta_that_no_database_would_keep_is_refused(meta: bytes) -> None:
+    data = b'{"unit": "ttc", "meta": ' + meta + b', "predictions": ' + flat(GOOD) + b"}"
+    assert [problem.code for problem in rejection(data).problems] == ["bad-meta"]
+
+
+@pytest.mark.parametrize("key", ["00", " 0", "0 ", "+0", "-0", "0.0", "0e0", "٠", "0x0", "", "None"])
+def test_only_the_plain_decimal_spelling_is_an_anno_id(key: str) -> None:
+    members: dict[str, float] = {key: 5.31, "1": -12.9, "2": 0.4, "3": 100.0}
+    assert {problem.code for problem in rejection(flat(members)).problems} == {"unknown-keys", "missing-keys"}
+
+
+def test_a_key_that_spells_its_number_otherwise_is_unknown_even_at_equal_length() -> None:
+    manifest = make_truth([4.0, 5.0], anno_ids=[100, 7]).manifest
+    assert rejection(b'{"1e2": 5.0, "7": 1.0}', manifest=manifest).problems[0].code == "unknown-keys"
+
+
+def test_every_code_of_prediction_files_has_a_case_here() -> None:
+    here = {problem.code for _, problem in CASES.values()} | {"too-large"}
+    codes = list(PROBLEM_CODES)
+    of_predictions = set(codes[: codes.index("undefined-error")])
+    assert of_predictions == here

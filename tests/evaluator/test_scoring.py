@@ -1,0 +1,288 @@
+"""Protocols, intervals and counts: evaluate() on made-up sequences."""
+
+import math
+from dataclasses import FrozenInstanceError, replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from evaluator import PROTOCOLS, SCORE_NAMES, Rejected, evaluate, evaluate_many, get_protocol
+from evaluator.metrics import motion_in_depth_error, relative_ttc_error
+from evaluator.predictions import Predictions
+from evaluator.protocol import INTERVAL_NAMES
+from evaluator.report import Report
+from evaluator.scale import scale_ratio_10hz
+from evaluator.truth import GroundTruth
+from tests.evaluator.worlds import make_truth, means_of_the_toolkit
+
+every_protocol = pytest.mark.parametrize("protocol", PROTOCOLS)
+
+
+def given_values(truth: GroundTruth, ttc_s: object) -> Predictions:
+    return Predictions.from_arrays(ttc_s=ttc_s, manifest=truth.manifest)  # type: ignore[arg-type]
+
+
+def scored(predicted_s: list[float], true_s: list[float], *, protocol: str = "tsttc-1") -> Report:
+    truth = make_truth(true_s)
+    return evaluate(given_values(truth, predicted_s), truth, protocol=protocol, keep_sequences=True)
+
+
+def problems_of(predicted_s: list[float], *, protocol: str) -> list[tuple[str, str]]:
+    with pytest.raises(Rejected) as rejected:
+        scored(predicted_s, [4.0] * len(predicted_s), protocol=protocol)
+    return [(problem.code, problem.where) for problem in rejected.value.problems]
+
+
+# --- intervals -------------------------------------------------------------------------------------------
+
+
+def test_intervals_are_closed_at_both_ends() -> None:
+    counts = {n: s.count for n, s in scored([1.0] * 5, [3.0, 6.0, 20.0, -20.0, 1e-6]).scores.items()}
+    assert counts == {"overall": 5, "crucial": 2, "small": 2, "large": 2, "negative": 1}
+
+
+@pytest.mark.parametrize(
+    ("true_s", "names"),
+    [
+        (2.9999999999999996, {"crucial"}),
+        (3.0, {"crucial", "small"}),
+        (3.0000000000000004, {"small"}),
+        (6.0, {"small", "large"}),
+        (20.0, {"large"}),
+        (20.000000000000004, set()),
+        (-20.0, {"negative"}),
+        (-20.000000000000004, set()),
+        (-0.11, {"negative"}),
+        (1e-9, {"crucial"}),
+    ],
+)
+def test_a_sequence_counts_where_its_true_value_lies(true_s: float, names: set[str]) -> None:
+    report = scored([5.0], [true_s])
+    assert {n for n, s in report.scores.items() if s.count} == {"overall"} | names
+    assert report.n_out_of_range == (0 if names else 1)
+
+
+def test_sequences_out_of_range_count_only_in_the_overall_mean() -> None:
+    report = scored([5.0, 20.0, -20.0], [4.0, 25.0, -30.0])
+    assert report.n_sequences == 3
+    assert report.n_out_of_range == 2
+    assert report.scores["overall"].count == 3
+    assert report.scores["overall"].rte == pytest.approx((25.0 + 20.0 + 100 / 3) / 3)
+    assert report.scores["small"].rte == 25.0
+
+
+def test_an_empty_interval_has_no_value_rather_than_zero() -> None:
+    report = scored([5.0], [4.0])
+    assert report.scores["negative"].mid is None
+    assert report.scores["negative"].rte is None
+    assert report.flat()["mid_negative"] is None
+
+
+@pytest.mark.parametrize("name", INTERVAL_NAMES)
+def test_the_predicted_value_never_chooses_the_interval(name: str) -> None:
+    counts = [
+        scored(predicted, [1.0, 4.0, 10.0, -5.0]).scores[name].count
+        for predicted in ([1.0, 4.0, 10.0, -5.0], [-5.0, 10.0, 4.0, 1.0])
+    ]
+    assert counts[0] == counts[1]
+
+
+# --- truncation ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("predicted_s", "used_s", "boundary"),
+    [
+        (20.0, 20.0, None),
+        (20.000000000000004, 20.0, "20"),
+        (1e308, 20.0, "20"),
+        (math.inf, 20.0, "20"),
+        (-20.000000000000004, -20.0, "-20"),
+        (-math.inf, -20.0, "-20"),
+        (0.05, 0.05, None),
+        (0.049999999999999996, 0.05, "0.05"),
+        (5e-324, 0.05, "0.05"),
+        (-0.15, -0.15, None),
+        (-0.14999999999999997, -0.15, "-0.15"),
+        (-5e-324, -0.15, "-0.15"),
+        (-0.1, -0.15, "-0.15"),
+    ],
+)
+def test_the_boards_protocol_truncates_to_the_nearest_boundary_of_the_same_sign(
+    predicted_s: float, used_s: float, boundary: str | None
+) -> None:
+    report = scored([predicted_s], [4.0])
+    assert report.sequences is not None
+    assert report.sequences.mid[0] == pytest.approx(float(motion_in_depth_error(used_s, 4.0)), rel=1e-12)
+    assert report.sequences.rte[0] == float(relative_ttc_error(used_s, 4.0))
+    assert {name: n for name, n in report.truncated.items() if n} == ({boundary: 1} if boundary else {})
+    assert list(report.truncated) == ["-20", "-0.15", "0.05", "20"]
+
+
+def test_the_boards_protocol_bounds_the_scale_ratio_to_a_factor_of_three() -> None:
+    low, high = get_protocol("tsttc-1").near_zero_s or (0.0, 0.0)
+    assert float(scale_ratio_10hz(low)) == pytest.approx(3, rel=1e-5)
+    assert float(scale_ratio_10hz(high)) == pytest.approx(1 / 3, rel=1e-5)
+
+
+def test_the_toolkits_protocol_truncates_only_at_twenty() -> None:
+    report = scored([1e-9, 30.0, -math.inf, -0.1], [4.0] * 4, protocol="toolkit")
+    assert dict(report.truncated) == {"-20": 1, "20": 1}
+    assert report.sequences is not None
+    assert report.sequences.mid[0] == pytest.approx(float(motion_in_depth_error(1e-9, 4.0)))
+
+
+def test_the_true_value_is_never_truncated() -> None:
+    report = scored([20.0], [40.0])
+    assert report.scores["overall"].rte == 50.0
+
+
+near_zero = st.floats(-0.15, 0.05, exclude_min=True, exclude_max=True)
+elsewhere = (st.floats(0.05) | st.floats(max_value=-0.15)).filter(lambda value: not math.isnan(value))
+
+
+@given(predicted_s=st.lists(elsewhere, min_size=1, max_size=20))
+def test_both_protocols_agree_exactly_away_from_zero(predicted_s: list[float]) -> None:
+    truth = make_truth(np.linspace(1, 19, len(predicted_s)))
+    board, toolkit = (evaluate(given_values(truth, predicted_s), truth, protocol=name) for name in PROTOCOLS)
+    assert board.scores == toolkit.scores
+
+
+@given(predicted_s=st.lists(near_zero.filter(bool), min_size=1, max_size=20))
+def test_the_boards_protocol_always_has_a_finite_result(predicted_s: list[float]) -> None:
+    truth = make_truth(np.linspace(1, 19, len(predicted_s)))
+    report = evaluate(given_values(truth, predicted_s), truth)
+    assert all(math.isfinite(value) for value in report.flat().values() if value is not None)
+    assert report.truncated["-0.15"] + report.truncated["0.05"] == len(predicted_s)
+
+
+# --- forbidden values ------------------------------------------------------------------------------------
+
+
+@every_protocol
+@pytest.mark.parametrize(("value", "code"), [(0.0, "zero"), (-0.0, "zero"), (math.nan, "nan")])
+def test_zero_and_nan_are_refused(protocol: str, value: float, code: str) -> None:
+    assert problems_of([4.0, value], protocol=protocol) == [(code, "/1")]
+
+
+@pytest.mark.parametrize("value", [-0.05, -0.0999999, -1e-9, -5e-324, 5e-324])
+def test_the_toolkits_protocol_refuses_values_without_a_logarithm(value: float) -> None:
+    assert problems_of([value], protocol="toolkit") == [("undefined-error", "/0")]
+
+
+@given(value=near_zero.filter(bool))
+def test_the_toolkits_protocol_refuses_exactly_where_the_ratio_is_not_positive_and_finite(
+    value: float,
+) -> None:
+    defined = 0 < float(scale_ratio_10hz(value)) < math.inf
+    if defined:
+        assert scored([value], [4.0], protocol="toolkit").scores["overall"].count == 1
+    else:
+        assert problems_of([value], protocol="toolkit") == [("undefined-error", "/0")]
+
+
+def test_every_forbidden_value_is_named_in_file_order() -> None:
+    found = problems_of([math.nan, 4.0, -0.05, 0.0], protocol="toolkit")
+    assert found == [("nan", "/0"), ("undefined-error", "/2"), ("zero", "/3")]
+
+
+def test_many_forbidden_values_are_counted_and_twenty_are_named() -> None:
+    with pytest.raises(Rejected) as rejected:
+        scored([math.nan] * 50, [4.0] * 50)
+    assert rejected.value.n_problems == 50
+    assert len(rejected.value.problems) == 21
+    assert rejected.value.problems[-1].message == "And 30 more like these: 50 in all."
+
+
+# --- the call --------------------------------------------------------------------------------------------
+
+
+def test_an_unknown_protocol_is_an_error_of_the_caller() -> None:
+    with pytest.raises(ValueError, match=r"Unknown protocol 'x'; expected one of tsttc-1, toolkit\."):
+        scored([4.0], [4.0], protocol="x")
+
+
+def test_predictions_for_another_manifest_are_an_error_of_the_caller() -> None:
+    truth, other = make_truth([4.0, 5.0]), make_truth([4.0, 5.0], anno_ids=[7, 8])
+    with pytest.raises(ValueError, match="another manifest"):
+        evaluate(given_values(other, [4.0, 5.0]), truth)
+
+
+def test_the_same_manifest_in_another_row_order_is_realigned() -> None:
+    truth = make_truth([4.0, 8.0, 2.0])
+    table = truth.to_table()
+    for column in (table.anno_id, table.bag_stamp, table.cam_id, table.ts_ns, table.track_id, table.ttc_s):
+        column.reverse()
+    other = GroundTruth.from_table(table)
+    assert other.digest == truth.digest
+    expected = evaluate(given_values(truth, [5.0, 8.0, 3.0]), truth, keep_sequences=True)
+    found = evaluate(given_values(other, [3.0, 8.0, 5.0]), truth, keep_sequences=True)
+    assert found.scores == expected.scores
+    assert found.sequences is not None
+    assert expected.sequences is not None
+    assert found.sequences.mid.tolist() == expected.sequences.mid.tolist()
+
+
+def test_a_batch_scores_like_its_parts() -> None:
+    rng = np.random.default_rng(3)
+    truth = make_truth(rng.uniform(0.3, 19, 50))
+    batch = [given_values(truth, truth.ttc_s * rng.lognormal(0, 0.2, 50)) for _ in range(8)]
+    together = evaluate_many(batch, truth)
+    assert together == [evaluate(predictions, truth) for predictions in batch]
+    for predictions, report in zip(batch, together, strict=True):
+        expected = means_of_the_toolkit(predictions.ttc_s.tolist(), truth.ttc_s.tolist())
+        assert report.scores["overall"].mid == pytest.approx(expected["overall"]["mid"], rel=1e-12, abs=0)
+
+
+def test_an_empty_batch_has_no_reports() -> None:
+    assert evaluate_many([], make_truth([4.0])) == []
+
+
+def test_values_of_sequences_come_in_file_order_and_only_on_request() -> None:
+    truth = make_truth([10.0, -5.0, 1.0])
+    predictions = given_values(truth, [11.0, -4.0, 1.5])
+    report = evaluate(predictions, truth, keep_sequences=True)
+    assert report.sequences is not None
+    assert report.sequences.rte.tolist() == relative_ttc_error([11.0, -4.0, 1.5], [10.0, -5.0, 1.0]).tolist()
+    assert evaluate(predictions, truth).sequences is None
+    assert "sequences" not in report.as_dict()
+
+
+def test_scoring_leaves_the_predictions_as_they_were() -> None:
+    truth = make_truth([4.0, 5.0])
+    predictions = given_values(truth, [400.0, 0.01])
+    evaluate(predictions, truth)
+    assert predictions.ttc_s.tolist() == [400.0, 0.01]
+    assert not predictions.ttc_s.flags.writeable
+
+
+def test_predictions_from_arrays_need_one_value_per_sequence() -> None:
+    with pytest.raises(ValueError, match=r"shape \(3,\); expected \(2,\)"):
+        given_values(make_truth([4.0, 5.0]), [1.0, 2.0, 3.0])
+
+
+def test_score_names_are_the_papers_columns() -> None:
+    intervals = ("crucial", "small", "large", "negative")
+    columns = ("mid", *(f"mid_{i}" for i in intervals), "rte", *(f"rte_{i}" for i in intervals))
+    assert columns == SCORE_NAMES
+    assert tuple(scored([4.0], [4.0]).flat()) == SCORE_NAMES
+
+
+@every_protocol
+def test_protocols_are_frozen_and_know_their_boundaries(protocol: str) -> None:
+    rules = get_protocol(protocol)
+    assert rules.decimals == 2
+    with pytest.raises(FrozenInstanceError):
+        rules.limit_s = 30.0  # type: ignore[misc]
+    stricter = replace(rules, name="stricter", limit_s=10.0)
+    assert list(stricter.boundaries.values()) == sorted(stricter.boundaries.values())
+
+
+def test_a_protocol_of_ones_own_can_be_tried() -> None:
+    truth = make_truth([4.0])
+    strict = replace(get_protocol("toolkit"), name="strict", limit_s=2.0)
+    report = evaluate(given_values(truth, [4.0]), truth, protocol=strict)
+    assert report.protocol == "strict"
+    assert report.scores["overall"].rte == 50.0

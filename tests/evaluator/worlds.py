@@ -1,0 +1,73 @@
+"""Small made-up ground truths, prediction files for them, and the dataset's toolkit as a plain loop."""
+
+import json
+import math
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+
+from evaluator import GroundTruth
+from evaluator.tables import Table
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+GOLDEN = REPOSITORY / "tests" / "golden" / "toolkit.json"
+SHARED_DATA = Path(os.environ.get("TSTTC_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
+
+
+def make_truth(ttc_s: Iterable[float], *, anno_ids: Sequence[int] | None = None) -> GroundTruth:
+    """A ground truth with these values: four sequences per recording, distinct natural keys."""
+    values = [float(value) for value in ttc_s]
+    n = len(values)
+    return GroundTruth.from_table(
+        Table(
+            anno_id=list(anno_ids or range(n)),
+            bag_stamp=[f"{row // 4:04d}" for row in range(n)],
+            cam_id=["1"] * n,
+            ts_ns=[500_000_000 + 100_000_000 * row for row in range(n)],
+            track_id=[str(row % 4) for row in range(n)],
+            ttc_s=values,
+        )
+    )
+
+
+def flat(values: Mapping[str, float] | Sequence[float]) -> bytes:
+    """The toolkit's form; a sequence is keyed by 0, 1, …"""
+    members = values if isinstance(values, Mapping) else {str(row): value for row, value in enumerate(values)}
+    return json.dumps(members).encode()
+
+
+def envelope(predictions: object, **fields: object) -> bytes:
+    return json.dumps({**fields, "predictions": predictions}).encode()
+
+
+def scale_ratio_of_the_toolkit(ttc_s: float) -> float:
+    return 1 / ((1 / (ttc_s * 10) + 1) + 1e-6)
+
+
+def errors_of_the_toolkit(predicted_s: float, true_s: float) -> dict[str, float]:
+    """Both errors of one sequence, in the toolkit's order of operations."""
+    clipped = max(min(predicted_s, 20), -20)
+    predicted, true = scale_ratio_of_the_toolkit(clipped), scale_ratio_of_the_toolkit(true_s)
+    return {
+        "rte": abs((clipped - true_s) / true_s) * 100,
+        "mid": abs(math.log(true) - math.log(predicted)) * 10**4,
+    }
+
+
+def means_of_the_toolkit(
+    predicted_s: Sequence[float], true_s: Sequence[float]
+) -> dict[str, dict[str, float | int | None]]:
+    """Mean errors and counts by interval, sequence after sequence; None where an interval is empty."""
+    ranges = {"crucial": (0, 3), "small": (3, 6), "large": (6, 20), "negative": (-20, 0)}
+    parts = {"overall": list(range(len(true_s)))}
+    for name, (low, high) in ranges.items():
+        parts[name] = [row for row, true in enumerate(true_s) if low <= true <= high]
+    errors = [errors_of_the_toolkit(p, t) for p, t in zip(predicted_s, true_s, strict=True)]
+    return {
+        name: {
+            metric: sum(errors[row][metric] for row in rows) / len(rows) if rows else None
+            for metric in ("mid", "rte")
+        }
+        | {"count": len(rows)}
+        for name, rows in parts.items()
+    }
