@@ -1,0 +1,52 @@
+"""The pages about format and scoring say what the code does."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from evaluator import INTERVALS, PROBLEM_CODES, PROTOCOLS, GroundTruth, read_predictions
+from evaluator.tables import Table
+from tests.evaluator.worlds import REPOSITORY
+
+FORMAT = (REPOSITORY / "docs" / "file-format.md").read_text(encoding="utf-8")
+SCORING = (REPOSITORY / "docs" / "scoring.md").read_text(encoding="utf-8")
+EXAMPLES = re.findall(r"```json\n(.*?)```", FORMAT, re.DOTALL)
+
+MANIFEST = GroundTruth.from_table(
+    Table(
+        anno_id=[0, 1, 2],
+        bag_stamp=["0007", "0007", "0012"],
+        cam_id=["1", "1", "4"],
+        ts_ns=[1_500_000_000, 2_100_000_000, 700_000_000],
+        track_id=["3", "3", "11"],
+        ttc_s=[5.0, -12.0, 1.0],
+    )
+).manifest
+
+
+def test_the_page_shows_every_form() -> None:
+    assert len(EXAMPLES) == 5
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_every_example_is_accepted_and_says_about_the_same(example: str) -> None:
+    found = read_predictions(example.encode(), manifest=MANIFEST)
+    np.testing.assert_allclose(found.ttc_s, [5.31, -12.9, 0.84], rtol=2e-3)
+    assert found.meta == json.loads(example).get("meta")
+
+
+def test_every_problem_has_its_line() -> None:
+    lines = dict(re.findall(r"^\| `([a-z0-9-]+)` \| (.*) \|$", FORMAT, re.MULTILINE))
+    assert lines == PROBLEM_CODES
+
+
+def test_every_protocol_and_interval_is_described() -> None:
+    assert [name for name in PROTOCOLS if f"`{name}`" not in SCORING] == []
+    for interval in INTERVALS:
+        low, high = (f"{value:g}".replace("-", "−") for value in (interval.low_s, interval.high_s))
+        assert interval.name in SCORING
+        assert f"{low} ≤ τ ≤ {high}" in SCORING
+    for boundary in PROTOCOLS["tsttc-1"].boundaries:
+        assert boundary.replace("-", "−") in SCORING
