@@ -1,14 +1,16 @@
 """The child process in which untrusted bytes are parsed: `python -m evaluator.quarantine`.
 
-It reads a prediction file from its standard input and writes to its standard output one line of JSON,
-followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the first
-untrusted byte is read it gives up memory, processor time, new processes and the right to open anything,
-sockets included.
+It writes `READY` to its standard output, reads a prediction file from its standard input, and writes one line
+of JSON, followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the
+first untrusted byte is read it gives up memory, processor time, new processes and the right to open anything,
+sockets included. A child that ends before `READY` has seen nothing of the file.
 """
 
 import codecs
+import ctypes
 import json
 import resource
+import signal
 import sys
 from pathlib import Path
 
@@ -19,6 +21,22 @@ import orjson
 from evaluator.predictions import read_predictions
 from evaluator.problems import Rejected
 from evaluator.truth import Manifest
+
+READY = b"ready\n"
+EXIT_OUT_OF_MEMORY = 77
+_PR_SET_PDEATHSIG = 1
+
+
+def obey_the_parent_alone() -> None:
+    """End with the parent, however it ends, and only then.
+
+    A signal that stops a whole service reaches this process too; were it to die of that, the file would be
+    blamed. The parent finishes what it has in hand, and ends this process if it must.
+    """
+    for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
+        signal.signal(number, signal.SIG_IGN)
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def limit(*, memory_bytes: int, cpu_s: int) -> None:
@@ -52,28 +70,38 @@ def warm_up(manifest: Manifest) -> None:
             raise RuntimeError(f"{library.__name__} is not loaded")
 
 
+def answer(data: bytes, *, manifest: Manifest) -> bytes:
+    """The header line for these bytes, and the values behind it if they are good."""
+    try:
+        predictions = read_predictions(data, manifest=manifest)
+    except Rejected as rejected:
+        return json.dumps({"verdict": "rejected", **rejected.as_dict()}).encode() + b"\n"
+    header = {
+        "verdict": "good",
+        "digest": predictions.digest,
+        "unit": predictions.unit,
+        "keys": predictions.keys,
+        "enveloped": predictions.enveloped,
+    }
+    values = np.ascontiguousarray(predictions.ttc_s, dtype="<f8").tobytes()
+    return json.dumps(header).encode() + b"\n" + values
+
+
 def main() -> None:
     """Arguments: manifest file, memory limit in bytes, processor time in seconds."""
+    obey_the_parent_alone()
     manifest = Manifest.load(Path(sys.argv[1]))
     warm_up(manifest)
     limit(memory_bytes=int(sys.argv[2]), cpu_s=int(sys.argv[3]))
+    out = sys.stdout.buffer
+    out.write(READY)
+    out.flush()
     try:
-        predictions = read_predictions(sys.stdin.buffer.read(), manifest=manifest)
-    except Rejected as rejected:
-        problems = [{"code": p.code, "message": p.message, "where": p.where} for p in rejected.problems]
-        header = {"verdict": "rejected", "problems": problems, "n_problems": rejected.n_problems}
-        body = b""
-    else:
-        header = {
-            "verdict": "good",
-            "digest": predictions.digest,
-            "unit": predictions.unit,
-            "keys": predictions.keys,
-            "enveloped": predictions.enveloped,
-        }
-        body = np.ascontiguousarray(predictions.ttc_s, dtype="<f8").tobytes()
-    sys.stdout.buffer.write(json.dumps(header).encode() + b"\n" + body)
-    sys.stdout.buffer.flush()
+        found = answer(sys.stdin.buffer.read(), manifest=manifest)
+    except MemoryError:
+        sys.exit(EXIT_OUT_OF_MEMORY)
+    out.write(found)
+    out.flush()
 
 
 if __name__ == "__main__":

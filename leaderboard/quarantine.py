@@ -1,14 +1,13 @@
 """Untrusted bytes are parsed in a limited child process; this is its parent's side.
 
-The child has no database credentials and cannot open files or sockets. If it dies, that is known at once, and
-known to be the file's doing: the worker itself lives on.
+The child has no database credentials and cannot open files or sockets. If it dies once it has begun to read
+the file, that is known at once, and known to be the file's doing: the worker itself lives on.
 """
 
 import json
 import os
 import subprocess
 import sys
-import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import IO, Any
@@ -17,14 +16,19 @@ import numpy as np
 from django.conf import settings
 
 from evaluator import Manifest, Predictions, Problem, Rejected
+from evaluator.quarantine import EXIT_OUT_OF_MEMORY, READY
 
 
 class ChildDied(Exception):
-    """The child ended without an answer: out of memory or time, or a crash."""
+    """The child ended without an answer while it read the file: out of memory or time, or a crash."""
+
+
+class ChildNotReady(Exception):
+    """The child ended before it had read anything of the file: the machine's doing, or the installation's."""
 
 
 class LeaseLost(Exception):
-    """The work was taken away while the child ran; the child has been ended."""
+    """The work was taken away, or its time was up, while the child ran; the child has been ended."""
 
 
 def read_predictions(
@@ -38,7 +42,8 @@ def read_predictions(
     """Parse and align a prediction file in a child process.
 
     `heartbeat` is called every `heartbeat_s` seconds while the child works; when it says False the child is
-    ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied`, or `LeaseLost`.
+    ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied`, `ChildNotReady`, or `LeaseLost`;
+    `OSError` if no child could be started.
     """
     command = [
         sys.executable,
@@ -54,41 +59,42 @@ def read_predictions(
         "PYTHONDONTWRITEBYTECODE": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
-    with tempfile.TemporaryFile() as errors:
-        child = subprocess.Popen(  # noqa: S603 - our own interpreter and module, nothing of the file
-            command, stdin=source, stdout=subprocess.PIPE, stderr=errors, env=environment, close_fds=True
-        )
-        answer = _answer(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
-        errors.seek(0, os.SEEK_END)
-        errors.seek(max(0, errors.tell() - 2000))
-        complaint = errors.read().decode(errors="replace").strip().rpartition("\n")[2]
+    child = subprocess.Popen(  # noqa: S603 - our own interpreter and module, nothing of the file
+        command, stdin=source, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, close_fds=True
+    )
+    answer, complaint = _answer(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+    if not answer.startswith(READY):
+        raise ChildNotReady(f"the reading process did not start: {_cause(child.returncode, complaint)}")
     if child.returncode != 0:
-        raise ChildDied(_cause(child.returncode, complaint))
-    return _decoded(answer, manifest=manifest)
+        raise ChildDied(f"reading the file {_cause(child.returncode, complaint)}")
+    return _decoded(answer[len(READY) :], manifest=manifest)
 
 
-def _answer(child: "subprocess.Popen[bytes]", *, heartbeat: Callable[[], bool], heartbeat_s: float) -> bytes:
-    """What the child writes, with a heartbeat while it does. Raises `LeaseLost`."""
+def _answer(
+    child: "subprocess.Popen[bytes]", *, heartbeat: Callable[[], bool], heartbeat_s: float
+) -> tuple[bytes, bytes]:
+    """What the child writes to output and error, with a heartbeat while it does. Raises `LeaseLost`."""
     try:
         while True:
             try:
-                return child.communicate(timeout=heartbeat_s)[0]
+                return child.communicate(timeout=heartbeat_s)
             except subprocess.TimeoutExpired:
                 if not heartbeat():
-                    raise LeaseLost("the lease ended while the file was being parsed") from None
+                    raise LeaseLost("the run reached its time limit or was taken away") from None
     finally:
         if child.poll() is None:
             child.kill()
             child.communicate()
 
 
-def _cause(returncode: int, complaint: str) -> str:
+def _cause(returncode: int, complaint: bytes) -> str:
     """Why the child died, in words."""
-    if "MemoryError" in complaint:
-        return f"reading the file needed more than {settings.CHILD_MEMORY_BYTES // 1_000_000} MB of memory"
+    if returncode == EXIT_OUT_OF_MEMORY:
+        return f"needed more than {settings.CHILD_MEMORY_BYTES // 1_000_000} MB of memory"
     if returncode < 0:
-        return f"reading the file ended with signal {-returncode}"
-    return f"reading the file ended with exit code {returncode}: {complaint[:200]}"
+        return f"ended with signal {-returncode}"
+    last_line = complaint[-2000:].decode(errors="replace").strip().rpartition("\n")[2]
+    return f"ended with exit code {returncode}: {last_line[:200]}"
 
 
 def _decoded(answer: bytes, *, manifest: Manifest) -> Predictions:
