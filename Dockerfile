@@ -1,0 +1,37 @@
+# One image for web, worker, beat and the maintainers' commands; docker-compose.yml says which does what.
+
+FROM python:3.11.14-slim-bookworm AS environment
+ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
+RUN python -m venv /opt/tsttc
+WORKDIR /build
+COPY requirements.lock ./
+RUN /opt/tsttc/bin/pip install --quiet --require-hashes -r requirements.lock
+
+FROM python:3.11.14-slim-bookworm
+ENV PATH=/opt/tsttc/bin:$PATH \
+    PYTHONUNBUFFERED=1 \
+    PYTHONDONTWRITEBYTECODE=1 \
+    OPENBLAS_NUM_THREADS=1 \
+    # Celery's warm shutdown on `docker stop`: finish what is in hand, then give the rest back.
+    REMAP_SIGTERM=SIGQUIT \
+    DJANGO_SETTINGS_MODULE=leaderboard.settings \
+    TSTTC_DATA_DIR=/var/lib/tsttc \
+    TSTTC_STATIC_ROOT=/srv/tsttc/staticfiles
+
+# Volumes take over the owner of the directory that they are first mounted on.
+RUN groupadd --gid 10001 tsttc \
+    && useradd --uid 10001 --gid tsttc --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin tsttc \
+    && install -d -o tsttc -g tsttc -m 0750 /var/lib/tsttc /var/lib/tsttc/files \
+    && install -d -o tsttc -g tsttc -m 0700 /var/lib/tsttc/ground-truth
+
+COPY --from=environment /opt/tsttc /opt/tsttc
+WORKDIR /srv/tsttc
+COPY . .
+# Static files are part of the image. Collecting needs no service, only settings that load.
+RUN TSTTC_PROFILE=embedded TSTTC_DATA_DIR=/tmp/collect python manage.py collectstatic --no-input --verbosity 0 \
+    && rm -rf /tmp/collect \
+    && python -m compileall -q evaluator leaderboard
+
+USER tsttc
+EXPOSE 8000
+CMD ["gunicorn", "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application"]
