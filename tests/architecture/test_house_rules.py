@@ -1,0 +1,170 @@
+"""Rules of the house that no ready-made tool knows."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+CODE = ("evaluator", "leaderboard", "tests", "benchmarks")
+MAX_LINES = 400
+# A name that says nothing collects everything.
+FORBIDDEN_NAMES = {
+    "util",
+    "utils",
+    "helper",
+    "helpers",
+    "common",
+    "misc",
+    "service",
+    "services",
+    "manager",
+    "managers",
+}
+# Tests name the servers that they need; the rule is about where behaviour lives.
+FORBIDDEN_EXCEPT = {Path("tests/services.py")}
+STATUS_WRITERS = {Path("leaderboard/lifecycle.py")}
+
+
+def python_files(*folders: str) -> list[Path]:
+    """Every source file of these folders, relative to the repository."""
+    return sorted(
+        path.relative_to(REPOSITORY)
+        for folder in folders
+        for path in (REPOSITORY / folder).rglob("*.py")
+        if "__pycache__" not in path.parts
+    )
+
+
+def tree(path: Path) -> ast.Module:
+    return ast.parse((REPOSITORY / path).read_text(encoding="utf-8"), filename=str(path))
+
+
+def is_migration(path: Path) -> bool:
+    return "migrations" in path.parts
+
+
+def written_by_hand(*folders: str) -> list[Path]:
+    return [path for path in python_files(*folders) if not is_migration(path)]
+
+
+def text_of(path: Path) -> str:
+    return (REPOSITORY / path).read_text(encoding="utf-8")
+
+
+def test_the_rules_look_at_real_files() -> None:
+    assert len(python_files("evaluator", "leaderboard")) > 20
+    assert set(python_files("leaderboard")) > STATUS_WRITERS
+
+
+def test_every_file_is_short_enough_to_read() -> None:
+    lengths = {path: len(text_of(path).splitlines()) for path in written_by_hand(*CODE)}
+    assert {path: n_lines for path, n_lines in lengths.items() if n_lines > MAX_LINES} == {}
+
+
+def test_every_module_is_named_for_what_it_holds() -> None:
+    def names(path: Path) -> set[str]:
+        return {part.removesuffix(".py").removeprefix("test_") for part in path.parts}
+
+    assert [path for path in python_files(*CODE) if names(path) & FORBIDDEN_NAMES] == [*FORBIDDEN_EXCEPT]
+
+
+# --- only lifecycle.py writes a status -------------------------------------------------------------------
+
+
+def status_writes(module: ast.Module) -> list[int]:
+    """Lines that assign `….status`, or that pass a status to a call which writes rows."""
+    lines = []
+    for node in ast.walk(module):
+        if isinstance(node, ast.Assign | ast.AugAssign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            lines += [t.lineno for t in targets if isinstance(t, ast.Attribute) and t.attr == "status"]
+        if isinstance(node, ast.Call) and writes_a_status(node):
+            lines.append(node.lineno)
+    return lines
+
+
+def writes_a_status(call: ast.Call) -> bool:
+    """Whether this call is `update(status=…)` and the like, an `Evaluation(status=…)`, or a `setattr`."""
+    function = call.func
+    name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    if name == "setattr":
+        return (
+            len(call.args) > 1 and isinstance(call.args[1], ast.Constant) and call.args[1].value == "status"
+        )
+    writers = {"update", "create", "acreate", "aupdate", "get_or_create", "update_or_create", "Evaluation"}
+    if name not in writers:
+        return False
+    given: set[object] = {keyword.arg for keyword in call.keywords}
+    for keyword in call.keywords:
+        if keyword.arg in {"defaults", "create_defaults"} and isinstance(keyword.value, ast.Dict):
+            given |= {key.value for key in keyword.value.keys if isinstance(key, ast.Constant)}
+    return "status" in given
+
+
+def test_only_lifecycle_writes_a_status() -> None:
+    writes = {path: status_writes(tree(path)) for path in written_by_hand("leaderboard")}
+    assert {path for path, lines in writes.items() if lines} == STATUS_WRITERS
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "evaluation.status = Status.SCORED",
+        "Evaluation.objects.filter(pk=1).update(status='SCORED')",
+        "Evaluation.objects.create(status=Status.QUEUED)",
+        "Evaluation(status='SCORED').save()",
+        "Evaluation.objects.update_or_create(pk=1, defaults={'status': 'SCORED'})",
+        "setattr(evaluation, 'status', 'SCORED')",
+    ],
+)
+def test_the_rule_about_statuses_sees_every_way_to_write_one(source: str) -> None:
+    assert status_writes(ast.parse(source)) == [1]
+
+
+# --- habits that the house does without --------------------------------------------------------------------
+
+
+def bad_habits(module: ast.Module, *, is_model: bool) -> set[str]:
+    found = set()
+    for node in ast.walk(module):
+        if (
+            isinstance(node, ast.Call)
+            and isinstance(node.func, ast.Name)
+            and node.func.id in {"eval", "exec"}
+        ):
+            found.add(node.func.id)
+        if isinstance(node, ast.ImportFrom) and node.module in {
+            "django.db.models.signals",
+            "django.dispatch",
+        }:
+            found.add("signals")
+        if isinstance(node, ast.FunctionDef) and node.name == "save" and is_model:
+            found.add("save() override")
+    return found
+
+
+def test_nothing_is_evaluated_no_signal_is_connected_no_save_is_overridden() -> None:
+    found = {
+        path: bad_habits(tree(path), is_model="models" in path.parts)
+        for path in python_files("evaluator", "leaderboard")
+    }
+    assert {path: habits for path, habits in found.items() if habits} == {}
+
+
+def test_every_ignore_carries_its_reason() -> None:
+    marker = re.compile(r"#\s*(?:noqa|type:\s*ignore|pragma)")
+    reasoned = re.compile(r"#\s*(?:noqa: [A-Z0-9, ]+|type: ignore\[[a-z-, ]+\])\s*(?:--?|#)\s*\S.{5,}")
+    bare = [
+        f"{path}:{number}: {line.strip()}"
+        for path in written_by_hand("evaluator", "leaderboard")
+        for number, line in enumerate(text_of(path).splitlines(), 1)
+        if marker.search(line) and not reasoned.search(line)
+    ]
+    assert bare == []
+
+
+def test_no_work_is_left_as_a_note_in_the_code() -> None:
+    note = re.compile(r"\b(?:TO" + r"DO|FIX" + r"ME|XX" + r"X)\b")
+    assert [path for path in python_files(*CODE) if note.search(text_of(path))] == []

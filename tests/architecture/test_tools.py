@@ -1,0 +1,86 @@
+"""The tools that hold the house's style: each must have nothing to say."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+BIN = Path(sys.executable).parent
+
+
+def says(*command: str, environment: dict[str, str] | None = None) -> str:
+    """What a command that fails printed; nothing if it succeeded."""
+    done = subprocess.run(
+        command,
+        cwd=REPOSITORY,
+        env=os.environ | (environment or {}),
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return "" if done.returncode == 0 else f"exit code {done.returncode}\n{done.stdout}{done.stderr}"
+
+
+def test_ruff_finds_no_fault() -> None:
+    assert says(sys.executable, "-m", "ruff", "check", ".") == ""
+
+
+def test_the_code_is_in_the_house_format() -> None:
+    assert says(sys.executable, "-m", "ruff", "format", "--check", ".") == ""
+
+
+@pytest.mark.slow
+def test_mypy_finds_no_fault() -> None:
+    assert says(sys.executable, "-m", "mypy", ".") == ""
+
+
+@pytest.mark.slow
+def test_imports_run_one_way() -> None:
+    assert says(str(BIN / "lint-imports")) == ""
+
+
+@pytest.mark.slow
+def test_every_change_of_a_model_has_its_migration() -> None:
+    assert says(sys.executable, "manage.py", "makemigrations", "--check", "--dry-run") == ""
+
+
+@pytest.mark.slow
+def test_the_production_profile_passes_the_deployment_checks(production: dict[str, str]) -> None:
+    command = ("manage.py", "check", "--deploy", "--fail-level", "WARNING")
+    assert says(sys.executable, *command, environment=production) == ""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name",
+    [
+        "TSTTC_SECRET_KEY",
+        "TSTTC_ALLOWED_HOSTS",
+        "TSTTC_SITE_URL",
+        "TSTTC_DATABASE_URL",
+        "TSTTC_BROKER_URL",
+    ],
+)
+def test_production_does_not_start_without_a_variable_that_it_needs(
+    production: dict[str, str], name: str
+) -> None:
+    complaint = says(sys.executable, "manage.py", "check", environment=production | {name: ""})
+    assert name in complaint
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
+@pytest.mark.parametrize("script", [".ci/run"])
+def test_shell_scripts_parse(script: str) -> None:
+    assert says("bash", "-n", script) == ""
+
+
+def test_every_target_that_the_readme_names_exists() -> None:
+    makefile = (REPOSITORY / "Makefile").read_text()
+    readme = (REPOSITORY / "README.md").read_text()
+    named = {line.split()[1] for line in readme.splitlines() if line.startswith("make ")}
+    assert {"demo", "test"} <= named
+    assert not {target for target in named if f"\n{target}:" not in makefile}
