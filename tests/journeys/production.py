@@ -1,0 +1,146 @@
+"""The leaderboard as it runs in production, started by a test: web, worker and beat as processes of their
+own.
+"""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import httpx
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+BIN = Path(sys.executable).parent
+PATIENCE_S = 60.0
+POLL_S = 0.05
+
+
+class NeverHappened(AssertionError):
+    """What was waited for did not come about in time."""
+
+
+def await_that(condition: Callable[[], bool], *, what: str, patience_s: float = PATIENCE_S) -> None:
+    """Return as soon as the condition holds; it is asked from outside, so there is no event to wait for."""
+    deadline_s = time.monotonic() + patience_s
+    while not condition():
+        if time.monotonic() > deadline_s:
+            raise NeverHappened(f"{what}: not within {patience_s:g} s")
+        time.sleep(POLL_S)
+
+
+def free_port() -> int:
+    """A port on loopback that nothing listens on."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+@dataclass(frozen=True)
+class Site:
+    """A running leaderboard."""
+
+    url: str
+    directory: Path
+    environment: dict[str, str]
+
+    def manage(self, *arguments: str) -> str:
+        """Run a management command, as a maintainer would; returns what it printed."""
+        done = subprocess.run(
+            [sys.executable, "manage.py", *arguments],
+            cwd=REPOSITORY,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout + done.stderr
+        return done.stdout
+
+    @property
+    def mails(self) -> list[str]:
+        """Every mail sent so far, oldest first."""
+        files = sorted((self.directory / "mail").glob("*.log"), key=lambda path: path.stat().st_mtime_ns)
+        return [path.read_text() for path in files]
+
+
+def settings_for(directory: Path, *, url: str, postgres_url: str, redis_url: str) -> dict[str, str]:
+    """The environment of a production process that keeps its files below `directory`."""
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("TSTTC_")}
+    return inherited | {
+        "TSTTC_PROFILE": "production",
+        "TSTTC_HTTPS": "0",  # there is no proxy with a certificate in front
+        "TSTTC_SECRET_KEY": "a-key-of-this-journey-alone-" + "0123456789" * 3,
+        "TSTTC_ALLOWED_HOSTS": "127.0.0.1",
+        "TSTTC_SITE_URL": url,
+        "TSTTC_DATABASE_URL": postgres_url,
+        "TSTTC_BROKER_URL": redis_url,
+        "TSTTC_DATA_DIR": str(directory),
+        "TSTTC_STATIC_ROOT": str(directory / "static"),
+        "TSTTC_EMAIL_URL": f"filemail:///{directory / 'mail'}",
+        "TSTTC_WEB_BIND": url.removeprefix("http://"),
+        "WEB_CONCURRENCY": "2",
+        "OPENBLAS_NUM_THREADS": "1",
+        "REMAP_SIGTERM": "SIGQUIT",
+    }
+
+
+@contextmanager
+def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of the site; asked to finish at the end, and made to if it does not."""
+    with (site.directory / f"{name}.log").open("wb") as log:
+        process = subprocess.Popen(
+            command,
+            cwd=REPOSITORY,
+            env=site.environment,
+            stdout=log,
+            stderr=log,
+            stdin=subprocess.DEVNULL,
+            start_new_session=True,
+        )
+    try:
+        yield process
+    finally:
+        process.terminate()
+        try:
+            process.wait(timeout=PATIENCE_S)
+        finally:
+            if process.poll() is None:
+                os.killpg(process.pid, signal.SIGKILL)
+                process.wait()
+
+
+def _answers(site: Site, process: subprocess.Popen[bytes]) -> bool:
+    assert process.poll() is None, (site.directory / "web.log").read_text()
+    try:
+        return httpx.get(f"{site.url}/api/v1/splits", trust_env=False).status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+@contextmanager
+def production_site(
+    directory: Path, *, postgres_url: str, redis_url: str, truth: Path, split: str, protocol: str = "tsttc-1"
+) -> Iterator[Site]:
+    """Migrate, import the ground truth, start web, worker and beat; all of it ends with the context."""
+    url = f"http://127.0.0.1:{free_port()}"
+    environment = settings_for(directory, url=url, postgres_url=postgres_url, redis_url=redis_url)
+    site = Site(url=url, directory=directory, environment=environment)
+    (directory / "mail").mkdir()
+    site.manage("migrate", "--no-input")
+    site.manage("collectstatic", "--no-input")
+    site.manage("import_truth", split, str(truth), "--protocol", protocol)
+    celery = str(BIN / "celery")
+    gunicorn = (str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application")
+    worker = ("worker", "--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info")
+    with ExitStack() as processes:
+        processes.enter_context(running(site, "beat", celery, "--app=leaderboard", "beat", "--loglevel=info"))
+        processes.enter_context(running(site, "worker", celery, "--app=leaderboard", *worker))
+        web = processes.enter_context(running(site, "web", *gunicorn))
+        await_that(lambda: _answers(site, web), what="the web server answers")
+        yield site
