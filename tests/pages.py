@@ -3,6 +3,8 @@
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 
+from django.http import HttpResponse, HttpResponseBase
+
 VOID = {"meta", "link", "input", "br", "hr", "img", "path", "rect", "source", "mspace"}
 
 
@@ -78,8 +80,9 @@ def read(html: str) -> Element:
     return reader.root
 
 
-def page(response) -> Element:  # type: ignore[no-untyped-def]  # whatever the test client answers
+def page(response: HttpResponseBase) -> Element:
     """The page in a response."""
+    assert isinstance(response, HttpResponse)
     return read(response.content.decode())
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from django.test import Client
 from django.urls import reverse
+from pytest_django import DjangoAssertNumQueries
 
 from leaderboard import teams
 from leaderboard.models import Edition, Method, PublishedResult, Split, User, Visibility
@@ -176,9 +177,7 @@ def test_board_without_any_row_has_no_empty_table(client: Client, benchmark: Non
     assert "not open yet" in root.one("main").text
 
 
-def test_demo_says_that_its_ground_truth_is_simulated(
-    client: Client, tmp_path: Path, benchmark: None
-) -> None:
+def test_demo_says_that_its_truth_is_simulated(client: Client, tmp_path: Path, benchmark: None) -> None:
     builders.import_truth(tmp_path, split="demo")
     assert "Simulated ground truth" in get(client, "/board/demo/").one("main").text
     assert "Simulated" not in get(client, "/board/test/").one("main").text
@@ -252,7 +251,7 @@ def test_interval_without_sequences_has_a_dash(client: Client, benchmark: None) 
 
 
 def test_number_of_queries_does_not_grow_with_the_board(
-    client: Client, edition: Edition, owner: User, django_assert_max_num_queries
+    client: Client, edition: Edition, owner: User, django_assert_max_num_queries: DjangoAssertNumQueries
 ) -> None:
     for i in range(4):
         builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10), method=f"Foo {i}")

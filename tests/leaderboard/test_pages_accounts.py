@@ -1,0 +1,102 @@
+"""Sign up, sign in, reset the password."""
+
+import re
+
+import pytest
+from django.core import mail
+from django.http import HttpResponseBase
+from django.test import Client
+
+from leaderboard.models import Edition, User
+from tests import builders, pages
+
+PASSWORD = "kestrel-altimeter-9"
+
+
+def sign_up(client: Client, **fields: str) -> HttpResponseBase:
+    form = {"email": "new@example.org", "password1": PASSWORD, "password2": PASSWORD, "name": "", **fields}
+    return client.post("/accounts/signup/", form)
+
+
+def test_sign_up_signs_in_and_goes_on_to_submitting(client: Client, edition: Edition) -> None:
+    response = sign_up(client, name="  Lapwings ")
+    assert response.status_code == 302
+    assert response.headers["Location"] == "/submit/"
+    assert User.objects.get(email="new@example.org").name == "Lapwings"
+    assert client.get("/submit/").status_code == 200
+
+
+def test_sign_up_goes_back_to_where_one_came_from(client: Client, edition: Edition) -> None:
+    assert sign_up(client, next="/submit/?split=test").headers["Location"] == "/submit/?split=test"
+
+
+def test_sign_up_never_goes_on_to_another_site(client: Client, edition: Edition) -> None:
+    response = sign_up(client, next="https://evil.example/")
+    assert "evil" not in response.headers.get("Location", "")
+
+
+def test_name_on_the_board_is_the_one_given(client: Client, edition: Edition) -> None:
+    sign_up(client, name="Lapwings")
+    builders.submit(User.objects.get(email="new@example.org"), builders.predictions(edition))
+    builders.score_all()
+    assert "Lapwings" in pages.column(pages.page(client.get("/")), 2)
+
+
+def test_address_never_appears_on_the_board(client: Client, edition: Edition) -> None:
+    sign_up(client)
+    builders.submit(User.objects.get(email="new@example.org"), builders.predictions(edition))
+    builders.score_all()
+    client.logout()
+    assert b"new@example.org" not in client.get("/").content
+
+
+@pytest.mark.parametrize(
+    ("fields", "field"),
+    [
+        ({"email": "no address"}, "email"),
+        ({"password1": "12345678", "password2": "12345678"}, "password1"),
+        ({"password2": "something else"}, "password2"),
+        ({"name": "x" * 81}, "name"),
+    ],
+)
+def test_faults_stand_at_their_field(
+    client: Client, benchmark: None, fields: dict[str, str], field: str
+) -> None:
+    response = sign_up(client, **fields)
+    assert response.status_code == 200
+    assert pages.page(response).one("div", id=f"{field}-error").text
+    assert not User.objects.filter(email="new@example.org").exists()
+
+
+def test_sign_in_with_the_wrong_password_says_so(client: Client, owner: User, benchmark: None) -> None:
+    response = client.post("/accounts/login/", {"login": owner.email, "password": "wrong"})
+    assert response.status_code == 200
+    assert pages.page(response).one("div", class_="form-errors").text
+
+
+def test_forgotten_password_is_reset_by_a_link(client: Client, owner: User, benchmark: None) -> None:
+    response = client.post("/accounts/password/reset/", {"email": owner.email}, follow=True)
+    assert "on its way" in pages.page(response).one("h1").text
+    (message,) = mail.outbox
+    link = re.search(r"https?://[^/]+(/accounts/password/reset/key/\S+)", str(message.body))
+    assert link is not None
+    form = client.get(link.group(1), follow=True)
+    assert "new password" in pages.page(form).one("h1").text
+    changed = client.post(
+        form.redirect_chain[-1][0], {"password1": PASSWORD, "password2": PASSWORD}, follow=True
+    )
+    assert "changed" in pages.page(changed).one("h1").text
+    assert client.login(email=owner.email, password=PASSWORD)
+
+
+def test_reset_does_not_tell_which_addresses_are_known(client: Client, owner: User, benchmark: None) -> None:
+    known, unknown = (
+        client.post("/accounts/password/reset/", {"email": email}, follow=True)
+        for email in (owner.email, "nobody@example.org")
+    )
+    assert pages.page(known).one("main").text == pages.page(unknown).one("main").text
+
+
+def test_used_link_is_refused_in_plain_words(client: Client, benchmark: None) -> None:
+    root = pages.page(client.get("/accounts/password/reset/key/1-nonsense/", follow=True))
+    assert root.one("h1").text == "The link is no longer valid"

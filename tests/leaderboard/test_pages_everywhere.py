@@ -1,0 +1,220 @@
+"""What holds on every page: one head line, a language, nothing inline, nothing from elsewhere."""
+
+import re
+from uuid import uuid4
+
+import pytest
+from django.contrib.staticfiles import finders
+from django.http import HttpResponseBase
+from django.template.loader import render_to_string
+from django.test import Client
+from django.test.utils import override_settings
+
+from evaluator.problems import PROBLEM_CODES
+from leaderboard.models import Edition, User
+from leaderboard.web import reference
+from tests import builders, pages
+
+PUBLIC = [
+    "/",
+    "/board/test/",
+    "/board/val/",
+    "/board/demo/",
+    "/?sort=-rte",
+    "/docs/",
+    "/accounts/login/",
+    "/accounts/login/?next=/submit/",
+    "/accounts/signup/",
+    "/accounts/password/reset/",
+    "/accounts/password/reset/done/",
+    "/accounts/password/reset/key/1-set-password/",
+    "/accounts/password/reset/key/done/",
+    "/accounts/confirm-email/",
+    "/accounts/confirm-email/nonsense/",
+    "/accounts/inactive/",
+]
+PRIVATE = [
+    "/submit/",
+    "/submissions/",
+    "/accounts/email/",
+    "/accounts/password/change/",
+    "/accounts/logout/",
+    "/accounts/reauthenticate/",
+]
+FAULTS = {"/nowhere/": 404, "/?sort=nowhere": 400, f"/methods/{uuid4()}/": 404}
+# Elements whose text is read by a machine, and attributes that run or style something in place.
+INLINE_TAGS = {"style"}
+INLINE_ATTRIBUTES = re.compile(r"^(on\w+|style)$")
+OWN = re.compile(r"^/(?!/)")
+
+
+def assert_sound(response: HttpResponseBase) -> pages.Element:
+    """The claims that hold on every page."""
+    assert response.headers["Content-Type"] == "text/html; charset=utf-8"
+    root = pages.page(response)
+    html = root.one("html")
+    assert html.attributes["lang"] == "en-GB"
+    assert html.one("title").text.endswith("· TSTTC leaderboard")
+    assert len(html.one("title").text) > len("· TSTTC leaderboard") + 2
+    assert len(html.all("h1")) == 1
+    assert html.one("h1").text
+    assert len(html.all("main")) == 1
+    assert html.all("meta", name="viewport")
+    assert_nothing_inline(html)
+    assert_nothing_from_elsewhere(html)
+    assert_every_field_has_a_label(html)
+    ids = [e.attributes["id"] for e in html.everything() if "id" in e.attributes]
+    assert len(ids) == len(set(ids)), sorted(i for i in ids if ids.count(i) > 1)
+    assert_links_within_the_page_lead_somewhere(html, ids)
+    return root
+
+
+def assert_nothing_inline(html: pages.Element) -> None:
+    for element in html.everything():
+        assert element.tag not in INLINE_TAGS
+        assert not [name for name in element.attributes if INLINE_ATTRIBUTES.match(name)], element
+        if element.tag == "script":
+            assert element.text == ""
+            assert "src" in element.attributes
+
+
+def assert_nothing_from_elsewhere(html: pages.Element) -> None:
+    for element in html.everything():
+        if element.tag in {"script", "img", "iframe", "source"} or (
+            element.tag == "link" and element.attributes["rel"] != "canonical"
+        ):
+            address = element.attributes.get("src", element.attributes.get("href", ""))
+            assert OWN.match(address), element
+            assert finders.find(address.removeprefix("/static/")), f"{address} is no static file"
+
+
+def assert_every_field_has_a_label(html: pages.Element) -> None:
+    labelled = {label.attributes.get("for") for label in html.all("label")}
+    wrapped = [field for label in html.all("label") for field in label.all("input")]
+    for tag in ("input", "textarea", "select"):
+        for field in html.all(tag):
+            if field.attributes.get("type") != "hidden" and field not in wrapped:
+                assert field.attributes["id"] in labelled, field
+
+
+def assert_links_within_the_page_lead_somewhere(html: pages.Element, ids: list[str]) -> None:
+    for link in html.all("a"):
+        address = link.attributes["href"]
+        assert address.split(":")[0] in {"http", "https"} or address[0] in "/?#", link
+        if address.startswith("#"):
+            assert address[1:] in ids, link
+
+
+@pytest.mark.parametrize("address", PUBLIC)
+def test_public_pages_are_sound(client: Client, edition: Edition, address: str) -> None:
+    response = client.get(address, follow=True)
+    assert response.status_code == 200
+    assert_sound(response)
+
+
+@pytest.mark.parametrize("address", PRIVATE)
+def test_private_pages_are_sound(client: Client, edition: Edition, owner: User, address: str) -> None:
+    client.force_login(owner)
+    response = client.get(address, follow=True)
+    assert response.status_code == 200
+    assert_sound(response)
+
+
+@pytest.mark.parametrize("address", ["/submit/", "/submissions/", f"/submissions/{uuid4()}/"])
+def test_private_pages_ask_visitors_to_sign_in(client: Client, benchmark: None, address: str) -> None:
+    response = client.get(address)
+    assert response.status_code == 302
+    assert response.headers["Location"] == f"/accounts/login/?next={address}"
+
+
+@pytest.mark.parametrize(("address", "status"), FAULTS.items())
+def test_pages_of_faults_are_sound(client: Client, benchmark: None, address: str, status: int) -> None:
+    response = client.get(address)
+    assert response.status_code == status
+    assert_sound(response)
+
+
+def test_pages_of_a_submissions_life_are_sound(client: Client, edition: Edition, owner: User) -> None:
+    client.force_login(owner)
+    good = builders.submit(owner, builders.predictions(edition), note="a remark", commit="abc123")
+    bad = builders.submit(owner, b'{"0": 0}')
+    waiting = client.get(f"/submissions/{good.pk}/")
+    builders.score_all()
+    for response in (
+        waiting,
+        client.get(f"/submissions/{good.pk}/"),
+        client.get(f"/submissions/{bad.pk}/"),
+        client.get(f"/methods/{good.method_id}/"),
+        client.get("/"),
+        client.get("/submissions/"),
+        client.post("/submit/", {}),
+    ):
+        assert_sound(response)
+
+
+def test_page_of_our_own_failure_needs_neither_request_nor_database() -> None:
+    root = pages.read(render_to_string("500.html"))
+    assert "our fault" in root.one("main").text
+    assert root.one("title").text.endswith("TSTTC leaderboard")
+
+
+@override_settings(DEBUG=False)
+def test_failure_of_the_server_is_answered_with_that_page(
+    client: Client, benchmark: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(**_: object) -> None:
+        raise RuntimeError("a secret detail")
+
+    monkeypatch.setattr("leaderboard.standings.board", fail)
+    client.raise_request_exception = False
+    response = client.get("/")
+    assert response.status_code == 500
+    assert b"our fault" in response.content
+    assert b"secret detail" not in response.content
+
+
+def test_policy_forbids_whatever_is_inline_or_foreign(client: Client, benchmark: None) -> None:
+    policy = client.get("/").headers["Content-Security-Policy"]
+    assert "default-src 'none'" in policy
+    assert "script-src 'self'" in policy
+    assert "style-src 'self'" in policy
+    assert "unsafe" not in policy
+
+
+def test_documentation_names_every_problem_of_a_prediction_file(client: Client, benchmark: None) -> None:
+    codes = {dt.text for dt in pages.page(client.get("/docs/")).one("dl", class_="codes").all("dt")}
+    assert set(PROBLEM_CODES) >= reference.GROUND_TRUTH_CODES
+    assert codes == set(PROBLEM_CODES) - reference.GROUND_TRUTH_CODES
+
+
+def test_documentation_has_an_anchor_for_each_entry_of_its_contents(client: Client, benchmark: None) -> None:
+    root = pages.page(client.get("/docs/"))
+    entries = [a.attributes["href"] for a in root.one("ul", class_="contents").all("a")]
+    assert entries == [f"#{h2.attributes['id']}" for h2 in root.all("h2")]
+
+
+def test_documentation_shows_the_three_commands(client: Client, benchmark: None) -> None:
+    commands = " ".join(pre.text for pre in pages.page(client.get("/docs/")).all("pre"))
+    for command in ("tsttc check ", "tsttc score ", "tsttc submit "):
+        assert command in commands
+
+
+def test_signed_in_people_find_their_submissions_and_the_way_out(
+    client: Client, benchmark: None, owner: User
+) -> None:
+    client.force_login(owner)
+    account = pages.page(client.get("/")).one("nav", class_="site-account")
+    assert "/submissions/" in [a.attributes["href"] for a in account.all("a")]
+    assert account.one("form").attributes["action"] == "/accounts/logout/"
+    assert client.post("/accounts/logout/").status_code == 302
+    assert client.get("/submissions/").status_code == 302
+
+
+def test_maintainers_and_nobody_else_find_the_administration(
+    client: Client, benchmark: None, owner: User, maintainer: User
+) -> None:
+    found = {}
+    for user in (owner, maintainer):
+        client.force_login(user)
+        found[user.name] = b'href="/admin/"' in client.get("/").content
+    assert found == {"Owls": False, "Keepers": True}

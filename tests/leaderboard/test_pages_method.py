@@ -1,0 +1,98 @@
+"""A method's page."""
+
+from pathlib import Path
+from uuid import uuid4
+
+import pytest
+from django.test import Client
+
+from leaderboard.models import Edition, Method, Submission, User, Visibility
+from tests import builders, pages
+
+
+@pytest.fixture
+def method(edition: Edition, owner: User) -> Method:
+    builders.submit(
+        owner,
+        builders.predictions(edition, factor=1.2),
+        description="First line.\n\nSecond <b>line</b>.",
+        paper_url="https://example.org/paper",
+    )
+    builders.submit(owner, builders.predictions(edition, factor=1.05))
+    builders.score_all()
+    return Method.objects.get()
+
+
+def get(client: Client, method: Method) -> pages.Element:
+    response = client.get(f"/methods/{method.pk}/")
+    assert response.status_code == 200
+    return pages.page(response)
+
+
+def test_board_leads_to_the_method(client: Client, method: Method) -> None:
+    links = [a.attributes["href"] for a in pages.page(client.get("/")).one("tbody").all("a")]
+    assert f"/methods/{method.pk}/" in links
+
+
+def test_it_says_what_it_is_and_where_to_read_more(client: Client, method: Method) -> None:
+    main = get(client, method).one("main")
+    assert main.one("h1").text == "Foo"
+    assert "Owls" in main.text
+    assert [p.text for p in main.one("div", class_="description").all("p")] == [
+        "First line.",
+        "Second <b>line</b>.",
+    ]
+    assert main.one("a", href="https://example.org/paper").attributes["rel"] == "nofollow ugc"
+
+
+def test_its_values_are_those_of_the_board(client: Client, method: Method) -> None:
+    (row,) = [row for row in pages.board_rows(pages.page(client.get("/"))) if row[1].startswith("Foo")]
+    main = get(client, method).one("main")
+    values = [
+        cell.text.removesuffix(" best").removesuffix(" second")
+        for half in main.one("div", class_="result").all("table")
+        for cell in half.one("tbody").all("tr")[0].all("td")
+    ]
+    assert values == row[4:]
+    assert f"rank {row[0]} of 6" in main.one("h2").text
+
+
+def test_standing_submissions_are_dated_and_withdrawn_ones_are_not(client: Client, method: Method) -> None:
+    assert "2 scored submissions" in get(client, method).one("section").text
+    withdrawn = Submission.objects.earliest("submitted_at")
+    Submission.objects.filter(pk=withdrawn.pk).update(withdrawn_at=withdrawn.submitted_at)
+    assert "1 scored submission;" in get(client, method).one("section").text
+
+
+def test_each_split_stands_in_its_own_section(
+    client: Client, method: Method, owner: User, tmp_path: Path
+) -> None:
+    demo = builders.import_truth(tmp_path, split="demo", seed=1)
+    builders.submit(owner, builders.predictions(demo), split="demo")
+    builders.score_all()
+    sections = get(client, method).all("section")
+    assert [section.one("h2").one("a").text for section in sections] == ["Test", "Demo"]
+    assert "Simulated ground truth" in sections[1].text
+    assert "Simulated" not in sections[0].text
+
+
+def test_method_without_a_score_says_so(client: Client, edition: Edition, owner: User) -> None:
+    submission = builders.submit(owner, b"[]")
+    builders.score_all()
+    assert "no scored submission" in get(client, submission.method).one("main").text
+
+
+def test_private_method_is_nothing_to_strangers_and_marked_for_its_team(
+    client: Client, method: Method, owner: User, teammate: User, stranger: User
+) -> None:
+    Method.objects.update(visibility=Visibility.PRIVATE)
+    assert client.get(f"/methods/{method.pk}/").status_code == 404
+    client.force_login(stranger)
+    assert client.get(f"/methods/{method.pk}/").status_code == 404
+    for member in (owner, teammate):
+        client.force_login(member)
+        assert "only your team sees this page" in get(client, method).one("main").text
+
+
+def test_unknown_method_is_a_404(client: Client, benchmark: None) -> None:
+    assert client.get(f"/methods/{uuid4()}/").status_code == 404
