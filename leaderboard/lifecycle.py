@@ -108,8 +108,17 @@ def enqueue(
     )
     if is_new:
         # Robust: the rows are committed by then, and nothing may turn that into a failure.
-        transaction.on_commit(lambda: nudge(evaluation.pk), robust=True)
+        transaction.on_commit(partial(_announce, evaluation), robust=True)
     return evaluation
+
+
+def _announce(evaluation: Evaluation) -> None:
+    """Say that it waits: in the log, and to the workers."""
+    with structlog.contextvars.bound_contextvars(
+        submission_id=str(evaluation.submission_id), evaluation_id=str(evaluation.pk)
+    ):
+        log.info("evaluation_queued")
+        nudge(evaluation.pk)
 
 
 def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> None:
@@ -384,4 +393,4 @@ def retry(*, evaluation: Evaluation, actor: User, reason: str = "") -> None:
         audit.record(
             verb="retried", noun="Evaluation", noun_id=evaluation.pk, actor=actor, details={"reason": reason}
         )
-        transaction.on_commit(lambda: nudge(evaluation.pk), robust=True)
+        transaction.on_commit(partial(_announce, evaluation), robust=True)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
+import structlog
 from django.conf import settings
 from django.core.exceptions import ValidationError
 from django.core.files.base import File
@@ -14,6 +15,8 @@ from django.db.models import Avg, DurationField, ExpressionWrapper, F, Q
 
 from leaderboard import audit, files, lifecycle, standings, teams
 from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
+
+log = structlog.get_logger(__name__)
 
 is_web_address = URLValidator(schemes=["http", "https"])
 
@@ -104,6 +107,14 @@ def submit(
             return Submitted(submission=standing.get(), is_new=False)
         _queue(submission)
         audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
+    log.info(
+        "submission_received",
+        submission_id=str(submission.pk),
+        split=split.pk,
+        via=via,
+        digest=kept.digest,
+        size_bytes=kept.size_bytes,
+    )
     return Submitted(submission=submission, is_new=True)
 
 
