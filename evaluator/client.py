@@ -229,6 +229,8 @@ def _checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
     """The response, if it is one of success; raises Unreachable, Redirected or Refused."""
     try:
         response = send()
+    except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
+        raise Unreachable(url=url, reason=str(error), was_connected=False) from error
     except (httpx.ConnectError, httpx.ConnectTimeout, httpx.ProxyError) as error:
         raise Unreachable(url=url, reason=_reason(error), was_connected=False) from error
     except (httpx.TransportError, httpx.DecodingError) as error:

@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import click
 
 from evaluator.cli.failures import FILE_AT_FAULT, SERVER, USAGE, Failure
 from evaluator.cli.options import TOKEN_VARIABLE
@@ -42,8 +45,11 @@ def connect(url: str, *, with_token: bool) -> Iterator[Client]:
     """A client for the site at `url`; its errors leave as failures worded for a person."""
     bearer = token() if with_token else None
     from evaluator.answers import ClientError  # noqa: PLC0415 -- loads msgspec
-    from evaluator.client import Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
 
+    site = urlsplit(url)
+    if bearer and site.scheme == "http" and site.hostname not in LOOPBACK_HOSTS:
+        click.echo(f"Warning: the token goes to {url} unencrypted; use https where you can.", err=True)
     try:
         with Client(url=url, token=bearer, user_agent=f"tsttc/{version()}") as client:
             yield client
@@ -66,6 +72,7 @@ def in_words(error: ClientError) -> Failure:
     from evaluator.answers import BadAnswer, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- msgspec
 
     hint = "Check --url (or TSTTC_URL), your network, and whether the server is up."
+    more: dict[str, Any] = {}
     match error:
         case Refused():
             return _refused(error)
@@ -81,10 +88,11 @@ def in_words(error: ClientError) -> Failure:
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
             code, words = "timeout", f"{_sentence(str(error))}{last}"
+            more = {"submission": error.submission.document if error.submission else None}
             hint = f"It goes on by itself; follow it with: tsttc status {error.submission_id} --watch"
         case _:
             code, words = "client", _sentence(str(error))
-    return Failure(words, exit_code=SERVER, code=code, hint=hint)
+    return Failure(words, exit_code=SERVER, code=code, hint=hint, more=more)
 
 
 def _sentence(text: str) -> str:

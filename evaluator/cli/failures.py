@@ -6,7 +6,7 @@ The sentences about a file are the library's and the server's own; here they are
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import click
@@ -23,7 +23,8 @@ INTERRUPTED = 130
 class Failure(Exception):
     """Ends the command: a sentence, what is wrong in the file where that is known, and what to do next.
 
-    `document` is what --json prints on standard output, by default in the shape of the API's own errors.
+    `document` is what --json prints on standard output, by default in the shape of the API's own errors,
+    with the members of `more` added.
     """
 
     def __init__(
@@ -36,6 +37,7 @@ class Failure(Exception):
         n_problems: int | None = None,
         hint: str = "",
         document: dict[str, Any] | None = None,
+        more: Mapping[str, Any] | None = None,
     ) -> None:
         super().__init__(message)
         self.message = message
@@ -48,6 +50,7 @@ class Failure(Exception):
             "title": message,
             "code": code,
             **Rejected(self.problems, n_problems=n_problems).as_dict(),
+            **(more or {}),
         }
 
     def show(self) -> None:

@@ -60,9 +60,25 @@ def slug(_context: click.Context, _parameter: click.Parameter, value: str) -> st
     return value
 
 
+def sendable(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
+    """Words that can be sent."""
+    if value is not None and not is_utf8(value):
+        raise click.BadParameter(f"found {value!r}, expected UTF-8 text.")
+    return value
+
+
+def is_utf8(text: str) -> bool:
+    """Whether an argument or a file name was UTF-8: bytes that are not come as lone surrogates."""
+    return not any("\ud800" <= character <= "\udfff" for character in text)
+
+
 def _site(_context: click.Context, _parameter: click.Parameter, value: str) -> str:
-    parts = urlsplit(value)
-    if parts.scheme not in {"http", "https"} or not parts.hostname:
+    try:
+        parts = urlsplit(value)
+        is_web = parts.scheme in {"http", "https"} and bool(parts.hostname) and parts.port != 0
+    except ValueError:  # brackets or a port that are none
+        is_web = False
+    if not is_web:
         raise click.BadParameter(f"found {value!r}, expected an address like https://example.org.")
     if parts.username or parts.password or parts.query or parts.fragment:
         raise click.BadParameter(

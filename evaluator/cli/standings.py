@@ -12,7 +12,7 @@ import click
 from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, UNITS, Cell, aligned, printable, short_name, width_of
-from evaluator.cli.options import json_option, slug, url_option
+from evaluator.cli.options import json_option, sendable, slug, url_option
 from evaluator.protocol import SCORE_NAMES
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 @click.argument("split", default="test", callback=slug)
 @click.option(
     "--sort",
+    callback=sendable,
     default="rank",
     show_default=True,
     metavar="COLUMN",

@@ -6,9 +6,9 @@ import shutil
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, cast
+from typing import TYPE_CHECKING, BinaryIO
 from urllib.parse import urljoin
 
 import click
@@ -16,7 +16,15 @@ import click
 from evaluator.cli.connection import connect
 from evaluator.cli.failures import FILE_AT_FAULT, SERVER, Failure, echo_json, n_problems_in_words
 from evaluator.cli.layout import printable, result_in_words
-from evaluator.cli.options import json_option, predictions_argument, slug, timeout_option, url_option
+from evaluator.cli.options import (
+    is_utf8,
+    json_option,
+    predictions_argument,
+    sendable,
+    slug,
+    timeout_option,
+    url_option,
+)
 
 if TYPE_CHECKING:
     from evaluator.answers import Submission
@@ -26,12 +34,14 @@ if TYPE_CHECKING:
 @click.command(short_help="Send a prediction file to the leaderboard.")
 @predictions_argument
 @click.option("--split", required=True, callback=slug, help="The split that it predicts: val, test, …")
-@click.option("--method", required=True, help="Name of your method; a new name makes a new method.")
-@click.option("--description", help="One sentence about the method.")
-@click.option("--paper-url", metavar="URL", help="Where the paper is.")
-@click.option("--code-url", metavar="URL", help="Where the code is.")
-@click.option("--note", help="A remark for yourself, shown beside the submission.")
-@click.option("--commit", help="The commit that produced the file.")
+@click.option(
+    "--method", callback=sendable, required=True, help="Name of the method; a new name makes a new one."
+)
+@click.option("--description", callback=sendable, help="One sentence about the method.")
+@click.option("--paper-url", callback=sendable, metavar="URL", help="Where the paper is.")
+@click.option("--code-url", callback=sendable, metavar="URL", help="Where the code is.")
+@click.option("--note", callback=sendable, help="A remark for yourself, shown beside the submission.")
+@click.option("--commit", callback=sendable, help="The commit that produced the file.")
 @click.option("--wait", is_flag=True, help="Wait for the scores.")
 @timeout_option
 @url_option
@@ -58,16 +68,15 @@ def submit(
       tsttc submit predictions.json --split test --method "Foo++" --wait --json > scores.json
     """
     with connect(url, with_token=True) as client, _opened(predictions) as file:
-        name = "predictions.json" if str(predictions) == "-" else predictions.name
         submission = client.submit(
             file,
-            filename=name,
+            filename=_name_to_send(predictions),
             split=split,
             method=method,
             details={field: value for field, value in details.items() if value},
         )
-        if not as_json:
-            _announce(submission, site=url)
+        if wait or not as_json:
+            _announce(submission, site=url, err=as_json)
         if wait and not submission.is_final:
             submission = _followed(client, submission.id, timeout_s=timeout_s)
     _conclude(submission, as_json=as_json)
@@ -99,17 +108,19 @@ def status(*, submission_id: str, watch: bool, timeout_s: float, url: str, as_js
 
 @contextmanager
 def _opened(path: Path) -> Iterator[BinaryIO]:
-    """The file to send; standard input is kept in a temporary file, so that sending can be repeated."""
-    if str(path) != "-":
-        try:
-            with path.open("rb") as file:
-                yield file
-        except OSError as error:
-            raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
-        return
-    with tempfile.TemporaryFile() as file:
-        shutil.copyfileobj(sys.stdin.buffer, file)
-        yield cast(BinaryIO, file)
+    """The file to send. What can be read only once is kept first, so that sending can be repeated."""
+    try:
+        source = nullcontext(sys.stdin.buffer) if str(path) == "-" else path.open("rb")
+        with source as file, tempfile.TemporaryFile() as kept:
+            if not file.seekable():
+                shutil.copyfileobj(file, kept)
+            yield file if file.seekable() else kept
+    except OSError as error:
+        raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def _name_to_send(path: Path) -> str:
+    return path.name if str(path) != "-" and is_utf8(path.name) else "predictions.json"
 
 
 def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
@@ -141,13 +152,12 @@ def state_in_words(submission: Submission) -> str:
     return words
 
 
-def _announce(submission: Submission, *, site: str) -> None:
+def _announce(submission: Submission, *, site: str, err: bool) -> None:
     """Name the submission before waiting for it, so that an interrupted command leaves something to go on."""
-    click.echo(
-        f"Submission {submission.id}" + (f"  {urljoin(site, submission.url)}" if submission.url else "")
-    )
+    address = f"  {urljoin(site, submission.url)}" if submission.url else ""
+    click.echo(printable(f"Submission {submission.id}{address}"), err=err)
     if not submission.is_new:
-        click.echo("This file was sent before; this is its first submission.")
+        click.echo("This file was sent before; this is its first submission.", err=err)
 
 
 def _conclude(submission: Submission, *, as_json: bool) -> None:

@@ -79,12 +79,27 @@ def test_unreachable_server_is_told_with_its_address(tsttc: Tsttc, monkeypatch: 
 
 @pytest.mark.parametrize(
     "url",
-    ["example.org", "ftp://example.org", "https://", "https://me:secret@example.org", "http://e.org/?x=1"],
+    [
+        "example.org",
+        "ftp://example.org",
+        "https://",
+        "http://[::1",
+        "http://example.org:port",
+        "https://me:secret@example.org",
+        "http://example.org/?x=1",
+    ],
 )
 def test_address_that_is_none_is_wrong_usage(tsttc: Tsttc, url: str) -> None:
     result = tsttc("board", "--url", url)
     assert result.exit_code == 2
     assert "--url" in result.stderr
+
+
+@pytest.mark.parametrize("host", ["a..b", "xn--a", "a" * 70 + ".org"])
+def test_host_that_cannot_exist_is_not_reached(tsttc: Tsttc, host: str) -> None:
+    result = tsttc("board", "--url", f"http://{host}:1")
+    assert result.exit_code == 3
+    assert f"Nothing answers at http://{host}:1" in result.stderr
 
 
 @pytest.mark.parametrize("arguments", [["status", "../splits"], ["board", "a/b"], ["status", "a?b"]])

@@ -92,6 +92,37 @@ def test_submit_takes_standard_input(tsttc: Tsttc, site: RecordedSite) -> None:
     assert sent == [("predictions.json", b'{"0": 1.5}')] * 2
 
 
+def test_submit_takes_a_pipe(site: RecordedSite) -> None:
+    site.put(POST, Reply(fault=CUT), Reply(QUEUED, status=201))
+    done = subprocess.run(
+        ["bash", "-c", f"{sys.executable} -m evaluator submit <(echo '{{}}') --split val --method Foo"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=REPOSITORY,
+    )
+    assert done.returncode == 0, done.stderr
+    assert [request.parts()["file"][1] for request in site.requests] == [b"{}\n"] * 2
+
+
+def test_file_whose_name_is_no_text_is_sent_under_another(
+    tsttc: Tsttc, site: RecordedSite, tmp_path: Path
+) -> None:
+    site.put(POST, Reply(QUEUED, status=201))
+    odd = tmp_path / os.fsdecode(b"\xff.json")
+    odd.write_bytes(b"{}")
+    assert tsttc("submit", odd, "--split", "val", "--method", "Foo").exit_code == 0
+    assert site.requests[0].parts()["file"] == ("predictions.json", b"{}")
+
+
+@pytest.mark.parametrize("option", ["--method", "--note", "--commit"])
+def test_words_that_are_no_text_are_wrong_usage(tsttc: Tsttc, site: RecordedSite, option: str) -> None:
+    result = submit(tsttc, option, os.fsdecode(b"\xff"))
+    assert result.exit_code == 2
+    assert "expected UTF-8 text" in result.stderr
+    assert site.requests == []
+
+
 def test_file_sent_before_is_said_to_be(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(SCORED, status=200))
     result = submit(tsttc, "--wait")
@@ -168,6 +199,25 @@ def test_timeout_says_that_the_submission_goes_on(tsttc: Tsttc, site: RecordedSi
     assert result.exit_code == 3
     assert f"Submission {ID} is not final after 0.1 s. It was QUEUED last." in result.stderr
     assert f"tsttc status {ID} --watch" in result.stderr
+    document = json.loads(submit(tsttc, "--wait", "--timeout", "0.1", "--json").stdout)
+    assert (document["code"], document["submission"]) == ("timeout", QUEUED)
+
+
+def test_waiting_job_knows_its_submission_from_the_start(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(POST, Reply(QUEUED, status=201))
+    site.put(GET, Reply(SCORED))
+    result = submit(tsttc, "--wait", "--json")
+    assert result.stderr == f"Submission {ID}  {site.url}/submissions/{ID}/\n"
+    assert json.loads(result.stdout) == SCORED
+
+
+def test_token_on_an_unencrypted_way_is_warned_of(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(GET, Reply(SCORED))
+    assert tsttc("status", ID).stderr == ""
+    elsewhere = site.url.replace("127.0.0.1", "127.1")  # the same machine under a name that does not look it
+    result = tsttc("status", ID, "--url", elsewhere)
+    assert result.exit_code == 0
+    assert result.stderr == f"Warning: the token goes to {elsewhere} unencrypted; use https where you can.\n"
 
 
 @pytest.mark.parametrize("command", ["submit", "status"])
