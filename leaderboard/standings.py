@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import UTC, datetime, time
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
 from django.db.models import Prefetch, Q, QuerySet
+from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator import ranking
 from evaluator.protocol import SCORE_NAMES
@@ -18,7 +19,6 @@ from leaderboard.models import (
     Score,
     Split,
     Status,
-    Submission,
     User,
     Visibility,
 )
@@ -35,6 +35,15 @@ class UnknownColumn(ValueError):
         super().__init__(
             f"The board cannot be sorted by {column!r}; expected one of {', '.join(SORTABLE)}, "
             "with a leading '-' for the reverse."
+        )
+
+
+class BadMoment(ValueError):
+    """The text is no point in time."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(
+            f"{text[:60]!r} is no date or time; expected one such as 2026-11-20 or 2026-11-20T18:00:00Z."
         )
 
 
@@ -59,6 +68,8 @@ class Entry:
     second: frozenset[str] = frozenset()
     is_mine: bool = False
     is_visible_to_all: bool = True
+    withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
+    is_unscorable: bool = False  # of a former edition, whose successor cannot score the file
 
     @property
     def date_text(self) -> str:
@@ -74,6 +85,7 @@ class Board:
     edition: Edition | None
     entries: tuple[Entry, ...]
     sort: str = "rank"
+    at: datetime | None = None
     updated_at: datetime | None = None
     is_open: bool = field(default=False)
 
@@ -92,21 +104,40 @@ def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
     return values
 
 
+def parse_moment(text: str) -> datetime:
+    """A point in time from a date (its end, in UTC) or an ISO time. Raises `BadMoment`."""
+    try:
+        moment = parse_datetime(text) or parse_date(text)
+    except ValueError:
+        moment = None
+    if moment is None:
+        raise BadMoment(text)
+    if not isinstance(moment, datetime):
+        return datetime.combine(moment, time.max, tzinfo=UTC)
+    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+
+
 def board(
-    *, split: Split, edition: Edition | None = None, viewer: User | AnonymousUser, sort: str = "rank"
+    *,
+    split: Split,
+    edition: Edition | None = None,
+    viewer: User | AnonymousUser,
+    sort: str = "rank",
+    at: datetime | None = None,
 ) -> Board:
     """The board of a split in one edition (the published one unless named), as `viewer` may see it.
 
+    With `at` the board as it stood then: the edition that was published, with what it had scored by then.
     Ranks are by published MiD among everything that everybody sees; ties share a rank; a row without that
-    value has none. Each method is represented by the best of its standing submissions. Rows that only the
-    viewer's own team sees carry the rank that they would have, and take nobody's place.
-    Raises `UnknownColumn`.
+    value has none. Each method is represented by the best of its standing submissions; one whose submissions
+    were all withdrawn leaves a row without values. Rows that only the viewer's own team sees carry the rank
+    that they would have, and take nobody's place. Raises `UnknownColumn`.
     """
     if sort.removeprefix("-") not in SORTABLE:
         raise UnknownColumn(sort)
-    edition = edition or split.published_edition
+    edition = edition or (_edition_at(split, at) if at else split.published_edition)
     entries = [_published_entry(result) for result in split.published_results.all()]
-    submitted = _submitted_entries(edition, viewer) if edition else []
+    submitted = _submitted_entries(split, edition, viewer, at) if edition else []
     ranked = _marked(_ranked([*entries, *submitted]))
     dates = [entry.date for entry in submitted if entry.date]
     if edition and edition.published_at:
@@ -116,9 +147,21 @@ def board(
         edition=edition,
         entries=tuple(_sorted(ranked, sort)),
         sort=sort,
+        at=at,
         updated_at=max(dates, default=None),
         is_open=split.accepts_submissions(),
     )
+
+
+def _edition_at(split: Split, at: datetime) -> Edition | None:
+    """The edition that was the board at that time."""
+    publication = (
+        split.publications.filter(at__lte=at)
+        .select_related("edition__ground_truth")
+        .order_by("-at", "-pk")
+        .first()
+    )
+    return publication.edition if publication else None
 
 
 def _published_entry(result: PublishedResult) -> Entry:
@@ -135,27 +178,39 @@ def _published_entry(result: PublishedResult) -> Entry:
     )
 
 
-def _submitted_entries(edition: Edition, viewer: User | AnonymousUser) -> list[Entry]:
+def _submitted_entries(
+    split: Split, edition: Edition, viewer: User | AnonymousUser, at: datetime | None
+) -> list[Entry]:
     """One entry for each method that the viewer may see: the best of its standing submissions."""
     rows = (
         Evaluation.objects.filter(
-            edition=edition,
-            status=Status.SCORED,
-            submission__withdrawn_at=None,
-            submission__method__in=_shown_methods(viewer),
+            edition=edition, status=Status.SCORED, submission__method__in=_shown_methods(viewer)
         )
         .select_related("submission__method__team")
         .prefetch_related(Prefetch("scores", queryset=Score.objects.order_by("pk")))
     )
+    if at is not None:
+        rows = rows.filter(finished_at__lte=at)
     mine = _team_ids(viewer)
+    unscorable = _unscorable(split, edition)
     best: dict[UUID, Entry] = {}
     for evaluation in rows:
-        entry = _submitted_entry(evaluation.submission, flat_scores(evaluation.scores.all()), mine)
-        assert entry.method_id is not None  # noqa: S101 - for the type checker: every submission has a method
-        rival = best.get(entry.method_id)
+        entry = _submitted_entry(
+            evaluation, mine, at=at, is_unscorable=evaluation.submission_id in unscorable
+        )
+        method_id = evaluation.submission.method_id
+        rival = best.get(method_id)
         if rival is None or _key(entry) < _key(rival):
-            best[entry.method_id] = entry
+            best[method_id] = entry
     return list(best.values())
+
+
+def _unscorable(split: Split, edition: Edition) -> set[UUID]:
+    """Submissions of a former edition that the published one rejects: its manifest has other keys."""
+    if split.published_edition_id in {None, edition.pk}:
+        return set()
+    rejected = Evaluation.objects.filter(edition=split.published_edition_id, status=Status.REJECTED)
+    return set(rejected.values_list("submission", flat=True))
 
 
 def _shown_methods(viewer: User | AnonymousUser) -> QuerySet[Method, dict[str, UUID]]:
@@ -172,14 +227,20 @@ def _team_ids(viewer: User | AnonymousUser) -> set[UUID]:
     return set(viewer.teams.values_list("pk", flat=True))
 
 
-def _submitted_entry(submission: Submission, scores: Mapping[str, float | None], mine: set[UUID]) -> Entry:
+def _submitted_entry(
+    evaluation: Evaluation, mine: set[UUID], *, at: datetime | None, is_unscorable: bool
+) -> Entry:
+    submission = evaluation.submission
     method = submission.method
+    withdrawn_at = submission.withdrawn_at
+    if at is not None and withdrawn_at is not None and withdrawn_at > at:
+        withdrawn_at = None
     return Entry(
         kind="submission",
         method=method.name,
         team=method.team.name,
         description=method.description,
-        scores=scores,
+        scores=flat_scores([] if withdrawn_at else evaluation.scores.all()),
         date=submission.submitted_at,
         method_id=method.pk,
         submission_id=submission.pk,
@@ -187,6 +248,8 @@ def _submitted_entry(submission: Submission, scores: Mapping[str, float | None],
         code_url=method.code_url,
         is_mine=method.team_id in mine,
         is_visible_to_all=method.visibility == Visibility.PUBLIC,
+        withdrawn_at=withdrawn_at,
+        is_unscorable=is_unscorable,
     )
 
 

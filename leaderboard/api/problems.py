@@ -41,6 +41,8 @@ def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | Non
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
         case standings.UnknownColumn():
             return problem(status=400, code="unknown-column", detail=str(exc), where="sort")
+        case standings.BadMoment():
+            return problem(status=400, code="bad-moment", detail=str(exc), where="at")
         case Http404():
             exc = exceptions.NotFound("There is nothing at this address that you may see.")
         case PermissionDenied():

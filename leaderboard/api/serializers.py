@@ -7,8 +7,8 @@ from django.urls import reverse
 from rest_framework import serializers
 
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
-from leaderboard import submissions
-from leaderboard.models import Split, Status, Submission
+from leaderboard import preview, rescoring, submissions
+from leaderboard.models import Edition, Publication, Split, Status, Submission
 from leaderboard.standings import Board, Entry
 
 
@@ -162,6 +162,10 @@ class EntrySerializer(serializers.Serializer[Entry]):
     paper_url = serializers.CharField(allow_blank=True)
     code_url = serializers.CharField(allow_blank=True)
     source = serializers.CharField(allow_blank=True, help_text="The citation of a published row.")
+    withdrawn_at = serializers.DateTimeField(allow_null=True, help_text="The team withdrew it: no values.")
+    is_unscorable = serializers.BooleanField(
+        help_text="In a former edition: the published one's ground truth cannot score this file."
+    )
     scores = ScoresSerializer()
 
 
@@ -172,10 +176,83 @@ class BoardSerializer(serializers.Serializer[Board]):
     edition = serializers.IntegerField(source="edition.number", default=None, allow_null=True)
     protocol = serializers.CharField(source="edition.protocol", default=None, allow_null=True)
     ground_truth = serializers.CharField(source="edition.ground_truth_id", default=None, allow_null=True)
+    at = serializers.DateTimeField(allow_null=True, help_text="The time that was asked for, if any.")
     updated_at = serializers.DateTimeField(allow_null=True)
     is_open = serializers.BooleanField()
     sort = serializers.CharField()
     entries = EntrySerializer(many=True)
+
+
+class EditionSerializer(serializers.Serializer[Edition]):
+    """An edition that was published: the frame of a ranking, quotable for ever."""
+
+    split = serializers.CharField(source="split_id")
+    edition = serializers.IntegerField(source="number")
+    protocol = serializers.CharField()
+    ground_truth = serializers.CharField(source="ground_truth_id")
+    manifest = serializers.CharField(source="ground_truth.manifest_digest")
+    n_sequences = serializers.IntegerField(source="ground_truth.n_sequences")
+    n_recordings = serializers.IntegerField(source="ground_truth.n_recordings")
+    published_at = serializers.DateTimeField()
+    is_board = serializers.SerializerMethodField(help_text="Whether it is the board now.")
+    url = serializers.SerializerMethodField()
+
+    def get_is_board(self, edition: Edition) -> bool:
+        """Whether the split points at it."""
+        return edition.split.published_edition_id == edition.pk
+
+    def get_url(self, edition: Edition) -> str:
+        """Its permanent page."""
+        return absolute("edition", edition.split_id, edition.number)
+
+
+class PublicationSerializer(serializers.Serializer[Publication]):
+    """One line of a split's public changelog."""
+
+    at = serializers.DateTimeField()
+    kind = serializers.CharField()
+    edition = serializers.IntegerField(source="edition.number")
+    replaced = serializers.IntegerField(source="replaced.number", default=None, allow_null=True)
+    reason = serializers.CharField()
+    n_left_out = serializers.SerializerMethodField()
+
+    def get_n_left_out(self, publication: Publication) -> int:
+        """How many submissions were knowingly left unfinished."""
+        return len(publication.left_out)
+
+
+class RescoringSerializer(serializers.Serializer[rescoring.Progress]):
+    """How far the re-scoring of an edition is."""
+
+    n_total = serializers.IntegerField()
+    n_done = serializers.IntegerField()
+    n_waiting = serializers.IntegerField()
+    n_scored = serializers.IntegerField()
+    n_rejected = serializers.IntegerField()
+    n_failed = serializers.IntegerField(help_text="By our fault.")
+    n_cancelled = serializers.IntegerField()
+    percent = serializers.IntegerField()
+    rate_per_s = serializers.FloatField(allow_null=True)
+    left_s = serializers.FloatField(allow_null=True)
+
+
+class PreviewSerializer(serializers.Serializer[preview.Preview]):
+    """What publishing an edition would change."""
+
+    edition = serializers.IntegerField(source="edition.number")
+    replaces = serializers.IntegerField()
+    n_added = serializers.IntegerField(source="edition.ground_truth.n_added")
+    n_removed = serializers.IntegerField(source="edition.ground_truth.n_removed")
+    n_changed_sequences = serializers.IntegerField(source="edition.ground_truth.n_changed")
+    n_changed = serializers.IntegerField()
+    n_moved = serializers.IntegerField()
+    n_newly_rejected = serializers.IntegerField()
+    progress = RescoringSerializer()
+    changes = serializers.SerializerMethodField()
+
+    def get_changes(self, found: preview.Preview) -> list[dict[str, Any]]:
+        """One flat row for each submission."""
+        return preview.rows(found)
 
 
 def absolute(name: str, *args: object) -> str:

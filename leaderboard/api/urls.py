@@ -4,13 +4,31 @@ from django.urls import path
 from drf_spectacular.views import SpectacularAPIView, SpectacularRedocView
 from rest_framework.permissions import AllowAny
 
-from leaderboard.api import views
+from leaderboard.api import edition_views, views
 
 urlpatterns = [
     path("submissions", views.SubmissionsView.as_view(), name="api-submissions"),
     path("submissions/<uuid:submission_id>", views.SubmissionView.as_view(), name="api-submission"),
     path("splits", views.SplitsView.as_view(), name="api-splits"),
     path("splits/<slug:split>/board", views.BoardView.as_view(), name="api-board"),
+    path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),
+    path("splits/<slug:split>/editions", edition_views.EditionsView.as_view(), name="api-editions"),
+    path(
+        "splits/<slug:split>/editions/<int:number>/board",
+        edition_views.EditionBoardView.as_view(),
+        name="api-edition-board",
+    ),
+    path(
+        "splits/<slug:split>/editions/<int:number>/progress",
+        edition_views.ProgressView.as_view(),
+        name="api-edition-progress",
+    ),
+    path(
+        "splits/<slug:split>/editions/<int:number>/preview",
+        edition_views.PreviewView.as_view(),
+        name="api-edition-preview",
+    ),
+    path("splits/<slug:split>/changelog", edition_views.ChangelogView.as_view(), name="api-changelog"),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
     path("schema", SpectacularAPIView.as_view(permission_classes=[AllowAny]), name="api-schema"),
     path(

@@ -83,6 +83,22 @@ class SubmissionView(APIView):
         return Response(SubmissionSerializer(get_object_or_404(rows, pk=submission_id)).data)
 
 
+class WithdrawView(APIView):
+    """Withdraw one's own submission."""
+
+    @extend_schema(
+        operation_id="withdraw",
+        request=None,
+        responses={200: SubmissionSerializer, (404, "application/problem+json"): ErrorSerializer},
+    )
+    def post(self, request: Request, submission_id: str) -> Response:
+        """Cancel what waits; what was published leaves a tombstone. Cannot be undone."""
+        rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
+        submission = get_object_or_404(rows, pk=submission_id)
+        submissions.withdraw(submission=submission, actor=cast("User", request.user), now=timezone.now())
+        return Response(SubmissionSerializer(submission).data)
+
+
 class SplitsView(APIView):
     """The splits."""
 
@@ -103,7 +119,10 @@ class BoardView(APIView):
 
     @extend_schema(
         operation_id="board",
-        parameters=[OpenApiParameter("sort", str, description="A column's name; '-' before it reverses.")],
+        parameters=[
+            OpenApiParameter("sort", str, description="A column's name; '-' before it reverses."),
+            OpenApiParameter("at", str, description="A date or time: the board as it stood then."),
+        ],
         responses={
             200: BoardSerializer,
             (400, "application/problem+json"): ErrorSerializer,
@@ -113,8 +132,12 @@ class BoardView(APIView):
     def get(self, request: Request, split: str) -> Response:
         """Submissions and published rows, ranked by published MiD."""
         found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+        at = request.query_params.get("at")
         board = standings.board(
-            split=found, viewer=request.user, sort=request.query_params.get("sort", "rank")
+            split=found,
+            viewer=request.user,
+            sort=request.query_params.get("sort", "rank"),
+            at=standings.parse_moment(at) if at else None,
         )
         return Response(BoardSerializer(board).data)
 

@@ -1,0 +1,90 @@
+"""Editions over the API: history for everybody, progress and preview for maintainers."""
+
+from django.shortcuts import get_object_or_404
+from drf_spectacular.utils import extend_schema
+from rest_framework.permissions import AllowAny, IsAdminUser
+from rest_framework.request import Request
+from rest_framework.response import Response
+from rest_framework.views import APIView
+
+from leaderboard import preview, rescoring, standings
+from leaderboard.api.serializers import (
+    BoardSerializer,
+    EditionSerializer,
+    ErrorSerializer,
+    PreviewSerializer,
+    PublicationSerializer,
+    RescoringSerializer,
+)
+from leaderboard.models import Edition, Publication, Split
+
+NOT_FOUND = {(404, "application/problem+json"): ErrorSerializer}
+EDITIONS = Edition.objects.select_related("split__published_edition", "ground_truth")
+
+
+class EditionsView(APIView):
+    """Every edition that was ever published."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(operation_id="list_editions", responses={200: EditionSerializer(many=True), **NOT_FOUND})
+    def get(self, request: Request, split: str) -> Response:
+        """The newest first."""
+        get_object_or_404(Split, pk=split)
+        rows = EDITIONS.filter(split=split).exclude(published_at=None).order_by("-number")
+        return Response(EditionSerializer(rows, many=True).data)
+
+
+class EditionBoardView(APIView):
+    """The board of one edition, for ever."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(operation_id="edition_board", responses={200: BoardSerializer, **NOT_FOUND})
+    def get(self, request: Request, split: str, number: int) -> Response:
+        """Submissions and published rows as that edition ranks them."""
+        edition = get_object_or_404(EDITIONS.exclude(published_at=None), split=split, number=number)
+        board = standings.board(
+            split=edition.split,
+            edition=edition,
+            viewer=request.user,
+            sort=request.query_params.get("sort", "rank"),
+        )
+        return Response(BoardSerializer(board).data)
+
+
+class ChangelogView(APIView):
+    """The public changelog of a split."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(operation_id="changelog", responses={200: PublicationSerializer(many=True), **NOT_FOUND})
+    def get(self, request: Request, split: str) -> Response:
+        """Which edition became the board, when and why; the newest first."""
+        get_object_or_404(Split, pk=split)
+        rows = Publication.objects.filter(split=split).select_related("edition", "replaced")
+        return Response(PublicationSerializer(rows, many=True).data)
+
+
+class ProgressView(APIView):
+    """How far the re-scoring of an edition is; for maintainers."""
+
+    permission_classes = [IsAdminUser]
+
+    @extend_schema(operation_id="edition_progress", responses={200: RescoringSerializer, **NOT_FOUND})
+    def get(self, request: Request, split: str, number: int) -> Response:
+        """Counts, rate and time left."""
+        edition = get_object_or_404(EDITIONS, split=split, number=number)
+        return Response(RescoringSerializer(rescoring.progress(edition)).data)
+
+
+class PreviewView(APIView):
+    """What publishing an edition would change; for maintainers."""
+
+    permission_classes = [IsAdminUser]
+
+    @extend_schema(operation_id="edition_preview", responses={200: PreviewSerializer, **NOT_FOUND})
+    def get(self, request: Request, split: str, number: int) -> Response:
+        """Totals, and one row for each submission."""
+        edition = get_object_or_404(EDITIONS, split=split, number=number)
+        return Response(PreviewSerializer(preview.preview(edition)).data)
