@@ -108,7 +108,7 @@ def enqueue(
     )
     if is_new:
         # Robust: the rows are committed by then, and nothing may turn that into a failure.
-        transaction.on_commit(partial(_announce, evaluation), robust=True)
+        transaction.on_commit(lambda: _announce(evaluation), robust=True)
     return evaluation
 
 
@@ -393,4 +393,4 @@ def retry(*, evaluation: Evaluation, actor: User, reason: str = "") -> None:
         audit.record(
             verb="retried", noun="Evaluation", noun_id=evaluation.pk, actor=actor, details={"reason": reason}
         )
-        transaction.on_commit(partial(_announce, evaluation), robust=True)
+        transaction.on_commit(lambda: _announce(evaluation), robust=True)
