@@ -2,7 +2,8 @@
 
     QUEUED -> RUNNING -> SCORED           scores, report and status in one transaction
                       -> REJECTED         the file is at fault
-                      -> QUEUED           a strike: the lease ran out, or the parsing child died
+                      -> QUEUED           a strike: the lease ran out, or the parsing child died;
+                                          or handed back before it was begun
                       -> SYSTEM_ERROR     strikes exhausted: our fault
     QUEUED | RUNNING  -> CANCELLED        by its team
     SYSTEM_ERROR      -> QUEUED           retried by a maintainer
@@ -76,7 +77,7 @@ class Outcome:
     n_problems: int = 0
 
 
-def _after(seconds: float) -> ExpressionWrapper:
+def _after(seconds: float) -> "ExpressionWrapper[Any]":
     """`seconds` from now, by the database's clock."""
     return ExpressionWrapper(Now() + Value(timedelta(seconds=seconds)), output_field=DateTimeField())
 
@@ -282,6 +283,18 @@ def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) 
                 f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer the valid one"
             )
         return _strike(evaluation, strike=strike, reason=reason, rng=rng)
+
+
+def hand_back(leases: Sequence[Lease]) -> int:
+    """Queue again what was claimed and never begun, without a strike. Returns how many that were.
+
+    Leases that are no longer valid are left alone.
+    """
+    with transaction.atomic():
+        held = _locked(leases)
+        return Evaluation.objects.filter(pk__in=held, status=Status.RUNNING).update(
+            status=Status.QUEUED, leased_until=None
+        )
 
 
 # --- the sweeper's verbs ---------------------------------------------------------------------------------

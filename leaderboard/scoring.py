@@ -3,11 +3,12 @@
 import hashlib
 import random
 import time
+from collections import deque
 from collections.abc import Callable, Sequence
 
 import structlog
 from django.conf import settings
-from django.db import InterfaceError, OperationalError, connection
+from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection
 
 import evaluator
 from evaluator import GroundTruth, Predictions, Rejected, Report, published
@@ -15,10 +16,33 @@ from evaluator.protocol import get_protocol
 from evaluator.scoring import Scorer
 from leaderboard import files, ground_truth, lifecycle, quarantine
 from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
-from leaderboard.models import Evaluation, Status
+from leaderboard.models import Edition, Evaluation, Status
 
 log = structlog.get_logger(__name__)
 
+
+class TruthDamaged(Exception):
+    """What the private directory has under this digest is not what was imported."""
+
+
+# The store, the disk, the private directory or the child's start failed: another try may well succeed.
+OUR_FAULTS = (OSError, quarantine.ChildNotReady, TruthDamaged)
+# The child died of the file, or our own code failed on it, or the database refused what came of it. Tried
+# again in case the machine was to blame, but not often: it would end the same way.
+FAULTS_OF_THE_FILE = (
+    quarantine.ChildDied,
+    quarantine.LeaseLost,
+    ArithmeticError,
+    AssertionError,
+    AttributeError,
+    DataError,
+    IntegrityError,
+    LookupError,
+    MemoryError,
+    RuntimeError,
+    TypeError,
+    ValueError,
+)
 RESCORE_BATCH = 50
 FINALISE_ATTEMPTS = 8
 MAX_STORED_PROBLEMS = 100
@@ -29,6 +53,7 @@ def run_next(*, rng: random.Random) -> bool:
 
     False: nothing was waiting.
     """
+    claimed_s = time.monotonic()
     leases = lifecycle.claim(lease_s=settings.LEASE_S, wall_s=settings.WALL_S)
     if not leases:
         return False
@@ -41,9 +66,19 @@ def run_next(*, rng: random.Random) -> bool:
             rescored_in=first.edition_id,
         )
         leases = rescore(leases)
-    for lease in leases:
-        run(lease, rng=rng)
+    waiting = deque(leases)
+    while waiting:
+        run(waiting.popleft(), rng=rng, waiting=waiting)
+        if time.monotonic() - claimed_s > settings.LEASE_S / 2:
+            _hand_back(waiting)
     return True
+
+
+def _hand_back(waiting: deque[Lease]) -> None:
+    """Give others what was claimed with a batch and would run out of its lease before it is begun."""
+    if waiting:
+        lifecycle.hand_back(tuple(waiting))
+        waiting.clear()
 
 
 def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
@@ -62,8 +97,8 @@ def rescore(leases: Sequence[Lease]) -> list[Lease]:
     evaluations = _evaluations(leases)
     edition = evaluations[0].edition
     try:
-        truth = ground_truth.load(edition.ground_truth_id)
-    except OSError:
+        truth = _truth(edition)
+    except (OSError, TruthDamaged):
         return list(leases)
     scorer = Scorer(truth, get_protocol(edition.protocol))
     outcomes: list[tuple[Lease, Outcome]] = []
@@ -74,8 +109,9 @@ def rescore(leases: Sequence[Lease]) -> list[Lease]:
             if predictions is not None:
                 outcomes.append((lease, scored(scorer.report(predictions))))
                 continue
-        except Rejected:
-            pass  # worded below, from the file
+        except (Rejected, *FAULTS_OF_THE_FILE) as fault:
+            # Worded, or struck, when it is read again from the file, alone.
+            log.info("not_rescored_in_the_batch", evaluation_id=str(lease.evaluation_id), reason=str(fault))
         rest.append(lease)
     if outcomes:
         _persist(lambda: lifecycle.finalise_many(outcomes))
@@ -95,35 +131,76 @@ def _aligned(evaluation: Evaluation, truth: GroundTruth) -> Predictions | None:
     return Predictions(manifest=truth.manifest, ttc_s=ttc_s, digest=evaluation.submission.digest)
 
 
-def run(lease: Lease, *, rng: random.Random) -> None:
-    """Decide one claimed evaluation. Whatever happens, the lease ends: decided, given back, or lost."""
+def run(lease: Lease, *, rng: random.Random, waiting: deque[Lease] | None = None) -> None:
+    """Decide one claimed evaluation. Whatever happens, the lease ends: decided, given back, or lost.
+
+    `waiting` are leases of this worker that are not begun: they are handed back if this run takes long. Only
+    the loss of the database is raised; the lease then runs out by itself.
+    """
+    waiting = deque() if waiting is None else waiting
     evaluation = _evaluations([lease])[0]
-    context = log.bind(submission_id=str(evaluation.submission_id), evaluation_id=str(lease.evaluation_id))
+    # Every line from here on says what it is about, also those of modules that know of no submission.
+    with structlog.contextvars.bound_contextvars(
+        submission_id=str(evaluation.submission_id),
+        evaluation_id=str(lease.evaluation_id),
+        attempt=lease.attempt,
+    ):
+        _run(lease, evaluation, waiting=waiting, rng=rng)
+
+
+def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: random.Random) -> None:
     started_s = time.monotonic()
     try:
-        outcome = _outcome(evaluation, heartbeat=lambda: lifecycle.heartbeat(lease, lease_s=settings.LEASE_S))
-        _persist(lambda: lifecycle.finalise(lease, outcome))
-    except quarantine.ChildDied as fault:
-        _give_back(lease, strike=Strike.POISON, reason=str(fault), rng=rng)
-    except OSError as fault:
-        _give_back(
-            lease, strike=Strike.INFRASTRUCTURE, reason=f"{type(fault).__name__}: {fault.strerror}", rng=rng
+        outcome = _outcome(
+            evaluation,
+            heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
         )
-    except (LostRace, quarantine.LeaseLost) as race:
-        context.warning("evaluation_lost", attempt=lease.attempt, reason=str(race))
+        _persist(lambda: lifecycle.finalise(lease, outcome))
+    except LostRace as race:
+        log.warning("evaluation_lost", reason=str(race))
+    except OUR_FAULTS as fault:
+        _give_back(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
+    except FAULTS_OF_THE_FILE as fault:
+        log.warning("evaluation_failed", exc_info=fault)
+        _give_back(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng)
     else:
-        context.info(
+        log.info(
             "evaluation_finished",
             status=outcome.status.value,
-            attempt=lease.attempt,
             duration_s=round(time.monotonic() - started_s, 3),
         )
+
+
+class Pulse:
+    """The heartbeat of one run: False once the work is somebody else's, or its time is up.
+
+    A database that does not answer says neither: the run goes on, since its result is fenced anyway, but not
+    beyond its own time. A run long enough to have a heartbeat keeps nothing waiting behind it.
+    """
+
+    def __init__(self, lease: Lease, *, waiting: deque[Lease], lease_s: float, wall_s: float) -> None:
+        self._lease = lease
+        self._waiting = waiting
+        self._lease_s = lease_s
+        self._ends_s = time.monotonic() + wall_s
+
+    def __call__(self) -> bool:
+        """Renew the lease."""
+        if time.monotonic() >= self._ends_s:
+            return False
+        try:
+            _hand_back(self._waiting)
+            return lifecycle.heartbeat(self._lease, lease_s=self._lease_s)
+        except (OperationalError, InterfaceError) as fault:
+            log.warning("heartbeat_not_sent", reason=str(fault)[:200])
+            connection.close()
+            return True
 
 
 def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcome:
     """Read, check and score one submission's file. A pure function of file digest and edition."""
     edition = evaluation.edition
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = _truth(edition)
     try:
         with files.opened_predictions(evaluation.submission.digest) as source:
             predictions = quarantine.read_predictions(
@@ -136,12 +213,30 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
         report = evaluator.evaluate(predictions, truth, protocol=edition.protocol)
     except Rejected as rejected:
         return rejection(rejected)
-    files.keep_aligned(
-        manifest_digest=edition.ground_truth.manifest_digest,
-        digest=evaluation.submission.digest,
-        ttc_s=predictions.ttc_s,
-    )
+    try:
+        files.keep_aligned(
+            manifest_digest=edition.ground_truth.manifest_digest,
+            digest=evaluation.submission.digest,
+            ttc_s=predictions.ttc_s,
+        )
+    except OSError as fault:
+        # They only make re-scoring quicker; without them it reads the file again.
+        log.warning("values_not_kept", submission_id=str(evaluation.submission_id), reason=_in_words(fault))
     return scored(report)
+
+
+def _truth(edition: Edition) -> GroundTruth:
+    """The edition's values. Raises `OSError` or `TruthDamaged`: a submission is never to blame for them."""
+    try:
+        return ground_truth.load(edition.ground_truth_id)
+    except Rejected as fault:
+        raise TruthDamaged(f"the ground truth {edition.ground_truth_id} cannot be used: {fault}") from fault
+
+
+def _in_words(fault: Exception) -> str:
+    """What happened, for maintainers. Ours are sentences already; a library's needs its name."""
+    ours = (quarantine.ChildDied, quarantine.ChildNotReady, quarantine.LeaseLost, TruthDamaged)
+    return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
 def scored(report: Report) -> Outcome:

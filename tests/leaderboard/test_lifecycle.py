@@ -310,6 +310,21 @@ def test_giving_back_a_stale_lease_counts_no_strike(edition: Edition, owner: Use
     assert (row.status, row.n_infrastructure_strikes) == (Status.RUNNING, 0)
 
 
+def test_what_was_never_begun_is_handed_back_without_a_strike(edition: Edition, owner: User) -> None:
+    for _ in range(3):
+        queue_rows.queued(edition, owner)
+    begun, *waiting = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)
+    lifecycle.finalise(begun, SCORED)
+    assert lifecycle.hand_back([begun, *waiting]) == 2
+    assert queue_rows.row(begun).status == Status.SCORED
+    for lease in waiting:
+        row = queue_rows.row(lease)
+        assert (row.status, row.n_infrastructure_strikes) == (Status.QUEUED, 0)
+        with pytest.raises(LostRace):
+            lifecycle.finalise(lease, SCORED)
+    assert len(lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)) == 2
+
+
 # --- the sweep -------------------------------------------------------------------------------------------
 
 

@@ -158,6 +158,13 @@ class Life(RuleBasedStateMachine):
             with pytest.raises(LostRace):
                 lifecycle.give_back(lease, strike=strike, reason="x", rng=random.Random(0))
 
+    @rule(some=st.lists(leases, max_size=4, unique_by=lambda lease: lease.evaluation_id))
+    def hand_back(self, some: list[Lease]) -> None:
+        held = [lease for lease in some if self.model[lease.evaluation_id].holds(lease)]
+        assert lifecycle.hand_back(some) == len(held)
+        for lease in held:
+            self.model[lease.evaluation_id].status = Status.QUEUED
+
     @rule(lease=leases, overran=st.booleans())
     def time_passes_beyond_the_lease(self, lease: Lease, overran: bool) -> None:
         expected = self.model[lease.evaluation_id]
