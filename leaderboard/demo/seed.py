@@ -27,6 +27,10 @@ SPLIT = "demo"
 DEMO_EMAIL = "demo@example.org"
 
 
+class Occupied(Exception):
+    """The split `demo` has ground truth that the seed did not make."""
+
+
 @dataclass(frozen=True)
 class Login:
     """The account that the demo's visitor signs in with."""
@@ -99,7 +103,7 @@ def seed(*, now: datetime, login_path: Path) -> Login:
     """Make whatever of the demo is missing; what is there stays. Returns the demo account.
 
     `login_path` keeps the password, readable by its owner only, so that it can be printed again. Raises
-    `ground_truth.Refused` where the split `demo` has other ground truth.
+    `Occupied` where the split `demo` has other ground truth; nothing is submitted then.
     """
     login = _login(login_path)
     users = {entry.email: _user(entry) for entry in ENTRIES}
@@ -107,7 +111,7 @@ def seed(*, now: datetime, login_path: Path) -> Login:
     missing = [entry for entry in ENTRIES if not _has_submitted(entry)]
     if missing or not Split.objects.get(name=SPLIT).accepts_submissions():
         truth = simulate(rng=np.random.default_rng(SEED))
-        _import(truth, now=now)
+        _open_split(truth, now=now)
         for entry in missing:
             _submit(entry, user=users[entry.email], truth=truth, now=now)
     return login
@@ -144,11 +148,19 @@ def _has_submitted(entry: Entry) -> bool:
     ).exists()
 
 
-def _import(truth: evaluator.GroundTruth, *, now: datetime) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "simulated.csv"
-        path.write_bytes(truth.to_csv())
-        ground_truth.import_truth(split_name=SPLIT, path=path, now=now)
+def _open_split(truth: evaluator.GroundTruth, *, now: datetime) -> None:
+    """Make sure that the split is scored against this ground truth."""
+    edition = Split.objects.select_related("published_edition").get(pk=SPLIT).published_edition
+    if edition is None:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "simulated.csv"
+            path.write_bytes(truth.to_csv())
+            ground_truth.import_truth(split_name=SPLIT, path=path, now=now)
+    elif edition.ground_truth_id != truth.digest:
+        raise Occupied(
+            f"The split '{SPLIT}' has the ground truth {edition.ground_truth_id}; "
+            f"expected none, or the simulated one, {truth.digest}."
+        )
 
 
 def _submit(entry: Entry, *, user: User, truth: evaluator.GroundTruth, now: datetime) -> None:

@@ -6,7 +6,6 @@ from django.conf import settings
 from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
-from leaderboard import ground_truth
 from leaderboard.demo import seed
 
 
@@ -23,6 +22,6 @@ class Command(BaseCommand):
             )
         try:
             login = seed.seed(now=timezone.now(), login_path=settings.DATA_DIR / "demo-password")
-        except ground_truth.Refused as refused:
+        except seed.Occupied as refused:
             raise CommandError(str(refused)) from refused
         self.stdout.write(f"Sign in as {login.email} with the password {login.password}")

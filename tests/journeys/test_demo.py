@@ -1,0 +1,123 @@
+"""The demo as somebody meets it: one process to start, a board in the browser, Ctrl-C to end it."""
+
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from leaderboard.demo.seed import ENTRIES
+from tests.journeys.people import Visitor
+from tests.journeys.production import REPOSITORY, Site, await_that, free_port
+
+pytestmark = pytest.mark.slow
+
+
+def environment(directory: Path) -> dict[str, str]:
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("TSTTC_")}
+    return inherited | {
+        "TSTTC_DATA_DIR": str(directory),
+        "TSTTC_STATIC_ROOT": str(directory / "static"),
+        "PYTHONUNBUFFERED": "1",
+    }
+
+
+@contextmanager
+def demo(directory: Path, *, port: int) -> Iterator[subprocess.Popen[str]]:
+    """The demo's supervisor, ended at the end however the test went."""
+    with subprocess.Popen(
+        [sys.executable, "manage.py", "demo", "--port", str(port)],
+        cwd=REPOSITORY,
+        env=environment(directory),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        start_new_session=True,
+    ) as supervisor:
+        try:
+            yield supervisor
+        finally:
+            if supervisor.poll() is None:
+                supervisor.terminate()
+            supervisor.wait(timeout=60)
+
+
+def banner(supervisor: subprocess.Popen[str]) -> str:
+    """What it prints until it is ready."""
+    lines: list[str] = []
+    assert supervisor.stdout is not None
+    while not lines or "Ctrl-C" not in lines[-1]:
+        line = supervisor.stdout.readline()
+        assert line, "".join(lines)
+        lines.append(line)
+    return "".join(lines)
+
+
+def entries(url: str) -> list[dict[str, Any]]:
+    return list(httpx.get(f"{url}/api/v1/splits/demo/board", trust_env=False).json()["entries"])
+
+
+def workers(supervisor: subprocess.Popen[str]) -> list[int]:
+    """The process ids of the worker that the supervisor holds."""
+    children = Path(f"/proc/{supervisor.pid}/task/{supervisor.pid}/children").read_text().split()
+    return [pid for pid in map(int, children) if b"celery" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def is_alive(pid: int) -> bool:
+    return Path(f"/proc/{pid}").exists() and "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
+def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_cleanly(tmp_path: Path) -> None:
+    port = free_port()
+    url = f"http://127.0.0.1:{port}"
+    with demo(tmp_path, port=port) as supervisor:
+        said = banner(supervisor)
+        assert url in said
+        n_scored = sum(entry.estimator is not None for entry in ENTRIES)
+        await_that(lambda: len(entries(url)) == n_scored, what="every demo submission is scored")
+
+        login = re.search(r"Sign in as (\S+) with the password (\S+)", said)
+        assert login, said
+        site = Site(url=url, directory=tmp_path, environment={})
+        visitor = Visitor(site)
+        answer = visitor.post_form("/accounts/login/", {"login": login[1], "password": login[2]})
+        assert answer.url.path == "/submit/"
+        assert "simulated" in visitor.text_of("/board/demo/").lower()
+
+        (first,) = workers(supervisor)
+        os.kill(first, signal.SIGKILL)
+        await_that(lambda: workers(supervisor) not in ([], [first]), what="another worker is started")
+        again = visitor.submit(split="demo", method="After the crash", data=b'{"0": 1.0}')
+        visitor_api = f"/api/v1/submissions/{again}"
+        await_that(
+            lambda: visitor.get(visitor_api).json()["state"] == "REJECTED", what="the new worker decides"
+        )
+        visitor.close()
+
+        (second,) = workers(supervisor)
+        supervisor.send_signal(signal.SIGINT)
+        assert supervisor.wait(timeout=60) == 0
+        assert not is_alive(first)
+        assert not is_alive(second)
+    with pytest.raises(httpx.ConnectError):
+        httpx.get(url, trust_env=False)
+
+
+def test_a_port_in_use_is_said_in_a_sentence_and_nothing_is_made(tmp_path: Path) -> None:
+    port = free_port()
+    with socket.create_server(("127.0.0.1", port)), demo(tmp_path, port=port) as supervisor:
+        assert supervisor.stdout is not None
+        said = supervisor.stdout.read()
+        assert supervisor.wait(timeout=60) == 1
+    assert f"Port {port} on 127.0.0.1 is in use" in said
+    assert "Traceback" not in said
+    assert not (tmp_path / "leaderboard.sqlite3").exists()
