@@ -1,7 +1,7 @@
 """`python -m benchmarks [NAME …]`: run every benchmark of this folder, or those named.
 
-A benchmark is a module with a function `main()` that measures and prints one line per figure, `name = value unit`.
-Each runs in a process of its own, so that none measures what another left in memory.
+A benchmark is a module with a function `main()` that measures and prints one line per figure, `name = value
+unit`. Each runs in a process of its own, so that none measures what another left in memory.
 """
 
 import subprocess

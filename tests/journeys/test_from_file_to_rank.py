@@ -4,6 +4,8 @@ Real processes (gunicorn, a Celery worker, beat), a real PostgreSQL and a real R
 and the programs use tokens.
 """
 
+import subprocess
+import sys
 from collections.abc import Callable
 
 import numpy as np
@@ -11,7 +13,7 @@ import pytest
 
 import evaluator
 from tests.journeys.people import Program, Visitor
-from tests.journeys.production import Site
+from tests.journeys.production import REPOSITORY, Site, free_port
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -106,3 +108,12 @@ def test_the_public_manifest_has_every_sequence_and_no_time_to_contact(
     assert lines[0] == "anno_id,bag_stamp,cam_id,ts,track_id"
     assert len(lines) == 1 + truth.n_sequences
     assert np.unique(lines).size == len(lines)
+
+
+def test_the_check_that_containers_use_finds_the_web_process_alive(site: Site) -> None:
+    command = [sys.executable, "deploy/healthcheck.py"]
+    alive = subprocess.run(command, cwd=REPOSITORY, env=site.environment, capture_output=True, check=False)
+    assert alive.returncode == 0, alive.stderr
+    elsewhere = site.environment | {"TSTTC_WEB_BIND": f"127.0.0.1:{free_port()}"}
+    dead = subprocess.run(command, cwd=REPOSITORY, env=elsewhere, capture_output=True, check=False)
+    assert dead.returncode == 1
