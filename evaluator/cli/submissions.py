@@ -128,11 +128,13 @@ def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submis
     states = client.watch(submission_id, timeout_s=timeout_s)
     if sys.stderr.isatty():
         from rich.console import Console  # noqa: PLC0415 -- only a terminal needs it
+        from rich.live import Live  # noqa: PLC0415 -- as above
+        from rich.spinner import Spinner  # noqa: PLC0415 -- as above
         from rich.text import Text  # noqa: PLC0415 -- as above
 
-        with Console(stderr=True).status("asking …") as line:
+        with Live(console=Console(stderr=True), transient=True) as line:
             for submission in states:
-                line.update(Text(state_in_words(submission)))
+                line.update(Spinner("dots", Text(state_in_words(submission))), refresh=True)
         return submission
     told = ""
     for submission in states:

@@ -306,3 +306,25 @@ def test_ctrl_c_while_waiting_ends_quietly_with_130(site: RecordedSite) -> None:
     waiting.send_signal(signal.SIGINT)
     stdout, stderr = waiting.communicate(timeout=30)
     assert (waiting.returncode, stdout, stderr.strip()) == (130, "", "Interrupted.")
+
+
+def test_terminal_shows_the_state_live_and_cannot_be_steered_by_it(site: RecordedSite) -> None:
+    hostile = QUEUED | {"state": "[red]\x1b[2JNEW"}
+    site.put(GET, Reply(QUEUED), Reply(hostile), Reply(SCORED))
+    terminal, end = os.openpty()
+    done = subprocess.run(
+        [sys.executable, "-m", "evaluator", "status", ID, "--watch", "--json"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=end,
+        check=False,
+        cwd=REPOSITORY,
+        env=os.environ | {"TERM": "xterm"},
+    )
+    with open(terminal, "rb", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
+        shown = screen.read(1 << 16).decode()
+    os.close(end)
+    assert (done.returncode, json.loads(done.stdout)) == (0, SCORED)
+    assert "QUEUED, 2 ahead, about 4 s" in shown
+    assert r"[red]\x1b[2JNEW" in shown
+    assert "\x1b[2JNEW" not in shown
