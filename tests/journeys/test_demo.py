@@ -26,7 +26,6 @@ def environment(directory: Path) -> dict[str, str]:
     return inherited | {
         "TSTTC_DATA_DIR": str(directory),
         "TSTTC_STATIC_ROOT": str(directory / "static"),
-        "PYTHONUNBUFFERED": "1",
     }
 
 

@@ -1,6 +1,7 @@
 """`manage.py demo`: everything in one terminal, on SQLite and a broker made of files."""
 
 import io
+import logging
 import os
 import sys
 from argparse import ArgumentParser
@@ -38,6 +39,9 @@ class Command(BaseCommand):
                 f"Port {port} on {host} is in use. "
                 "End what listens there, or choose another: make demo PORT=8010"
             )
+        # What the processes have to say is in their logs, and what the seed did is on the board.
+        logging.disable(logging.WARNING)
+        self._say("Preparing database, static files and simulated data …\n")
         call_command("migrate", verbosity=0)
         if static_files_changed(Path(settings.STATIC_ROOT)):
             call_command("collectstatic", interactive=False, clear=True, verbosity=0)
@@ -54,10 +58,15 @@ class Command(BaseCommand):
                 _processes(host, port, address=address),
                 host=host,
                 port=port,
-                ready=lambda: self.stdout.write(banner, ending=""),
+                ready=lambda: self._say(banner),
             )
         except StartFailed as fault:
             raise CommandError(str(fault)) from fault
+
+    def _say(self, text: str) -> None:
+        """Print it at once, also where the output is not a terminal."""
+        self.stdout.write(text, ending="")
+        self.stdout.flush()
 
 
 def static_files_changed(root: Path) -> bool:
