@@ -11,7 +11,6 @@ from pathlib import Path
 
 from django.db import transaction
 from django.db.models import Count, Min, Q
-from django.db.models.functions import Now
 
 from evaluator.protocol import get_protocol
 from leaderboard import audit, ground_truth, lifecycle
@@ -126,7 +125,7 @@ def queue_standing(edition: Edition) -> int:
 
 
 def progress(edition: Edition) -> Progress:
-    """How far an edition is, by one query."""
+    """How far an edition is, with a rate from its first start to now by the database's clock."""
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
 
     def of(*statuses: Status) -> Count:
@@ -139,14 +138,13 @@ def progress(edition: Edition) -> Progress:
         n_failed=of(Status.SYSTEM_ERROR),
         n_cancelled=of(Status.CANCELLED),
         first=Min("started_at"),
-        now=Now(),
     )
-    first, now = counts.pop("first"), counts.pop("now")
+    first = counts.pop("first")
     n_done = counts["n_scored"] + counts["n_rejected"] + counts["n_failed"] + counts["n_cancelled"]
     n_waiting = counts["n_total"] - n_done
     rate = left_s = None
     if first is not None and n_done and n_waiting:
-        rate = n_done / max((now - first).total_seconds(), 0.001)
+        rate = n_done / max((lifecycle.database_now() - first).total_seconds(), 0.001)
         left_s = n_waiting / rate
     return Progress(**counts, rate_per_s=rate, left_s=left_s)
 
