@@ -4,7 +4,7 @@ import os
 import random
 
 from celery import Celery
-from celery.signals import setup_logging, worker_process_init
+from celery.signals import setup_logging, worker_process_init, worker_process_shutdown
 from django_structlog.celery.steps import DjangoStructLogInitStep
 
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
@@ -26,4 +26,10 @@ def look_for_work_unasked(**_: object) -> None:
     """Start this process's poller, so that queued work is found with no broker at all."""
     from leaderboard.queue import Poller  # noqa: PLC0415 - the app registry is ready only now
 
-    Poller(rng=random.Random()).start()  # noqa: S311 - jitter, not a secret
+    poller = Poller(rng=random.Random())  # noqa: S311 - jitter, not a secret
+    poller.start()
+
+    @worker_process_shutdown.connect(weak=False)
+    def finish_what_is_in_hand(**_: object) -> None:
+        """Let the poller finish, as Celery lets a task; else its evaluation waits for its lease to end."""
+        poller.stop(patience_s=app.conf.worker_soft_shutdown_timeout)

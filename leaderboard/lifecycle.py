@@ -139,15 +139,20 @@ def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> No
         ignore_conflicts=True,
     )
     for pk in waiting_ids(limit=NUDGES_PER_EDITION):
-        transaction.on_commit(partial(nudge, pk))
+        transaction.on_commit(partial(nudge, pk), robust=True)
 
 
-def nudge(evaluation_id: uuid.UUID) -> None:
-    """Tell the workers that something waits. A lost nudge costs seconds: they also look by themselves."""
+def nudge(evaluation_id: uuid.UUID) -> bool:
+    """Tell the workers that something waits; False if the broker did not take it.
+
+    A lost nudge costs seconds: workers also look by themselves.
+    """
     try:
         current_app.send_task("leaderboard.tasks.nudge", args=[str(evaluation_id)], ignore_result=True)
     except (OperationalError, OSError) as fault:
         log.warning("nudge_not_sent", evaluation_id=str(evaluation_id), reason=str(fault)[:200])
+        return False
+    return True
 
 
 # --- a worker's verbs ------------------------------------------------------------------------------------
