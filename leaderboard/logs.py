@@ -105,6 +105,8 @@ def logging_settings(*, as_json: bool, level: str) -> dict[str, Any]:
             "django.request": {"level": "CRITICAL"},
             "celery.worker.strategy": {"level": "WARNING"},
             "celery.app.trace": {"level": "WARNING"},
+            # Says at every connection that a broker made of files has no host name.
+            "kombu.connection": {"level": "ERROR"},
             # Says at every second request that one waits for a thread.
             "waitress.queue": {"level": "ERROR"},
         },

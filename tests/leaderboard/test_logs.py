@@ -1,0 +1,269 @@
+"""What is written down: ids in every line about a submission, and nothing that nobody may read."""
+
+import io
+import json
+import logging
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import structlog
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client, RequestFactory
+from django.utils.functional import SimpleLazyObject
+from pytest_django.fixtures import Settings
+
+from leaderboard import files, ground_truth, logs, tokens
+from leaderboard.models import Edition, User
+from leaderboard.web.request_log import RequestLogMiddleware
+from tests import builders
+
+Lines = Callable[[], list[dict[str, Any]]]
+
+
+@pytest.fixture
+def written() -> Iterator[io.StringIO]:
+    """What goes to standard error in production: every line, ours and the libraries'."""
+    stream = io.StringIO()
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(logs.formatter(as_json=True))
+    root = logging.getLogger()
+    root.addHandler(handler)
+    yield stream
+    root.removeHandler(handler)
+
+
+@pytest.fixture
+def lines(written: io.StringIO) -> Lines:
+    """The lines so far, each parsed: a line that is no JSON fails the test."""
+    return lambda: [json.loads(line) for line in written.getvalue().splitlines()]
+
+
+@pytest.fixture
+def opened(benchmark: None, tmp_path: Path, transactional_db: None) -> Edition:
+    """The test split, open; its nudges really follow their commits."""
+    return builders.import_truth(tmp_path)
+
+
+def _send(token: str, data: bytes) -> Any:
+    upload = SimpleUploadedFile("predictions.json", data, content_type="application/json")
+    return Client(headers={"Authorization": f"Bearer {token}"}).post(
+        "/api/v1/submissions",
+        {"split": "test", "method": "Foo", "file": upload, "note": "call me at home@example.net"},
+    )
+
+
+def events(found: list[dict[str, Any]]) -> list[str]:
+    return [line["event"] for line in found]
+
+
+def test_every_line_from_upload_to_score_names_the_submission(
+    opened: Edition, owner: User, lines: Lines
+) -> None:
+    sent = _send(tokens.create(user=owner, name="CI"), builders.predictions(opened))
+    submission_id = sent.json()["id"]
+    assert builders.score_all() == 1
+    found = lines()
+    assert events(found) == [
+        "evaluation_queued",
+        "submission_received",
+        "request_finished",
+        "evaluation_finished",
+    ]
+    [evaluation_id] = {line["evaluation_id"] for line in found if "evaluation_id" in line}
+    for line in found:
+        if line["event"] != "request_finished":
+            assert line["submission_id"] == submission_id
+        if line["event"].startswith("evaluation"):
+            assert line["evaluation_id"] == evaluation_id
+        assert {"level", "logger", "timestamp"} <= set(line)
+
+
+def test_lines_of_one_request_share_its_id_and_the_answer_bears_it(
+    opened: Edition, owner: User, lines: Lines
+) -> None:
+    token = tokens.create(user=owner, name="CI")
+    sent = _send(token, builders.predictions(opened))
+    _send(token, builders.predictions(opened, factor=1.2))
+    ids = [line["request_id"] for line in lines()]
+    assert ids[:3] == [sent.headers["X-Request-ID"]] * 3
+    assert len(set(ids)) == 2
+
+
+def test_no_secret_no_address_and_no_true_value_is_ever_written(
+    opened: Edition, owner: User, written: io.StringIO
+) -> None:
+    token = tokens.create(user=owner, name="CI")
+    assert _send(token, builders.predictions(opened)).status_code == 201
+    assert _send(token, b'{"0": "nonsense"}').status_code == 201
+    assert _send(token[:-1] + "x", b"{}").status_code == 401
+    visitor = Client()
+    visitor.post("/accounts/login/", {"login": owner.email, "password": "correct horse"})
+    visitor.post("/accounts/login/", {"login": owner.email, "password": "wrong staple"})
+    visitor.post("/accounts/password/reset/", {"email": owner.email})
+    visitor.get("/accounts/confirm-email/MQ:1abcde:secret-key-of-the-mail/")
+    visitor.get("/board/test/", {"q": "what.i.look@for.example"})
+    builders.score_all()
+    text = written.getvalue()
+    assert text.count("evaluation_finished") == 2
+    secrets = [token, token[8:], owner.email, "@", "correct horse", "wrong staple", "secret-key-of-the-mail"]
+    assert [secret for secret in secrets if secret in text] == []
+    truth = ground_truth.load(opened.ground_truth_id)
+    telling = [repr(float(value)) for value in truth.ttc_s if len(repr(float(value))) > 8]
+    assert len(telling) > 100
+    assert [value for value in telling if value[:8] in text] == []
+
+
+def test_run_that_fails_by_our_fault_is_found_by_its_submission(
+    opened: Edition, owner: User, lines: Lines, settings: Settings
+) -> None:
+    submission = builders.submit(owner, builders.predictions(opened))
+    Path(settings.FILES_DIR, files.predictions_name(submission.digest)).unlink()
+    settings.BACKOFF_S = 60
+    assert builders.score_all() == 1
+    [struck] = [line for line in lines() if line["event"] == "evaluation_struck"]
+    assert struck["submission_id"] == str(submission.pk)
+    assert struck["evaluation_id"] == str(submission.evaluations.get().pk)
+    assert (struck["strike"], struck["level"], struck["attempt"]) == ("INFRASTRUCTURE", "warning", 1)
+
+
+def test_library_knows_of_no_submission_and_its_line_names_it_all_the_same(
+    opened: Edition, owner: User, lines: Lines, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def load_and_tell(digest: str) -> Any:
+        logging.getLogger("some.library").warning("reading %s", "slowly")
+        return read(digest)
+
+    read = ground_truth.load
+    submission = builders.submit(owner, builders.predictions(opened))
+    monkeypatch.setattr(ground_truth, "load", load_and_tell)
+    builders.score_all()
+    [told] = [line for line in lines() if line["logger"] == "some.library"]
+    assert told["event"] == "reading slowly"
+    assert told["submission_id"] == str(submission.pk)
+
+
+def test_ids_end_with_the_run(opened: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(opened))
+    builders.score_all()
+    assert structlog.contextvars.get_contextvars() == {}
+
+
+# --- the last step: what slips in -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "hidden"),
+    [
+        ("Invalid token tsttc_" + "0123456789abcdef" * 4, "0123456789abcdef"),
+        ("headers: Authorization: Bearer eyJhbGciOi.J9.x-y_z=", "eyJhbGciOi"),
+        ("authorization: basic dXNlcjpwYXNz", "dXNlcjpwYXNz"),
+        ("connecting to redis://:swordfish@cache:6379/0", "swordfish"),
+        ("connecting to postgres://tsttc:sword%40fish@db/tsttc", "sword%40fish"),
+        ("s3://AKIA:secret@bucket", "secret"),
+        ("Key (email)=(ada.lovelace+ci@cs.example.ac.uk) already exists.", "ada.lovelace"),
+        ("GET /accounts/password/reset/key/4-c2hhcmVk-abc/", "c2hhcmVk"),
+        ("GET /accounts/confirm-email/MQ:1abc:xyz/", "1abc"),
+    ],
+)
+@pytest.mark.parametrize("as_json", [True, False])
+def test_secret_in_a_librarys_message_is_taken_out(as_json: bool, text: str, hidden: str) -> None:
+    record = logging.LogRecord("some.library", logging.WARNING, __file__, 1, "%s", (text,), None)
+    line = logs.formatter(as_json=as_json).format(record)
+    assert hidden not in line
+    assert "hidden]" in line
+    assert not as_json or json.loads(line)["level"] == "warning"
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "evaluation 0b6c2f6e-0d9f-4a93-9d1c-9d0f3a3b8f3e attempt 2",
+        "sha256:7f3a0000 at 2026-11-21T03:01:59.409640Z",
+        "GET /api/v1/submissions/0b6c2f6e-0d9f-4a93-9d1c-9d0f3a3b8f3e",
+        "http://127.0.0.1:8000/board/test/",
+    ],
+)
+def test_what_is_no_secret_stays(text: str) -> None:
+    assert logs.without_secrets(text).startswith(text[:20])
+    assert logs.without_secrets(text).endswith(text[-8:])
+
+
+@pytest.mark.parametrize("as_json", [True, False])
+def test_traceback_is_written_without_local_variables(as_json: bool) -> None:
+    def fail() -> None:
+        predictions = "4.2424242"  # noqa: F841 - what a pretty traceback would print
+        raise ValueError("no such account: ada@example.org")
+
+    try:
+        fail()
+    except ValueError as fault:
+        record = logging.LogRecord(
+            "x", logging.ERROR, __file__, 1, "it failed", (), (type(fault), fault, fault.__traceback__)
+        )
+    line = logs.formatter(as_json=as_json).format(record)
+    assert "ValueError: no such account: [address hidden]" in line
+    assert "raise ValueError" in line
+    assert "'4.2424242'" not in line
+
+
+def test_people_get_a_line_that_they_can_read() -> None:
+    structlog_line = logging.LogRecord(
+        "leaderboard.scoring", logging.INFO, __file__, 1, "evaluation_finished", (), None
+    )
+    line = logs.formatter(as_json=False).format(structlog_line)
+    assert "evaluation_finished" in line
+    assert "\x1b[" not in line
+    assert not line.startswith("{")
+
+
+# --- what is worth a line -------------------------------------------------------------------------------
+
+
+def test_probes_that_succeed_are_no_news(db: None, lines: Lines) -> None:
+    for path in ("/healthz", "/metrics"):
+        assert Client().get(path).status_code == 200
+    assert lines() == []
+
+
+def test_probe_that_fails_is_news(db: None, lines: Lines) -> None:
+    assert Client().get("/readyz").status_code == 503
+    [line] = [line for line in lines() if line["event"] == "request_finished"]
+    assert (line["request"], line["code"], line["level"]) == ("GET /readyz", 503, "error")
+
+
+def test_request_is_written_without_its_query(db: None, lines: Lines) -> None:
+    Client().get("/healthzz", {"token": "swordfish"})
+    [line] = lines()
+    assert (line["request"], line["code"]) == ("GET /healthzz", 404)
+
+
+def test_line_names_the_account_by_number(owner: User, lines: Lines) -> None:
+    client = Client()
+    client.force_login(owner)
+    client.get("/submissions/")
+    [line] = lines()
+    assert line["user_id"] == owner.pk
+
+
+def test_line_is_no_reason_to_look_up_who_asks(rf: RequestFactory) -> None:
+    def look_up() -> User:
+        raise AssertionError("the database was asked")
+
+    request = rf.get("/")
+    request.user = SimpleLazyObject(look_up)  # type: ignore[assignment]  # as the middleware leaves it
+    RequestLogMiddleware.bind_user_id(request)
+    assert "user_id" not in structlog.contextvars.get_contextvars()
+
+
+def test_failure_of_a_page_is_one_line_with_its_traceback(
+    db: None, lines: Lines, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("leaderboard.web.health.health.Recent.__call__", lambda self: 1 / 0)
+    response = Client(raise_request_exception=False).get("/readyz")
+    assert response.status_code == 500
+    [line] = [line for line in lines() if line["level"] == "error"]
+    assert line["event"] == "request_failed"
+    assert "ZeroDivisionError" in line["exception"]
+    assert line["request_id"] == response.headers["X-Request-ID"]
