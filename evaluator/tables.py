@@ -6,6 +6,7 @@ import csv
 import hashlib
 import io
 import re
+import struct
 import zipfile
 import zlib
 from dataclasses import dataclass, field
@@ -24,7 +25,10 @@ _MAX_FIELD: Final = 200
 _MAX_INT64: Final = 2**63 - 1
 _WHOLE: Final = re.compile(r"[0-9]{1,19}", re.ASCII)
 _STORE_KINDS: Final = {"anno_id": "i", "bag_stamp": "U", "cam_id": "U", "ts_ns": "i", "track_id": "U"}
-_NOT_A_STORE: Final = (ValueError, EOFError, KeyError, TypeError, SyntaxError, zipfile.BadZipFile, zlib.error)
+_NOT_A_STORE: Final = (
+    *(ValueError, EOFError, KeyError, TypeError, SyntaxError, RuntimeError, struct.error),
+    *(zipfile.BadZipFile, zlib.error),
+)
 _NUMBER: Final = re.compile(
     r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
 )
@@ -186,7 +190,8 @@ def load_store(path: str | Path, *, with_ttc: bool) -> tuple[Table, str]:
     """The table and the digest that `save_store` wrote; raises `Rejected` for anything else."""
     path = Path(path)
     try:
-        with np.load(path, allow_pickle=False) as store:
+        # numpy leaves its own file open when it fails.
+        with path.open("rb") as file, np.load(file, allow_pickle=False) as store:
             arrays = {name: store[name] for name in store.files}
     except OSError as error:
         raise reject(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from evaluator.documents import parse, read_document
 from evaluator.problems import Findings, pointer, quoted
 from evaluator.scale import N_FRAMES
 from evaluator.truth import Manifest
@@ -35,13 +36,16 @@ def write_predictions(
     """
     values = _values(ttc_s, scale_ratio)
     names = _names(manifest, keys, n_values=len(values))
+    header = _header(ttc_s is None, fps_hz, frame_gap)
     _check(values, names, is_ratio=ttc_s is None)
     predictions = dict(zip(names, values.tolist(), strict=True))
-    header = _header(ttc_s is None, fps_hz, frame_gap)
     document: dict[str, object] = dict(predictions)
     if ttc_s is None or meta is not None:
         document = {**header, **({} if meta is None else {"meta": dict(meta)}), "predictions": predictions}
-    data = json.dumps(document, separators=(",", ":"), ensure_ascii=False).encode()
+    data = json.dumps(document, separators=(",", ":")).encode()
+    if meta is not None:
+        # What the reader would refuse is refused before it is written.
+        read_document(parse(data))
     if path is not None:
         Path(path).write_bytes(data)
     return data

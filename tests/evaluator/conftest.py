@@ -1,4 +1,4 @@
-"""What the tests of the command line share: the command itself, and a server to speak to."""
+"""What these tests share: the command itself, a server to speak to, and patience."""
 
 from __future__ import annotations
 
@@ -6,9 +6,14 @@ from collections.abc import Callable, Iterator
 
 import pytest
 from click.testing import CliRunner, Result
+from hypothesis import settings
 
 from evaluator.cli import main
 from tests.evaluator.recorded_site import RecordedSite
+
+# How long an example takes says more about the machine than about the code.
+settings.register_profile("unhurried", deadline=None)
+settings.load_profile("unhurried")
 
 
 @pytest.fixture

@@ -1,0 +1,81 @@
+"""Problems and rejections as values."""
+
+import copy
+import json
+import pickle
+import re
+
+import pytest
+
+from evaluator import PROBLEM_CODES, Problem, Rejected
+from evaluator.problems import Findings, listed, pointer, quoted
+
+
+def test_codes_are_kebab_case_and_explained() -> None:
+    for code, meaning in PROBLEM_CODES.items():
+        assert re.fullmatch(r"[a-z0-9]+(-[a-z0-9]+)*", code)
+        assert meaning.endswith(".")
+
+
+def test_a_rejection_lists_its_problems_in_words_and_as_json() -> None:
+    rejected = Rejected(
+        [Problem("nan", "The value is NaN; expected …", "/7"), Problem("zero", "…")], n_problems=9
+    )
+    assert str(rejected) == "9 problems:\n  1. /7: The value is NaN; expected …\n  2. …"
+    assert json.loads(rejected.to_json()) == {
+        "n_problems": 9,
+        "problems": [
+            {"code": "nan", "message": "The value is NaN; expected …", "where": "/7"},
+            {"code": "zero", "message": "…", "where": ""},
+        ],
+    }
+    assert str(Rejected([Problem("zero", "…")])) == "1 problem:\n  1. …"
+
+
+def test_a_rejection_survives_copying_and_pickling() -> None:
+    rejected = Rejected([Problem("nan", "…", "/7")], n_problems=3)
+    for twin in (copy.copy(rejected), pickle.loads(pickle.dumps(rejected))):
+        assert (twin.problems, twin.n_problems) == (rejected.problems, 3)
+
+
+def test_nothing_found_raises_nothing() -> None:
+    Findings().raise_if_any()
+
+
+def test_kinds_are_listed_apart() -> None:
+    findings = Findings()
+    for row in range(25):
+        findings.add("nan", f"nan {row}", f"/{row}")
+    for row in range(21):
+        findings.add("zero", f"zero {row}", f"/{row}")
+    findings.group("missing-keys", "7 missing", n_faults=7)
+    with pytest.raises(Rejected) as rejected:
+        findings.raise_if_any()
+    messages = [problem.message for problem in rejected.value.problems]
+    assert rejected.value.n_problems == 53
+    assert messages == [
+        *(f"nan {row}" for row in range(20)),
+        *(f"zero {row}" for row in range(20)),
+        "7 missing",
+        "And 5 more like these: 25 in all.",
+        "And 1 more like these: 21 in all.",
+    ]
+
+
+def test_names_of_strangers_are_shown_in_printable_ascii() -> None:
+    for text in ("\x1b[31m", "\ud800", "a" * 1000, "\u202e", '"\n'):
+        assert quoted(text).isascii() or quoted(text).endswith('…"')
+        assert quoted(text).isprintable()
+        assert len(quoted(text)) < 400
+        assert pointer(text).isascii()
+        assert pointer(text).isprintable()
+
+
+def test_pointers_escape_what_json_pointers_escape() -> None:
+    assert pointer("a/b", "~", "") == "/a~1b/~0/"
+    assert pointer() == ""
+
+
+def test_long_lists_end_after_twenty() -> None:
+    assert listed([str(n) for n in range(20)]).endswith("18, 19")
+    assert listed([str(n) for n in range(21)]).endswith("18, 19, … (the first 20)")

@@ -1,0 +1,366 @@
+"""Ground truth and manifests: reading, refusing, naming, keeping."""
+
+import hashlib
+import io
+import math
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from evaluator import GroundTruth, Manifest, Problem, Rejected, read_manifest, read_truth
+from evaluator.tables import read_csv
+from tests.evaluator.worlds import make_truth
+
+HEADER = "anno_id,bag_stamp,cam_id,ts,track_id,ttc"
+ROWS = ["4,0007,1,1500000000,3,2.5", "1,0007,1,2100000000,3,-8.125", "9,0003,cam8,700000000,11,25"]
+
+Write = Callable[..., Path]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    def write_csv(*rows: str, header: str = HEADER) -> Path:
+        path = tmp_path / "truth.csv"
+        path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+        return path
+
+    return write_csv
+
+
+def rejection(path: Path, read: Callable[[Path], object] = read_truth) -> Rejected:
+    with pytest.raises(Rejected) as rejected:
+        read(path)
+    return rejected.value
+
+
+# --- what is read ----------------------------------------------------------------------------------------
+
+
+def test_a_table_is_read_in_file_order(write: Write) -> None:
+    truth = read_truth(write(*ROWS))
+    manifest = truth.manifest
+    assert truth.ttc_s.tolist() == [2.5, -8.125, 25.0]
+    assert manifest.anno_id.tolist() == [4, 1, 9]
+    assert manifest.bag_stamp == ("0007", "0007", "0003")
+    assert manifest.cam_id == ("1", "1", "cam8")
+    assert manifest.ts_ns.tolist() == [1_500_000_000, 2_100_000_000, 700_000_000]
+    assert manifest.track_id == ("3", "3", "11")
+    assert manifest.natural_keys[0] == "0007/1/1500000000/3"
+    assert (truth.n_sequences, manifest.n_sequences, manifest.n_recordings) == (3, 3, 2)
+
+
+def test_recordings_are_numbered_independently_of_the_row_order(write: Write) -> None:
+    manifest = read_truth(write(*ROWS)).manifest
+    assert manifest.recordings == ("0003", "0007")
+    assert manifest.recording_index.tolist() == [1, 1, 0]
+
+
+def test_intervals_are_counted() -> None:
+    truth = make_truth([3.0, 1.0, 25.0, -5.0, 6.0, -21.0])
+    assert truth.interval_counts == {"crucial": 2, "small": 2, "large": 1, "negative": 1}
+    assert truth.n_out_of_range == 2
+
+
+def test_columns_are_found_by_name_and_others_ignored(write: Write) -> None:
+    path = write('2.5,x,0007,4,"1",1500000000,3', header="ttc,note,bag_stamp,anno_id,cam_id,ts,track_id")
+    truth = read_truth(path)
+    assert truth.ttc_s.tolist() == [2.5]
+    assert truth.manifest.natural_keys == ("0007/1/1500000000/3",)
+
+
+def test_spreadsheets_line_ends_and_byte_order_marks_are_tolerated(tmp_path: Path, write: Write) -> None:
+    plain = read_truth(write(*ROWS))
+    path = tmp_path / "excel.csv"
+    path.write_bytes(b"\xef\xbb\xbf" + "\r\n".join([HEADER, ROWS[0], "", *ROWS[1:], ""]).encode())
+    assert read_truth(path).digest == plain.digest
+
+
+def test_a_manifest_is_read_from_its_own_table_or_from_the_truths(tmp_path: Path, write: Write) -> None:
+    truth = read_truth(write(*ROWS))
+    path = tmp_path / "manifest.csv"
+    path.write_bytes(truth.manifest.to_csv())
+    assert read_manifest(path).digest == truth.manifest.digest
+    assert read_manifest(write(*[row.replace("25", "nan") for row in ROWS[2:]])).n_sequences == 1
+
+
+def test_arrays_are_read_only() -> None:
+    truth = make_truth([4.0, 5.0])
+    for array in (truth.ttc_s, truth.manifest.anno_id, truth.manifest.ts_ns, truth.manifest.recording_index):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 1
+
+
+# --- what is refused -------------------------------------------------------------------------------------
+
+EXPECTED_TTC = "expected ttc > 0 or ttc < -0.1."
+WHOLE = "expected a whole number from 0 to 2^63 - 1."
+
+FAULTS: dict[str, tuple[str, Problem]] = {
+    "duplicate id": (
+        "4,0009,1,5,3,2.5",
+        Problem("duplicate-ids", 'The anno_id "4" is already used at line 2; expected it once.', "line 5"),
+    ),
+    "duplicate target frame": (
+        "5,0007,1,1500000000,3,2.5",
+        Problem(
+            "duplicate-natural-keys",
+            'The natural key "0007/1/1500000000/3" is already used at line 2; expected it once.',
+            "line 5",
+        ),
+    ),
+    "NaN": ("5,a,1,5,3,nan", Problem("truth-not-finite", "ttc is nan; expected a finite number.", "line 5")),
+    "infinite": (
+        "5,a,1,5,3,-inf",
+        Problem("truth-not-finite", "ttc is -inf; expected a finite number.", "line 5"),
+    ),
+    "beyond float64": (
+        "5,a,1,5,3,1e400",
+        Problem("truth-not-finite", "ttc is inf; expected a finite number.", "line 5"),
+    ),
+    "zero": (
+        "5,a,1,5,3,0",
+        Problem("truth-near-zero", f"ttc is 0.0, where the errors are undefined; {EXPECTED_TTC}", "line 5"),
+    ),
+    "just below zero": (
+        "5,a,1,5,3,-0.1",
+        Problem("truth-near-zero", f"ttc is -0.1, where the errors are undefined; {EXPECTED_TTC}", "line 5"),
+    ),
+    "so small that errors overflow": (
+        "5,a,1,5,3,1e-310",
+        Problem(
+            "truth-near-zero", f"ttc is 1e-310, where the errors are undefined; {EXPECTED_TTC}", "line 5"
+        ),
+    ),
+    "no time": ("5,a,1,5,3,", Problem("bad-field", 'ttc is ""; expected a number of seconds.', "line 5")),
+    "underscores": (
+        "5,a,1,5,3,1_0",
+        Problem("bad-field", 'ttc is "1_0"; expected a number of seconds.', "line 5"),
+    ),
+    "negative id": ("-5,a,1,5,3,1", Problem("bad-field", f'anno_id is "-5"; {WHOLE}', "line 5")),
+    "large id": (
+        "9223372036854775808,a,1,5,3,1",
+        Problem("bad-field", f'anno_id is "9223372036854775808"; {WHOLE}', "line 5"),
+    ),
+    "fraction of a nanosecond": ("5,a,1,5.5,3,1", Problem("bad-field", f'ts is "5.5"; {WHOLE}', "line 5")),
+    "other digits": ("٥,a,1,5,3,1", Problem("bad-field", f'anno_id is "\\u0665"; {WHOLE}', "line 5")),
+    "no recording": ("5,,1,5,3,1", Problem("bad-field", 'bag_stamp is "": it is empty.', "line 5")),
+    "slash": ("5,a/b,1,5,3,1", Problem("bad-field", 'bag_stamp is "a/b": it contains "/".', "line 5")),
+    "comma": ('5,"a,b",1,5,3,1', Problem("bad-field", 'bag_stamp is "a,b": it contains ",".', "line 5")),
+    "quotation mark": (
+        '5,a,"1""",5,3,1',
+        Problem("bad-field", 'cam_id is "1\\"": it contains a quotation mark.', "line 5"),
+    ),
+    "white space": (
+        "5,a,1,5, 3,1",
+        Problem("bad-field", 'track_id is " 3": it has control characters, or spaces at an end.', "line 5"),
+    ),
+    "long name": (
+        f"5,{'a' * 201},1,5,3,1",
+        Problem("bad-field", f'bag_stamp is "{"a" * 60}…": it is longer than 200 characters.', "line 5"),
+    ),
+    "short row": ("5,a,1", Problem("bad-csv", "The row has 3 fields; expected 6.", "line 5")),
+    "open quotation": (
+        '5,"a,1,5,3,1',
+        Problem("bad-csv", "This is not a CSV table: unexpected end of data.", "line 5"),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_faulty_row_is_refused_by_its_line(write: Write, name: str) -> None:
+    row, problem = FAULTS[name]
+    assert rejection(write(*ROWS, row)).problems == (problem,)
+
+
+@pytest.mark.parametrize("ttc", ["5e-324", "-0.05", "-0.0999999", "-0", "1e-201"])
+def test_times_without_finite_errors_are_refused(write: Write, ttc: str) -> None:
+    assert [p.code for p in rejection(write(f"5,a,1,5,3,{ttc}")).problems] == ["truth-near-zero"]
+
+
+@pytest.mark.parametrize("ttc", ["-0.1000001", "1e-9", "1e308", "-1e308", "0.05"])
+def test_other_extreme_times_are_accepted(write: Write, ttc: str) -> None:
+    assert read_truth(write(f"5,a,1,5,3,{ttc}")).ttc_s.tolist() == [float(ttc)]
+
+
+def test_all_faults_are_told_at_once_and_twenty_of_a_kind(write: Write) -> None:
+    rejected = rejection(write(*[f"{row},a,1,{row},3,x" for row in range(50)], "60,a,1"))
+    assert rejected.n_problems == 51
+    assert [p.where for p in rejected.problems] == [*(f"line {row + 2}" for row in range(20)), "line 52", ""]
+
+
+def test_missing_columns_are_named(write: Write) -> None:
+    path = write("1,a,1,5,3", header="anno_id,bag_stamp,cam_id,ts,track_id")
+    assert read_manifest(path).n_sequences == 1
+    assert rejection(path).problems == (
+        Problem(
+            "missing-columns",
+            'The table has no column ttc; found "anno_id,bag_stamp,cam_id,ts,track_id", '
+            "expected anno_id,bag_stamp,cam_id,ts,track_id,ttc.",
+            "line 1",
+        ),
+    )
+
+
+@pytest.mark.parametrize(
+    ("content", "code"),
+    [
+        (b"", "missing-columns"),
+        (HEADER.encode() + b"\n", "empty"),
+        (b"\xff\xfe", "not-utf8"),
+        (b"a\x00b\n", "missing-columns"),
+        (HEADER.encode() + b"\n5,a,1,5,3\x00,1\n", "bad-field"),
+        (HEADER.encode() + b"\n5," + b"a" * 200_000 + b",1,5,3,1\n", "bad-csv"),
+        (b'"', "bad-csv"),
+    ],
+)
+def test_what_is_no_table_is_refused(tmp_path: Path, content: bytes, code: str) -> None:
+    path = tmp_path / "truth.csv"
+    path.write_bytes(content)
+    assert [problem.code for problem in rejection(path).problems] == [code]
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    problem = rejection(tmp_path / "nothing.csv").problems[0]
+    assert problem == Problem(
+        "unreadable", "The file cannot be read: No such file or directory.", "nothing.csv"
+    )
+    assert rejection(tmp_path / "nothing.npz").problems[0].code == "unreadable"
+
+
+@settings(max_examples=200)
+@given(data=st.binary(max_size=200) | st.text(max_size=100).map(lambda text: (HEADER + "\n" + text).encode()))
+def test_no_bytes_raise_anything_but_a_rejection(
+    tmp_path_factory: pytest.TempPathFactory, data: bytes
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "hostile.csv"
+    path.write_bytes(data)
+    try:
+        n_rows = len(read_csv(path, with_ttc=True).anno_id)
+    except Rejected as rejected:
+        n_rows = -len(rejected.problems)
+    assert n_rows <= data.count(b"\n") + data.count(b"\r")
+
+
+# --- digests ---------------------------------------------------------------------------------------------
+
+
+def test_the_digest_is_that_of_the_canonical_text(write: Write) -> None:
+    canonical = "\n".join(
+        [
+            HEADER,
+            "1,0007,1,2100000000,3,-8.125",
+            "4,0007,1,1500000000,3,2.5",
+            "9,0003,cam8,700000000,11,25.0",
+            "",
+        ]
+    )
+    truth = read_truth(write(*ROWS))
+    assert truth.digest == "sha256:" + hashlib.sha256(canonical.encode()).hexdigest()
+    without_times = "\n".join(line.rpartition(",")[0] for line in canonical.split("\n"))
+    assert truth.manifest.digest == "sha256:" + hashlib.sha256(without_times.encode()).hexdigest()
+
+
+def test_the_digest_knows_no_row_order_but_every_value(write: Write) -> None:
+    digest = read_truth(write(*ROWS)).digest
+    assert read_truth(write(*reversed(ROWS))).digest == digest
+    assert read_truth(write(*ROWS[:2], ROWS[2].replace("25", "25.000000000000004"))).digest != digest
+    assert read_truth(write(*ROWS[:2], ROWS[2].replace("25", "2.5e1"))).digest == digest
+    assert read_truth(write(*ROWS[:2], ROWS[2].replace("cam8", "8"))).digest != digest
+
+
+# --- keeping ---------------------------------------------------------------------------------------------
+
+
+def test_what_is_saved_reads_back_exactly(tmp_path: Path, write: Write) -> None:
+    truth = read_truth(write(*ROWS))
+    path = tmp_path / "kept"
+    truth.save(path)
+    found = GroundTruth.load(path)
+    assert found.digest == truth.digest
+    assert found.manifest.digest == truth.manifest.digest
+    assert found.to_csv() == truth.to_csv()
+    truth.manifest.save(path)
+    assert Manifest.load(path).to_csv() == truth.manifest.to_csv()
+
+
+def test_saved_files_are_read_wherever_tables_are(tmp_path: Path, write: Write) -> None:
+    truth = read_truth(write(*ROWS))
+    path = tmp_path / "kept.npz"
+    truth.save(path)
+    assert read_truth(path).digest == truth.digest
+    assert read_manifest(path).digest == truth.manifest.digest
+    truth.manifest.save(path)
+    assert read_manifest(path).digest == truth.manifest.digest
+    assert rejection(path).problems[0].message == "The file is no saved ground truth of this version."
+
+
+def test_values_of_extreme_size_survive_keeping(tmp_path: Path) -> None:
+    values = [1e-9, 0.1, 1 / 3, 1e308, -1e308, -0.10000001, math.pi]
+    truth = make_truth(values)
+    truth.save(tmp_path / "kept.npz")
+    assert GroundTruth.load(tmp_path / "kept.npz").ttc_s.tolist() == values
+    (tmp_path / "kept.csv").write_bytes(truth.to_csv())
+    assert read_truth(tmp_path / "kept.csv").ttc_s.tolist() == values
+
+
+def repacked(path: Path, **changes: object) -> Path:
+    with np.load(path) as store:
+        arrays = {name: store[name] for name in store.files} | {k: np.asarray(v) for k, v in changes.items()}
+    np.savez(path, **{name: array for name, array in arrays.items() if array.dtype != object})
+    return path
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        ({"ttc_s": [2.5, -8.125, 24.0]}, "bad-digest"),
+        ({"cam_id": ["1", "1", "2"]}, "bad-digest"),
+        ({"ttc_s": [2.5, -8.125, 0.0]}, "truth-near-zero"),
+        ({"anno_id": [4, 4, 9]}, "duplicate-ids"),
+        ({"anno_id": [-4, 1, 9]}, "bad-field"),
+        ({"cam_id": ["1", "1", "a/b"]}, "bad-field"),
+        ({"ttc_s": [1.0, 2.0]}, "unreadable"),
+        ({"ttc_s": 1.0}, "unreadable"),
+        ({"anno_id": [4.0, 1.0, 9.0]}, "unreadable"),
+        ({"truth_digest": None}, "unreadable"),
+        ({"track_id": None}, "unreadable"),
+    ],
+)
+def test_a_changed_file_is_refused(
+    tmp_path: Path, write: Write, changes: dict[str, object], code: str
+) -> None:
+    path = tmp_path / "kept.npz"
+    read_truth(write(*ROWS)).save(path)
+    assert rejection(repacked(path, **changes)).problems[0].code == code
+
+
+@settings(max_examples=100)
+@given(at=st.integers(0, 3_000), n_removed=st.integers(0, 30), piece=st.binary(max_size=8))
+def test_a_damaged_file_raises_nothing_but_a_rejection(
+    tmp_path_factory: pytest.TempPathFactory, at: int, n_removed: int, piece: bytes
+) -> None:
+    truth = make_truth([4.0, 5.0])
+    path = tmp_path_factory.getbasetemp() / "damaged.npz"
+    truth.save(path)
+    data = path.read_bytes()
+    path.write_bytes(data[:at] + piece + data[at + n_removed :])
+    try:
+        digest = GroundTruth.load(path).digest
+    except Rejected:
+        return
+    assert digest == truth.digest
+
+
+def test_pickled_objects_in_a_saved_file_are_not_read(tmp_path: Path) -> None:
+    path = tmp_path / "kept.npz"
+    make_truth([4.0]).save(path)
+    inner = io.BytesIO()
+    np.save(inner, np.array([{}], dtype=object), allow_pickle=True)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("extra.npy", inner.getvalue())
+    assert rejection(path).problems[0].code == "unreadable"
