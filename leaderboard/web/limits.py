@@ -39,6 +39,4 @@ class UploadLimitMiddleware:
                 status=413,
                 content_type="application/problem+json",
             )
-        # The body stays unread, so the connection cannot be used for another request.
-        response.headers["Connection"] = "close"
         return response

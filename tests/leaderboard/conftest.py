@@ -5,8 +5,9 @@ from pathlib import Path
 import pytest
 
 from leaderboard import teams
-from leaderboard.models import Edition, Membership, User
+from leaderboard.models import Edition, Membership, Submission, User
 from tests import builders
+from tests.editions import FACTORS
 
 
 @pytest.fixture
@@ -39,3 +40,14 @@ def maintainer(db: None) -> User:
 def edition(benchmark: None, tmp_path: Path) -> Edition:
     """The test split, open, with made-up ground truth."""
     return builders.import_truth(tmp_path)
+
+
+@pytest.fixture
+def entries(edition: Edition, owner: User) -> list[Submission]:
+    """Four scored submissions of four methods."""
+    made = [
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
+        for factor in FACTORS
+    ]
+    builders.score_all()
+    return made

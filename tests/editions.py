@@ -1,0 +1,71 @@
+"""Editions for tests: corrected ground truth, and the verbs with their usual arguments."""
+
+from pathlib import Path
+
+from django.contrib.auth.models import AnonymousUser
+from django.utils import timezone
+
+from evaluator import GroundTruth, evaluate, published, read_predictions
+from leaderboard import rescoring, scoring, standings
+from leaderboard.models import (
+    Edition,
+    Publication,
+    Split,
+    Submission,
+    User,
+)
+
+ANYBODY = AnonymousUser()
+FACTORS = (1.05, 1.1, 1.2, 1.4)
+
+
+def corrected(tmp_path: Path, *, drop: str = "", factor: float = 1.0, recording: str = "0001") -> Path:
+    """The made-up truth without the recording `drop`, and another recording's values times `factor`."""
+    lines = (tmp_path / "truth-test.csv").read_text().splitlines()
+    kept = [lines[0]]
+    for line in lines[1:]:
+        fields = line.split(",")
+        if fields[1] == drop:
+            continue
+        if fields[1] == recording:
+            fields[5] = repr(float(fields[5]) * factor)
+        kept.append(",".join(fields))
+    path = tmp_path / f"corrected-{drop}-{factor}.csv"
+    path.write_text("\n".join(kept) + "\n")
+    return path
+
+
+def open_edition(
+    path: Path | None = None, *, actor: User | None = None, protocol: str | None = None
+) -> Edition:
+    return rescoring.open_edition(
+        split_name="test", path=path, protocol=protocol, now=timezone.now(), actor=actor
+    )
+
+
+def publish(edition: Edition, *, replaces: int | None = 1, leave_out: bool = False) -> Publication:
+    return rescoring.publish(
+        edition=edition,
+        reason="Labels corrected.",
+        now=timezone.now(),
+        actor=None,
+        replaces=replaces,
+        leave_out=leave_out,
+    )
+
+
+def roll_back(*, replaces: int = 2) -> Publication:
+    return rescoring.roll_back(
+        split_name="test", reason="A mistake.", now=timezone.now(), actor=None, replaces=replaces
+    )
+
+
+def board_now() -> standings.Board:
+    split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
+    return standings.board(split=split, viewer=ANYBODY)
+
+
+def offline(submission: Submission, truth: GroundTruth) -> dict[str, float | None]:
+    with scoring.files.opened_predictions(submission.digest) as kept:
+        predictions = read_predictions(kept.read(), manifest=truth.manifest)
+    return {name: published(value) for name, value in evaluate(predictions, truth).flat().items()}
