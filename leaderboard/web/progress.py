@@ -10,6 +10,7 @@ from leaderboard.submissions import Progress
 from leaderboard.templatetags.board import duration, grouped
 from leaderboard.web.tables import ResultGroup, result_groups
 
+MAX_POINTS: Final = 20
 _ENDS: Final = {
     Status.SCORED: "Scored",
     Status.REJECTED: "Rejected",
@@ -36,6 +37,8 @@ class Shown:
     seen: str
     groups: tuple[ResultGroup, ...]
     truncation: str
+    problems: tuple[Mapping[str, str], ...]
+    listing: str
 
 
 def shown(progress: Progress) -> Shown:
@@ -45,6 +48,8 @@ def shown(progress: Progress) -> Shown:
         seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}",
         groups=result_groups(progress.scores, progress.counts) if progress.scores else (),
         truncation=truncation(progress.truncated),
+        problems=tuple(progress.problems[:MAX_POINTS]),
+        listing=listing(n_problems=progress.n_problems, n_points=len(progress.problems)),
     )
 
 
@@ -87,3 +92,18 @@ def truncation(truncated: Mapping[str, int]) -> str:
     subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
     verb = "was" if n_moved == 1 else "were"
     return f"{subject} lay outside the allowed range and {verb} truncated: {where}."
+
+
+def listing(*, n_problems: int, n_points: int) -> str:
+    """Why the list has fewer points than there are problems, in a sentence.
+
+    >>> listing(n_problems=3, n_points=3)
+    ''
+    >>> listing(n_problems=42, n_points=3)
+    'Keys at fault in the same way stand together in one point.'
+    >>> listing(n_problems=42, n_points=42)
+    'The first 20 of 42 points are shown.'
+    """
+    if n_points > MAX_POINTS:
+        return f"The first {MAX_POINTS} of {n_points} points are shown."
+    return "" if n_points == n_problems else "Keys at fault in the same way stand together in one point."

@@ -1,0 +1,92 @@
+"""One site for all tests in a browser, and a browser for each module of them."""
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from urllib.parse import urlsplit
+
+import pytest
+from playwright.sync_api import Browser, Page, expect
+
+import evaluator
+from tests import services
+from tests.browser.chromium import WIDE, Complaints, chromium
+from tests.browser.site import open_split, web_alone
+from tests.journeys.production import Site
+
+PASSWORD = "kestrel-altimeter-9"
+PATIENCE_MS = 30_000
+MAX_PREDICTIONS_BYTES = 200_000
+
+NewPage = Callable[..., Page]
+
+
+@pytest.fixture(scope="session")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A site without a worker; nothing is started where there is no browser to look at it."""
+    try:
+        services.chromium()
+    except services.ServiceMissing as missing:
+        services.skip_or_fail(missing)
+    limit = {"TSTTC_MAX_PREDICTIONS_BYTES": str(MAX_PREDICTIONS_BYTES)}
+    with web_alone(tmp_path_factory.mktemp("site"), **limit) as running:
+        yield running
+
+
+@pytest.fixture(scope="session")
+def truth(site: Site) -> evaluator.GroundTruth:
+    """Ground truth of the split `test`, which is open from here on."""
+    return open_split(site, "test")
+
+
+@pytest.fixture(scope="module")
+def browser(site: Site) -> Iterator[Browser]:
+    """A Chromium; closed after each module, because its event loop would be in others' way."""
+    expect.set_options(timeout=PATIENCE_MS)
+    with chromium() as running:
+        yield running
+
+
+@pytest.fixture
+def new_page(browser: Browser, site: Site) -> Iterator[NewPage]:
+    """Opens pages in contexts of their own; at the end none of them may have complained."""
+    complaints = Complaints(host=urlsplit(site.url).netloc)
+    with ExitStack() as contexts:
+
+        def arrive(**options: object) -> Page:
+            context = browser.new_context(**{"base_url": site.url, "viewport": WIDE, **options})  # type: ignore[arg-type]
+            context.set_default_timeout(PATIENCE_MS)
+            contexts.callback(context.close)
+            complaints.watch(context)
+            return context.new_page()
+
+        yield arrive
+    assert complaints.said == []
+
+
+@pytest.fixture
+def page(new_page: NewPage) -> Page:
+    """A page on a wide screen, in the light."""
+    return new_page()
+
+
+def sign_up(page: Page, *, email: str, name: str) -> None:
+    """Make an account; the site signs it in at once."""
+    page.goto("/accounts/signup/")
+    page.get_by_label("Email").fill(email)
+    page.get_by_label("Name shown on the board").fill(name)
+    page.get_by_label("Password", exact=True).fill(PASSWORD)
+    page.get_by_label("Password (again)").fill(PASSWORD)
+    page.get_by_role("button", name="Sign up").click()
+    page.wait_for_url("**/submit/")
+
+
+def submit(page: Page, data: bytes, *, method: str, split: str = "test") -> None:
+    """Send a file through the form; the page is the submission's afterwards."""
+    page.goto("/submit/")
+    page.get_by_role("radio", name=split).check()
+    page.get_by_label("Method", exact=True).fill(method)
+    page.get_by_label("Prediction file").set_input_files(
+        {"name": "predictions.json", "mimeType": "application/json", "buffer": data}
+    )
+    page.get_by_role("button", name="Submit").click()
+    page.wait_for_url("**/submissions/*/")

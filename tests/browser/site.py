@@ -1,0 +1,75 @@
+"""The leaderboard as `make demo` runs it, small: SQLite, a broker in files, one web process, one worker."""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import httpx
+import numpy as np
+
+import evaluator
+from leaderboard.demo.truth import simulate
+from tests.journeys.production import BIN, Site, await_that, free_port, running
+
+WEB = (sys.executable, "-m", "waitress")
+WORKER = (
+    *(str(BIN / "celery"), "--app=leaderboard", "worker", "--pool=solo", "--beat"),
+    *("--without-gossip", "--without-mingle", "--without-heartbeat", "--loglevel=info"),
+)
+
+
+def environment(directory: Path, *, url: str, **settings: str) -> dict[str, str]:
+    """What the processes read: everything of theirs lies below `directory`, and `settings` besides."""
+    inherited = {name: value for name, value in os.environ.items() if not name.startswith("TSTTC_")}
+    return inherited | {
+        "TSTTC_DATA_DIR": str(directory),
+        "TSTTC_STATIC_ROOT": str(directory / "static"),
+        "TSTTC_SITE_URL": url,
+        "OPENBLAS_NUM_THREADS": "1",
+        **settings,
+    }
+
+
+@contextmanager
+def web_alone(directory: Path, **settings: str) -> Iterator[Site]:
+    """A migrated site with its web process; nothing is scored until `worker` runs."""
+    url = f"http://127.0.0.1:{free_port()}"
+    site = Site(url=url, directory=directory, environment=environment(directory, url=url, **settings))
+    site.manage("migrate", "--no-input")
+    site.manage("collectstatic", "--no-input")
+    listen = f"--listen={url.removeprefix('http://')}"
+    with running(site, "web", *WEB, listen, "leaderboard.wsgi:application") as web:
+        await_that(lambda: web.poll() is not None or _answers(url), what="the web server answers")
+        assert web.poll() is None, (directory / "web.log").read_text()
+        yield site
+
+
+def _answers(url: str) -> bool:
+    try:
+        return httpx.get(f"{url}/docs/", trust_env=False).status_code == 200
+    except httpx.TransportError:
+        return False
+
+
+@contextmanager
+def worker(site: Site) -> Iterator[None]:
+    """A worker of the site, which scores what is queued and what comes."""
+    with ExitStack() as processes:
+        processes.enter_context(running(site, "worker", *WORKER))
+        yield
+
+
+def open_split(site: Site, split: str) -> evaluator.GroundTruth:
+    """Give a split made-up ground truth: 1,200 sequences in 40 recordings."""
+    truth = simulate(rng=np.random.default_rng(len(split)), n_sequences=1_200, n_recordings=40)
+    table = site.directory / f"{split}.csv"
+    table.write_bytes(truth.to_csv())
+    site.manage("import_truth", split, str(table))
+    return truth
+
+
+def predictions(truth: evaluator.GroundTruth, *, factor: float) -> bytes:
+    """A valid file: the truth times a factor."""
+    return evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * factor)

@@ -1,0 +1,147 @@
+"""From signing up to the board, in a real browser with a real worker."""
+
+import re
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Page, expect
+
+import evaluator
+from tests.browser.chromium import NARROW, tab_to
+from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
+from tests.browser.site import predictions, worker
+from tests.journeys.production import Site
+
+pytestmark = pytest.mark.browser
+
+
+def await_step(page: Page, label: str) -> None:
+    """Return once the current station of the line of state is this one."""
+    expect(page.locator("[aria-current=step] .label")).to_have_text(label)
+
+
+def test_by_keyboard_alone_from_signing_up_to_the_board(
+    page: Page, site: Site, truth: evaluator.GroundTruth, tmp_path: Path
+) -> None:
+    path = tmp_path / "predictions.json"
+    path.write_bytes(predictions(truth, factor=1.01))
+    press, write = page.keyboard.press, page.keyboard.type
+    page.goto("/")
+    tab_to(page, "Submit")
+    press("Enter")
+    page.wait_for_url("**/accounts/login/?next=/submit/")
+    tab_to(page, "Sign up")
+    press("Enter")
+    page.wait_for_url("**/accounts/signup/?next=*")
+    for label, text in (
+        ("Email", "keys@example.org"),
+        ("Name shown on the board", "Keyboard team"),
+        ("Password", PASSWORD),
+        ("Password (again)", PASSWORD),
+    ):
+        tab_to(page, label)
+        write(text)
+    press("Enter")
+    page.wait_for_url("**/submit/")
+    tab_to(page, "Method")
+    write("By keyboard")
+    tab_to(page, "Prediction file")
+    with page.expect_file_chooser() as chooser:
+        press("Enter")
+    chooser.value.set_files(path)
+    expect(page.locator("#chosen")).to_have_text(f"{path.stat().st_size:,} bytes")
+    tab_to(page, "Submit")
+    press("Enter")
+    page.wait_for_url("**/submissions/*/")
+    await_step(page, "Queued")
+    with worker(site):
+        await_step(page, "Scored")
+    tab_to(page, "See it on the test board")
+    press("Enter")
+    row = page.locator("tr.mine")
+    expect(row).to_contain_text("By keyboard")
+    expect(row).to_contain_text("Keyboard team")
+    expect(row.locator(".rank")).to_have_text("1")
+
+
+def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
+    sign_up(page, email="moves@example.org", name="Moves")
+    submit(page, predictions(truth, factor=1.1), method="Moving")
+    await_step(page, "Queued")
+    page.evaluate("window.isTheSamePage = true")
+    with worker(site):
+        await_step(page, "Scored")
+    expect(page.locator(".result table")).to_have_count(2)
+    expect(page.locator("#outcome")).to_contain_text("truncated")
+    assert page.evaluate("window.isTheSamePage") is True
+
+
+def test_polling_ends_with_the_result(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
+    page.clock.install()
+    sign_up(page, email="ends@example.org", name="Ends")
+    submit(page, predictions(truth, factor=1.2), method="Ending")
+    with worker(site):
+        await_step(page, "Scored")
+    asked: list[str] = []
+    page.on("request", lambda request: asked.append(request.url))
+    page.clock.fast_forward(10_000)
+    assert asked == []
+
+
+def test_nothing_is_announced_while_nothing_moves(page: Page, truth: evaluator.GroundTruth) -> None:
+    sign_up(page, email="quiet@example.org", name="Quiet")
+    submit(page, predictions(truth, factor=1.3), method="Quiet")
+    page.evaluate(
+        """() => { window.nChanges = 0;
+        new MutationObserver(() => window.nChanges++).observe(document.getElementById("state"),
+          {childList: true, subtree: true, characterData: true}); }"""
+    )
+    for _ in range(2):
+        with page.expect_response(re.compile("/state/")) as answer:
+            pass
+        assert answer.value.status == 204
+    assert page.evaluate("window.nChanges") == 0
+
+
+def test_problems_of_a_bad_file_appear_by_themselves(
+    new_page: NewPage, site: Site, truth: evaluator.GroundTruth
+) -> None:
+    page = new_page(viewport=NARROW)
+    sign_up(page, email="bad@example.org", name="Bad")
+    submit(page, b'{"0": 0, "1": "fast", "nowhere": 1}', method="Broken")
+    with worker(site):
+        await_step(page, "Rejected")
+    expect(page.locator("#outcome h2")).to_contain_text("problems in the file")
+    expect(page.locator(".problems li")).not_to_have_count(0)
+    expect(page.locator("#outcome pre")).to_contain_text("tsttc check predictions.json")
+
+
+def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: evaluator.GroundTruth) -> None:
+    sign_up(page, email="large@example.org", name="Large")
+    sent: list[str] = []
+    page.on("request", lambda request: sent.append(request.method))
+    field = page.get_by_label("Prediction file")
+    page.get_by_label("Method", exact=True).fill("Large")
+    field.set_input_files({"name": "p.json", "mimeType": "application/json", "buffer": b"1" * 250_000})
+    page.get_by_role("button", name="Submit").click()
+    said = field.evaluate("e => e.validationMessage")
+    assert said == f"The file has 250,000 bytes; expected at most {MAX_PREDICTIONS_BYTES:,} (0.2 MB)."
+    assert "POST" not in sent
+
+
+def test_everything_works_without_script(new_page: NewPage, site: Site, truth: evaluator.GroundTruth) -> None:
+    page = new_page(java_script_enabled=False)
+    sign_up(page, email="plain@example.org", name="Plain")
+    submit(page, predictions(truth, factor=1.4), method="Plain")
+    await_step(page, "Queued")
+    with worker(site):
+        link = page.get_by_role("link", name="look again")
+        while link.count():
+            with page.expect_navigation():
+                link.click()
+    await_step(page, "Scored")
+    page.get_by_role("link", name="See it on the test board").click()
+    page.get_by_role("link", name="RTE, overall, %").click()
+    expect(page.locator("th[aria-sort=ascending]")).to_contain_text("RTE")
+    page.get_by_role("button", name="Sign out").click()
+    expect(page.get_by_role("link", name="Sign in")).to_be_visible()
