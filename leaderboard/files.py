@@ -6,8 +6,9 @@ It goes through Django's storages, so that workers and web on several machines c
 import hashlib
 import os
 import tempfile
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -18,19 +19,40 @@ from django.core.files.storage import FileSystemStorage, Storage, storages
 from numpy.typing import NDArray
 
 CHUNK_BYTES = 1 << 20
+INCOMING = ".incoming"
+LEFTOVER_S = 3600.0
+
+
+class StoreAway(OSError):
+    """The store is on another machine and does not answer, or refuses us. What was asked for may work later."""
 
 
 class DurableFileSystemStorage(FileSystemStorage):
-    """A local directory whose files are whole or absent, and on the disk before `save` returns."""
+    """A local directory whose files are whole or absent, and on the disk before `save` returns.
+
+    A file is written below `.incoming`, flushed to the disk, and renamed. What a process that was killed left
+    there is in nobody's way, and is removed by whoever saves next, after an hour.
+    """
 
     def get_available_name(self, name: str, max_length: int | None = None) -> str:
         """The name itself: equal names hold equal bytes here."""
         return name
 
-    def _save(self, name: str, content: File) -> str:
+    def exists(self, name: str) -> bool:
+        """Whether the file is there, and would still be after a power cut."""
+        found = super().exists(name)
+        if found:
+            # Whoever renamed it may have been killed before the directory was on the disk.
+            self._settle(Path(self.path(name)))
+        return found
+
+    def _save(self, name: str, content: "File[bytes]") -> str:
         target = Path(self.path(name))
+        incoming = Path(self.location) / INCOMING
+        incoming.mkdir(parents=True, exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=target.parent, prefix=".incoming-")
+        _remove_leftovers(incoming)
+        handle, temporary = tempfile.mkstemp(dir=incoming)
         try:
             with os.fdopen(handle, "wb") as out:
                 for chunk in content.chunks(CHUNK_BYTES):
@@ -41,14 +63,29 @@ class DurableFileSystemStorage(FileSystemStorage):
         except BaseException:
             Path(temporary).unlink(missing_ok=True)
             raise
-        # The rename itself is only durable once the directory is on the disk, and so are new directories.
-        for directory in (target.parent, target.parent.parent):
+        self._settle(target)
+        return name
+
+    def _settle(self, target: Path) -> None:
+        """Put the directories above a file on the disk: a rename is durable no sooner."""
+        root = Path(self.location)
+        for directory in target.parents:
             descriptor = os.open(directory, os.O_RDONLY)
             try:
                 os.fsync(descriptor)
             finally:
                 os.close(descriptor)
-        return name
+            if directory == root:
+                return
+
+
+def _remove_leftovers(incoming: Path) -> None:
+    """Remove what was begun more than an hour ago: nobody writes a file of a few megabytes for so long."""
+    for entry in os.scandir(incoming):
+        # Another process may be tidying up too.
+        with suppress(FileNotFoundError):
+            if time.time() - entry.stat().st_mtime > LEFTOVER_S:
+                Path(entry.path).unlink()
 
 
 @dataclass(frozen=True)
@@ -75,8 +112,11 @@ def manifest_name(digest: str) -> str:
     return f"manifests/{digest.removeprefix('sha256:')}.csv"
 
 
-def keep_predictions(upload: File) -> StoredFile:
-    """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once."""
+def keep_predictions(upload: "File[bytes]") -> StoredFile:
+    """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
+
+    Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
+    """
     digest = hashlib.sha256()
     size_bytes = 0
     for chunk in upload.chunks(CHUNK_BYTES):
@@ -138,4 +178,4 @@ def opened_predictions(digest: str) -> Iterator[IO[bytes]]:
                 local.seek(0)
                 yield local
         else:
-            yield kept  # type: ignore[misc]  # a File over a real file reads like one
+            yield kept

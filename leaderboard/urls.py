@@ -14,3 +14,6 @@ urlpatterns = [
     path("readyz", health.readyz, name="readyz"),
     path("metrics", health.prometheus, name="metrics"),
 ]
+
+# What no view has handled: an outage is told as such, everything else is a 500.
+handler500 = "leaderboard.web.outages.server_error"

@@ -9,7 +9,7 @@ from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import exception_handler as default_handler
 
-from leaderboard import standings, submissions
+from leaderboard import outages, standings, submissions
 
 
 def problem(
@@ -33,6 +33,17 @@ def problem(
 
 def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | None:
     """Translate what the verbs raise; everything else keeps the framework's status."""
+    return _outage(exc) or _of_a_verb(exc) or _of_the_framework(exc, context)
+
+
+def _outage(exc: Exception) -> Response | None:
+    outage = outages.outage_of(exc)
+    if outage is None:
+        return None
+    return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)
+
+
+def _of_a_verb(exc: Exception) -> Response | None:
     match exc:
         case submissions.TooLarge():
             return problem(status=413, code=exc.code, detail=str(exc), where=exc.field)
@@ -43,6 +54,11 @@ def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | Non
             return problem(status=400, code="unknown-column", detail=str(exc), where="sort")
         case standings.BadMoment():
             return problem(status=400, code="bad-moment", detail=str(exc), where="at")
+    return None
+
+
+def _of_the_framework(exc: Exception, context: dict[str, Any]) -> Response | None:
+    match exc:
         case Http404():
             exc = exceptions.NotFound("There is nothing at this address that you may see.")
         case PermissionDenied():

@@ -1,0 +1,200 @@
+"""What stands beneath the leaderboard fails: a clear answer on every door, and nothing half kept."""
+
+import errno
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import psycopg
+import pytest
+from django.core.files.base import ContentFile
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.db import InterfaceError, OperationalError, connection
+from django.http import HttpResponse
+from django.test import Client
+from pytest_django import Settings
+
+from leaderboard import files, outages, tokens
+from leaderboard.models import Edition, Evaluation, Method, Submission, User
+from tests import builders
+
+
+def sent(data: bytes, **fields: str) -> dict[str, object]:
+    """A form as the page and the API take it."""
+    return {"split": "test", "method": "Foo", "file": SimpleUploadedFile("p.json", data), **fields}
+
+
+@pytest.fixture
+def page(owner: User) -> Callable[[bytes], HttpResponse]:
+    """Submit through the page."""
+    client = Client(raise_request_exception=False)
+    client.force_login(owner)
+    return lambda data: client.post("/submit/", sent(data))  # type: ignore[return-value]  # the test client's own
+
+
+@pytest.fixture
+def api(owner: User) -> Callable[[bytes], HttpResponse]:
+    """Submit through the API."""
+    client = Client(raise_request_exception=False)
+    headers = {"Authorization": f"Bearer {tokens.create(user=owner, name='test')}"}
+    return lambda data: client.post("/api/v1/submissions", sent(data), headers=headers)  # type: ignore[return-value]  # the test client's own
+
+
+@contextmanager
+def full_disk(fault: int = errno.ENOSPC) -> Iterator[None]:
+    """Every flush to the disk says that there is no room."""
+
+    def fsync(descriptor: int) -> None:
+        raise OSError(fault, os.strerror(fault))
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", fsync)
+        yield
+
+
+def assert_nothing_kept(settings: Settings) -> None:
+    assert not Submission.objects.exists()
+    assert not Evaluation.objects.exists()
+    assert not Method.objects.exists()
+    kept = [path for path in Path(settings.FILES_DIR).rglob("*") if path.is_file()]
+    assert not [path for path in kept if "manifests" not in path.parts]
+
+
+@pytest.mark.parametrize("fault", [errno.ENOSPC, errno.EDQUOT])
+def test_full_disk_is_a_507_problem_and_leaves_nothing(
+    edition: Edition, api: Callable[[bytes], HttpResponse], settings: Settings, fault: int
+) -> None:
+    with full_disk(fault):
+        answer = api(builders.predictions(edition))
+    assert answer.status_code == 507
+    assert answer["Content-Type"] == "application/problem+json"
+    body = answer.json()  # type: ignore[attr-defined]  # the test client's own
+    assert (body["code"], body["status"]) == ("storage-full", 507)
+    assert "no room left" in body["detail"]
+    assert_nothing_kept(settings)
+    assert api(builders.predictions(edition)).status_code == 201
+
+
+def test_full_disk_is_a_507_page_and_leaves_nothing(
+    edition: Edition, page: Callable[[bytes], HttpResponse], settings: Settings
+) -> None:
+    with full_disk():
+        answer = page(builders.predictions(edition))
+    assert answer.status_code == 507
+    assert "There is no room left" in answer.content.decode()
+    assert_nothing_kept(settings)
+    assert page(builders.predictions(edition)).status_code == 302
+
+
+@contextmanager
+def database_away(fault: type[Exception]) -> Iterator[None]:
+    """Every question to the database is answered by the loss of the connection."""
+
+    def refuse(*_: object) -> object:
+        raise fault("server closed the connection unexpectedly")
+
+    with connection.execute_wrapper(refuse):
+        yield
+
+
+@pytest.mark.parametrize("fault", [OperationalError, InterfaceError])
+def test_absent_database_is_a_503_problem(
+    edition: Edition, api: Callable[[bytes], HttpResponse], settings: Settings, fault: type[Exception]
+) -> None:
+    data = builders.predictions(edition)
+    with database_away(fault):
+        answer = api(data)
+    assert answer.status_code == 503
+    assert answer["Content-Type"] == "application/problem+json"
+    assert answer["Retry-After"] == "5"
+    assert answer.json()["code"] == "database-unavailable"  # type: ignore[attr-defined]  # the test client's own
+    assert_nothing_kept(settings)
+
+
+@pytest.mark.parametrize("address", ["/", "/board/test/", "/submissions/", "/docs/"])
+def test_absent_database_is_a_503_page(edition: Edition, owner: User, address: str) -> None:
+    client = Client(raise_request_exception=False)
+    client.force_login(owner)
+    with database_away(OperationalError):
+        answer = client.get(address)
+    assert answer.status_code == 503
+    assert "The database does not answer at the moment" in answer.content.decode()
+
+
+def test_any_other_fault_stays_a_500(
+    edition: Edition, client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(**_: object) -> None:
+        raise KeyError("a fault of our own")
+
+    monkeypatch.setattr("leaderboard.standings.board", broken)
+    client.raise_request_exception = False
+    for address in ("/", "/api/v1/splits/test/board"):
+        answer = client.get(address)
+        assert answer.status_code == 500
+        assert "our fault" in answer.content.decode()
+
+
+def test_a_database_without_room_is_a_full_store_and_not_an_absent_one() -> None:
+    fault = OperationalError("could not extend file")
+    fault.__cause__ = psycopg.errors.DiskFull("could not extend file")
+    assert outages.outage_of(fault) == outages.STORAGE_FULL
+    assert outages.outage_of(OperationalError("gone")) == outages.DATABASE_AWAY
+    assert outages.outage_of(FileNotFoundError(errno.ENOENT, "no such file")) is None
+    assert outages.outage_of(None) is None
+
+
+# --- the store itself -------------------------------------------------------------------------------------
+
+
+def test_file_is_flushed_before_it_is_renamed_and_its_directories_after(
+    settings: Settings, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    events: list[str] = []
+    real_fsync, real_replace = os.fsync, Path.replace
+
+    def fsync(descriptor: int) -> None:
+        path = Path(f"/proc/self/fd/{descriptor}").readlink()
+        events.append(
+            f"flush {path.relative_to(settings.FILES_DIR).parts[:1]}" if path.is_file() else f"flush {path}"
+        )
+        real_fsync(descriptor)
+
+    def replace(self: Path, target: Path) -> Path:
+        events.append("rename")
+        return real_replace(self, target)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    monkeypatch.setattr(Path, "replace", replace)
+    kept = files.keep_predictions(ContentFile(b"{}"))
+    folder = Path(settings.FILES_DIR) / Path(files.predictions_name(kept.digest)).parent
+    above = [folder, folder.parent, folder.parent.parent]
+    assert events == ["flush ('.incoming',)", "rename", *(f"flush {path}" for path in above)]
+    events.clear()
+    assert files.keep_predictions(ContentFile(b"{}")) == kept
+    assert events == [f"flush {path}" for path in above], (
+        "known bytes are answered only once they are durable"
+    )
+
+
+def test_interrupted_upload_is_never_visible(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    def killed(self: Path, target: Path) -> Path:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", killed)
+    with pytest.raises(KeyboardInterrupt):
+        files.keep_predictions(ContentFile(b"{}"))
+    assert not [path for path in Path(settings.FILES_DIR).rglob("*") if path.is_file()]
+
+
+def test_leftovers_of_killed_processes_are_removed_after_an_hour(settings: Settings) -> None:
+    incoming = Path(settings.FILES_DIR) / files.INCOMING
+    incoming.mkdir(parents=True)
+    old, new = incoming / "old", incoming / "new"
+    for path in (old, new):
+        path.write_bytes(b"{")
+    os.utime(old, (time.time() - files.LEFTOVER_S - 60,) * 2)
+    files.keep_predictions(ContentFile(b"{}"))
+    assert [path.name for path in incoming.iterdir()] == ["new"]
