@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, TypeGuard
 
 import numpy as np
 
@@ -147,7 +147,7 @@ def _seconds_fault(value: object) -> tuple[str, str] | None:
 def _ratio_fault(value: object) -> tuple[str, str] | None:
     if problem := _number_fault(value, "a scale ratio greater than 0"):
         return problem
-    if not value > 0:  # type: ignore[operator]
+    if isinstance(value, int | float) and not value > 0:
         return "not-positive", f"The value is {kind_of(value)}; expected a scale ratio greater than 0."
     return None
 
@@ -155,13 +155,13 @@ def _ratio_fault(value: object) -> tuple[str, str] | None:
 def _number_fault(value: object, expected: str) -> tuple[str, str] | None:
     if not _is_number(value):
         return "not-a-number", f"The value is {kind_of(value)}; expected {expected}."
-    if value != value:  # noqa: PLR0124 - NaN alone differs from itself
+    if value != value:  # noqa: PLR0124 -- NaN alone differs from itself
         return "nan", f"The value is NaN; expected {expected}."
     return None
 
 
 def _fps_fault(value: object) -> tuple[str, str] | None:
-    if _is_number(value) and 0 < value < math.inf:  # type: ignore[operator]
+    if _is_number(value) and 0 < value < math.inf:
         return None
     return "bad-rate", f"fps is {kind_of(value)}; expected a rate in Hz, a finite number greater than 0."
 
@@ -175,7 +175,7 @@ def _gap_fault(value: object) -> tuple[str, str] | None:
     )
 
 
-def _is_number(value: object) -> bool:
+def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 

@@ -14,12 +14,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 from evaluator.pickles import Attributes, load_plain
 from evaluator.problems import Findings, quoted, reject
 from evaluator.scale import N_FRAMES
 from evaluator.tables import Table, name_fault
+
+Camera = dict[float, list[Attributes]]
+"""The objects that one camera sees, by timestamp."""
 
 FRAME_STEP_NS: Final = 100_000_000
 MAX_FILE_BYTES: Final = 128 * 1024 * 1024
@@ -52,18 +55,16 @@ def read_annotations(folder: Path, *, with_ttc: bool) -> Table:
     return table
 
 
-def cut_sequences(
-    camera: dict[object, list[Attributes]], *, n_frames: int = N_FRAMES
-) -> Iterator[list[Attributes]]:
+def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[Attributes]]:
     """The sequences of one camera in the toolkit's order: by the frame that completes them, then by track.
 
     A track that skips a frame starts anew; a complete sequence starts the next one with an empty hand.
     """
     open_tracks: dict[object, list[Attributes]] = {}
-    for stamp in sorted(camera):  # type: ignore[type-var]
+    for stamp in sorted(camera):
         for seen in camera[stamp]:
             track = open_tracks.get(seen["id"])
-            if track is not None and seen["ts"] - track[-1]["ts"] == FRAME_STEP_NS:  # type: ignore[operator]
+            if track is not None and seen["ts"] - track[-1]["ts"] == FRAME_STEP_NS:
                 track.append(seen)
             else:
                 open_tracks[seen["id"]] = [seen]
@@ -72,7 +73,7 @@ def cut_sequences(
             yield open_tracks.pop(track_id)
 
 
-def _read_file(file: Path, name: str) -> list[dict[object, list[Attributes]]]:
+def _read_file(file: Path, name: str) -> list[Camera]:
     """The cameras of one annotation file, with their structure checked."""
     try:
         size = file.stat().st_size
@@ -86,7 +87,7 @@ def _read_file(file: Path, name: str) -> list[dict[object, list[Attributes]]]:
     if fault:
         expected = "a list of dictionaries, one per camera, from timestamp to list of attribute-dicts"
         raise reject("bad-annotations", f"The file holds {fault}; expected {expected}.", name)
-    return cameras  # type: ignore[return-value]  # _structure_fault has looked at every level
+    return cast("list[Camera]", cameras)
 
 
 def _structure_fault(cameras: object) -> str | None:
@@ -148,7 +149,7 @@ def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *
     table.bag_stamp.append(names["bag_stamp"])
     table.cam_id.append(names["cam_id"])
     table.track_id.append(names["id"])
-    table.ts_ns.append(target["ts"])  # type: ignore[arg-type]
+    table.ts_ns.append(target["ts"])
     if not with_ttc:
         return
     ttc_s = target.get("ttc_imu")

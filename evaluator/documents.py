@@ -138,7 +138,7 @@ def kind_of(value: object) -> str:
 
 def _unit(fields: Mapping[str, object], findings: Findings) -> Unit:
     unit = fields.get("unit")
-    if unit == "ttc" or unit == "scale_ratio":  # noqa: PLR1714 - two comparisons narrow the type, a set does not
+    if unit == "ttc" or unit == "scale_ratio":  # noqa: PLR1714 -- narrows the type
         return unit
     found = kind_of(unit) if "unit" in fields else "none"
     findings.add("unknown-unit", f'The unit is {found}; expected "ttc" or "scale_ratio".', "/unit")

@@ -32,7 +32,7 @@ Array = np.ndarray[Any, np.dtype[Any]]
 _SCALARS: Final = (str, bytes, int, float, bool, type(None))
 
 
-class Attributes(dict[object, object]):
+class Attributes(dict[Any, Any]):
     """An attribute-dict of whatever class, as plain data."""
 
 
@@ -269,11 +269,11 @@ def _empty_array(_cls: object, _shape: object, _typecode: object) -> Array:
     return np.zeros(0)
 
 
-def _fill(array: Array, state: object) -> None:
+def _fill(array: Any, state: object) -> None:
     _version, shape, dtype, is_fortran, raw = _expect(state, tuple)
     kind = _expect(dtype, _Dtype).value
     _check_size(shape, kind, raw)
-    array.__setstate__((1, shape, kind, bool(is_fortran), bytes(raw)))  # type: ignore[arg-type]  # numpy's own states look so
+    array.__setstate__((1, shape, kind, bool(is_fortran), bytes(raw)))
 
 
 def _from_buffer(raw: object, dtype: object, shape: object, order: object) -> Array:

@@ -113,7 +113,7 @@ def read_csv(path: Path, *, with_ttc: bool) -> Table:
         raise reject("bad-csv", f"This is not a CSV table: {error}.", f"line {rows.line_num}") from None
 
 
-def _read_rows(rows: csv._reader, columns: tuple[str, ...]) -> Table:  # type: ignore[name-defined]
+def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
     header = [name.strip() for name in next(rows, [])]
     missing = [name for name in columns if name not in header]
     if missing:

@@ -100,6 +100,6 @@ def _header(is_ratio: bool, fps_hz: float | None, frame_gap: int | None) -> dict
         if not 0 < fps_hz < float("inf"):
             raise ValueError(f"fps_hz is {fps_hz}; expected a finite number greater than 0.")
         return {"unit": "scale_ratio", "fps": float(fps_hz)}
-    if frame_gap not in range(1, N_FRAMES):
+    if frame_gap is None or frame_gap not in range(1, N_FRAMES):
         raise ValueError(f"frame_gap is {frame_gap}; expected 1 to {N_FRAMES - 1}.")
-    return {"unit": "scale_ratio", "frame_gap": int(frame_gap)}  # type: ignore[arg-type]
+    return {"unit": "scale_ratio", "frame_gap": int(frame_gap)}
