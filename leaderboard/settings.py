@@ -153,9 +153,16 @@ else:
     DATABASES["default"]["CONN_HEALTH_CHECKS"] = True
     DATABASES["default"].setdefault("OPTIONS", {})["connect_timeout"] = 5
 
+# Prediction files, aligned arrays and public manifests, all named by their digest: in a local directory, or
+# in an S3-compatible service that web and workers on several machines share (see leaderboard/s3.py).
+FILES_URL = env.str("TSTTC_FILES_URL", default="")
+if FILES_URL and not FILES_URL.startswith("s3://"):
+    raise ImproperlyConfigured("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
+
 STORAGES: dict[str, dict[str, Any]] = {
-    # Prediction files, aligned arrays and public manifests, all named by their digest.
-    "files": {
+    "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": FILES_URL}}
+    if FILES_URL
+    else {
         "BACKEND": "leaderboard.files.DurableFileSystemStorage",
         "OPTIONS": {"location": str(FILES_DIR)},
     },

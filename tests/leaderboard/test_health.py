@@ -12,7 +12,7 @@ from django.db.models import DateTimeField, ExpressionWrapper, Value
 from django.db.models.functions import Now
 from django.test import Client
 from django.utils.connection import ConnectionDoesNotExist
-from pytest_django.fixtures import Settings
+from pytest_django import Settings
 
 from leaderboard import health, queue
 from leaderboard.models import SweepBeat

@@ -12,7 +12,7 @@ import structlog
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client, RequestFactory
 from django.utils.functional import SimpleLazyObject
-from pytest_django.fixtures import Settings
+from pytest_django import Settings
 
 from leaderboard import files, ground_truth, logs, tokens
 from leaderboard.models import Edition, User

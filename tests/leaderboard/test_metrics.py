@@ -9,8 +9,7 @@ import pytest
 from django.db.models import F
 from django.test import Client
 from prometheus_client.parser import text_string_to_metric_families
-from pytest_django import DjangoAssertNumQueries
-from pytest_django.fixtures import Settings
+from pytest_django import DjangoAssertNumQueries, Settings
 
 from leaderboard import lifecycle, metrics, queue
 from leaderboard.lifecycle import Strike

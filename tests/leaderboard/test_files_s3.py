@@ -1,0 +1,260 @@
+"""The file store in an S3-compatible service: everything through it, and nothing beside it."""
+
+import errno
+import hashlib
+import os
+import random
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import boto3
+import pytest
+from django.core.exceptions import ImproperlyConfigured
+from django.core.files.base import ContentFile
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+from moto.server import ThreadedMotoServer
+from pytest_django import Settings
+
+from leaderboard import files, s3, scoring, tokens
+from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from tests import builders
+
+BUCKET = "tsttc-test"
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[str]:
+    """The endpoint of an S3 server on loopback."""
+    running = ThreadedMotoServer(ip_address="127.0.0.1", port=0, verbose=False)
+    running.start()
+    host, port = running.get_host_and_port()
+    yield f"http://{host}:{port}"
+    running.stop()
+
+
+@pytest.fixture
+def bucket(server: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """An empty bucket, and its keys in the environment."""
+    monkeypatch.setenv("AWS_ACCESS_KEY_ID", "the-key")
+    monkeypatch.setenv("AWS_SECRET_ACCESS_KEY", "the-secret")
+    made = boto3.resource("s3", endpoint_url=server, region_name="us-east-1").Bucket(BUCKET)
+    made.create()
+    yield made
+    made.objects.all().delete()
+    made.delete()
+
+
+@pytest.fixture
+def stored(bucket: Any, server: str, settings: Settings) -> s3.S3FileStore:
+    """The store that the application uses in this test."""
+    url = f"s3://{BUCKET}/files?endpoint={server}"
+    settings.STORAGES = {
+        **settings.STORAGES,
+        "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": url}},
+    }
+    found = files.store()
+    assert isinstance(found, s3.S3FileStore)
+    return found
+
+
+@pytest.fixture
+def nobody_answers(stored: s3.S3FileStore, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on, nothing listens where the store should be."""
+    monkeypatch.setattr(s3, "CONNECT_TIMEOUT_S", 0.2)
+    url = f"s3://{BUCKET}/files?endpoint=http://127.0.0.1:1"
+    settings.STORAGES = {
+        **settings.STORAGES,
+        "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": url}},
+    }
+
+
+def _names(bucket: Any) -> list[str]:
+    return sorted(entry.key for entry in bucket.objects.all())
+
+
+def _send(user: User, data: bytes) -> Any:
+    token = tokens.create(user=user, name="CI")
+    return Client(headers={"Authorization": f"Bearer {token}"}, raise_request_exception=False).post(
+        "/api/v1/submissions",
+        {"split": "test", "method": "Foo", "file": SimpleUploadedFile("p.json", data)},
+    )
+
+
+# --- the journey ----------------------------------------------------------------------------------------
+
+
+def test_submission_is_scored_and_the_manifest_served_without_any_local_file(
+    stored: s3.S3FileStore, bucket: Any, settings: Settings, benchmark: None, owner: User, tmp_path: Path
+) -> None:
+    edition = builders.import_truth(tmp_path)
+    data = builders.predictions(edition)
+    assert _send(owner, data).status_code == 201
+    assert builders.score_all() == 1
+    evaluation = Evaluation.objects.get()
+    assert evaluation.status == Status.SCORED
+    assert evaluation.scores.count() == 10
+    manifest = Client().get("/api/v1/splits/test/manifest")
+    text = b"".join(manifest.streaming_content)  # type: ignore[attr-defined]  # a FileResponse
+    assert text.count(b"\n") == builders.N_SEQUENCES + 1
+    assert int(manifest.headers["Content-Length"]) == len(text)
+    assert not Path(settings.FILES_DIR).exists()
+    assert [name.split("/")[:2] for name in _names(bucket)] == [
+        ["files", "aligned"],
+        ["files", "manifests"],
+        ["files", "predictions"],
+    ]
+
+
+def test_same_bytes_are_one_object(stored: s3.S3FileStore, bucket: Any) -> None:
+    upload = ContentFile(b'{"0": 1.5}', name="p.json")
+    first = files.keep_predictions(upload)
+    assert files.keep_predictions(upload) == first
+    assert _names(bucket) == [f"files/{files.predictions_name(first.digest)}"]
+    with files.opened_predictions(first.digest) as kept:
+        assert kept.read() == b'{"0": 1.5}'
+
+
+def test_object_is_named_by_the_digest_of_what_it_holds(stored: s3.S3FileStore, bucket: Any) -> None:
+    data = random.Random(1).randbytes(9_000_001)
+    kept = files.keep_predictions(ContentFile(data, name="p.json"))
+    [entry] = bucket.objects.all()
+    body = entry.get()["Body"].read()
+    assert kept.size_bytes == len(body)
+    assert f"sha256:{hashlib.sha256(body).hexdigest()}" == kept.digest
+
+
+def test_opened_file_has_a_descriptor_that_a_child_process_can_read(stored: s3.S3FileStore) -> None:
+    data = b'{"0": 1.5}' * 1000
+    kept = files.keep_predictions(ContentFile(data, name="p.json"))
+    with files.opened_predictions(kept.digest) as source:
+        assert os.pread(source.fileno(), len(data) + 1, 0) == data
+        assert os.lseek(source.fileno(), 0, os.SEEK_CUR) == 0, "a child reads from the start"
+
+
+def test_many_threads_may_use_the_store_at_once(stored: s3.S3FileStore) -> None:
+    def there_and_back(number: int) -> bool:
+        data = f'{{"{number}": 1.5}}'.encode()
+        kept = files.keep_predictions(ContentFile(data, name="p.json"))
+        with files.opened_predictions(kept.digest) as source:
+            return source.read() == data
+
+    with ThreadPoolExecutor(8) as pool:
+        assert all(pool.map(there_and_back, range(40)))
+
+
+def test_absent_object_is_an_absent_file(stored: s3.S3FileStore) -> None:
+    assert not stored.exists("predictions/00/absent.json")
+    for ask in (stored.size, stored.get_modified_time, stored.open):
+        with pytest.raises(FileNotFoundError):
+            ask("predictions/00/absent.json")
+
+
+def test_folders_are_listed(stored: s3.S3FileStore) -> None:
+    stored.save("predictions/ab/one.json", ContentFile(b"1"))
+    stored.save("predictions/cd/two.json", ContentFile(b"22"))
+    assert stored.listdir("predictions") == (["ab", "cd"], [])
+    assert stored.listdir("predictions/cd") == ([], ["two.json"])
+    assert stored.size("predictions/cd/two.json") == 2
+    stored.delete("predictions/cd/two.json")
+    assert stored.listdir("predictions/cd") == ([], [])
+
+
+# --- when it is away ------------------------------------------------------------------------------------
+
+
+def test_upload_while_the_store_is_away_is_answered_503_and_leaves_no_row(
+    edition: Edition, owner: User, nobody_answers: None
+) -> None:
+    response = _send(owner, b'{"0": 1.5}')
+    assert response.status_code == 503
+    assert response.json()["code"] == "store-unavailable"
+    assert "our fault" in response.json()["detail"]
+    assert int(response.headers["Retry-After"]) > 0
+    assert "127.0.0.1" not in response.text
+    assert not Submission.objects.exists()
+
+
+def test_form_while_the_store_is_away_says_so(edition: Edition, owner: User, nobody_answers: None) -> None:
+    client = Client(raise_request_exception=False)
+    client.force_login(owner)
+    upload = SimpleUploadedFile("p.json", b'{"0": 1.5}')
+    response = client.post("/submit/", {"split": "test", "method": "Foo", "file": upload})
+    assert response.status_code == 503
+    assert "does not answer" in response.text
+    assert not Submission.objects.exists()
+
+
+def test_manifest_while_the_store_is_away_is_a_503(edition: Edition, nobody_answers: None) -> None:
+    response = Client(raise_request_exception=False).get("/api/v1/splits/test/manifest")
+    assert (response.status_code, response.json()["code"]) == (503, "store-unavailable")
+
+
+def test_worker_without_its_store_blames_the_machine_and_tries_again(
+    stored: s3.S3FileStore,
+    benchmark: None,
+    owner: User,
+    tmp_path: Path,
+    settings: Settings,
+    server: str,
+    request: pytest.FixtureRequest,
+) -> None:
+    edition = builders.import_truth(tmp_path)
+    builders.submit(owner, builders.predictions(edition))
+    there = settings.STORAGES
+    request.getfixturevalue("nobody_answers")
+    settings.BACKOFF_S = 0.0
+    assert scoring.run_next(rng=random.Random(0))
+    evaluation = Evaluation.objects.get()
+    assert (evaluation.status, evaluation.n_infrastructure_strikes, evaluation.n_poison_strikes) == (
+        Status.QUEUED,
+        1,
+        0,
+    )
+    assert "does not answer" in evaluation.last_error
+    settings.STORAGES = there
+    builders.score_all()
+    evaluation.refresh_from_db()
+    assert evaluation.status == Status.SCORED
+
+
+# --- faults are told as a disk would tell them ------------------------------------------------------------
+
+
+def test_bucket_that_does_not_exist_is_a_store_that_refuses(stored: s3.S3FileStore, bucket: Any) -> None:
+    with pytest.raises(files.StoreAway) as caught:
+        s3.S3FileStore(url=f"s3://no-such-bucket?endpoint={stored.endpoint_url}").save("x", ContentFile(b"1"))
+    assert caught.value.errno == errno.EIO
+    assert caught.value.strerror == "the file store refused (NoSuchBucket)"
+
+
+@pytest.mark.parametrize(
+    ("url", "address"),
+    [
+        ("s3://tsttc", s3.Address("tsttc", "", None, "us-east-1")),
+        ("s3://tsttc/a/b/?region=eu-west-1", s3.Address("tsttc", "a/b", None, "eu-west-1")),
+        (
+            "s3://tsttc?endpoint=https://minio.example:9000",
+            s3.Address("tsttc", "", "https://minio.example:9000", "us-east-1"),
+        ),
+    ],
+)
+def test_url_says_where_the_files_are(url: str, address: s3.Address) -> None:
+    assert s3.parsed(url) == address
+
+
+@pytest.mark.parametrize(
+    "url", ["s3://", "http://bucket", "s3://bucket?endpiont=x", "s3:///folder", "bucket", ""]
+)
+def test_url_that_says_something_else_is_refused(url: str) -> None:
+    with pytest.raises(ImproperlyConfigured, match="expected s3://bucket/folder"):
+        s3.parsed(url)
+
+
+def test_key_in_the_url_is_refused_and_not_repeated() -> None:
+    with pytest.raises(ImproperlyConfigured) as caught:
+        s3.parsed("s3://AKIAKEY:swordfish@bucket/folder")
+    assert "AWS_SECRET_ACCESS_KEY" in str(caught.value)
+    assert "swordfish" not in str(caught.value)
