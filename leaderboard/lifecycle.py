@@ -18,20 +18,18 @@ import random
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timedelta
 from enum import Enum
 from functools import partial
 from typing import Any
 
 import structlog
-from celery import current_app
 from django.conf import settings
 from django.db import transaction
-from django.db.models import DateTimeField, ExpressionWrapper, F, Q, QuerySet, Value
+from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
-from kombu.exceptions import OperationalError
 
-from leaderboard import audit
+from leaderboard import audit, broker
+from leaderboard.clock import after
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 
 log = structlog.get_logger(__name__)
@@ -77,21 +75,6 @@ class Outcome:
     n_problems: int = 0
 
 
-def _after(seconds: float) -> "ExpressionWrapper[Any]":
-    """`seconds` from now, by the database's clock."""
-    return ExpressionWrapper(Now() + Value(timedelta(seconds=seconds)), output_field=DateTimeField())
-
-
-def database_now() -> datetime:
-    """The database's clock, for whoever compares with times written here."""
-    row = Edition.objects.annotate(now=Now()).values_list("now", flat=True).first()
-    if row is None:
-        from django.utils import timezone  # noqa: PLC0415 - only an empty database comes here
-
-        return timezone.now()
-    return row
-
-
 # --- into the queue --------------------------------------------------------------------------------------
 
 
@@ -119,7 +102,7 @@ def _announce(evaluation: Evaluation) -> None:
         submission_id=str(evaluation.submission_id), evaluation_id=str(evaluation.pk)
     ):
         log.info("evaluation_queued")
-        nudge(evaluation.pk)
+        broker.nudge(evaluation.pk)
 
 
 def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> None:
@@ -139,20 +122,7 @@ def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> No
         ignore_conflicts=True,
     )
     for pk in waiting_ids(limit=NUDGES_PER_EDITION):
-        transaction.on_commit(partial(nudge, pk), robust=True)
-
-
-def nudge(evaluation_id: uuid.UUID) -> bool:
-    """Tell the workers that something waits; False if the broker did not take it.
-
-    A lost nudge costs seconds: workers also look by themselves.
-    """
-    try:
-        current_app.send_task("leaderboard.tasks.nudge", args=[str(evaluation_id)], ignore_result=True)
-    except (OperationalError, OSError) as fault:
-        log.warning("nudge_not_sent", evaluation_id=str(evaluation_id), reason=str(fault)[:200])
-        return False
-    return True
+        transaction.on_commit(partial(broker.nudge, pk), robust=True)
 
 
 # --- a worker's verbs ------------------------------------------------------------------------------------
@@ -181,8 +151,8 @@ def claim(*, lease_s: float, wall_s: float, limit: int = 1, rescored_in: int | N
             attempt=F("attempt") + 1,
             lease_token=token,
             started_at=Now(),
-            deadline_at=_after(wall_s),
-            leased_until=_after(min(lease_s, wall_s)),
+            deadline_at=after(wall_s),
+            leased_until=after(min(lease_s, wall_s)),
         )
         claimed = Evaluation.objects.filter(pk__in=ids, lease_token=token)
         attempts = dict(claimed.values_list("pk", "attempt"))
@@ -201,7 +171,7 @@ def heartbeat(lease: Lease, *, lease_s: float) -> bool:
     renewed = (
         _held(lease)
         .filter(deadline_at__gt=Now())
-        .update(leased_until=Least(_after(lease_s), F("deadline_at")))
+        .update(leased_until=Least(after(lease_s), F("deadline_at")))
     )
     return renewed == 1
 
@@ -353,7 +323,7 @@ def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.
     else:
         status = Status.QUEUED
         backoff_s = min(settings.BACKOFF_S * 2 ** (n_poison + n_infrastructure - 1), MAX_BACKOFF_S)
-        changes |= {"due_at": _after(backoff_s * rng.uniform(0.5, 1.0)), "leased_until": None}
+        changes |= {"due_at": after(backoff_s * rng.uniform(0.5, 1.0)), "leased_until": None}
     Evaluation.objects.filter(pk=evaluation.pk, status=Status.RUNNING, attempt=evaluation.attempt).update(
         status=status, **changes
     )

@@ -11,7 +11,7 @@ import structlog
 from django.conf import settings
 from django.db import Error, connections
 
-from leaderboard import health, lifecycle, scoring
+from leaderboard import broker, health, lifecycle, scoring
 
 log = structlog.get_logger(__name__)
 
@@ -23,7 +23,7 @@ def sweep(*, rng: random.Random) -> int:
     lifecycle.release_expired(rng=rng)
     n_sent = 0
     for evaluation_id in lifecycle.waiting_ids(limit=MAX_NUDGES_PER_SWEEP):
-        if not lifecycle.nudge(evaluation_id):
+        if not broker.nudge(evaluation_id):
             # A broker that does not answer takes seconds to say so, each time.
             break
         n_sent += 1

@@ -13,7 +13,7 @@ from django.db import transaction
 from django.db.models import Count, Min, Q
 
 from evaluator.protocol import get_protocol
-from leaderboard import audit, ground_truth, lifecycle
+from leaderboard import audit, clock, ground_truth, lifecycle
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status, Submission, User
 
 
@@ -144,7 +144,7 @@ def progress(edition: Edition) -> Progress:
     n_waiting = counts["n_total"] - n_done
     rate = left_s = None
     if first is not None and n_done and n_waiting:
-        rate = n_done / max((lifecycle.database_now() - first).total_seconds(), 0.001)
+        rate = n_done / max((clock.database_now() - first).total_seconds(), 0.001)
         left_s = n_waiting / rate
     return Progress(**counts, rate_per_s=rate, left_s=left_s)
 

@@ -2,6 +2,7 @@
 
 import random
 import uuid
+from dataclasses import replace
 from datetime import timedelta
 
 from django.db.models import F
@@ -9,7 +10,7 @@ from django.db.models.functions import Now
 from django.utils import timezone
 
 from leaderboard import lifecycle, teams
-from leaderboard.lifecycle import Lease, Outcome
+from leaderboard.lifecycle import Lease, Outcome, Strike
 from leaderboard.models import Edition, Evaluation, Method, Score, Status, Submission, User
 
 LEASE_S = 60.0
@@ -75,3 +76,17 @@ def n_scores(lease: Lease) -> int:
 def row(lease: Lease) -> Evaluation:
     """The evaluation of this lease as the database has it."""
     return Evaluation.objects.get(pk=lease.evaluation_id)
+
+
+def give_back(lease: Lease, strike: Strike = Strike.INFRASTRUCTURE) -> Status:
+    """End a run without a result; the state it left."""
+    return lifecycle.give_back(lease, strike=strike, reason="the disk failed", rng=random.Random(0))
+
+
+def stale(lease: Lease) -> dict[str, Lease]:
+    """The lease of an earlier attempt, of another worker, and of another evaluation."""
+    return {
+        "attempt": replace(lease, attempt=lease.attempt - 1),
+        "token": replace(lease, token=uuid.uuid4()),
+        "evaluation": replace(lease, evaluation_id=uuid.uuid4()),
+    }

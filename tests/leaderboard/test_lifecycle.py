@@ -1,6 +1,5 @@
 """`leaderboard.lifecycle`: every verb, one step at a time."""
 
-import random
 import uuid
 from dataclasses import replace
 from datetime import timedelta
@@ -8,13 +7,11 @@ from datetime import timedelta
 import pytest
 from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
-from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
+from pytest_django import DjangoCaptureOnCommitCallbacks
 
-from leaderboard import lifecycle
+from leaderboard import broker, lifecycle
 from leaderboard.lifecycle import (
-    MAX_INFRASTRUCTURE_STRIKES,
     MAX_POISON_STRIKES,
-    Lease,
     LostRace,
     Outcome,
     Strike,
@@ -22,11 +19,6 @@ from leaderboard.lifecycle import (
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
 from tests.leaderboard import queue_rows
 from tests.leaderboard.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
-
-
-def give_back(lease: Lease, strike: Strike = Strike.INFRASTRUCTURE) -> Status:
-    return lifecycle.give_back(lease, strike=strike, reason="the disk failed", rng=random.Random(0))
-
 
 # --- enqueue ---------------------------------------------------------------------------------------------
 
@@ -57,7 +49,7 @@ def test_nudge_is_sent_after_the_commit_and_its_failure_is_nobodys_problem(
         sent.append(evaluation_id)
         raise RuntimeError("the broker's client has a fault of its own")
 
-    monkeypatch.setattr(lifecycle, "nudge", broken_nudge)
+    monkeypatch.setattr(broker, "nudge", broken_nudge)
     with django_capture_on_commit_callbacks(execute=True):
         evaluation = queue_rows.queued(edition, owner)
         assert not sent
@@ -145,15 +137,6 @@ def test_heartbeat_after_the_deadline_says_stop(edition: Edition, owner: User) -
     assert not lifecycle.heartbeat(lease, lease_s=LEASE_S)
 
 
-def stale(lease: Lease) -> dict[str, Lease]:
-    """The lease of an earlier attempt, of another worker, and of another evaluation."""
-    return {
-        "attempt": replace(lease, attempt=lease.attempt - 1),
-        "token": replace(lease, token=uuid.uuid4()),
-        "evaluation": replace(lease, evaluation_id=uuid.uuid4()),
-    }
-
-
 @pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
 def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(
     edition: Edition, owner: User, what: str
@@ -161,7 +144,7 @@ def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(
     queue_rows.queued(edition, owner)
     lease = queue_rows.claim()
     before = queue_rows.row(lease).leased_until
-    assert not lifecycle.heartbeat(stale(lease)[what], lease_s=10 * LEASE_S)
+    assert not lifecycle.heartbeat(queue_rows.stale(lease)[what], lease_s=10 * LEASE_S)
     assert queue_rows.row(lease).leased_until == before
 
 
@@ -195,7 +178,7 @@ def test_result_of_a_stale_lease_is_discarded(edition: Edition, owner: User, wha
     queue_rows.queued(edition, owner)
     lease = queue_rows.claim()
     with pytest.raises(LostRace):
-        lifecycle.finalise(stale(lease)[what], SCORED)
+        lifecycle.finalise(queue_rows.stale(lease)[what], SCORED)
     assert queue_rows.row(lease).status == Status.RUNNING
     assert not Score.objects.exists()
     assert lifecycle.finalise(lease, SCORED)
@@ -219,7 +202,7 @@ def test_a_decided_evaluation_is_not_decided_otherwise(edition: Edition, owner: 
     with pytest.raises(LostRace):
         lifecycle.finalise(lease, REJECTED)
     with pytest.raises(LostRace):
-        give_back(lease)
+        queue_rows.give_back(lease)
     assert queue_rows.row(lease).status == Status.SCORED
 
 
@@ -258,115 +241,6 @@ def test_a_run_ends_as_scored_or_rejected_only(edition: Edition, owner: User, st
     assert queue_rows.row(lease).status == Status.RUNNING
 
 
-# --- strikes ---------------------------------------------------------------------------------------------
-
-
-def test_given_back_evaluation_waits_out_a_growing_backoff(
-    edition: Edition, owner: User, settings: Settings
-) -> None:
-    settings.BACKOFF_S = 4.0
-    queue_rows.queued(edition, owner)
-    for n_strikes in (1, 2, 3):
-        lease = queue_rows.claim()
-        Evaluation.objects.update(started_at=Now())
-        started_at = queue_rows.row(lease).started_at
-        assert give_back(lease) == Status.QUEUED
-        row = queue_rows.row(lease)
-        assert row.n_infrastructure_strikes == n_strikes
-        assert started_at is not None
-        assert row.due_at - started_at >= timedelta(seconds=4.0 * 2 ** (n_strikes - 1) / 2)
-        assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
-        queue_rows.make_due()
-
-
-@pytest.mark.parametrize(
-    ("strike", "limit"),
-    [(Strike.POISON, MAX_POISON_STRIKES), (Strike.INFRASTRUCTURE, MAX_INFRASTRUCTURE_STRIKES)],
-)
-def test_exhausted_strikes_are_a_system_error_without_scores(
-    edition: Edition, owner: User, strike: Strike, limit: int
-) -> None:
-    queue_rows.queued(edition, owner)
-    left = []
-    for _ in range(limit):
-        queue_rows.make_due()
-        lease = queue_rows.claim()
-        left.append(give_back(lease, strike))
-    assert left == [Status.QUEUED] * (limit - 1) + [Status.SYSTEM_ERROR]
-    row = queue_rows.row(lease)
-    assert row.finished_at is not None
-    assert row.last_error == "the disk failed"
-    assert AuditEvent.objects.filter(verb="system_error", noun_id=row.pk).count() == 1
-    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
-
-
-@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_giving_back_a_stale_lease_counts_no_strike(edition: Edition, owner: User, what: str) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
-    with pytest.raises(LostRace):
-        give_back(stale(lease)[what])
-    row = queue_rows.row(lease)
-    assert (row.status, row.n_infrastructure_strikes) == (Status.RUNNING, 0)
-
-
-def test_what_was_never_begun_is_handed_back_without_a_strike(edition: Edition, owner: User) -> None:
-    for _ in range(3):
-        queue_rows.queued(edition, owner)
-    begun, *waiting = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)
-    lifecycle.finalise(begun, SCORED)
-    assert lifecycle.hand_back([begun, *waiting]) == 2
-    assert queue_rows.row(begun).status == Status.SCORED
-    for lease in waiting:
-        row = queue_rows.row(lease)
-        assert (row.status, row.n_infrastructure_strikes) == (Status.QUEUED, 0)
-        with pytest.raises(LostRace):
-            lifecycle.finalise(lease, SCORED)
-    assert len(lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)) == 2
-
-
-# --- the sweep -------------------------------------------------------------------------------------------
-
-
-def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
-    queue_rows.expire(lease)
-    assert (queue_rows.release_expired(), queue_rows.release_expired()) == (1, 0)
-    row = queue_rows.row(lease)
-    assert (row.status, row.n_infrastructure_strikes, row.n_poison_strikes) == (Status.QUEUED, 1, 0)
-    assert row.last_error == "the worker stopped answering"
-
-
-def test_a_valid_lease_is_not_taken_back(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
-    assert queue_rows.release_expired() == 0
-    assert queue_rows.row(lease).status == Status.RUNNING
-
-
-def test_a_run_that_held_on_until_its_deadline_is_poison(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
-    queue_rows.expire(lease, overran=True)
-    assert queue_rows.release_expired() == 1
-    row = queue_rows.row(lease)
-    assert (row.n_infrastructure_strikes, row.n_poison_strikes) == (0, 1)
-    assert row.last_error == "the run reached its time limit"
-
-
-def test_a_sweep_that_comes_after_the_deadline_does_not_blame_the_file_for_a_dead_worker(
-    edition: Edition, owner: User
-) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
-    Evaluation.objects.update(
-        leased_until=Now() - timedelta(seconds=400), deadline_at=Now() - timedelta(seconds=160)
-    )
-    assert queue_rows.release_expired() == 1
-    assert queue_rows.row(lease).n_poison_strikes == 0
-
-
 # --- people ----------------------------------------------------------------------------------------------
 
 
@@ -403,13 +277,13 @@ def test_maintainer_retries_a_system_error_with_a_clean_slate(
     for _ in range(MAX_POISON_STRIKES):
         queue_rows.make_due()
         last = queue_rows.claim()
-        give_back(last, Strike.POISON)
+        queue_rows.give_back(last, Strike.POISON)
     lifecycle.retry(evaluation=evaluation, actor=maintainer, reason="the limit was too tight")
     lease = queue_rows.claim()
     assert lease.attempt == last.attempt + 1
     with pytest.raises(LostRace):
         lifecycle.finalise(last, SCORED)
-    assert give_back(lease, Strike.POISON) == Status.QUEUED
+    assert queue_rows.give_back(lease, Strike.POISON) == Status.QUEUED
     event = AuditEvent.objects.get(verb="retried")
     assert (event.actor, event.details) == (maintainer, {"reason": "the limit was too tight"})
 

@@ -9,7 +9,7 @@ import pytest
 from django.db import connections
 from pytest_django import Settings
 
-from leaderboard import health, lifecycle, queue, scoring
+from leaderboard import broker, health, lifecycle, queue, scoring
 from leaderboard.models import Edition, Evaluation, Status, User
 from leaderboard.queue import Poller
 from tests import builders
@@ -25,7 +25,7 @@ def nudged(monkeypatch: pytest.MonkeyPatch) -> list[uuid.UUID]:
         taken.append(evaluation_id)
         return len(taken) <= 3
 
-    monkeypatch.setattr(lifecycle, "nudge", nudge)
+    monkeypatch.setattr(broker, "nudge", nudge)
     return taken
 
 

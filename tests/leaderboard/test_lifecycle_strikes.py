@@ -1,0 +1,121 @@
+"""`leaderboard.lifecycle`: what happens to a run that came to nothing."""
+
+from datetime import timedelta
+
+import pytest
+from django.db.models.functions import Now
+from pytest_django import Settings
+
+from leaderboard import lifecycle
+from leaderboard.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES, LostRace, Strike
+from leaderboard.models import AuditEvent, Edition, Evaluation, Status, User
+from tests.leaderboard import queue_rows
+from tests.leaderboard.queue_rows import LEASE_S, SCORED, WALL_S
+
+# --- strikes ---------------------------------------------------------------------------------------------
+
+
+def test_given_back_evaluation_waits_out_a_growing_backoff(
+    edition: Edition, owner: User, settings: Settings
+) -> None:
+    settings.BACKOFF_S = 4.0
+    queue_rows.queued(edition, owner)
+    for n_strikes in (1, 2, 3):
+        lease = queue_rows.claim()
+        Evaluation.objects.update(started_at=Now())
+        started_at = queue_rows.row(lease).started_at
+        assert queue_rows.give_back(lease) == Status.QUEUED
+        row = queue_rows.row(lease)
+        assert row.n_infrastructure_strikes == n_strikes
+        assert started_at is not None
+        assert row.due_at - started_at >= timedelta(seconds=4.0 * 2 ** (n_strikes - 1) / 2)
+        assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+        queue_rows.make_due()
+
+
+@pytest.mark.parametrize(
+    ("strike", "limit"),
+    [(Strike.POISON, MAX_POISON_STRIKES), (Strike.INFRASTRUCTURE, MAX_INFRASTRUCTURE_STRIKES)],
+)
+def test_exhausted_strikes_are_a_system_error_without_scores(
+    edition: Edition, owner: User, strike: Strike, limit: int
+) -> None:
+    queue_rows.queued(edition, owner)
+    left = []
+    for _ in range(limit):
+        queue_rows.make_due()
+        lease = queue_rows.claim()
+        left.append(queue_rows.give_back(lease, strike))
+    assert left == [Status.QUEUED] * (limit - 1) + [Status.SYSTEM_ERROR]
+    row = queue_rows.row(lease)
+    assert row.finished_at is not None
+    assert row.last_error == "the disk failed"
+    assert AuditEvent.objects.filter(verb="system_error", noun_id=row.pk).count() == 1
+    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+
+
+@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
+def test_giving_back_a_stale_lease_counts_no_strike(edition: Edition, owner: User, what: str) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    with pytest.raises(LostRace):
+        queue_rows.give_back(queue_rows.stale(lease)[what])
+    row = queue_rows.row(lease)
+    assert (row.status, row.n_infrastructure_strikes) == (Status.RUNNING, 0)
+
+
+def test_what_was_never_begun_is_handed_back_without_a_strike(edition: Edition, owner: User) -> None:
+    for _ in range(3):
+        queue_rows.queued(edition, owner)
+    begun, *waiting = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)
+    lifecycle.finalise(begun, SCORED)
+    assert lifecycle.hand_back([begun, *waiting]) == 2
+    assert queue_rows.row(begun).status == Status.SCORED
+    for lease in waiting:
+        row = queue_rows.row(lease)
+        assert (row.status, row.n_infrastructure_strikes) == (Status.QUEUED, 0)
+        with pytest.raises(LostRace):
+            lifecycle.finalise(lease, SCORED)
+    assert len(lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)) == 2
+
+
+# --- the sweep -------------------------------------------------------------------------------------------
+
+
+def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    queue_rows.expire(lease)
+    assert (queue_rows.release_expired(), queue_rows.release_expired()) == (1, 0)
+    row = queue_rows.row(lease)
+    assert (row.status, row.n_infrastructure_strikes, row.n_poison_strikes) == (Status.QUEUED, 1, 0)
+    assert row.last_error == "the worker stopped answering"
+
+
+def test_a_valid_lease_is_not_taken_back(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    assert queue_rows.release_expired() == 0
+    assert queue_rows.row(lease).status == Status.RUNNING
+
+
+def test_a_run_that_held_on_until_its_deadline_is_poison(edition: Edition, owner: User) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    queue_rows.expire(lease, overran=True)
+    assert queue_rows.release_expired() == 1
+    row = queue_rows.row(lease)
+    assert (row.n_infrastructure_strikes, row.n_poison_strikes) == (0, 1)
+    assert row.last_error == "the run reached its time limit"
+
+
+def test_a_sweep_that_comes_after_the_deadline_does_not_blame_the_file_for_a_dead_worker(
+    edition: Edition, owner: User
+) -> None:
+    queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    Evaluation.objects.update(
+        leased_until=Now() - timedelta(seconds=400), deadline_at=Now() - timedelta(seconds=160)
+    )
+    assert queue_rows.release_expired() == 1
+    assert queue_rows.row(lease).n_poison_strikes == 0
