@@ -29,3 +29,9 @@ def private_directories(tmp_path: Path, settings) -> None:
             "OPTIONS": {"location": str(settings.FILES_DIR)},
         },
     }
+
+
+@pytest.fixture(autouse=True)
+def quick_passwords(settings) -> None:
+    """A hash that is slow on purpose protects passwords that are worth something; here it costs minutes."""
+    settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
