@@ -107,14 +107,15 @@ def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
 def parse_moment(text: str) -> datetime:
     """A point in time from a date (its end, in UTC) or an ISO time. Raises `BadMoment`."""
     try:
-        moment = parse_datetime(text) or parse_date(text)
-    except ValueError:
-        moment = None
-    if moment is None:
-        raise BadMoment(text)
-    if not isinstance(moment, datetime):
-        return datetime.combine(moment, time.max, tzinfo=UTC)
-    return moment if moment.tzinfo else moment.replace(tzinfo=UTC)
+        # The date first: an ISO time may leave out its time of day, and would then mean the day's beginning.
+        moment = parse_date(text) or parse_datetime(text)
+        if moment is None:
+            raise BadMoment(text)
+        if not isinstance(moment, datetime):
+            return datetime.combine(moment, time.max, tzinfo=UTC)
+        return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
+    except (ValueError, OverflowError):
+        raise BadMoment(text) from None
 
 
 def board(

@@ -1,5 +1,7 @@
 """`standings.board`: who stands where, and who sees whom."""
 
+from datetime import UTC, datetime
+
 import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
@@ -141,3 +143,21 @@ def test_a_board_takes_the_same_few_queries_whatever_its_size(
     split = split_called()
     with django_assert_max_num_queries(3):
         assert len(standings.board(split=split, viewer=ANYBODY).entries) == 13
+
+
+@pytest.mark.parametrize(
+    ("text", "moment"),
+    [
+        ("2026-11-20", datetime(2026, 11, 20, 23, 59, 59, 999999, tzinfo=UTC)),
+        ("2026-11-20T18:00", datetime(2026, 11, 20, 18, tzinfo=UTC)),
+        ("2026-11-20T18:00:00+02:00", datetime(2026, 11, 20, 16, tzinfo=UTC)),
+    ],
+)
+def test_date_means_its_end_and_a_time_its_moment(text: str, moment: datetime) -> None:
+    assert standings.parse_moment(text) == moment
+
+
+@pytest.mark.parametrize("text", ["", "soon", "2026-13-40", "0001-01-01T00:00:00+14:00", "2026-11-20T25:00"])
+def test_what_is_no_moment_is_named_as_such(text: str) -> None:
+    with pytest.raises(standings.BadMoment, match="is no date or time; expected one such as 2026-11-20"):
+        standings.parse_moment(text)
