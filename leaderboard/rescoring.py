@@ -210,15 +210,13 @@ def roll_back(
     with transaction.atomic():
         split = Split.objects.select_for_update().get(pk=split_name)
         _require_same_board(split, replaces)
-        latest = split.publications.filter(
-            edition=split.published_edition, kind=Publication.Kind.PUBLISHED
-        ).first()
-        if latest is None or latest.replaced is None:
+        former = predecessor(split)
+        if former is None:
             raise Refused(
                 f"{split.published_edition or split.pk} replaced no edition; there is nothing to go back to."
             )
         publication = ground_truth.make_board(
-            edition=Edition.objects.select_related("split").get(pk=latest.replaced_id),
+            edition=former,
             kind=Publication.Kind.ROLLED_BACK,
             reason=reason,
             now=now,
@@ -226,6 +224,18 @@ def roll_back(
         )
         queue_standing(publication.edition)
     return publication
+
+
+def predecessor(split: Split) -> Edition | None:
+    """The edition that rolling back returns to: the one that the board replaced when it was published."""
+    latest = split.publications.filter(
+        edition=split.published_edition_id, kind=Publication.Kind.PUBLISHED
+    ).first()
+    if latest is None or latest.replaced_id is None:
+        return None
+    return Edition.objects.select_related("split__published_edition", "ground_truth").get(
+        pk=latest.replaced_id
+    )
 
 
 def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None) -> None:

@@ -1,0 +1,119 @@
+"""What became of editions: when each was the board, what replaced it, what a correction did to an entry."""
+
+from dataclasses import dataclass
+
+from leaderboard.models import Edition, Evaluation, Publication, Split, Submission
+
+
+@dataclass(frozen=True)
+class Past:
+    """An edition that was published, and what became of it."""
+
+    edition: Edition
+    followed: Edition | None  # the board that it first replaced
+    replaced_by: Publication | None  # None while it is the board
+    publications: tuple[Publication, ...] = ()  # each time that it became the board, the newest first
+
+    @property
+    def is_board(self) -> bool:
+        """Whether it is the board now."""
+        return self.replaced_by is None
+
+
+@dataclass(frozen=True)
+class TruthChange:
+    """By how many sequences one ground truth differs from another."""
+
+    n_added: int
+    n_removed: int
+    n_changed: int
+
+    @property
+    def is_none(self) -> bool:
+        """Whether both are the same."""
+        return not (self.n_added or self.n_removed or self.n_changed)
+
+
+@dataclass(frozen=True)
+class Rescored:
+    """What the last change of the board did to one submission: its evaluation before and after."""
+
+    publication: Publication
+    old: Evaluation | None
+    new: Evaluation | None
+
+
+def changelog(split: Split) -> tuple[Publication, ...]:
+    """Every change of a split's board, the newest first."""
+    return tuple(
+        split.publications.select_related("edition__ground_truth", "replaced__ground_truth").order_by(
+            "-at", "-pk"
+        )
+    )
+
+
+def latest_change(split: Split) -> Publication | None:
+    """How the present board became the board; None if it replaced none."""
+    latest = (
+        split.publications.select_related("edition__ground_truth", "replaced__ground_truth")
+        .order_by("-at", "-pk")
+        .first()
+    )
+    return latest if latest and latest.replaced_id else None
+
+
+def history(split: Split) -> tuple[Past, ...]:
+    """Every edition that was ever published, the newest first."""
+    publications = changelog(split)
+    published = split.editions.exclude(published_at=None).select_related("ground_truth")
+    return tuple(_past(edition, split, publications) for edition in published.order_by("-number"))
+
+
+def past(edition: Edition) -> Past:
+    """What became of one edition that was published."""
+    return _past(edition, edition.split, changelog(edition.split))
+
+
+def _past(edition: Edition, split: Split, publications: tuple[Publication, ...]) -> Past:
+    own = tuple(p for p in publications if p.edition_id == edition.pk)
+    replaced_by = next((p for p in publications if p.replaced_id == edition.pk), None)
+    is_board = split.published_edition_id == edition.pk
+    return Past(
+        edition=edition,
+        followed=own[-1].replaced if own else None,
+        replaced_by=None if is_board else replaced_by,
+        publications=own,
+    )
+
+
+def truth_change(old: Edition, new: Edition) -> TruthChange | None:
+    """What differs between the ground truths of two editions; None if these two were never compared.
+
+    They are counted once, at import, against the ground truth that was published then.
+    """
+    before, after = old.ground_truth, new.ground_truth
+    if before.pk == after.pk:
+        return TruthChange(0, 0, 0)
+    if after.compared_with_id == before.pk:
+        return TruthChange(after.n_added, after.n_removed, after.n_changed)
+    if before.compared_with_id == after.pk:
+        return TruthChange(before.n_removed, before.n_added, before.n_changed)
+    return None
+
+
+def rescored(submission: Submission) -> Rescored | None:
+    """What the last change of the board did to a standing submission; None if it came after that."""
+    publication = latest_change(submission.split)
+    if publication is None or publication.at <= submission.submitted_at or submission.withdrawn_at:
+        return None
+    evaluations = {
+        evaluation.edition_id: evaluation
+        for evaluation in submission.evaluations.filter(
+            edition__in=[publication.edition_id, publication.replaced_id]
+        ).prefetch_related("scores")
+    }
+    return Rescored(
+        publication=publication,
+        old=evaluations.get(publication.replaced_id or 0),
+        new=evaluations.get(publication.edition_id),
+    )
