@@ -11,9 +11,9 @@ from django.core.exceptions import ValidationError
 from django.core.files.base import File
 from django.core.validators import URLValidator
 from django.db import IntegrityError, transaction
-from django.db.models import Avg, DurationField, ExpressionWrapper, F, Q
+from django.db.models import Q
 
-from leaderboard import audit, files, lifecycle, standings, teams
+from leaderboard import audit, estimates, files, lifecycle, standings, teams
 from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
 
 log = structlog.get_logger(__name__)
@@ -261,6 +261,7 @@ class Progress:
     problems: list[dict[str, str]] = field(default_factory=list)
     n_problems: int = 0
     fault_is_ours: bool = False
+    sentence: str = ""
     is_final: bool = False
     edition_number: int | None = None
     protocol: str = ""
@@ -278,7 +279,7 @@ def progress(submission: Submission) -> Progress:
     """How far a submission is, and what came of it."""
     evaluation = evaluation_of(submission)
     report = evaluation.report or {}
-    n_ahead, estimate_s = _waiting(evaluation)
+    place = estimates.place_of(evaluation)
     return Progress(
         state=evaluation.status,
         state_label=Status(evaluation.status).label,
@@ -286,8 +287,8 @@ def progress(submission: Submission) -> Progress:
         queued_at=evaluation.queued_at,
         started_at=evaluation.started_at,
         finished_at=evaluation.finished_at,
-        n_ahead=n_ahead,
-        estimate_s=estimate_s,
+        n_ahead=place.n_ahead if place else None,
+        estimate_s=place.estimate_s if place else None,
         scores=standings.flat_scores(evaluation.scores.all()) if evaluation.status == Status.SCORED else None,
         counts=report.get("counts", {}),
         truncated=report.get("truncated", {}),
@@ -295,32 +296,32 @@ def progress(submission: Submission) -> Progress:
         problems=evaluation.problems,
         n_problems=evaluation.n_problems,
         fault_is_ours=evaluation.status == Status.SYSTEM_ERROR,
+        sentence=_sentence(evaluation),
         is_final=evaluation.is_final,
         edition_number=evaluation.edition.number,
         protocol=evaluation.edition.protocol,
     )
 
 
-def _waiting(evaluation: Evaluation) -> tuple[int | None, float | None]:
-    """How many go first, and about how long that takes by the mean of the last fifty runs."""
-    if evaluation.is_final:
-        return None, None
-    n_ahead = 0
-    if evaluation.status == Status.QUEUED:
-        earlier = Q(priority__lt=evaluation.priority) | Q(
-            priority=evaluation.priority, queued_at__lt=evaluation.queued_at
-        )
-        n_ahead = Evaluation.objects.filter(earlier, status=Status.QUEUED).exclude(pk=evaluation.pk).count()
-    recent = (
-        Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED])
-        .exclude(started_at=None)
-        .order_by("-finished_at")
-        .annotate(took=ExpressionWrapper(F("finished_at") - F("started_at"), output_field=DurationField()))[
-            :50
-        ]
-    )
-    mean = recent.aggregate(mean=Avg("took"))["mean"]
-    if mean is None:
-        return n_ahead, None
-    n_running = Evaluation.objects.filter(status=Status.RUNNING).count()
-    return n_ahead, mean.total_seconds() * (n_ahead + n_running + 1)
+def _sentence(evaluation: Evaluation) -> str:
+    """Whose fault it was, or what goes on, where that needs saying."""
+    n_failed = evaluation.n_poison_strikes + evaluation.n_infrastructure_strikes
+    match evaluation.status:
+        case Status.REJECTED:
+            n = evaluation.n_problems
+            found = f"it has {n:,} problems" if n != 1 else "it has a problem"
+            return f"The file is at fault: {found}, so nothing of it was scored."
+        case Status.SYSTEM_ERROR:
+            tries = f"{n_failed} times" if n_failed != 1 else "once"
+            return (
+                f"The fault is ours, not the file's: scoring it failed {tries}. The file is kept; the "
+                "maintainers see it and can have it scored again."
+            )
+        case Status.CANCELLED:
+            return "Its team cancelled it before it was scored."
+        case Status.QUEUED | Status.RUNNING if n_failed:
+            tries = f"{n_failed} tries" if n_failed != 1 else "One try"
+            return (
+                f"{tries} ended without a result. That says nothing of the file; it is tried again by itself."
+            )
+    return ""

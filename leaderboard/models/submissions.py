@@ -185,6 +185,12 @@ class Evaluation(models.Model):
             ),
             models.Index(fields=["leased_until"], condition=Q(status="RUNNING"), name="evaluation_leases"),
             models.Index(fields=["edition", "status"], name="evaluation_by_edition"),
+            # The last runs, which every estimate for somebody who waits is made of.
+            models.Index(
+                fields=["-finished_at"],
+                condition=Q(status__in=["SCORED", "REJECTED"]),
+                name="evaluation_decided_last",
+            ),
         ]
 
     def __str__(self) -> str:

@@ -1,0 +1,160 @@
+"""How long a submission still has to wait, told from what the last runs show; None where nothing shows it.
+
+What is counted on is seen, never configured: how long runs took, how many went on at the same time, how long
+an evaluation waited for its claim although a worker was free. A worker that has died stops being counted as
+soon as the runs without it are the recent ones.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from statistics import fmean, median
+
+from django.db.models import Count, Q
+from django.db.models.functions import Now
+
+from leaderboard import clock, health
+from leaderboard.models import Evaluation, Status
+
+N_RUNS = 50
+"""As many of the last runs are looked at."""
+ALIVE_S = health.MAX_SWEEP_AGE_S
+"""A sweep or a claim this recent shows that somebody works."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """An evaluation that was decided: when it was queued, last claimed, and finished."""
+
+    queued_at: datetime
+    started_at: datetime
+    finished_at: datetime
+
+    @property
+    def took_s(self) -> float:
+        """From claim to decision."""
+        return (self.finished_at - self.started_at).total_seconds()
+
+    def is_running_at(self, at: datetime) -> bool:
+        """Whether a worker held it then."""
+        return self.started_at <= at < self.finished_at
+
+    def is_waiting_at(self, at: datetime) -> bool:
+        """Whether it was in the queue then."""
+        return self.queued_at <= at < self.started_at
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the database shows of the workers. `n_running` counts the claims that are held now."""
+
+    now: datetime
+    runs: Sequence[Run]
+    n_running: int
+    is_alive: bool
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where an evaluation stands: how many go first, and the seconds to its result, if anything tells."""
+
+    n_ahead: int
+    estimate_s: float | None
+
+
+def place_of(evaluation: Evaluation) -> Place | None:
+    """Where an evaluation stands; None once it is decided."""
+    if evaluation.is_final:
+        return None
+    if evaluation.priority != Evaluation.PRIORITY_LIVE:
+        # Re-scoring goes in batches behind everything else: single runs say nothing about it.
+        return Place(n_ahead=_n_ahead(evaluation), estimate_s=None)
+    evidence = _evidence()
+    if evaluation.status == Status.RUNNING and evaluation.started_at is not None:
+        return Place(0, left_s(evidence, elapsed_s=(evidence.now - evaluation.started_at).total_seconds()))
+    n_ahead = _n_ahead(evaluation)
+    due_in_s = (evaluation.due_at - evidence.now).total_seconds()
+    return Place(n_ahead, wait_s(evidence, n_ahead=n_ahead, due_in_s=due_in_s))
+
+
+# --- from evidence to seconds ---------------------------------------------------------------------------
+
+
+def wait_s(evidence: Evidence, *, n_ahead: int, due_in_s: float = 0.0) -> float | None:
+    """Seconds until the result of one that is queued behind `n_ahead` others and not due before `due_in_s`.
+
+    With c workers and runs of r seconds, one run ends every r / c seconds; a worker is free for this one
+    after as many ends as there are evaluations before it, less the workers that have nothing to do.
+    """
+    if not evidence.runs or not evidence.is_alive:
+        return None
+    run_s = fmean(run.took_s for run in evidence.runs)
+    n_workers = seen_workers(evidence)
+    n_ends = evidence.n_running + n_ahead - n_workers + 1
+    begins_in_s = claim_s(evidence.runs, n_workers=n_workers) if n_ends <= 0 else n_ends * run_s / n_workers
+    return max(begins_in_s, due_in_s) + run_s
+
+
+def left_s(evidence: Evidence, *, elapsed_s: float) -> float | None:
+    """Seconds left of a run that has gone on for `elapsed_s`: what longer runs took beyond that, on average.
+
+    None if none took longer: then nothing is known.
+    """
+    longer_s = [run.took_s - elapsed_s for run in evidence.runs if run.took_s > elapsed_s]
+    return fmean(longer_s) if longer_s else None
+
+
+def seen_workers(evidence: Evidence) -> int:
+    """How many evaluations were seen to run at the same time, at least one."""
+    at_once = [sum(run.is_running_at(each.started_at) for run in evidence.runs) for each in evidence.runs]
+    return max(1, evidence.n_running, *at_once)
+
+
+def claim_s(runs: Sequence[Run], *, n_workers: int) -> float:
+    """How long an evaluation waits for its claim although a worker is free: the middle of such cases."""
+    waits_s = [
+        (run.started_at - run.queued_at).total_seconds()
+        for run in runs
+        if _n_busy(runs, but=run, at=run.queued_at) < n_workers
+    ]
+    return median(waits_s) if waits_s else 0.0
+
+
+def _n_busy(runs: Sequence[Run], *, but: Run, at: datetime) -> int:
+    """How many other evaluations ran or waited then."""
+    return sum((run.is_running_at(at) or run.is_waiting_at(at)) for run in runs if run is not but)
+
+
+# --- from the database to evidence ----------------------------------------------------------------------
+
+
+def _evidence() -> Evidence:
+    decided = Evaluation.objects.filter(
+        status__in=[Status.SCORED, Status.REJECTED],
+        priority=Evaluation.PRIORITY_LIVE,
+        started_at__isnull=False,
+    )
+    rows = decided.order_by("-finished_at").values_list("queued_at", "started_at", "finished_at")[:N_RUNS]
+    runs = [Run(queued, started, finished) for queued, started, finished in rows if started and finished]
+    # A batch of re-scoring is held by one worker: its claims share their tokens.
+    held = Evaluation.objects.filter(status=Status.RUNNING, leased_until__gt=Now())
+    n_running: int = held.aggregate(n=Count("lease_token", distinct=True))["n"]
+    now = clock.database_now()
+    age_s = health.sweep_age_s()
+    is_alive = (
+        n_running > 0
+        or (age_s is not None and age_s < ALIVE_S)
+        or any(now - run.started_at < timedelta(seconds=ALIVE_S) for run in runs)
+    )
+    return Evidence(now=now, runs=runs, n_running=n_running, is_alive=is_alive)
+
+
+def _n_ahead(evaluation: Evaluation) -> int:
+    """How many are claimed before this one; those that wait for another try are not in its way."""
+    if evaluation.status != Status.QUEUED:
+        return 0
+    earlier = Q(priority__lt=evaluation.priority) | Q(
+        priority=evaluation.priority, queued_at__lt=evaluation.queued_at
+    )
+    waiting = Evaluation.objects.filter(earlier, status=Status.QUEUED, due_at__lte=Now())
+    return waiting.exclude(pk=evaluation.pk).count()
