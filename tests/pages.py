@@ -5,7 +5,7 @@ from html.parser import HTMLParser
 
 from django.http import HttpResponse, HttpResponseBase
 
-VOID = {"meta", "link", "input", "br", "hr", "img", "path", "rect", "source", "mspace"}
+VOID = {"col", "meta", "link", "input", "br", "hr", "img", "path", "rect", "source", "mspace"}
 
 
 @dataclass

@@ -10,11 +10,13 @@ from leaderboard.models import Split
 _SECTIONS = {
     "home": "board",
     "board": "board",
+    "edition": "board",
     "method": "board",
     "submit": "submit",
     "submissions": "submissions",
     "submission": "submissions",
     "docs": "docs",
+    "api_reference": "api",
 }
 
 

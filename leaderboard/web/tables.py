@@ -5,7 +5,9 @@ Templates only place what they are given; a thousand rows of number filters woul
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Final
+from urllib.parse import urlencode
 
 from evaluator.protocol import INTERVALS, SCORE_NAMES, Interval
 from evaluator.report import format_published
@@ -149,15 +151,18 @@ class MethodResult:
     groups: tuple[ResultGroup, ...]
 
 
-def board_table(board: Board) -> BoardTable:
-    """The board, ready to be drawn."""
+def board_table(board: Board, *, query: Mapping[str, str]) -> BoardTable:
+    """The board, ready to be drawn; its links keep what else the address asks for."""
+    kept = {name: value for name, value in query.items() if name != "sort"}
     sources = _sources(board.entries)
     numbers = {source.citation: source.number for source in sources}
     counts = board.edition.ground_truth.counts if board.edition else {}
     return BoardTable(
-        text_headings=tuple(_text_heading(name, board.sort) for name in ("rank", "method", "team", "date")),
+        text_headings=tuple(
+            _text_heading(name, board.sort, kept) for name in ("rank", "method", "team", "date")
+        ),
         groups=score_groups(),
-        score_headings=tuple(score_heading(name, board.sort) for name in SCORE_NAMES),
+        score_headings=tuple(score_heading(name, board.sort, kept) for name in SCORE_NAMES),
         rows=tuple(_row(entry, numbers) for entry in board.entries),
         sources=sources,
         intervals=interval_facts(counts),
@@ -185,7 +190,7 @@ def interval_facts(counts: Mapping[str, int]) -> tuple[IntervalFact, ...]:
     )
 
 
-def score_heading(name: str, sort: str) -> Heading:
+def score_heading(name: str, sort: str = "", kept: Mapping[str, str] = MappingProxyType({})) -> Heading:
     """The head of one of the ten numbers."""
     metric, _, interval_name = name.partition("_")
     symbol = METRIC_SYMBOLS[metric]
@@ -199,7 +204,7 @@ def score_heading(name: str, sort: str) -> Heading:
         caption=interval_name or "overall",
         unit=METRIC_UNITS[metric],
         spoken=spoken,
-        href=_sort_href(name, sort),
+        href=_sort_href(name, sort, kept),
         aria_sort=_aria_sort(name, sort),
         css=f"{css} first" if interval is None else css,
     )
@@ -232,7 +237,7 @@ def result_groups(
     second: frozenset[str] = frozenset(),
 ) -> tuple[ResultGroup, ...]:
     """The ten numbers of one result, with the number of sequences behind each."""
-    headings = [score_heading(name, "") for name in SCORE_NAMES]
+    headings = [score_heading(name) for name in SCORE_NAMES]
     columns = [
         (heading, cell, grouped(counts.get(heading.caption)))
         for heading, cell in zip(headings, score_cells(scores, best=best, second=second), strict=True)
@@ -291,21 +296,21 @@ def _cell_css(name: str, value: float | None, decimals: int) -> str:
     return f"{place} absent" if value is None else f"{place} d{decimals}"
 
 
-def _text_heading(name: str, sort: str) -> Heading:
+def _text_heading(name: str, sort: str, kept: Mapping[str, str]) -> Heading:
     label = {"rank": "Rank", "method": "Method", "team": "Team", "date": "Date"}[name]
     return Heading(
         name=name,
         symbol=label,
-        href=_sort_href(name, sort),
+        href=_sort_href(name, sort, kept),
         aria_sort=_aria_sort(name, sort),
         css=f"{name} wide" if name in {"team", "date"} else name,
     )
 
 
-def _sort_href(name: str, sort: str) -> str:
+def _sort_href(name: str, sort: str, kept: Mapping[str, str]) -> str:
     """Sort by this column; where it decides already, turn round. Dates begin with the newest."""
     usual, other = (f"-{name}", name) if name == "date" else (name, f"-{name}")
-    return f"?sort={other if sort == usual else usual}"
+    return "?" + urlencode({**kept, "sort": other if sort == usual else usual})
 
 
 def _aria_sort(name: str, sort: str) -> str:

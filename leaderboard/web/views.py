@@ -15,7 +15,8 @@ from django.views.decorators.http import require_http_methods, require_safe
 
 from leaderboard import methods, standings
 from leaderboard import submissions as verbs
-from leaderboard.models import Evaluation, Method, Split, Submission, User
+from leaderboard.models import Edition, Evaluation, Method, Publication, Split, Submission, User
+from leaderboard.web import api_reference as api
 from leaderboard.web import reference, tables
 from leaderboard.web.forms import SubmissionForm
 from leaderboard.web.progress import shown
@@ -34,13 +35,30 @@ def home(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def board(request: HttpRequest, split: str) -> HttpResponse:
-    """A split's board, in the order that `?sort=` asks for."""
+    """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
     found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+    return _board(request, split=found)
+
+
+@require_safe
+def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """The board of one edition, at an address that stays."""
+    rows = Edition.objects.exclude(published_at=None)
+    rows = rows.select_related("split__published_edition", "ground_truth")
+    found = get_object_or_404(rows, split=split, number=number)
+    return _board(request, split=found.split, edition=found)
+
+
+def _board(request: HttpRequest, **asked: Any) -> HttpResponse:
+    query = {name: request.GET[name] for name in ("sort", "at") if name in request.GET}
     try:
-        shown = standings.board(split=found, viewer=request.user, sort=request.GET.get("sort", "rank"))
-    except standings.UnknownColumn as fault:
+        at = standings.parse_moment(query["at"]) if "at" in query else None
+        shown = standings.board(viewer=request.user, sort=query.get("sort", "rank"), at=at, **asked)
+    except (standings.UnknownColumn, standings.BadMoment) as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=400)
-    return render(request, "board.html", {"board": shown, "table": tables.board_table(shown)})
+    history = Publication.objects.filter(split=shown.split).select_related("edition", "replaced")
+    table = tables.board_table(shown, query=query)
+    return render(request, "board.html", {"board": shown, "table": table, "history": history})
 
 
 @login_required
@@ -110,6 +128,12 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
 def docs(request: HttpRequest) -> HttpResponse:
     """How to submit, the file's format, the errors, the API."""
     return render(request, "docs.html", reference.docs())
+
+
+@require_safe
+def api_reference(request: HttpRequest) -> HttpResponse:
+    """Every path, parameter and shape of the API."""
+    return render(request, "api_reference.html", {"api": api.reference()})
 
 
 def _evaluation(request: HttpRequest, submission_id: UUID) -> dict[str, Any]:

@@ -14,6 +14,7 @@ PUBLIC = (
     "/board/test/?sort=-rte_negative",
     "/board/val/",
     "/docs/",
+    "/docs/api/",
     "/accounts/login/",
     "/accounts/signup/",
     "/accounts/password/reset/",

@@ -22,6 +22,7 @@ PUBLIC = [
     "/board/demo/",
     "/?sort=-rte",
     "/docs/",
+    "/docs/api/",
     "/accounts/login/",
     "/accounts/login/?next=/submit/",
     "/accounts/signup/",

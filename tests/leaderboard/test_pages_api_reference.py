@@ -1,0 +1,40 @@
+"""The API's reference."""
+
+from django.test import Client
+from django.urls import reverse
+
+from tests import pages
+
+
+def get(client: Client) -> pages.Element:
+    response = client.get("/docs/api/")
+    assert response.status_code == 200
+    return pages.page(response)
+
+
+def test_every_operation_of_the_schema_is_described(client: Client, benchmark: None) -> None:
+    schema = client.get(reverse("api-schema"), headers={"accept": "application/vnd.oai.openapi+json"}).json()
+    described = {h2.text for h2 in get(client).all("h2", class_="operation")}
+    assert described == {
+        f"{method.upper()} {path}" for path, methods in schema["paths"].items() for method in methods
+    }
+
+
+def test_links_between_shapes_lead_somewhere(client: Client, benchmark: None) -> None:
+    root = get(client)
+    ids = {e.attributes["id"] for e in root.everything() if "id" in e.attributes}
+    wanted = {a.attributes["href"][1:] for a in root.all("a") if a.attributes["href"].startswith("#")}
+    assert len(wanted) > 20
+    assert wanted <= ids
+
+
+def test_submitting_says_what_to_send_and_that_it_needs_an_account(client: Client, benchmark: None) -> None:
+    section = get(client).one("section", **{"aria-labelledby": "submit"})
+    assert "Needs an account" in section.text
+    fields = [row.all("td")[0].text for row in section.one("tbody").all("tr")]
+    assert fields[:3] == ["split", "method", "file"]
+    assert [dt.text for dt in section.one("dl").all("dt")] == ["200", "201", "409", "413", "422"]
+
+
+def test_boards_need_no_account(client: Client, benchmark: None) -> None:
+    assert "Needs an account" not in get(client).one("section", **{"aria-labelledby": "board"}).text
