@@ -10,6 +10,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import IO
 
@@ -21,10 +22,12 @@ from numpy.typing import NDArray
 CHUNK_BYTES = 1 << 20
 INCOMING = ".incoming"
 LEFTOVER_S = 3600.0
+FRESH = timedelta(hours=12)
+"""Younger files are nobody's to clean up; see `leaderboard/cleaning.py`, which waits for twice as long."""
 
 
 class StoreAway(OSError):
-    """The store is on another machine and does not answer, or refuses us. What was asked for may work later."""
+    """The store is on another machine and does not answer, or refuses us. Asking again later may help."""
 
 
 class DurableFileSystemStorage(FileSystemStorage):
@@ -51,7 +54,8 @@ class DurableFileSystemStorage(FileSystemStorage):
         incoming = Path(self.location) / INCOMING
         incoming.mkdir(parents=True, exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        _remove_leftovers(incoming)
+        for leftover in self.leftovers():
+            leftover.unlink(missing_ok=True)
         handle, temporary = tempfile.mkstemp(dir=incoming)
         try:
             with os.fdopen(handle, "wb") as out:
@@ -78,14 +82,29 @@ class DurableFileSystemStorage(FileSystemStorage):
             if directory == root:
                 return
 
+    def delete_if_older(self, name: str, than: datetime) -> bool:
+        """Remove a file unless it was written after `than`, even in this moment; whether it was removed."""
+        target = Path(self.path(name))
+        aside = Path(self.location) / INCOMING / f"removed-{target.name}"
+        aside.parent.mkdir(exist_ok=True)
+        try:
+            target.rename(aside)
+        except FileNotFoundError:
+            return False
+        # Nobody writes to it under this name, so its age is certain now.
+        if aside.stat().st_mtime < than.timestamp():
+            aside.unlink()
+            return True
+        aside.replace(target)
+        return False
 
-def _remove_leftovers(incoming: Path) -> None:
-    """Remove what was begun more than an hour ago: nobody writes a file of a few megabytes for so long."""
-    for entry in os.scandir(incoming):
-        # Another process may be tidying up too.
-        with suppress(FileNotFoundError):
-            if time.time() - entry.stat().st_mtime > LEFTOVER_S:
-                Path(entry.path).unlink()
+    def leftovers(self) -> Iterator[Path]:
+        """What was begun more than an hour ago: nobody writes a file of a few megabytes for so long."""
+        for entry in (Path(self.location) / INCOMING).glob("*"):
+            # Another process may be tidying up too.
+            with suppress(FileNotFoundError):
+                if time.time() - entry.stat().st_mtime > LEFTOVER_S:
+                    yield entry
 
 
 @dataclass(frozen=True)
@@ -112,8 +131,11 @@ def manifest_name(digest: str) -> str:
     return f"manifests/{digest.removeprefix('sha256:')}.csv"
 
 
-def keep_predictions(upload: "File[bytes]") -> StoredFile:
+def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
     """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
+
+    Bytes that have been there for long are written again all the same: whoever cleans up looks for old files
+    that no row names, and this one's row is only about to be written.
 
     Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
     """
@@ -124,7 +146,7 @@ def keep_predictions(upload: "File[bytes]") -> StoredFile:
         size_bytes += len(chunk)
     kept = StoredFile(digest=f"sha256:{digest.hexdigest()}", size_bytes=size_bytes)
     name = predictions_name(kept.digest)
-    if not store().exists(name):
+    if not store().exists(name) or store().get_modified_time(name) < now - FRESH:
         upload.seek(0)
         store().save(name, upload)
     return kept

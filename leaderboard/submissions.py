@@ -80,7 +80,7 @@ def submit(
     )
     note = _clean_text("note", note, limit=500, required=False)
     commit = _clean_text("commit", commit, limit=64, required=False)
-    kept = _keep(upload)
+    kept = _keep(upload, now=now)
     team = teams.team_of(user=user)
     with transaction.atomic():
         method = _method(team=team, name=name, details=details, now=now)
@@ -154,14 +154,14 @@ def _open_split(name: str, *, now: datetime) -> Split:
     return split
 
 
-def _keep(upload: File | None) -> files.StoredFile:
+def _keep(upload: "File[bytes] | None", *, now: datetime) -> files.StoredFile:
     if upload is None:
         raise Refused(
             "no-file", "No prediction file was sent; expected one in the field 'file'.", field="file"
         )
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
         raise TooLarge("too-large", too_large(found_bytes=upload.size), field="file")
-    return files.keep_predictions(upload)
+    return files.keep_predictions(upload, now=now)
 
 
 def too_large(*, found_bytes: int) -> str:

@@ -6,6 +6,7 @@ import os
 import random
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,11 @@ from django.core.exceptions import ImproperlyConfigured
 from django.core.files.base import ContentFile
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
+from django.utils import timezone
 from moto.server import ThreadedMotoServer
 from pytest_django import Settings
 
-from leaderboard import files, s3, scoring, tokens
+from leaderboard import cleaning, files, s3, scoring, tokens
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from tests import builders
 
@@ -110,8 +112,8 @@ def test_submission_is_scored_and_the_manifest_served_without_any_local_file(
 
 def test_same_bytes_are_one_object(stored: s3.S3FileStore, bucket: Any) -> None:
     upload = ContentFile(b'{"0": 1.5}', name="p.json")
-    first = files.keep_predictions(upload)
-    assert files.keep_predictions(upload) == first
+    first = files.keep_predictions(upload, now=timezone.now())
+    assert files.keep_predictions(upload, now=timezone.now()) == first
     assert _names(bucket) == [f"files/{files.predictions_name(first.digest)}"]
     with files.opened_predictions(first.digest) as kept:
         assert kept.read() == b'{"0": 1.5}'
@@ -119,7 +121,7 @@ def test_same_bytes_are_one_object(stored: s3.S3FileStore, bucket: Any) -> None:
 
 def test_object_is_named_by_the_digest_of_what_it_holds(stored: s3.S3FileStore, bucket: Any) -> None:
     data = random.Random(1).randbytes(9_000_001)
-    kept = files.keep_predictions(ContentFile(data, name="p.json"))
+    kept = files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
     [entry] = bucket.objects.all()
     body = entry.get()["Body"].read()
     assert kept.size_bytes == len(body)
@@ -128,7 +130,7 @@ def test_object_is_named_by_the_digest_of_what_it_holds(stored: s3.S3FileStore, 
 
 def test_opened_file_has_a_descriptor_that_a_child_process_can_read(stored: s3.S3FileStore) -> None:
     data = b'{"0": 1.5}' * 1000
-    kept = files.keep_predictions(ContentFile(data, name="p.json"))
+    kept = files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
     with files.opened_predictions(kept.digest) as source:
         assert os.pread(source.fileno(), len(data) + 1, 0) == data
         assert os.lseek(source.fileno(), 0, os.SEEK_CUR) == 0, "a child reads from the start"
@@ -137,7 +139,7 @@ def test_opened_file_has_a_descriptor_that_a_child_process_can_read(stored: s3.S
 def test_many_threads_may_use_the_store_at_once(stored: s3.S3FileStore) -> None:
     def there_and_back(number: int) -> bool:
         data = f'{{"{number}": 1.5}}'.encode()
-        kept = files.keep_predictions(ContentFile(data, name="p.json"))
+        kept = files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
         with files.opened_predictions(kept.digest) as source:
             return source.read() == data
 
@@ -258,3 +260,26 @@ def test_key_in_the_url_is_refused_and_not_repeated() -> None:
         s3.parsed("s3://AKIAKEY:swordfish@bucket/folder")
     assert "AWS_SECRET_ACCESS_KEY" in str(caught.value)
     assert "swordfish" not in str(caught.value)
+
+
+# --- cleaning up ----------------------------------------------------------------------------------------
+
+
+def test_orphan_in_the_bucket_is_found_and_removed(stored: s3.S3FileStore, bucket: Any, db: None) -> None:
+    kept = files.keep_predictions(ContentFile(b'{"0": 1.5}', name="p.json"), now=timezone.now())
+    assert list(cleaning.orphans(now=timezone.now())) == []
+    in_two_days = timezone.now() + timedelta(days=2)
+    [orphan] = cleaning.orphans(now=in_two_days)
+    assert (orphan.digest, orphan.size_bytes) == (kept.digest, 10)
+    assert not cleaning.remove(orphan, now=timezone.now()), "written within the day"
+    assert cleaning.remove(orphan, now=in_two_days)
+    assert _names(bucket) == []
+
+
+def test_old_object_that_comes_again_is_written_again(stored: s3.S3FileStore, bucket: Any) -> None:
+    upload = ContentFile(b'{"0": 1.5}', name="p.json")
+    n_puts: list[int] = []
+    stored._client.meta.events.register("before-call.s3.PutObject", lambda **_: n_puts.append(1))
+    for later in (timedelta(0), timedelta(hours=1), timedelta(hours=13)):
+        files.keep_predictions(upload, now=timezone.now() + later)
+    assert len(n_puts) == 2

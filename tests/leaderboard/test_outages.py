@@ -14,6 +14,7 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.db import InterfaceError, OperationalError, connection
 from django.http import HttpResponse
 from django.test import Client
+from django.utils import timezone
 from pytest_django import Settings
 
 from leaderboard import files, outages, tokens
@@ -168,12 +169,12 @@ def test_file_is_flushed_before_it_is_renamed_and_its_directories_after(
 
     monkeypatch.setattr(os, "fsync", fsync)
     monkeypatch.setattr(Path, "replace", replace)
-    kept = files.keep_predictions(ContentFile(b"{}"))
+    kept = files.keep_predictions(ContentFile(b"{}"), now=timezone.now())
     folder = Path(settings.FILES_DIR) / Path(files.predictions_name(kept.digest)).parent
     above = [folder, folder.parent, folder.parent.parent]
     assert events == ["flush ('.incoming',)", "rename", *(f"flush {path}" for path in above)]
     events.clear()
-    assert files.keep_predictions(ContentFile(b"{}")) == kept
+    assert files.keep_predictions(ContentFile(b"{}"), now=timezone.now()) == kept
     assert events == [f"flush {path}" for path in above], (
         "known bytes are answered only once they are durable"
     )
@@ -185,7 +186,7 @@ def test_interrupted_upload_is_never_visible(settings: Settings, monkeypatch: py
 
     monkeypatch.setattr(Path, "replace", killed)
     with pytest.raises(KeyboardInterrupt):
-        files.keep_predictions(ContentFile(b"{}"))
+        files.keep_predictions(ContentFile(b"{}"), now=timezone.now())
     assert not [path for path in Path(settings.FILES_DIR).rglob("*") if path.is_file()]
 
 
@@ -196,5 +197,5 @@ def test_leftovers_of_killed_processes_are_removed_after_an_hour(settings: Setti
     for path in (old, new):
         path.write_bytes(b"{")
     os.utime(old, (time.time() - files.LEFTOVER_S - 60,) * 2)
-    files.keep_predictions(ContentFile(b"{}"))
+    files.keep_predictions(ContentFile(b"{}"), now=timezone.now())
     assert [path.name for path in incoming.iterdir()] == ["new"]

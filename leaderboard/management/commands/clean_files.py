@@ -1,0 +1,46 @@
+"""`manage.py clean_files [--remove]`."""
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+from django.utils import timezone
+
+from leaderboard import cleaning
+
+
+class Command(BaseCommand):
+    """Lists or removes files that no submission names."""
+
+    help = "List stored files that no submission has named for a day; with --remove, remove them."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Whether to remove."""
+        parser.add_argument(
+            "--remove", action="store_true", help="remove what is listed, each with an audit row"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Go through the store, and say what was found and done."""
+        try:
+            self._files(remove=options["remove"])
+        except OSError as fault:
+            raise CommandError(f"The file store does not answer: {fault.strerror or fault}") from fault
+        for path in cleaning.leftovers():
+            self.stdout.write(f"half-written: {path.name}")
+            if options["remove"]:
+                path.unlink(missing_ok=True)
+
+    def _files(self, *, remove: bool) -> None:
+        now = timezone.now()
+        n_found = n_removed = n_bytes = 0
+        for orphan in cleaning.orphans(now=now):
+            self.stdout.write(
+                f"{orphan.name}  {orphan.size_bytes:,} bytes, written {orphan.modified_at:%Y-%m-%d %H:%M} UTC"
+            )
+            n_found += 1
+            n_bytes += orphan.size_bytes
+            n_removed += remove and cleaning.remove(orphan, now=now)
+        found = f"{n_found} file{'s' if n_found != 1 else ''} without a submission, {n_bytes:,} bytes"
+        done = f"removed {n_removed}" if remove else "nothing was removed (--remove does)"
+        self.stdout.write(f"{found}; {done}.")
