@@ -1,7 +1,8 @@
 """Addresses of the API, version 1."""
 
 from django.urls import path
-from drf_spectacular.views import SpectacularAPIView, SpectacularRedocView
+from django.views.generic import RedirectView
+from drf_spectacular.views import SpectacularAPIView
 from rest_framework.permissions import AllowAny
 
 from leaderboard.api import edition_views, views
@@ -31,9 +32,5 @@ urlpatterns = [
     path("splits/<slug:split>/changelog", edition_views.ChangelogView.as_view(), name="api-changelog"),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
     path("schema", SpectacularAPIView.as_view(permission_classes=[AllowAny]), name="api-schema"),
-    path(
-        "docs",
-        SpectacularRedocView.as_view(url_name="api-schema", permission_classes=[AllowAny]),
-        name="api-docs",
-    ),
+    path("docs", RedirectView.as_view(pattern_name="api_reference"), name="api-docs"),
 ]

@@ -1,9 +1,11 @@
 """Sign up, sign in, reset the password."""
 
 import re
+from collections.abc import Iterator
 
 import pytest
 from django.core import mail
+from django.core.cache import cache
 from django.http import HttpResponseBase
 from django.test import Client
 
@@ -11,6 +13,13 @@ from leaderboard.models import Edition, User
 from tests import builders, pages
 
 PASSWORD = "kestrel-altimeter-9"
+
+
+@pytest.fixture
+def forgiven() -> Iterator[None]:
+    """Afterwards nobody is remembered for too many tries."""
+    yield
+    cache.clear()
 
 
 def sign_up(client: Client, **fields: str) -> HttpResponseBase:
@@ -100,3 +109,12 @@ def test_reset_does_not_tell_which_addresses_are_known(client: Client, owner: Us
 def test_used_link_is_refused_in_plain_words(client: Client, benchmark: None) -> None:
     root = pages.page(client.get("/accounts/password/reset/key/1-nonsense/", follow=True))
     assert root.one("h1").text == "The link is no longer valid"
+
+
+@pytest.mark.usefixtures("forgiven")
+def test_guessing_passwords_ends_on_a_page_that_says_so(client: Client, owner: User, benchmark: None) -> None:
+    guess = {"login": owner.email, "password": "wrong"}
+    answers = [client.post("/accounts/login/", guess) for _ in range(12)]
+    refused = pages.page(answers[-1]).one("main").text
+    assert "Too many" in refused
+    assert client.post("/accounts/login/", {**guess, "password": "correct horse"}).status_code != 302

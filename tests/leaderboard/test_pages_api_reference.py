@@ -38,3 +38,7 @@ def test_submitting_says_what_to_send_and_that_it_needs_an_account(client: Clien
 
 def test_boards_need_no_account(client: Client, benchmark: None) -> None:
     assert "Needs an account" not in get(client).one("section", **{"aria-labelledby": "board"}).text
+
+
+def test_address_beside_the_schema_leads_to_the_reference(client: Client, benchmark: None) -> None:
+    assert client.get("/api/v1/docs").headers["Location"] == "/docs/api/"
