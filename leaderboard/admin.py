@@ -1,10 +1,11 @@
 """Django's admin, read-mostly; its actions call the same verbs as every other door."""
 
+from typing import Any
 
 from django.contrib import admin, messages
 from django.contrib.auth.admin import UserAdmin as DjangoUserAdmin
 from django.db.models import Model, QuerySet
-from django.http import HttpRequest
+from django.http import HttpRequest, HttpResponse
 
 from leaderboard import lifecycle
 from leaderboard.models import (
@@ -17,6 +18,7 @@ from leaderboard.models import (
     Method,
     PublishedResult,
     Split,
+    Status,
     Submission,
     Team,
     User,
@@ -58,6 +60,14 @@ class EvaluationAdmin(ReadOnlyAdmin):
     list_select_related = ["submission__method", "edition"]
     date_hierarchy = "queued_at"
     actions = ["retry"]
+
+    def changelist_view(
+        self, request: HttpRequest, extra_context: dict[str, Any] | None = None
+    ) -> HttpResponse:
+        """The list, headed by how many wait for a maintainer."""
+        n_failed = Evaluation.objects.filter(status=Status.SYSTEM_ERROR).count()
+        heading = f"{n_failed} failed by our fault and wait to be retried" if n_failed else None
+        return super().changelist_view(request, {"subtitle": heading, **(extra_context or {})})
 
     @admin.action(description="Retry system errors", permissions=["retry"])
     def retry(self, request: HttpRequest, queryset: QuerySet[Evaluation]) -> None:

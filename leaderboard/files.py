@@ -146,10 +146,18 @@ def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
         size_bytes += len(chunk)
     kept = StoredFile(digest=f"sha256:{digest.hexdigest()}", size_bytes=size_bytes)
     name = predictions_name(kept.digest)
-    if not store().exists(name) or store().get_modified_time(name) < now - FRESH:
+    if not _is_fresh(name, now=now):
         upload.seek(0)
         store().save(name, upload)
     return kept
+
+
+def _is_fresh(name: str, *, now: datetime) -> bool:
+    try:
+        return store().exists(name) and store().get_modified_time(name) >= now - FRESH
+    except FileNotFoundError:
+        # It was cleaned up between the two questions.
+        return False
 
 
 def aligned_name(*, manifest_digest: str, digest: str) -> str:
