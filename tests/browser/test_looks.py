@@ -20,6 +20,8 @@ PUBLIC = (
     "/accounts/password/reset/",
 )
 PRIVATE = ("/submit/", "/submissions/", "/accounts/email/", "/accounts/password/change/")
+# A tenth of what counts as good: a table's columns may settle by a hair while its rows arrive.
+MAX_SHIFT = 0.01
 SCREENS = [(size, scheme) for size in ("wide", "narrow") for scheme in ("light", "dark")]
 
 
@@ -39,7 +41,7 @@ def look_at(page: Page, addresses: tuple[str, ...]) -> None:
         assert answer is not None
         assert answer.status == 200, address
         assert page.evaluate(OVERFLOW_PX) <= 0, f"{address} is wider than the screen"
-        assert page.evaluate(LAYOUT_SHIFT) == 0, f"{address} moves while it loads"
+        assert page.evaluate(LAYOUT_SHIFT) < MAX_SHIFT, f"{address} moves while it loads"
         assert page.evaluate(LOW_CONTRAST) == [], address
 
 
