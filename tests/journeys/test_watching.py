@@ -1,0 +1,95 @@
+"""What an operator sees of a running site: probes, figures, and logs that follow a submission."""
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import httpx
+import pytest
+
+import evaluator
+from tests.journeys.people import PASSWORD, Program, Visitor
+from tests.journeys.production import Site, await_that
+
+pytestmark = [pytest.mark.services, pytest.mark.slow]
+
+People = Callable[[Site], Visitor]
+Programs = Callable[[Site, str], Program]
+
+
+def lines(site: Site, name: str) -> list[dict[str, Any]]:
+    """A process's log. A line that is no JSON fails the test, but for Celery's greeting at a terminal."""
+    text = (site.directory / f"{name}.log").read_text().splitlines()
+    return [json.loads(line) for line in text if name == "web" or line.startswith("{")]
+
+
+def about(site: Site, name: str, submission: str) -> list[dict[str, Any]]:
+    return [line for line in lines(site, name) if line.get("submission_id") == submission]
+
+
+def is_ready(site: Site) -> bool:
+    return httpx.get(f"{site.url}/readyz", trust_env=False).status_code == 200
+
+
+def figure(site: Site, name: str) -> float:
+    """One figure of /metrics, read from loopback as a Prometheus on the same machine would."""
+    answer = httpx.get(f"{site.url}/metrics", trust_env=False)
+    assert answer.status_code == 200
+    return next(float(line.split()[-1]) for line in answer.text.splitlines() if line.startswith(f"{name} "))
+
+
+def test_a_submission_can_be_followed_through_every_process_and_nothing_secret_is_written(
+    site: Site, people: People, programs: Programs, truth: evaluator.GroundTruth
+) -> None:
+    eve = people(site)
+    eve.sign_up(email="eve@example.org", name="Eve and company")
+    eve.get("/accounts/password/reset/key/4-c2hhcmVk-secret/")
+    eve.get("/board/test/?sort=-mid&looking=for-something")
+    data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * 1.07)
+    program = programs(site, "eve@example.org")
+    submission = program.submit(split="test", method="Followed", data=data)
+    assert program.outcome(submission)["state"] == "SCORED"
+
+    [queued] = [line for line in about(site, "web", submission) if line["event"] == "evaluation_queued"]
+    [finished] = [
+        line for line in about(site, "worker", submission) if line["event"] == "evaluation_finished"
+    ]
+    assert finished["evaluation_id"] == queued["evaluation_id"]
+    assert finished["status"] == "SCORED"
+    if "task_id" in finished:  # found by the message, and not by the worker's own look
+        assert finished["request_id"] == queued["request_id"]
+
+    text = "".join(path.read_text() for path in site.directory.glob("*.log"))
+    token = str(program.http.headers["Authorization"]).removeprefix("Bearer ")
+    secrets = [token, token[-40:], PASSWORD, "@example.org", "c2hhcmVk-secret", "for-something"]
+    assert [secret for secret in secrets if secret in text] == []
+    true_values = [repr(value)[:10] for value in truth.ttc_s.tolist() if len(repr(value)) > 12]
+    assert [value for value in true_values if value in text] == []
+    assert len(lines(site, "beat")) > 0
+
+
+def test_a_working_site_says_so(site: Site) -> None:
+    assert httpx.get(f"{site.url}/healthz", trust_env=False).json() == {"status": "alive"}
+    # The first sweep comes with beat's first round.
+    await_that(lambda: is_ready(site), what="the site is ready")
+    assert 0 <= figure(site, "tsttc_last_sweep_age_seconds") < 60
+
+
+def test_figures_follow_what_is_scored(
+    site: Site, people: People, programs: Programs, truth: evaluator.GroundTruth
+) -> None:
+    people(site).sign_up(email="finn@example.org", name="Finn")
+    program = programs(site, "finn@example.org")
+    scored = 'tsttc_runs_finished_total{outcome="scored"}'
+    before = figure(site, scored)
+    data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * 1.11)
+    assert program.outcome(program.submit(split="test", method="Counted", data=data))["state"] == "SCORED"
+    assert figure(site, scored) == before + 1
+    assert figure(site, 'tsttc_queue_depth{priority="live"}') == 0
+    assert figure(site, 'tsttc_evaluations{status="SYSTEM_ERROR"}') == 0
+
+
+def test_a_stranger_reads_no_figures_through_a_proxy(site: Site) -> None:
+    for header in ("X-Forwarded-For", "Forwarded", "X-Real-IP", "X-Forwarded-Proto"):
+        answer = httpx.get(f"{site.url}/metrics", headers={header: "127.0.0.1"}, trust_env=False)
+        assert answer.status_code == 403
