@@ -1,9 +1,26 @@
-"""The audit trail: who did what to what, when."""
+"""The audit trail: who did what to what, when. Each event is bound to the one before it by its hash.
 
-from collections.abc import Iterable, Mapping
+Of two transactions that write events the second waits for the end of the first, whose hash it has to know.
+A verb therefore records last of all that it writes: the wait is then as long as a COMMIT, and nobody waits
+for a row while others wait for the chain.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
+from django.db import connection, transaction
+from django.db.models import QuerySet
+from django.utils import timezone
+
 from leaderboard.models import AuditEvent, User
+from leaderboard.models.audit import GENESIS
+
+# Names the chain among PostgreSQL's advisory locks: "audit" in ASCII.
+_LOCK = 0x6175646974
+_CHUNK = 2000
+MAX_BREAKS = 20
 
 
 def record(
@@ -14,15 +31,132 @@ def record(
     actor: User | None = None,
     details: Mapping[str, Any] | None = None,
 ) -> AuditEvent:
-    """Write one deed. Call it inside the transaction of the deed itself: both happen, or neither."""
-    return AuditEvent.objects.create(
-        verb=verb, noun=noun, noun_id=str(noun_id), actor=actor, details=dict(details or {})
-    )
+    """Write one deed. Call it inside the transaction of the deed itself: both happen, or neither.
+
+    `details` are texts, whole numbers, truth values, None, and lists and mappings of them; never a secret,
+    never a value of a hidden ground truth. Raises `TypeError` for anything else, also for floats, which no
+    two databases give back alike.
+    """
+    [event] = _append([(verb, noun, noun_id, details or {})], actor=actor)
+    return event
 
 
 def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
     """Write many deeds of the machine itself at once: verb, noun, noun_id, details."""
-    AuditEvent.objects.bulk_create(
-        AuditEvent(verb=verb, noun=noun, noun_id=str(noun_id), details=dict(details))
-        for verb, noun, noun_id, details in deeds
-    )
+    _append(list(deeds), actor=None)
+
+
+def _append(
+    deeds: Sequence[tuple[str, str, object, Mapping[str, Any]]], *, actor: User | None
+) -> list[AuditEvent]:
+    if not deeds:
+        return []
+    with transaction.atomic():
+        previous_hash = _locked_tip()
+        at = timezone.now()
+        events = []
+        for verb, noun, noun_id, details in deeds:
+            event = AuditEvent(
+                at=at,
+                actor=actor,
+                verb=verb,
+                noun=noun,
+                noun_id=_storable(str(noun_id)),
+                details=_plain(details),
+                previous_hash=previous_hash,
+            )
+            event.hash = previous_hash = event.expected_hash()
+            events.append(event)
+        return AuditEvent.objects.bulk_create(events)
+
+
+def _locked_tip() -> str:
+    """The hash of the last event, which stays the last until the transaction ends."""
+    if connection.vendor == "postgresql":
+        with connection.cursor() as cursor:
+            cursor.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
+    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+    return AuditEvent.objects.order_by("-pk").values_list("hash", flat=True).first() or GENESIS
+
+
+def _plain(value: Any) -> Any:
+    """A copy of what every database gives back as it was."""
+    if isinstance(value, str):
+        return _storable(value)
+    if value is None or isinstance(value, bool | int):
+        return value
+    if isinstance(value, Mapping):
+        return {_storable(str(key)): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    raise TypeError(f"details of an audit event hold {type(value).__name__}; expected texts or whole numbers")
+
+
+def _storable(text: str) -> str:
+    """The text without what PostgreSQL cannot keep: NUL and lone surrogates."""
+    return text.replace("\x00", "�").encode("utf-8", "replace").decode()
+
+
+# --- reading it ------------------------------------------------------------------------------------------
+
+
+def events(
+    *,
+    actor: str = "",
+    verb: str = "",
+    noun: str = "",
+    noun_id: str = "",
+    since: datetime | None = None,
+    until: datetime | None = None,
+) -> QuerySet[AuditEvent]:
+    """The events that fit, the newest first. `actor` is a part of an e-mail address; `until` is excluded."""
+    wanted = {
+        "actor__email__icontains": actor,
+        "verb": verb,
+        "noun": noun,
+        "noun_id__startswith": noun_id,
+        "at__gte": since,
+        "at__lt": until,
+    }
+    given = {name: value for name, value in wanted.items() if value}
+    return AuditEvent.objects.filter(**given).select_related("actor").order_by("-pk")
+
+
+@dataclass(frozen=True)
+class Break:
+    """A place where the chain does not hold."""
+
+    event_id: int
+    what: str
+
+
+@dataclass(frozen=True)
+class Verification:
+    """What going through the chain found: its length, its last hash, the first places that do not hold."""
+
+    n_events: int
+    tip: str
+    breaks: tuple[Break, ...]
+
+
+def verify(*, expected_hash: str = "") -> Verification:
+    """Compute every hash anew, from the first event to the last.
+
+    A chain whose end was cut off, or which was written anew from some event on, is sound in itself: only a
+    hash that was noted elsewhere shows it. With `expected_hash`, some event has to have it.
+    """
+    n_events, tip, breaks = 0, GENESIS, []
+    is_found = not expected_hash
+    for event in AuditEvent.objects.order_by("pk").iterator(chunk_size=_CHUNK):
+        if event.previous_hash != tip:
+            before = f"after {n_events:,} events" if n_events else "as the first event"
+            breaks.append(Break(event.pk, f"stands {before}, and follows another one: something is missing"))
+        if event.hash != event.expected_hash():
+            breaks.append(Break(event.pk, "says something else than when it was written"))
+        is_found = is_found or event.hash == expected_hash
+        n_events, tip = n_events + 1, event.hash
+    if not is_found:
+        breaks.append(
+            Break(0, f"no event has the hash {expected_hash[:64]}: the end was cut off or rewritten")
+        )
+    return Verification(n_events=n_events, tip=tip, breaks=tuple(breaks[:MAX_BREAKS]))

@@ -75,6 +75,9 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     _keep_values(truth)
     files.keep_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
     with transaction.atomic():
+        # The split before the audit trail, as every verb takes them: two that did it the other way round
+        # could wait for each other.
+        Split.objects.select_for_update().get(pk=split.pk)
         row, is_new = GroundTruth.objects.get_or_create(
             digest=truth.digest,
             defaults={

@@ -228,7 +228,12 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
             for (metric, interval), value in outcome.scores.items()
         )
         audit.record_many(
-            (outcome.status.lower(), "Evaluation", lease.evaluation_id, {"attempt": lease.attempt})
+            (
+                outcome.status.lower(),
+                "Evaluation",
+                lease.evaluation_id,
+                {"attempt": lease.attempt, "report_digest": outcome.report_digest},
+            )
             for lease, outcome in decided
         )
     return {lease.evaluation_id for lease, _ in decided}

@@ -1,0 +1,31 @@
+"""`manage.py verify_audit`."""
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from leaderboard import audit
+
+
+class Command(BaseCommand):
+    """Goes through the audit trail."""
+
+    help = "Check that no audit event was changed, removed or put in. Note the hash it prints somewhere else."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """The hash noted last time."""
+        parser.add_argument(
+            "--expect", metavar="HASH", default="", help="the hash that an earlier run printed; must be there"
+        )
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """One line on standard output, or where the chain breaks and exit code 1."""
+        found = audit.verify(expected_hash=options["expect"])
+        if found.breaks:
+            places = "\n".join(
+                f"  event {each.event_id}: {each.what}" if each.event_id else f"  {each.what}"
+                for each in found.breaks
+            )
+            raise CommandError(f"The audit trail of {found.n_events:,} events does not hold:\n{places}")
+        self.stdout.write(f"audit: {found.n_events:,} events, unbroken, last hash {found.tip}")

@@ -1,0 +1,250 @@
+"""The audit trail: append-only, and a chain that shows what was done to it."""
+
+from datetime import timedelta
+from io import StringIO
+from typing import Any
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.db import IntegrityError, connection, transaction
+from django.utils import timezone
+
+from leaderboard import audit
+from leaderboard.models import AuditEvent, Edition, Evaluation, User
+from leaderboard.models.audit import GENESIS, AppendOnly
+from tests import builders
+
+SQLITE_ONLY = pytest.mark.skipif("connection.vendor != 'sqlite'", reason="there the database refuses it")
+POSTGRESQL_ONLY = pytest.mark.skipif(
+    "connection.vendor != 'postgresql'", reason="only PostgreSQL refuses what is asked for in SQL"
+)
+
+
+def record(n: int = 1, **fields: Any) -> AuditEvent:
+    """Write `n` events; returns the last."""
+    for number in range(n):
+        event = audit.record(
+            **{"verb": "tried", "noun": "Door", "noun_id": number, "details": {"try": number}, **fields}
+        )
+    return event
+
+
+def in_sql(statement: str, *values: str | int | None) -> None:
+    with connection.cursor() as cursor:
+        cursor.execute(statement, values)
+
+
+def verify_audit(*arguments: str) -> str:
+    out = StringIO()
+    call_command("verify_audit", *arguments, stdout=out)
+    return out.getvalue().strip()
+
+
+# --- the chain -------------------------------------------------------------------------------------------
+
+
+def test_each_event_is_bound_to_the_one_before_it(owner: User) -> None:
+    hashes = AuditEvent.objects.order_by("pk").values_list("previous_hash", "hash")
+    record(3, actor=owner)
+    (first, one), (second, two), (third, _) = hashes
+    assert (first, second, third) == (GENESIS, one, two)
+
+
+def test_events_written_together_are_chained_in_their_order(db: None) -> None:
+    record()
+    audit.record_many(("scored", "Evaluation", number, {"attempt": 1}) for number in range(500))
+    record()
+    assert list(AuditEvent.objects.order_by("pk").values_list("noun_id", flat=True)[1:501]) == [
+        str(number) for number in range(500)
+    ]
+    found = audit.verify()
+    assert (found.n_events, found.breaks) == (502, ())
+
+
+def test_a_deed_that_is_undone_leaves_no_gap(db: None) -> None:
+    record()
+    with transaction.atomic():
+        record()
+        transaction.set_rollback(True)
+    record()
+    assert audit.verify().n_events == 2
+    assert audit.verify().breaks == ()
+
+
+def test_an_empty_trail_holds(db: None) -> None:
+    assert verify_audit() == f"audit: 0 events, unbroken, last hash {GENESIS}"
+
+
+@pytest.mark.parametrize(
+    "details",
+    [
+        {"text": "τ, “quoted”, 😀", "number": 10**25, "nothing": None, "yes": True, "list": [1, [], {}]},
+        {"b": 1, "a": 2, "": ""},
+        {"cut": "a\x00b\ud800c"},
+    ],
+)
+def test_details_come_back_as_they_were_hashed(db: None, details: dict[str, Any]) -> None:
+    record(details=details, noun_id="a\x00b")
+    record()
+    assert audit.verify().breaks == ()
+
+
+@pytest.mark.parametrize("value", [1.5, float("nan"), b"bytes", timezone.now(), {"in": [0.1]}])
+def test_details_that_databases_give_back_differently_are_refused(db: None, value: object) -> None:
+    with pytest.raises(TypeError, match="expected texts or whole numbers"):
+        record(details={"value": value})
+    assert not AuditEvent.objects.exists()
+
+
+def test_what_a_run_found_is_bound_by_the_digest_of_its_report(edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    row = Evaluation.objects.get()
+    event = AuditEvent.objects.get(verb="scored")
+    assert event.details == {"attempt": 1, "report_digest": row.report_digest}
+    assert row.report_digest.startswith("sha256:")
+
+
+# --- append-only -----------------------------------------------------------------------------------------
+
+
+def test_the_application_can_neither_change_nor_delete(db: None) -> None:
+    event = record(2)
+    event.verb = "never"
+    attempts = (
+        event.save,
+        event.delete,
+        lambda: event.save(update_fields=["verb"]),
+        AuditEvent.objects.all().delete,
+        lambda: AuditEvent.objects.update(verb="never"),
+        lambda: AuditEvent.objects.bulk_update([event], ["verb"]),
+        lambda: AuditEvent.objects.update_or_create(pk=event.pk, defaults={"verb": "never"}),
+    )
+    for attempt in attempts:
+        with pytest.raises(AppendOnly), transaction.atomic():
+            attempt()
+    assert AuditEvent.objects.count() == 2
+    assert audit.verify().breaks == ()
+
+
+@POSTGRESQL_ONLY
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "UPDATE leaderboard_auditevent SET verb = 'never'",
+        "UPDATE leaderboard_auditevent SET verb = 'never' WHERE id < 0",
+        "DELETE FROM leaderboard_auditevent",
+    ],
+)
+def test_postgresql_refuses_to_change_and_to_delete(db: None, statement: str) -> None:
+    record(2)
+    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
+        in_sql(statement)
+    assert audit.verify().n_events == 2
+
+
+@POSTGRESQL_ONLY
+def test_postgresql_refuses_to_empty_the_trail(db: None) -> None:
+    in_sql("ALTER TABLE leaderboard_auditevent ENABLE TRIGGER audit_no_truncate")
+    with pytest.raises(IntegrityError, match="TRUNCATE refused"), transaction.atomic():
+        in_sql("TRUNCATE leaderboard_auditevent")
+
+
+def test_the_chain_cannot_fork(db: None) -> None:
+    event = record()
+    with pytest.raises(IntegrityError), transaction.atomic():
+        AuditEvent.objects.create(
+            verb="v", noun="n", noun_id="1", previous_hash=event.previous_hash, hash="f" * 64
+        )
+
+
+# --- tampering is found ----------------------------------------------------------------------------------
+
+
+@SQLITE_ONLY
+@pytest.mark.parametrize(
+    ("column", "value"),
+    [
+        ("verb", "other"),
+        ("noun", "Other"),
+        ("noun_id", "7"),
+        ("details", '{"try": 8}'),
+        ("at", "2020-01-01 00:00:00"),
+        ("actor_id", None),
+    ],
+)
+def test_a_changed_event_is_named(owner: User, column: str, value: str | None) -> None:
+    record(3, actor=owner)
+    second = AuditEvent.objects.order_by("pk")[1]
+    in_sql(f"UPDATE leaderboard_auditevent SET {column} = %s WHERE id = %s", value, second.pk)
+    [found] = audit.verify().breaks
+    assert (found.event_id, found.what) == (second.pk, "says something else than when it was written")
+
+
+@SQLITE_ONLY
+def test_a_changed_event_with_a_fitting_hash_is_betrayed_by_the_next(db: None) -> None:
+    record(3)
+    second = AuditEvent.objects.order_by("pk")[1]
+    second.verb = "other"
+    in_sql(
+        "UPDATE leaderboard_auditevent SET verb = %s, hash = %s WHERE id = %s",
+        second.verb,
+        second.expected_hash(),
+        second.pk,
+    )
+    [found] = audit.verify().breaks
+    assert found.event_id == second.pk + 1
+
+
+@SQLITE_ONLY
+@pytest.mark.parametrize("index", [0, 1])
+def test_a_removed_event_is_missed(db: None, index: int) -> None:
+    record(3)
+    removed = AuditEvent.objects.order_by("pk")[index]
+    in_sql("DELETE FROM leaderboard_auditevent WHERE id = %s", removed.pk)
+    [found] = audit.verify().breaks
+    assert found.event_id == removed.pk + 1
+    assert "something is missing" in found.what
+
+
+@SQLITE_ONLY
+def test_two_events_that_changed_places_are_found(db: None) -> None:
+    last = record(3).pk
+    in_sql("UPDATE leaderboard_auditevent SET id = -1 WHERE id = %s", last)
+    assert [found.event_id for found in audit.verify().breaks] == [-1, last - 2]
+
+
+@SQLITE_ONLY
+def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) -> None:
+    noted = record(3).hash
+    assert verify_audit("--expect", noted).startswith("audit: 3 events, unbroken")
+    in_sql("DELETE FROM leaderboard_auditevent WHERE hash = %s", noted)
+    assert verify_audit().startswith("audit: 2 events, unbroken")
+    with pytest.raises(CommandError, match=f"no event has the hash {noted}"):
+        verify_audit("--expect", noted)
+
+
+@SQLITE_ONLY
+def test_the_command_says_where_and_exits_with_1(db: None) -> None:
+    event = record(2)
+    in_sql("UPDATE leaderboard_auditevent SET verb = 'other' WHERE id = %s", event.pk)
+    with pytest.raises(CommandError, match=f"2 events does not hold:\n  event {event.pk}: says") as caught:
+        verify_audit()
+    assert caught.value.returncode == 1
+
+
+# --- looking for events ----------------------------------------------------------------------------------
+
+
+def test_events_are_found_by_actor_verb_noun_and_time(owner: User, stranger: User) -> None:
+    record(2, actor=owner)
+    record(actor=stranger, verb="opened", noun="Window", noun_id="abc-1")
+    assert [e.actor for e in audit.events(actor="OWNER@")] == [owner, owner]
+    assert audit.events(verb="opened").count() == 1
+    assert audit.events(noun="Window").count() == 1
+    assert audit.events(noun_id="abc").count() == 1
+    assert audit.events().count() == 3
+    hour = timedelta(hours=1)
+    assert audit.events(since=timezone.now() - hour, until=timezone.now() + hour).count() == 3
+    assert not audit.events(since=timezone.now() + hour).exists()
+    assert not audit.events(until=timezone.now() - hour).exists()
