@@ -1,0 +1,106 @@
+"""The leaderboard with everything it needs, as processes that may be killed one by one."""
+
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import httpx
+
+from tests.chaos.processes import REPOSITORY, Process
+from tests.chaos.services import Postgres, Redis
+from tests.journeys.production import BIN, await_that, free_port, settings_for
+
+# Seconds. Lease, heartbeat and wall are a tenth of the real ones, so that a run of minutes sees many of them.
+PACE = {
+    "TSTTC_LEASE_S": "6",
+    "TSTTC_HEARTBEAT_S": "2",
+    "TSTTC_WALL_S": "30",
+    "TSTTC_SWEEP_S": "15",
+    "TSTTC_POLL_S": "5",
+    "TSTTC_BACKOFF_S": "0.5",
+    # A file that needs more than this is poison.
+    "TSTTC_CHILD_MEMORY_BYTES": "200000000",
+}
+SPLIT = "test"
+
+
+class Site:
+    """Web, workers, beat, PostgreSQL and Redis of one run."""
+
+    def __init__(self, directory: Path, *, n_workers: int, changes: Mapping[str, str]) -> None:
+        self.directory = directory
+        self.postgres = Postgres(directory)
+        self.redis = Redis(directory)
+        self.url = f"http://127.0.0.1:{free_port()}"
+        self.environment = settings_for(
+            directory, url=self.url, postgres_url=self.postgres.url, redis_url=self.redis.url
+        )
+        self.environment |= {**PACE, **changes}
+        gunicorn = [
+            str(BIN / "gunicorn"),
+            "--config",
+            "deploy/gunicorn.conf.py",
+            "leaderboard.wsgi:application",
+        ]
+        self.web = self._process("web", gunicorn)
+        celery = [str(BIN / "celery"), "--app=leaderboard"]
+        self.beat = self._process("beat", [*celery, "beat", "--pidfile=", "--loglevel=info"])
+        options = ["--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info"]
+        self.workers = [
+            self._process(f"worker-{i}", [*celery, "worker", f"--hostname=worker-{i}@%h", *options])
+            for i in range(n_workers)
+        ]
+
+    @property
+    def processes(self) -> list[Process]:
+        """All but the services."""
+        return [self.web, self.beat, *self.workers]
+
+    def _process(self, name: str, command: list[str]) -> Process:
+        return Process(name, command, directory=self.directory, environment=self.environment)
+
+    def manage(self, *arguments: str) -> str:
+        """Run a management command; returns what it printed."""
+        command = [sys.executable, "manage.py", *arguments]
+        done = subprocess.run(
+            command, cwd=REPOSITORY, env=self.environment, capture_output=True, text=True, check=False
+        )
+        if done.returncode != 0:
+            raise RuntimeError(f"{' '.join(arguments)}: {done.stdout}{done.stderr}")
+        return done.stdout
+
+    def await_web(self) -> None:
+        """Return once the web server answers."""
+        await_that(self._answers, what="the web server answers")
+
+    def _answers(self) -> bool:
+        try:
+            return httpx.get(f"{self.url}/api/v1/splits", trust_env=False).status_code == 200
+        except httpx.TransportError:
+            return False
+
+
+@contextmanager
+def running_site(
+    directory: Path, *, truth: bytes, n_workers: int, changes: Mapping[str, str] | None = None
+) -> Iterator[Site]:
+    """A site whose split `test` is open; everything that was started ends with the context."""
+    site = Site(directory, n_workers=n_workers, changes=changes or {})
+    with ExitStack() as ends:
+        ends.callback(site.postgres.end)
+        ends.callback(site.redis.server.ask_to_end)
+        for process in site.processes:
+            ends.callback(process.kill_if_started)
+        site.postgres.start()
+        site.redis.start()
+        site.manage("migrate", "--no-input")
+        site.manage("collectstatic", "--no-input")
+        table = directory / "truth.csv"
+        table.write_bytes(truth)
+        site.manage("import_truth", SPLIT, str(table))
+        for process in site.processes:
+            process.start()
+        site.await_web()
+        yield site
