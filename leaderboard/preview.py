@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Final
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
@@ -12,6 +12,12 @@ from leaderboard import rescoring, standings
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
 
 ABSENT = "ABSENT"  # not evaluated in that edition
+COLUMNS: Final = (
+    *("submission", "method", "team", "old_status", "new_status", "old_rank", "new_rank"),
+    *(f"{side}_{name}" for side in ("old", "new", "delta") for name in SCORE_NAMES),
+    "reason",
+)
+"""Of the flat rows, in their order."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +116,7 @@ def preview(edition: Edition) -> Preview:
 
 
 def rows(found: Preview) -> list[dict[str, Any]]:
-    """The preview as flat rows for CSV and JSON: one for each submission."""
+    """The preview as flat rows for CSV and JSON: one for each submission, with `COLUMNS`."""
     return [
         {
             "submission": str(change.submission_id),

@@ -1,13 +1,12 @@
 """`manage.py preview_edition SPLIT NUMBER`."""
 
-import csv
 import json
 from argparse import ArgumentParser
 from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError
 
-from leaderboard import preview, rescoring
+from leaderboard import exports, preview, rescoring
 from leaderboard.management.commands.open_edition import line
 from leaderboard.models import Edition
 
@@ -38,10 +37,7 @@ class Command(BaseCommand):
         self.stdout.write(json.dumps(preview.rows(found), indent=2))
 
     def _csv(self, found: preview.Preview) -> None:
-        rows = preview.rows(found)
-        writer = csv.DictWriter(self.stdout, fieldnames=list(rows[0]) if rows else ["submission"])
-        writer.writeheader()
-        writer.writerows(rows)
+        self.stdout.write(exports.csv_text(preview.rows(found), columns=preview.COLUMNS), ending="")
 
     def _table(self, found: preview.Preview) -> None:
         truth = found.edition.ground_truth
