@@ -2,7 +2,10 @@
 
 from dataclasses import dataclass
 
-from leaderboard.models import Edition, Evaluation, Publication, Split, Submission
+from django.db.models import Count
+
+from leaderboard import rescoring
+from leaderboard.models import Edition, Evaluation, Publication, Split, Status, Submission
 
 
 @dataclass(frozen=True)
@@ -116,4 +119,34 @@ def rescored(submission: Submission) -> Rescored | None:
         publication=publication,
         old=evaluations.get(publication.replaced_id or 0),
         new=evaluations.get(publication.edition_id),
+    )
+
+
+@dataclass(frozen=True)
+class Desk:
+    """What a maintainer finds of one split."""
+
+    split: Split
+    published: Edition | None
+    former: tuple[Edition, ...]  # published once, and replaced
+    in_preparation: tuple[tuple[Edition, rescoring.Progress], ...]
+    system_errors: tuple[tuple[Edition, int], ...]
+    predecessor: Edition | None  # what rolling back returns to
+
+
+def desk(split: Split) -> Desk:
+    """The editions of a split as maintainers see them, and what failed by our fault."""
+    rows = list(split.editions.select_related("ground_truth", "split").order_by("-number"))
+    published = next((e for e in rows if e.pk == split.published_edition_id), None)
+    failed = Evaluation.objects.filter(status=Status.SYSTEM_ERROR, submission__withdrawn_at=None)
+    n_failed = dict(
+        failed.filter(edition__in=rows).values_list("edition").annotate(n=Count("pk")).order_by("edition")
+    )
+    return Desk(
+        split=split,
+        published=published,
+        former=tuple(e for e in rows if e.published_at and e != published),
+        in_preparation=tuple((e, rescoring.progress(e)) for e in rows if e.is_in_preparation),
+        system_errors=tuple((e, n_failed[e.pk]) for e in rows if e.pk in n_failed),
+        predecessor=rescoring.predecessor(split),
     )

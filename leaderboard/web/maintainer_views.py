@@ -1,0 +1,190 @@
+"""The maintainers' pages: open an edition, look before switching, switch, go back. One verb each.
+
+To everybody else they are not there: the answer is the one for an address that does not exist.
+"""
+
+from collections.abc import Callable
+from functools import wraps
+from typing import Any, cast
+
+from django.contrib import messages
+from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from leaderboard import editions, exports, preview, rescoring
+from leaderboard.api.serializers import PreviewSerializer
+from leaderboard.models import Edition, Split, User
+from leaderboard.web import edition_tables
+from leaderboard.web.maintainer_forms import DiscardForm, OpenForm, PublishForm, RollBackForm, VerbForm
+from leaderboard.web.views import STOP_POLLING
+
+View = Callable[..., HttpResponse]
+asks_first = require_http_methods(["GET", "HEAD", "POST"])
+
+
+def maintainers_only(view: View) -> View:
+    """Let maintainers in, uncached; for others the page does not exist."""
+    uncached = never_cache(view)
+
+    @wraps(view)
+    def guarded(request: HttpRequest, *args: Any, **kwargs: Any) -> HttpResponse:
+        if not (request.user.is_authenticated and request.user.is_maintainer):
+            raise Http404
+        try:
+            return uncached(request, *args, **kwargs)
+        except rescoring.NotMaintainer as refusal:
+            # They were one when the request came in.
+            raise Http404 from refusal
+
+    return guarded
+
+
+@maintainers_only
+@require_safe
+def hub(request: HttpRequest) -> HttpResponse:
+    """Every split: its board, what is being prepared, what failed."""
+    splits = Split.objects.select_related("published_edition__ground_truth")
+    desks = [edition_tables.desk_row(editions.desk(split)) for split in splits]
+    is_running = any(not shown.is_final for row in desks for shown in row.running)
+    return render(request, "maintainers/hub.html", {"desks": desks, "is_running": is_running})
+
+
+@maintainers_only
+@asks_first
+def open_edition(request: HttpRequest, split: str) -> HttpResponse:
+    """Open an edition beside the board and queue every standing submission for it."""
+    found = get_object_or_404(Split.objects.select_related("published_edition"), pk=split)
+    form = OpenForm.asked(request, split=found)
+    if form.is_valid():
+        with form.refusals():
+            opened = rescoring.open_edition(
+                split_name=split, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            )
+            return redirect("maintain_edition", split, opened.number)
+    return _form(request, "maintainers/open.html", form, split=found)
+
+
+@maintainers_only
+@require_safe
+def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """What publishing an edition would change, and how far its re-scoring is."""
+    return render(request, "maintainers/edition.html", _comparison(_edition(split, number)))
+
+
+@maintainers_only
+@require_safe
+def edition_progress(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """What a waiting page asks for: nothing new, how far it is, or at the end not to ask any more."""
+    found = _edition(split, number)
+    running = edition_tables.running(found, rescoring.progress(found))
+    if request.GET.get("seen") == running.seen and not running.is_final:
+        return HttpResponse(status=204)
+    context: dict[str, Any] = {"running": running}
+    if running.is_final and "comparison" in request.GET:
+        context |= _comparison(found)
+    status = STOP_POLLING if running.is_final else 200
+    return render(request, "maintainers/progress_state.html", context, status=status)
+
+
+@maintainers_only
+@require_safe
+def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """The comparison as a table for spreadsheets."""
+    rows = preview.rows(preview.preview(_edition(split, number)))
+    return HttpResponse(
+        exports.csv_text(rows, columns=preview.COLUMNS),
+        content_type="text/csv; charset=utf-8",
+        headers={"Content-Disposition": _attachment(split, number, "csv")},
+    )
+
+
+@maintainers_only
+@require_safe
+def preview_json(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """The comparison as the API gives it."""
+    return JsonResponse(
+        PreviewSerializer(preview.preview(_edition(split, number))).data,
+        headers={"Content-Disposition": _attachment(split, number, "json")},
+    )
+
+
+@maintainers_only
+@asks_first
+def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """Make an edition the board."""
+    found = _edition(split, number)
+    context = _comparison(found)
+    form = PublishForm.asked(request, initial={"replaces": context["preview"].replaces})
+    if form.is_valid():
+        with form.refusals():
+            rescoring.publish(
+                edition=found, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            )
+            messages.success(request, f"Edition {number} is the board of {split}.")
+            return redirect("board", split)
+    return _form(request, "maintainers/publish.html", form, unfinished=rescoring.unfinished(found), **context)
+
+
+@maintainers_only
+@asks_first
+def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """Make the edition that this one replaced the board again."""
+    found = _edition(split, number)
+    former = rescoring.predecessor(found.split)
+    form = RollBackForm.asked(request, initial={"replaces": number})
+    if form.is_valid():
+        with form.refusals():
+            rescoring.roll_back(
+                split_name=split, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            )
+            messages.success(request, f"The board of {split} is what it was before edition {number}.")
+            return redirect("board", split)
+    context = _comparison(former) if former else {}
+    return _form(request, "maintainers/roll_back.html", form, leaving=found, former=former, **context)
+
+
+@maintainers_only
+@asks_first
+def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """Give up an edition in preparation."""
+    found = _edition(split, number)
+    form = DiscardForm.asked(request)
+    if form.is_valid():
+        with form.refusals():
+            rescoring.discard(
+                edition=found, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            )
+            messages.success(request, f"Edition {number} of {split} was given up.")
+            return redirect("maintain")
+    return _form(request, "maintainers/discard.html", form, **_comparison(found))
+
+
+def _maintainer(request: HttpRequest) -> User:
+    return cast("User", request.user)
+
+
+def _edition(split: str, number: int) -> Edition:
+    rows = Edition.objects.select_related("split__published_edition__ground_truth", "ground_truth")
+    return get_object_or_404(rows, split=split, number=number)
+
+
+def _comparison(found: Edition) -> dict[str, Any]:
+    """An edition beside the board, ready to be drawn."""
+    compared = preview.preview(found)
+    return {
+        "edition": found,
+        "preview": compared,
+        "table": edition_tables.change_table(compared),
+        "running": edition_tables.running(found, compared.progress),
+    }
+
+
+def _form(request: HttpRequest, template: str, form: VerbForm, **context: Any) -> HttpResponse:
+    return render(request, template, {"form": form, **context}, status=422 if form.errors else 200)
+
+
+def _attachment(split: str, number: int, kind: str) -> str:
+    return f'attachment; filename="tsttc-{split}-edition-{number}-preview.{kind}"'
