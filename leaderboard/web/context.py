@@ -11,13 +11,16 @@ _SECTIONS = {
     "home": "board",
     "board": "board",
     "edition": "board",
+    "editions": "board",
     "method": "board",
     "submit": "submit",
     "submissions": "submissions",
     "submission": "submissions",
+    "withdraw": "submissions",
     "docs": "docs",
     "api_reference": "api",
 }
+_PREFIXES = {"account_": "account", "maintain": "maintain"}
 
 
 def site(request: HttpRequest) -> dict[str, Any]:
@@ -27,6 +30,9 @@ def site(request: HttpRequest) -> dict[str, Any]:
     return {
         "site_name": settings.SITE_NAME,
         "site_url": settings.SITE_URL,
-        "section": "account" if name.startswith("account_") else _SECTIONS.get(name, ""),
+        "section": next(
+            (section for prefix, section in _PREFIXES.items() if name.startswith(prefix)),
+            _SECTIONS.get(name, ""),
+        ),
         "splits": Split.objects.select_related("published_edition"),
     }

@@ -93,6 +93,7 @@ class Row:
     team: str
     cells: tuple[Cell, ...]
     source_number: int | None = None
+    note: str = ""  # why it stays in a former edition
 
 
 @dataclass(frozen=True)
@@ -293,7 +294,9 @@ def submission_rows(submissions: Iterable[Submission]) -> tuple[SubmissionRow, .
 
 def _cell_css(name: str, value: float | None, decimals: int) -> str:
     place = {"mid": "primary first", "rte": "overall first"}.get(name, "wide")
-    return f"{place} absent" if value is None else f"{place} d{decimals}"
+    if value is None:
+        return f"{place} absent"
+    return place if decimals == SCORED_DECIMALS else f"{place} d{decimals}"
 
 
 def _text_heading(name: str, sort: str, kept: Mapping[str, str]) -> Heading:

@@ -1,13 +1,23 @@
 """Addresses of the pages."""
 
-from django.urls import path
+from django.urls import include, path
 
-from leaderboard.web import views
+from leaderboard.web import edition_views, maintainer_views, views
 
+MAINTAINED_EDITION = [
+    path("", maintainer_views.edition, name="maintain_edition"),
+    path("progress/", maintainer_views.edition_progress, name="maintain_progress"),
+    path("preview.csv", maintainer_views.preview_csv, name="maintain_preview_csv"),
+    path("preview.json", maintainer_views.preview_json, name="maintain_preview_json"),
+    path("publish/", maintainer_views.publish, name="maintain_publish"),
+    path("roll-back/", maintainer_views.roll_back, name="maintain_roll_back"),
+    path("discard/", maintainer_views.discard, name="maintain_discard"),
+]
 urlpatterns = [
     path("", views.home, name="home"),
     path("board/<slug:split>/", views.board, name="board"),
-    path("board/<slug:split>/editions/<int:number>/", views.edition, name="edition"),
+    path("board/<slug:split>/editions/", edition_views.editions, name="editions"),
+    path("board/<slug:split>/editions/<int:number>/", edition_views.edition, name="edition"),
     path("submit/", views.submit, name="submit"),
     path("submissions/", views.submissions, name="submissions"),
     path("submissions/<uuid:submission_id>/", views.submission, name="submission"),
@@ -15,4 +25,7 @@ urlpatterns = [
     path("methods/<uuid:method_id>/", views.method, name="method"),
     path("docs/", views.docs, name="docs"),
     path("docs/api/", views.api_reference, name="api_reference"),
+    path("maintain/", maintainer_views.hub, name="maintain"),
+    path("maintain/<slug:split>/open/", maintainer_views.open_edition, name="maintain_open"),
+    path("maintain/<slug:split>/editions/<int:number>/", include(MAINTAINED_EDITION)),
 ]

@@ -15,9 +15,9 @@ from django.views.decorators.http import require_http_methods, require_safe
 
 from leaderboard import methods, standings
 from leaderboard import submissions as verbs
-from leaderboard.models import Edition, Evaluation, Method, Publication, Split, Submission, User
+from leaderboard.models import Edition, Evaluation, Method, Split, Submission, User
 from leaderboard.web import api_reference as api
-from leaderboard.web import reference, tables
+from leaderboard.web import edition_tables, reference, tables
 from leaderboard.web.forms import SubmissionForm
 from leaderboard.web.progress import shown
 
@@ -37,28 +37,25 @@ def home(request: HttpRequest) -> HttpResponse:
 def board(request: HttpRequest, split: str) -> HttpResponse:
     """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
     found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
-    return _board(request, split=found)
+    return draw_board(request, "board.html", split=found, news=edition_tables.news(found))
 
 
-@require_safe
-def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """The board of one edition, at an address that stays."""
-    rows = Edition.objects.exclude(published_at=None)
-    rows = rows.select_related("split__published_edition", "ground_truth")
-    found = get_object_or_404(rows, split=split, number=number)
-    return _board(request, split=found.split, edition=found)
-
-
-def _board(request: HttpRequest, **asked: Any) -> HttpResponse:
-    query = {name: request.GET[name] for name in ("sort", "at") if name in request.GET}
+def draw_board(
+    request: HttpRequest, template: str, *, split: Split, edition: Edition | None = None, **more: Any
+) -> HttpResponse:
+    """A board in the order, and as of the time, that the address asks for; an edition's has no other time."""
+    names = ("sort",) if edition else ("sort", "at")
+    query = {name: request.GET[name] for name in names if name in request.GET}
     try:
         at = standings.parse_moment(query["at"]) if "at" in query else None
-        shown = standings.board(viewer=request.user, sort=query.get("sort", "rank"), at=at, **asked)
+        at = at if at and at < timezone.now() else None  # what has not come yet is as it is now
+        shown = standings.board(
+            split=split, edition=edition, viewer=request.user, sort=query.get("sort", "rank"), at=at
+        )
     except (standings.UnknownColumn, standings.BadMoment) as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=400)
-    history = Publication.objects.filter(split=shown.split).select_related("edition", "replaced")
-    table = tables.board_table(shown, query=query)
-    return render(request, "board.html", {"board": shown, "table": table, "history": history})
+    table = edition_tables.with_reasons(tables.board_table(shown, query=query), shown)
+    return render(request, template, {"board": shown, "table": table, **more})
 
 
 @login_required

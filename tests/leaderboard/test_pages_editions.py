@@ -1,17 +1,22 @@
 """A board's past: editions at addresses that stay, the board as it stood at a time, what changed."""
 
+from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from django.conf import settings
 from django.test import Client
 from django.utils import timezone
+from pytest_django import DjangoAssertNumQueries
 
-from leaderboard.models import Edition, Publication, Submission
+from leaderboard import rescoring, submissions
+from leaderboard.models import Edition, Publication, Submission, User
 from tests import builders, pages
-from tests.editions import corrected, open_edition, publish
+from tests.editions import corrected, open_edition, publish, roll_back
 
 OLD, NEW = "/board/test/editions/1/", "/board/test/editions/2/"
+EDITIONS = "/board/test/editions/"
 
 
 @pytest.fixture
@@ -29,9 +34,15 @@ def get(client: Client, address: str) -> pages.Element:
     return pages.page(response)
 
 
+def facts(root: pages.Element) -> dict[str, str]:
+    """The edition's own facts, by name."""
+    facts = root.one("dl", class_="edition-facts")
+    return {dt.text: dd.text for dt, dd in zip(facts.all("dt"), facts.all("dd"), strict=True)}
+
+
 def test_present_edition_is_the_board(client: Client, entries: list[Submission]) -> None:
     assert pages.board_rows(get(client, OLD)) == pages.board_rows(get(client, "/board/test/"))
-    assert "not the board any more" not in get(client, OLD).one("main").text
+    assert get(client, OLD).one("p", class_="notice").text.startswith("This is the board now.")
 
 
 def test_former_edition_keeps_its_board_and_names_its_successor(
@@ -44,9 +55,40 @@ def test_former_edition_keeps_its_board_and_names_its_successor(
     root = get(client, OLD)
     assert pages.board_rows(root) == before
     notice = root.one("p", class_="notice")
-    assert "not the board any more" in notice.text
-    assert notice.one("a").text == "edition 2"
+    assert notice.text.startswith(f"Replaced by edition 2 on {timezone.now():%Y-%m-%d}. “Labels corrected.”")
+    assert [a.attributes["href"] for a in notice.all("a")] == [NEW, "/board/test/"]
     assert pages.board_rows(get(client, NEW)) == pages.board_rows(get(client, "/board/test/")) != before
+
+
+def test_edition_names_its_ground_truth_protocol_counts_and_time(client: Client, replaced: Edition) -> None:
+    truth = replaced.ground_truth
+    said = facts(get(client, NEW))
+    assert said["Ground truth"] == truth.digest
+    assert said["Manifest"] == truth.manifest_digest
+    assert said["Protocol"] == "tsttc-1"
+    counts = truth.counts
+    assert said["Sequences"] == (
+        f"120 in 24 recordings: crucial {counts['crucial']}, small {counts['small']}, "
+        f"large {counts['large']}, negative {counts['negative']}, out of range {counts['out_of_range']}"
+    )
+    assert said["Changed"] == "5 labels corrected, compared with edition 1"
+    assert said["Published"].endswith("UTC: Labels corrected.")
+
+
+def test_edition_that_was_taken_back_says_so_and_keeps_its_board(client: Client, replaced: Edition) -> None:
+    before = pages.board_rows(get(client, NEW))
+    roll_back()
+    root = get(client, NEW)
+    assert pages.board_rows(root) == before
+    assert "Taken back on" in root.one("p", class_="notice").text
+    assert "edition 1 is the board again. “A mistake.”" in root.one("p", class_="notice").text
+    assert "again: A mistake." in facts(get(client, OLD))["Published"]
+
+
+@pytest.mark.parametrize("sort", ["-rte", "date"])
+def test_editions_board_can_be_sorted(client: Client, replaced: Edition, sort: str) -> None:
+    assert len(pages.board_rows(get(client, f"{OLD}?sort={sort}"))) == 9
+    assert client.get(f"{OLD}?sort=nowhere").status_code == 400
 
 
 def test_edition_in_preparation_is_nothing_to_anybody(
@@ -56,6 +98,7 @@ def test_edition_in_preparation_is_nothing_to_anybody(
     assert client.get(NEW).status_code == 404
     assert client.get("/board/test/editions/7/").status_code == 404
     assert client.get("/board/val/editions/1/").status_code == 404
+    assert client.get(f"/board/test/editions/{10**30}/").status_code == 404
 
 
 def test_board_as_it_stood_at_a_time(client: Client, entries: list[Submission]) -> None:
@@ -79,15 +122,110 @@ def test_no_time_is_a_clear_400(client: Client, benchmark: None, at: str) -> Non
     assert "is no date or time" in pages.page(response).one("main").text
 
 
-def test_history_names_what_changed_and_why(client: Client, replaced: Edition) -> None:
-    items = [li.text for li in get(client, "/board/test/").one("details", class_="history").all("li")]
-    assert len(items) == 2
-    assert "edition 2 published in place of edition 1. Labels corrected." in items[0]
+def test_time_that_has_not_come_is_now(client: Client, entries: list[Submission]) -> None:
+    tomorrow = get(client, f"/board/test/?at={timezone.now() + timedelta(days=1):%Y-%m-%d}")
+    assert pages.board_rows(tomorrow) == pages.board_rows(get(client, "/board/test/"))
+    assert "as it stood on" not in tomorrow.one("main").text
 
 
-def test_reasons_are_text_never_markup(client: Client, replaced: Edition) -> None:
+def test_past_board_leads_to_its_edition_and_to_the_board_now(client: Client, replaced: Edition) -> None:
+    long_ago = timezone.now() - timedelta(days=9)
+    Publication.objects.filter(edition__number=1).update(at=long_ago)
+    root = get(client, f"/board/test/?at={long_ago + timedelta(days=1):%Y-%m-%d}")
+    links = [a.attributes["href"] for a in root.one("p", class_="notice").all("a")]
+    assert links == [OLD, "/board/test/"]
+    assert "what changed" not in root.one("p", class_="facts").text
+
+
+def test_board_before_any_edition_says_so(client: Client, edition: Edition) -> None:
+    root = get(client, "/board/test/?at=2001-01-01")
+    assert "no edition was published yet" in root.one("p", class_="facts").text
+    assert "Nobody has submitted" not in root.one("main").text
+
+
+def test_first_edition_has_no_news(client: Client, edition: Edition) -> None:
+    assert "what changed" not in get(client, "/board/test/").one("p", class_="facts").text
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda tmp_path: open_edition(corrected(tmp_path, factor=1.3)), "edition 2, 5 labels corrected"),
+        (lambda tmp_path: open_edition(corrected(tmp_path, drop="0003")), "edition 2, 5 sequences removed"),
+        (lambda _: open_edition(None, protocol="toolkit"), "edition 2, protocol toolkit instead of tsttc-1"),
+    ],
+    ids=["labels", "sequences", "protocol"],
+)
+def test_head_says_what_changed_and_leads_to_the_changelog(
+    client: Client, entries: list[Submission], tmp_path: Path, change: Callable[[Path], Edition], words: str
+) -> None:
+    publish(change(tmp_path), leave_out=True)
+    head = get(client, "/board/test/").one("p", class_="facts")
+    (link,) = [a for a in head.all("a") if a.attributes["href"] == f"{EDITIONS}#changelog"]
+    assert link.text == words
+
+
+def test_head_says_that_a_change_was_taken_back(client: Client, replaced: Edition) -> None:
+    roll_back()
+    assert "what changed: back to edition 1" in get(client, "/board/test/").one("p", class_="facts").text
+
+
+def test_list_has_every_published_edition_and_what_became_of_it(
+    client: Client, replaced: Edition, tmp_path: Path
+) -> None:
+    open_edition(corrected(tmp_path, factor=1.5))
+    root = get(client, EDITIONS)
+    rows = [[cell.text for cell in row.all("td")] for row in root.one("tbody").all("tr")]
+    today = f"{timezone.now():%Y-%m-%d}"
+    first, second = (edition.ground_truth.short_digest for edition in Edition.objects.all()[:2])
+    assert rows == [
+        ["edition 2", "the board now", today, second, "tsttc-1", "120", "5 labels corrected"],
+        ["edition 1", f"replaced by edition 2 on {today}", today, first, "tsttc-1", "120", "the first"],
+    ]
+
+
+def test_changelog_tells_every_change_with_its_reason(client: Client, replaced: Edition) -> None:
+    roll_back()
+    items = [li.one("div").text for li in get(client, EDITIONS).one("ol", class_="changelog").all("li")]
+    assert items == [
+        "Back to edition 1 from edition 2. A mistake.",
+        "Edition 2 replaced edition 1. Labels corrected.",
+        "Edition 1 became the board. The first edition.",
+    ]
+
+
+def test_changelog_counts_what_was_left_out_and_names_nobody(
+    client: Client, entries: list[Submission], tmp_path: Path
+) -> None:
+    publish(open_edition(corrected(tmp_path, factor=1.3)), leave_out=True)
+    said = get(client, EDITIONS).one("main").text
+    assert "4 submissions knowingly left out." in said
+    assert str(entries[0].pk) not in said
+
+
+def test_split_without_an_edition_says_so(client: Client, benchmark: None) -> None:
+    assert "No edition of val has been published yet" in get(client, "/board/val/editions/").one("main").text
+    assert client.get("/board/nowhere/editions/").status_code == 404
+
+
+def test_number_of_queries_does_not_grow_with_the_editions(
+    client: Client,
+    entries: list[Submission],
+    tmp_path: Path,
+    django_assert_max_num_queries: DjangoAssertNumQueries,
+) -> None:
+    for number, factor in enumerate((1.2, 1.3, 1.4), 1):
+        publish(open_edition(corrected(tmp_path, factor=factor)), replaces=number, leave_out=True)
+    with django_assert_max_num_queries(5):
+        client.get(EDITIONS)
+    with django_assert_max_num_queries(10):
+        client.get(OLD)
+
+
+@pytest.mark.parametrize("address", ["/board/test/", EDITIONS, OLD])
+def test_reasons_are_text_never_markup(client: Client, replaced: Edition, address: str) -> None:
     Publication.objects.update(reason="<script>alert(1)</script>")
-    assert get(client, "/board/test/").one("main").all("script") == []
+    assert get(client, address).one("main").all("script") == []
 
 
 def test_withdrawn_entry_leaves_a_marked_row_without_values(
@@ -108,11 +246,41 @@ def test_entry_that_the_next_edition_cannot_score_is_marked(
     second = open_edition(corrected(tmp_path, drop="0002"))
     builders.score_all()
     publish(second, leave_out=True)
-    marked = [row for row in pages.board_rows(get(client, OLD)) if "not in the next edition" in row[1]]
+    marked = [row[1] for row in pages.board_rows(get(client, OLD)) if "not in edition 2" in row[1]]
     assert len(marked) == len(entries)
+    assert all(text.endswith("Edition 2 removed sequences that its file predicts.") for text in marked)
 
 
-def test_only_the_present_board_is_the_canonical_one(client: Client, replaced: Edition) -> None:
-    assert get(client, "/").one("link", rel="canonical").attributes["href"].endswith("/board/test/")
-    assert get(client, OLD).all("link", rel="canonical") == []
-    assert get(client, "/?at=2030-01-01").all("link", rel="canonical") == []
+def test_entry_that_lacks_added_sequences_is_marked_with_that_reason(
+    client: Client, edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    fewer = open_edition(corrected(tmp_path, drop="0002"))
+    rescoring.publish(edition=fewer, reason="Fewer.", now=timezone.now(), actor=None, replaces=1)
+    builders.submit(owner, builders.predictions(fewer), method="Short")
+    builders.score_all()
+    rescoring.roll_back(split_name="test", reason="More.", now=timezone.now(), actor=None, replaces=2)
+    builders.score_all()
+    (marked,) = [row[1] for row in pages.board_rows(get(client, NEW)) if row[1].startswith("Short")]
+    assert marked.endswith("Edition 1 added sequences that its file does not predict.")
+
+
+@pytest.mark.parametrize("address", ["/board/test/", OLD, NEW])
+def test_withdrawn_entry_leaves_its_mark_in_every_edition(
+    client: Client, entries: list[Submission], owner: User, replaced: Edition, address: str
+) -> None:
+    submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+    rows = get(client, address).one("table", class_="board").one("tbody").all("tr")
+    (row,) = [row for row in rows if "withdrawn" in row.classes]
+    assert row.one("div", class_="name").text == f"M1.05 withdrawn {timezone.now():%Y-%m-%d}"
+
+
+def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:
+    def canonical(address: str) -> list[str]:
+        links = get(client, address).all("link", rel="canonical")
+        return [link.attributes["href"].removeprefix(settings.SITE_URL) for link in links]
+
+    assert canonical("/") == canonical("/board/test/?sort=-mid") == ["/board/test/"]
+    assert canonical(f"{OLD}?sort=-mid") == [OLD]
+    assert canonical(NEW) == [NEW]
+    assert canonical(EDITIONS) == [EDITIONS]
+    assert canonical("/?at=2020-01-01") == []

@@ -211,11 +211,11 @@ def test_signed_in_people_find_their_submissions_and_the_way_out(
     assert client.get("/submissions/").status_code == 302
 
 
-def test_maintainers_and_nobody_else_find_the_administration(
+def test_maintainers_and_nobody_else_find_their_pages(
     client: Client, benchmark: None, owner: User, maintainer: User
 ) -> None:
     found = {}
     for user in (owner, maintainer):
         client.force_login(user)
-        found[user.name] = b'href="/admin/"' in client.get("/").content
+        found[user.name] = b'href="/maintain/"' in client.get("/").content
     assert found == {"Owls": False, "Keepers": True}
