@@ -9,7 +9,7 @@ from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import exception_handler as default_handler
 
-from leaderboard import outages, standings, submissions
+from leaderboard import outages, rescoring, standings, submissions
 
 
 def problem(
@@ -54,6 +54,10 @@ def _of_a_verb(exc: Exception) -> Response | None:
             return problem(status=400, code="unknown-column", detail=str(exc), where="sort")
         case standings.BadMoment():
             return problem(status=400, code="bad-moment", detail=str(exc), where="at")
+        case rescoring.Refused():
+            return problem(status=409, code="edition-refused", detail=str(exc))
+        case rescoring.NotMaintainer():
+            return problem(status=403, code="not-maintainer", detail=str(exc))
     return None
 
 
