@@ -64,5 +64,8 @@ def depth_error(true_log_scale_ratio: Floats, scale_ratio: Floats) -> Floats:
 
 def exact_log(values: Floats) -> Floats:
     """The C library's natural logarithm, as the dataset's toolkit takes it; NaN where it has none."""
-    logs = [math.log(value) if value > 0 else math.nan for value in values.ravel().tolist()]
-    return np.array(logs, dtype=np.float64).reshape(values.shape)
+    with np.errstate(invalid="ignore"):
+        positive = values > 0
+    logs = np.full(values.shape, math.nan)
+    logs[positive] = np.fromiter(map(math.log, values[positive].tolist()), dtype=np.float64)
+    return logs

@@ -38,11 +38,8 @@ class KeyWords:
 
     def __init__(self, anno_id: NDArray[np.int64]) -> None:
         self._anno_id = anno_id
-        texts = [
-            f'"{number}":'.encode()[-WORD_BYTES:].rjust(WORD_BYTES, b"\0") for number in anno_id.tolist()
-        ]
-        self._words: Words = np.frombuffer(b"".join(texts), dtype="<u8")
         self._n_digits = np.searchsorted(10 ** np.arange(1, MAX_DIGITS), anno_id, side="right") + 1
+        self._words: Words = _spell(anno_id, self._n_digits)
         self._masks: Words = _MASKS[self._n_digits]
         self.fits = int(self._n_digits.max()) < MAX_DIGITS
 
@@ -75,6 +72,19 @@ class KeyWords:
         rows = np.zeros(int(self._anno_id.max()) + 1, dtype=np.intp)
         rows[self._anno_id] = np.arange(len(self._anno_id))
         return rows
+
+
+def _spell(anno_id: NDArray[np.int64], n_digits: Rows) -> Words:
+    octets = np.zeros((len(anno_id), WORD_BYTES), dtype=np.uint8)
+    octets[:, -2:] = tuple(b'":')
+    rest = anno_id
+    for place in range(MAX_DIGITS):
+        at = MAX_DIGITS - 1 - place
+        octets[:, at] = np.where(place < n_digits, rest % 10 + ord("0"), 0)
+        rest = rest // 10
+    inside = n_digits < MAX_DIGITS
+    octets[np.flatnonzero(inside), MAX_DIGITS - 1 - n_digits[inside]] = ord('"')
+    return octets.view("<u8").ravel()
 
 
 def _numbers(windows: Words, n_digits: Rows) -> Words:
