@@ -14,6 +14,7 @@ import pickletools
 import re
 import struct
 import sys
+import warnings
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -25,7 +26,16 @@ MAX_CONTAINERS: Final = 5_000_000
 
 _DICT_LIKE_NAMES: Final = ("dict", "munch", "bunch", "box", "namespace")
 _NUMERIC: Final = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|c8|c16)")
-_FAULTS: Final = (ValueError, IndexError, KeyError, TypeError, AttributeError, OverflowError, struct.error)
+_FAULTS: Final = (
+    Warning,
+    ValueError,
+    IndexError,
+    KeyError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    struct.error,
+)
 _MARK: Final = object()
 
 Array = np.ndarray[Any, np.dtype[Any]]
@@ -70,7 +80,9 @@ def load_plain(data: bytes, *, where: str) -> object:
     dicts.
     """
     try:
-        return _Machine().run(data)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an escape that no pickle ever wrote
+            return _Machine().run(data)
     except Rejected as rejected:
         problem = rejected.problems[0]
         raise reject(problem.code, problem.message, where) from None
@@ -123,9 +135,6 @@ class _Machine:
     def pop_two(self) -> list[object]:
         second = self.pop()
         return [self.pop(), second]
-
-    def drop_mark(self) -> None:
-        self.pop_mark()
 
     def pop_mark(self) -> list[object]:
         """Everything above the topmost mark; the mark goes too."""
@@ -361,7 +370,7 @@ _OPCODES: Final[dict[str, _Handler]] = {
     "NEWFALSE": lambda machine, _: machine.push(False),
     "MARK": lambda machine, _: machine.push(_MARK),
     "POP": lambda machine, _: machine.pop(),
-    "POP_MARK": lambda machine, _: machine.drop_mark(),
+    "POP_MARK": lambda machine, _: machine.pop_mark(),
     "DUP": lambda machine, _: machine.push(machine.stack[-1]),
     **dict.fromkeys(("PUT", "BINPUT", "LONG_BINPUT", "MEMOIZE"), _Machine.put),
     **dict.fromkeys(("GET", "BINGET", "LONG_BINGET"), _Machine.get),

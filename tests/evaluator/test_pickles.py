@@ -222,6 +222,7 @@ BROKEN = {
     "a name as the value": proto4(name("builtins", "dict")),
     "unknown instruction": b"\x80\x04\xff.",
     "a number of 5,000 digits": b"I" + b"9" * 5000 + b"\n.",
+    "unknown escape": b"S'\\ '\n.",
     "bad escape": b"S'\\x'\n.",
     "bad utf-8": proto4(b"\x8c\x01\xff"),
     "array larger than its data": proto4(array_state(b"J\xff\xff\xff\x7f\x85")),
