@@ -81,7 +81,7 @@ def _as_os_errors() -> Iterator[None]:
         raise StoreAway(errno.EIO, f"the file store does not answer ({type(fault).__name__})") from fault
 
 
-class S3FileStore(S3Storage):  # type: ignore[misc]  # django-storages has no types
+class S3FileStore(S3Storage):
     """A bucket whose objects are whole or absent: each is written by one request.
 
     Whatever goes wrong is an `OSError`, as it would be with a directory.

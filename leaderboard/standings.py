@@ -214,12 +214,12 @@ def _unscorable(split: Split, edition: Edition) -> set[UUID]:
     return set(rejected.values_list("submission", flat=True))
 
 
-def _shown_methods(viewer: User | AnonymousUser) -> QuerySet[Method, dict[str, UUID]]:
+def _shown_methods(viewer: User | AnonymousUser) -> QuerySet[Method]:
     """Public methods, and the viewer's own team's; a maintainer's board is the public one as well."""
     shown = Q(visibility=Visibility.PUBLIC)
     if viewer.is_authenticated:
         shown |= Q(team__memberships__user=viewer)
-    return Method.objects.filter(shown).values("pk")
+    return Method.objects.filter(shown)
 
 
 def _team_ids(viewer: User | AnonymousUser) -> set[UUID]:
@@ -311,5 +311,5 @@ def _sorted(entries: list[Entry], sort: str) -> list[Entry]:
 
     valued = [entry for entry in in_rank_order if value(entry) is not None]
     without = [entry for entry in in_rank_order if value(entry) is None]
-    valued.sort(key=value, reverse=sort.startswith("-"))  # type: ignore[arg-type,return-value]  # one column, one type
+    valued.sort(key=value, reverse=sort.startswith("-"))  # type: ignore[arg-type]  # one column, one type
     return [*valued, *without]

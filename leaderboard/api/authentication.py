@@ -26,7 +26,7 @@ class BearerAuthentication(TokenAuthentication):
         return super().authenticate_credentials(token)
 
 
-class BearerScheme(OpenApiAuthenticationExtension):  # type: ignore[no-untyped-call]  # the library has no types
+class BearerScheme(OpenApiAuthenticationExtension):
     """How the schema describes bearer tokens."""
 
     target_class = BearerAuthentication

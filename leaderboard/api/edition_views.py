@@ -32,7 +32,7 @@ class EditionsView(APIView):
         """The newest first."""
         get_object_or_404(Split, pk=split)
         rows = EDITIONS.filter(split=split).exclude(published_at=None).order_by("-number")
-        return Response(EditionSerializer(rows, many=True).data)
+        return Response(EditionSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
 class EditionBoardView(APIView):
@@ -63,7 +63,7 @@ class ChangelogView(APIView):
         """Which edition became the board, when and why; the newest first."""
         get_object_or_404(Split, pk=split)
         rows = Publication.objects.filter(split=split).select_related("edition", "replaced")
-        return Response(PublicationSerializer(rows, many=True).data)
+        return Response(PublicationSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
 class ProgressView(APIView):

@@ -43,22 +43,25 @@ def _outage(exc: Exception) -> Response | None:
     return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)
 
 
+# What verbs raise beside `submissions.Refused`: status, code, and the input at fault.
+OF_VERBS: dict[type[Exception], tuple[int, str, str]] = {
+    standings.UnknownColumn: (400, "unknown-column", "sort"),
+    standings.BadMoment: (400, "bad-moment", "at"),
+    rescoring.Refused: (409, "edition-refused", ""),
+    rescoring.NotMaintainer: (403, "not-maintainer", ""),
+}
+
+
 def _of_a_verb(exc: Exception) -> Response | None:
-    match exc:
-        case submissions.TooLarge():
-            return problem(status=413, code=exc.code, detail=str(exc), where=exc.field)
-        case submissions.Refused():
-            status = 409 if exc.code in {"split-not-open", "split-closed"} else 422
-            return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case standings.UnknownColumn():
-            return problem(status=400, code="unknown-column", detail=str(exc), where="sort")
-        case standings.BadMoment():
-            return problem(status=400, code="bad-moment", detail=str(exc), where="at")
-        case rescoring.Refused():
-            return problem(status=409, code="edition-refused", detail=str(exc))
-        case rescoring.NotMaintainer():
-            return problem(status=403, code="not-maintainer", detail=str(exc))
-    return None
+    if isinstance(exc, submissions.Refused):
+        status = 413 if isinstance(exc, submissions.TooLarge) else 422
+        if exc.code in {"split-not-open", "split-closed"}:
+            status = 409
+        return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
+    if type(exc) not in OF_VERBS:
+        return None
+    status, code, where = OF_VERBS[type(exc)]
+    return problem(status=status, code=code, detail=str(exc), where=where)
 
 
 def _of_the_framework(exc: Exception, context: dict[str, Any]) -> Response | None:

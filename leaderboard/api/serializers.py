@@ -161,7 +161,9 @@ class EntrySerializer(serializers.Serializer[Entry]):
     description = serializers.CharField(allow_blank=True)
     paper_url = serializers.CharField(allow_blank=True)
     code_url = serializers.CharField(allow_blank=True)
-    source = serializers.CharField(allow_blank=True, help_text="The citation of a published row.")
+    source = serializers.CharField(  # type: ignore[assignment]  # the row's own name, also one of the field's
+        allow_blank=True, help_text="The citation of a published row."
+    )
     withdrawn_at = serializers.DateTimeField(allow_null=True, help_text="The team withdrew it: no values.")
     is_unscorable = serializers.BooleanField(
         help_text="In a former edition: the published one's ground truth cannot score this file."

@@ -77,7 +77,7 @@ class Reference:
 @cache
 def reference() -> Reference:
     """The reference; the schema cannot change while the process lives."""
-    schema: dict[str, Any] = SchemaGenerator().get_schema(request=None, public=True)  # type: ignore[no-untyped-call]  # untyped upstream
+    schema: dict[str, Any] = SchemaGenerator().get_schema(request=None, public=True)
     return read(schema)
 
 

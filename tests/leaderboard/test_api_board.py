@@ -62,7 +62,7 @@ def test_bad_address_is_a_problem(
 
 def test_manifest_is_public_and_has_no_time_to_contact(edition: Edition, client: Client) -> None:
     response = client.get("/api/v1/splits/test/manifest")
-    text = b"".join(response.streaming_content).decode()
+    text = response.getvalue().decode()
     assert response.headers["Content-Type"] == "text/csv"
     assert 'filename="tsttc-test-manifest.csv"' in response.headers["Content-Disposition"]
     assert text.splitlines()[0] == "anno_id,bag_stamp,cam_id,ts,track_id"
