@@ -61,11 +61,7 @@ def embedded_secret_key() -> str:
 
 # --- the frame -------------------------------------------------------------------------------------------
 
-SECRET_KEY = (
-    env.str("TSTTC_SECRET_KEY")
-    if PRODUCTION
-    else env.str("TSTTC_SECRET_KEY", default="") or embedded_secret_key()
-)
+SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="") or embedded_secret_key()
 DEBUG = env.bool("TSTTC_DEBUG", default=False)
 ALLOWED_HOSTS = required("TSTTC_ALLOWED_HOSTS", embedded="*").split(",")
 CSRF_TRUSTED_ORIGINS = env.list("TSTTC_CSRF_TRUSTED_ORIGINS", default=[])
