@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from django.db import connection
 from pytest_django import DjangoDbBlocker
+from pytest_django.fixtures import Settings
 
 from leaderboard import benchmark as benchmark_verbs
 
@@ -28,7 +29,7 @@ def benchmark(db: None) -> None:
 
 
 @pytest.fixture(autouse=True)
-def private_directories(tmp_path: Path, settings) -> None:
+def private_directories(tmp_path: Path, settings: Settings) -> None:
     """Files and ground truth of each test live in its own directory."""
     settings.FILES_DIR = tmp_path / "files"
     settings.GROUND_TRUTH_DIR = tmp_path / "ground-truth"
@@ -42,6 +43,6 @@ def private_directories(tmp_path: Path, settings) -> None:
 
 
 @pytest.fixture(autouse=True)
-def quick_passwords(settings) -> None:
+def quick_passwords(settings: Settings) -> None:
     """A hash that is slow on purpose protects passwords that are worth something; here it costs minutes."""
     settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]

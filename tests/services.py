@@ -111,6 +111,14 @@ def chromium() -> str:
     raise ServiceMissing("no Chromium was found on the PATH (TSTTC_TEST_CHROMIUM names one)")
 
 
+def environment_of_its_own() -> dict[str, str]:
+    """This process's environment without anything that sets up this project or Django: for a process to be
+    told everything anew.
+    """
+    ours = ("TSTTC_", "DJANGO_")
+    return {name: value for name, value in os.environ.items() if not name.startswith(ours)}
+
+
 def shared_data() -> Path | None:
     """The folder of data that may be used in place but not copied here; None where it is absent."""
     for candidate in (os.environ.get("TSTTC_SHARED_DATA", ""), REPOSITORY.parent / "shared" / "data"):
@@ -119,9 +127,9 @@ def shared_data() -> Path | None:
     return None
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def postgres_url() -> Iterator[str]:
-    """An empty PostgreSQL database of this test run."""
+    """An empty PostgreSQL database of this module's own."""
     try:
         with throwaway_database() as url:
             yield url
@@ -129,9 +137,9 @@ def postgres_url() -> Iterator[str]:
         skip_or_fail(missing)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def redis_url() -> Iterator[str]:
-    """An empty Redis database of this test run."""
+    """An empty Redis database of this module's own."""
     try:
         with throwaway_redis() as url:
             yield url

@@ -1,12 +1,13 @@
 """The tools that hold the house's style: each must have nothing to say."""
 
-import os
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+
+from tests.services import environment_of_its_own
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
@@ -17,7 +18,7 @@ def says(*command: str, environment: dict[str, str] | None = None) -> str:
     done = subprocess.run(
         command,
         cwd=REPOSITORY,
-        env=os.environ | (environment or {}),
+        env=environment_of_its_own() | (environment or {}),
         capture_output=True,
         text=True,
         check=False,

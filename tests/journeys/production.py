@@ -15,6 +15,8 @@ from pathlib import Path
 
 import httpx
 
+from tests.services import environment_of_its_own
+
 REPOSITORY = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
 PATIENCE_S = 60.0
@@ -71,8 +73,7 @@ class Site:
 
 def settings_for(directory: Path, *, url: str, postgres_url: str, redis_url: str) -> dict[str, str]:
     """The environment of a production process that keeps its files below `directory`."""
-    inherited = {name: value for name, value in os.environ.items() if not name.startswith("TSTTC_")}
-    return inherited | {
+    return environment_of_its_own() | {
         "TSTTC_PROFILE": "production",
         "TSTTC_HTTPS": "0",  # there is no proxy with a certificate in front
         "TSTTC_SECRET_KEY": "a-key-of-this-journey-alone-" + "0123456789" * 3,

@@ -17,13 +17,13 @@ import pytest
 from leaderboard.demo.seed import ENTRIES
 from tests.journeys.people import Visitor
 from tests.journeys.production import REPOSITORY, Site, await_that, free_port
+from tests.services import environment_of_its_own
 
 pytestmark = pytest.mark.slow
 
 
 def environment(directory: Path) -> dict[str, str]:
-    inherited = {name: value for name, value in os.environ.items() if not name.startswith("TSTTC_")}
-    return inherited | {
+    return environment_of_its_own() | {
         "TSTTC_DATA_DIR": str(directory),
         "TSTTC_STATIC_ROOT": str(directory / "static"),
     }
