@@ -21,7 +21,7 @@ def motion_in_depth_error(predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> 
     Shapes broadcast. NaN where α₁₀ is not positive.
 
     >>> round(float(motion_in_depth_error(5.0, 4.0)), 6)
-    48.899833
+    48.899805
     """
     predicted, true = np.broadcast_arrays(
         np.asarray(predicted_ttc_s, dtype=np.float64), np.asarray(true_ttc_s, dtype=np.float64)
