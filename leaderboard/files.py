@@ -17,7 +17,8 @@ from typing import IO
 import numpy as np
 from django.core.files.base import ContentFile, File
 from django.core.files.storage import FileSystemStorage, Storage, storages
-from numpy.typing import NDArray
+
+from evaluator import Manifest, Predictions
 
 CHUNK_BYTES = 1 << 20
 INCOMING = ".incoming"
@@ -166,24 +167,31 @@ def aligned_name(*, manifest_digest: str, digest: str) -> str:
     return f"aligned/{manifest[:16]}/{digest.removeprefix('sha256:')}.f8"
 
 
-def keep_aligned(*, manifest_digest: str, digest: str, ttc_s: NDArray[np.float64]) -> None:
-    """Keep a file's values in seconds as little-endian float64, in the manifest's order.
+def keep_aligned(predictions: Predictions) -> None:
+    """Keep a file's values in seconds as little-endian float64, in ascending anno_id.
 
-    They were checked when the file was read, so scoring them again needs neither its bytes nor a child.
+    They were checked when the file was read, so scoring them again needs neither its bytes nor a child. The
+    order is the manifest's own: two tables of the same sequences may have their rows in another order.
     """
-    name = aligned_name(manifest_digest=manifest_digest, digest=digest)
+    manifest = predictions.manifest
+    name = aligned_name(manifest_digest=manifest.digest, digest=predictions.digest)
     if not store().exists(name):
-        store().save(name, ContentFile(ttc_s.astype("<f8", copy=False).tobytes()))
+        ascending = predictions.ttc_s[np.argsort(manifest.anno_id, kind="stable")]
+        store().save(name, ContentFile(ascending.astype("<f8", copy=False).tobytes()))
 
 
-def load_aligned(*, manifest_digest: str, digest: str, n_sequences: int) -> NDArray[np.float64] | None:
-    """A file's values in seconds, shape (n_sequences,); None if they are not kept."""
+def load_aligned(*, manifest: Manifest, digest: str) -> Predictions | None:
+    """The values that were kept of a file, in the order of `manifest`; None if they are not there."""
     try:
-        with store().open(aligned_name(manifest_digest=manifest_digest, digest=digest), "rb") as kept:
-            ttc_s = np.frombuffer(kept.read(), dtype="<f8")
+        with store().open(aligned_name(manifest_digest=manifest.digest, digest=digest), "rb") as kept:
+            ascending = np.frombuffer(kept.read(), dtype="<f8")
     except OSError:
         return None
-    return ttc_s if ttc_s.shape == (n_sequences,) else None
+    if ascending.shape != (manifest.n_sequences,):
+        return None
+    ttc_s = np.empty_like(ascending)
+    ttc_s[np.argsort(manifest.anno_id, kind="stable")] = ascending
+    return Predictions(manifest=manifest, ttc_s=ttc_s, digest=digest)
 
 
 def keep_manifest(*, digest: str, csv: bytes) -> None:

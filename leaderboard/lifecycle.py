@@ -28,8 +28,8 @@ from django.db import transaction
 from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
-from leaderboard import audit, broker
-from leaderboard.clock import after
+from leaderboard import audit, broker, bulk
+from leaderboard.clock import after, database_now
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 
 log = structlog.get_logger(__name__)
@@ -37,7 +37,9 @@ log = structlog.get_logger(__name__)
 MAX_POISON_STRIKES = 3
 MAX_INFRASTRUCTURE_STRIKES = 10
 MAX_BACKOFF_S = 60.0
-NUDGES_PER_EDITION = 8
+# Large enough that a batch's round trips and COMMITs are nothing beside its arithmetic; small enough that the
+# workers of an edition end together, and that a live submission waits for a fraction of a second.
+RESCORE_BATCH = 50
 
 
 class LostRace(Exception):
@@ -106,33 +108,35 @@ def _announce(evaluation: Evaluation) -> None:
 
 
 def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> None:
-    """Queue many submissions for an edition's re-scoring, each once. A few nudges wake the workers."""
-    Evaluation.objects.bulk_create(
-        [
-            Evaluation(
-                submission_id=pk,
-                edition=edition,
-                priority=Evaluation.PRIORITY_RESCORE,
-                queued_at=Now(),
-                due_at=Now(),
-            )
-            for pk in submission_ids
-        ],
-        batch_size=1000,
+    """Queue many submissions for an edition's re-scoring, each once; the workers hear of every batch.
+
+    Must run inside the transaction that holds the split; the nudges follow its commit.
+    """
+    now = database_now()
+    bulk.insert(
+        Evaluation,
+        ["submission", "edition", "priority", "queued_at", "due_at"],
+        [(pk, edition.pk, Evaluation.PRIORITY_RESCORE, now, now) for pk in submission_ids],
         ignore_conflicts=True,
     )
-    for pk in waiting_ids(limit=NUDGES_PER_EDITION):
-        transaction.on_commit(partial(broker.nudge, pk), robust=True)
+    transaction.on_commit(partial(_announce_many, len(submission_ids)), robust=True)
+
+
+def _announce_many(n: int) -> None:
+    """Nudge once for each batch, or until the broker does not take it."""
+    for pk in waiting_ids(limit=-(-n // RESCORE_BATCH)):
+        if not broker.nudge(pk):
+            return
 
 
 # --- a worker's verbs ------------------------------------------------------------------------------------
 
 
-def claim(*, lease_s: float, wall_s: float, limit: int = 1, rescored_in: int | None = None) -> list[Lease]:
+def claim(*, lease_s: float, wall_s: float, limit: int = 1, batch: int = 1) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
-    With `rescored_in`, only what is re-scored in the edition of that key. Two workers never get the same one:
-    PostgreSQL skips rows that another claim holds, SQLite has one writer.
+    If the first is one of an edition's re-scoring, up to `batch` of that edition's. Two workers never get the
+    same one: PostgreSQL skips rows that another claim holds, SQLite has one writer.
     """
     token = uuid.uuid4()
     with transaction.atomic():
@@ -140,13 +144,16 @@ def claim(*, lease_s: float, wall_s: float, limit: int = 1, rescored_in: int | N
             Evaluation.objects.select_for_update(skip_locked=True)
             .filter(status=Status.QUEUED, due_at__lte=Now())
             .order_by("priority", "queued_at")
+            .values_list("pk", "attempt", "priority", "edition")
         )
-        if rescored_in is not None:
-            waiting = waiting.filter(edition=rescored_in, priority=Evaluation.PRIORITY_RESCORE)
-        ids = list(waiting.values_list("pk", flat=True)[:limit])
-        if not ids:
+        rows = list(waiting[:limit])
+        if not rows:
             return []
-        Evaluation.objects.filter(pk__in=ids, status=Status.QUEUED).update(
+        _, _, priority, edition = rows[0]
+        if priority == Evaluation.PRIORITY_RESCORE and batch > limit:
+            more = waiting.filter(edition=edition, priority=priority).exclude(pk__in=[row[0] for row in rows])
+            rows += more[: batch - limit]
+        Evaluation.objects.filter(pk__in=[row[0] for row in rows], status=Status.QUEUED).update(
             status=Status.RUNNING,
             attempt=F("attempt") + 1,
             lease_token=token,
@@ -154,9 +161,7 @@ def claim(*, lease_s: float, wall_s: float, limit: int = 1, rescored_in: int | N
             deadline_at=after(wall_s),
             leased_until=after(min(lease_s, wall_s)),
         )
-        claimed = Evaluation.objects.filter(pk__in=ids, lease_token=token)
-        attempts = dict(claimed.values_list("pk", "attempt"))
-        return [Lease(evaluation_id=pk, attempt=attempts[pk], token=token) for pk in ids if pk in attempts]
+    return [Lease(evaluation_id=pk, attempt=attempt + 1, token=token) for pk, attempt, _, _ in rows]
 
 
 def _held(lease: Lease) -> QuerySet[Evaluation]:
@@ -209,23 +214,28 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
             Evaluation.objects.filter(pk__in=ids, status=Status.RUNNING).update(
                 status=status, finished_at=Now(), finished_attempt=F("attempt"), last_error=""
             )
-        Evaluation.objects.bulk_update(
+        bulk.update(
+            Evaluation,
+            ["report", "report_digest", "problems", "n_problems"],
             [
-                Evaluation(
-                    pk=lease.evaluation_id,
-                    report=outcome.report,
-                    report_digest=outcome.report_digest,
-                    problems=list(outcome.problems),
-                    n_problems=outcome.n_problems,
+                (
+                    outcome.report,
+                    outcome.report_digest,
+                    list(outcome.problems),
+                    outcome.n_problems,
+                    lease.evaluation_id,
                 )
                 for lease, outcome in decided
             ],
-            ["report", "report_digest", "problems", "n_problems"],
         )
-        Score.objects.bulk_create(
-            Score(evaluation_id=lease.evaluation_id, metric=metric, interval=interval, value=value)
-            for lease, outcome in decided
-            for (metric, interval), value in outcome.scores.items()
+        bulk.insert(
+            Score,
+            ["evaluation", "metric", "interval", "value"],
+            [
+                (lease.evaluation_id, metric, interval, value)
+                for lease, outcome in decided
+                for (metric, interval), value in outcome.scores.items()
+            ],
         )
         audit.record_many(
             (

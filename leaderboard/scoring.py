@@ -11,7 +11,7 @@ from django.conf import settings
 from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection
 
 import evaluator
-from evaluator import GroundTruth, Predictions, Rejected, Report, published
+from evaluator import GroundTruth, Rejected, Report, published
 from evaluator.protocol import get_protocol
 from evaluator.scoring import Scorer
 from leaderboard import files, ground_truth, lifecycle, quarantine
@@ -43,7 +43,6 @@ FAULTS_OF_THE_FILE = (
     TypeError,
     ValueError,
 )
-RESCORE_BATCH = 50
 FINALISE_ATTEMPTS = 8
 MAX_STORED_PROBLEMS = 100
 
@@ -54,18 +53,12 @@ def run_next(*, rng: random.Random) -> bool:
     False: nothing was waiting.
     """
     claimed_s = time.monotonic()
-    leases = lifecycle.claim(lease_s=settings.LEASE_S, wall_s=settings.WALL_S)
+    leases = lifecycle.claim(lease_s=settings.LEASE_S, wall_s=settings.WALL_S, batch=lifecycle.RESCORE_BATCH)
     if not leases:
         return False
-    first = _evaluations(leases)[0]
+    first = _evaluations(leases[:1])[0]
     if first.priority == Evaluation.PRIORITY_RESCORE:
-        leases += lifecycle.claim(
-            lease_s=settings.LEASE_S,
-            wall_s=settings.WALL_S,
-            limit=RESCORE_BATCH - 1,
-            rescored_in=first.edition_id,
-        )
-        leases = rescore(leases)
+        leases = rescore(leases, edition=first.edition)
     waiting = deque(leases)
     while waiting:
         run(waiting.popleft(), rng=rng, waiting=waiting)
@@ -87,15 +80,15 @@ def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
     return [found[pk] for pk in ids]
 
 
-def rescore(leases: Sequence[Lease]) -> list[Lease]:
-    """Score a batch of one edition from values that are already aligned with its manifest.
+def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
+    """Score a batch of an edition from values that are already aligned with its manifest.
 
     Returns the leases that need their file read again: those without such values (another manifest), and
     those that the protocol rejects, so that the problem is worded from the file itself. A store that does not
     answer is theirs to report as well.
     """
-    evaluations = _evaluations(leases)
-    edition = evaluations[0].edition
+    ids = [lease.evaluation_id for lease in leases]
+    digests = dict(Evaluation.objects.filter(pk__in=ids).values_list("pk", "submission__digest"))
     try:
         truth = _truth(edition)
     except (OSError, TruthDamaged):
@@ -103,8 +96,8 @@ def rescore(leases: Sequence[Lease]) -> list[Lease]:
     scorer = Scorer(truth, get_protocol(edition.protocol))
     outcomes: list[tuple[Lease, Outcome]] = []
     rest: list[Lease] = []
-    for lease, evaluation in zip(leases, evaluations, strict=True):
-        predictions = _aligned(evaluation, truth)
+    for lease in leases:
+        predictions = files.load_aligned(manifest=truth.manifest, digest=digests[lease.evaluation_id])
         try:
             if predictions is not None:
                 outcomes.append((lease, scored(scorer.report(predictions))))
@@ -117,18 +110,6 @@ def rescore(leases: Sequence[Lease]) -> list[Lease]:
         _persist(lambda: lifecycle.finalise_many(outcomes))
     log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
     return rest
-
-
-def _aligned(evaluation: Evaluation, truth: GroundTruth) -> Predictions | None:
-    """The submission's values, if they were aligned with this manifest before."""
-    ttc_s = files.load_aligned(
-        manifest_digest=evaluation.edition.ground_truth.manifest_digest,
-        digest=evaluation.submission.digest,
-        n_sequences=truth.n_sequences,
-    )
-    if ttc_s is None:
-        return None
-    return Predictions(manifest=truth.manifest, ttc_s=ttc_s, digest=evaluation.submission.digest)
 
 
 def run(lease: Lease, *, rng: random.Random, waiting: deque[Lease] | None = None) -> None:
@@ -214,11 +195,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
     except Rejected as rejected:
         return rejection(rejected)
     try:
-        files.keep_aligned(
-            manifest_digest=edition.ground_truth.manifest_digest,
-            digest=evaluation.submission.digest,
-            ttc_s=predictions.ttc_s,
-        )
+        files.keep_aligned(predictions)
     except OSError as fault:
         # They only make re-scoring quicker; without them it reads the file again.
         log.warning("values_not_kept", submission_id=str(evaluation.submission_id), reason=_in_words(fault))

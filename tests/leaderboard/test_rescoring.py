@@ -22,7 +22,7 @@ from leaderboard.models import (
     User,
 )
 from tests import builders
-from tests.editions import FACTORS, board_now, corrected, open_edition, publish, roll_back
+from tests.editions import FACTORS, board_now, corrected, offline, open_edition, publish, roll_back
 
 
 def test_opening_queues_every_standing_submission_once_and_changes_nothing_public(
@@ -263,3 +263,17 @@ def test_single_system_error_can_be_retried_and_unblocks_publishing(
     lifecycle.retry(evaluation=broken, actor=maintainer)
     builders.score_all()
     publish(edition)
+
+
+def test_a_correction_whose_rows_have_another_order_gives_the_same_numbers(
+    entries: list[Submission], edition: Edition, tmp_path: Path
+) -> None:
+    path = corrected(tmp_path, factor=1.3)
+    head, *rows = path.read_text().splitlines()
+    path.write_text("\n".join([head, *reversed(rows)]) + "\n")
+    second = open_edition(path)
+    assert second.ground_truth.manifest_digest == edition.ground_truth.manifest_digest
+    builders.score_all()
+    truth = read_truth(path)
+    for evaluation in Evaluation.objects.filter(edition=second).select_related("submission"):
+        assert standings.flat_scores(evaluation.scores.all()) == offline(evaluation.submission, truth)
