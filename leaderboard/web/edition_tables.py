@@ -11,7 +11,7 @@ from leaderboard import editions
 from leaderboard.models import Edition, Evaluation, Publication, Split, Status
 from leaderboard.preview import ABSENT, Change, Preview
 from leaderboard.rescoring import Progress
-from leaderboard.standings import Board
+from leaderboard.standings import Board, flat_scores
 from leaderboard.templatetags.board import duration, grouped
 from leaderboard.web.tables import ABSENT as NO_VALUE
 from leaderboard.web.tables import BoardTable, Heading, score_heading
@@ -115,6 +115,53 @@ def past_row(past: editions.Past) -> PastRow:
     """One edition, ready to be placed."""
     change = change_words(past.followed, past.edition) if past.followed else "the first"
     return PastRow(past=past, change=change)
+
+
+@dataclass(frozen=True)
+class RescoredNotice:
+    """What the last change of the board did to a submission, in words for its team."""
+
+    publication: Publication
+    heading: str  # before the date
+    outcome: str  # after the reason
+
+
+def rescored_notice(rescored: editions.Rescored | None) -> RescoredNotice | None:
+    """The notice on a submission's page; None where the change of the board changed nothing for it."""
+    if rescored is None:
+        return None
+    old, new, publication = rescored.old, rescored.new, rescored.publication
+    former = publication.replaced
+    if former is None:
+        return None
+    if old and new and old.status == new.status == Status.REJECTED:
+        return None
+    if publication.kind == Publication.Kind.ROLLED_BACK:
+        heading = f"Edition {publication.edition.number} is the board again since"
+    elif new and new.status == Status.SCORED:
+        heading = f"Re-scored in edition {publication.edition.number} on"
+    else:
+        heading = f"Edition {publication.edition.number} became the board on"
+    return RescoredNotice(publication, heading, _outcome(old, new, former.number))
+
+
+def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str:
+    """What became of one submission, by its MiD."""
+    before, after = _mid(old), _mid(new)
+    if new and new.status == Status.SCORED:
+        return f"MiD stays {after}." if before == after else f"MiD {before} → {after}."
+    kept = f" In edition {former} it keeps its result, MiD {before}." if before != NO_VALUE else ""
+    if new is None or new.status == Status.CANCELLED:
+        return f"This file was left out of it.{kept}"
+    if new.status == Status.REJECTED:
+        return f"It cannot score this file, for the reason below.{kept}"
+    if new.status == Status.SYSTEM_ERROR:
+        return f"Scoring this file in it failed by our fault.{kept}"
+    return f"This file waits to be scored in it.{kept}"
+
+
+def _mid(evaluation: Evaluation | None) -> str:
+    return format_published(flat_scores(evaluation.scores.all())["mid"] if evaluation else None)
 
 
 @dataclass(frozen=True)

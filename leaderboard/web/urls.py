@@ -22,6 +22,7 @@ urlpatterns = [
     path("submissions/", views.submissions, name="submissions"),
     path("submissions/<uuid:submission_id>/", views.submission, name="submission"),
     path("submissions/<uuid:submission_id>/state/", views.submission_state, name="submission_state"),
+    path("submissions/<uuid:submission_id>/withdraw/", views.withdraw, name="withdraw"),
     path("methods/<uuid:method_id>/", views.method, name="method"),
     path("docs/", views.docs, name="docs"),
     path("docs/api/", views.api_reference, name="api_reference"),

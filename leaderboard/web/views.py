@@ -13,7 +13,7 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import methods, standings
+from leaderboard import editions, methods, standings
 from leaderboard import submissions as verbs
 from leaderboard.models import Edition, Evaluation, Method, Split, Submission, User
 from leaderboard.web import api_reference as api
@@ -112,6 +112,21 @@ def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     return render(request, "submission_state.html", context | {"is_fragment": True}, status=status)
 
 
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
+    """Say what withdrawing does, and do it; for the submission's own team."""
+    user = cast("User", request.user)
+    own = Submission.objects.filter(method__team__memberships__user=user)
+    found = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
+    if request.method == "POST" and verbs.withdraw(submission=found, actor=user, now=timezone.now()):
+        messages.success(request, "The submission is withdrawn.")
+    if request.method == "POST" or found.withdrawn_at:
+        return redirect("submission", found.pk)
+    return render(request, "withdraw.html", {"submission": found})
+
+
 @require_safe
 def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """A method: what it is, and what it achieved on each split."""
@@ -137,4 +152,10 @@ def _evaluation(request: HttpRequest, submission_id: UUID) -> dict[str, Any]:
     rows = Submission.objects.visible_to(request.user).select_related("method__team", "split", "submitted_by")
     found = get_object_or_404(rows, pk=submission_id)
     progress = verbs.progress(found)
-    return {"submission": found, "progress": progress, "shown": shown(progress)}
+    return {
+        "submission": found,
+        "progress": progress,
+        "shown": shown(progress),
+        "rescored": edition_tables.rescored_notice(editions.rescored(found)),
+        "is_mine": found.method.team.memberships.filter(user=cast("User", request.user)).exists(),
+    }

@@ -1,0 +1,249 @@
+"""What a team finds on its submission: that its board was corrected, and how to withdraw."""
+
+from pathlib import Path
+from uuid import uuid4
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import lifecycle
+from leaderboard.models import AuditEvent, Edition, Evaluation, Publication, Status, Submission, User
+from tests import builders, pages
+from tests.editions import corrected, open_edition, publish, roll_back
+from tests.leaderboard.test_pages_everywhere import assert_sound
+
+
+def today() -> str:
+    return f"{timezone.now():%Y-%m-%d}"
+
+
+def address(submission: Submission, part: str = "") -> str:
+    return f"/submissions/{submission.pk}/{part}"
+
+
+def mid(submission: Submission, number: int) -> str:
+    evaluation = submission.evaluations.get(edition__number=number)
+    return f"{evaluation.scores.get(metric='mid', interval='overall').value:.2f}"
+
+
+@pytest.fixture
+def signed_in(client: Client, owner: User) -> Client:
+    """The owner's browser."""
+    client.force_login(owner)
+    return client
+
+
+@pytest.fixture
+def sent(entries: list[Submission]) -> Submission:
+    """One of the owner's scored submissions."""
+    return entries[1]
+
+
+def notices(client: Client, submission: Submission) -> list[str]:
+    response = client.get(address(submission))
+    assert response.status_code == 200
+    return [p.text for p in assert_sound(response).one("div", id="outcome").all("p", class_="notice")]
+
+
+# --- the board was corrected -------------------------------------------------------------------------------
+
+
+def test_without_a_correction_there_is_no_notice(signed_in: Client, sent: Submission, tmp_path: Path) -> None:
+    assert notices(signed_in, sent) == []
+    open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    assert notices(signed_in, sent) == []
+
+
+def test_team_is_told_what_a_correction_did_to_its_entry(
+    signed_in: Client, sent: Submission, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    publish(second)
+    assert mid(sent, 1) != mid(sent, 2)
+    assert notices(signed_in, sent) == [
+        f"Re-scored in edition 2 on {today()}: Labels corrected. MiD {mid(sent, 1)} → {mid(sent, 2)}. "
+        "Edition 1 stays as it was; all editions."
+    ]
+
+
+def test_team_is_told_that_a_correction_was_taken_back(
+    signed_in: Client, sent: Submission, tmp_path: Path
+) -> None:
+    publish(open_edition(corrected(tmp_path, factor=1.3)), leave_out=True)
+    builders.score_all()
+    roll_back()
+    (notice,) = notices(signed_in, sent)
+    assert notice.startswith(
+        f"Edition 1 is the board again since {today()}: A mistake. MiD {mid(sent, 2)} → "
+    )
+
+
+def test_value_that_stays_is_said_to_stay(signed_in: Client, sent: Submission) -> None:
+    second = open_edition(None, protocol="toolkit")
+    builders.score_all()
+    publish(second)
+    (notice,) = notices(signed_in, sent)
+    assert f"Labels corrected. MiD stays {mid(sent, 1)}." in notice
+
+
+def test_team_is_told_that_the_new_truth_cannot_score_its_file(
+    signed_in: Client, sent: Submission, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, drop="0003"))
+    builders.score_all()
+    publish(second)
+    assert notices(signed_in, sent) == [
+        f"Edition 2 became the board on {today()}: Labels corrected. It cannot score this file, for the "
+        f"reason below. In edition 1 it keeps its result, MiD {mid(sent, 1)}. "
+        "Edition 1 stays as it was; all editions."
+    ]
+    outcome = pages.page(signed_in.get(address(sent))).one("div", id="outcome").text
+    assert "1 problem in the file" in outcome or "5 problems in the file" in outcome
+    assert "In edition 2 nothing of it is scored." in outcome
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [
+        (Status.QUEUED, "This file waits to be scored in it."),
+        (Status.SYSTEM_ERROR, "Scoring this file in it failed by our fault."),
+        (Status.CANCELLED, "This file was left out of it."),
+    ],
+)
+def test_team_is_told_when_its_file_is_not_scored_in_the_new_edition(
+    signed_in: Client, sent: Submission, tmp_path: Path, status: Status, words: str
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    Evaluation.objects.filter(edition=second, submission=sent).update(status=status)
+    publish(second, leave_out=True)
+    (notice,) = notices(signed_in, sent)
+    assert f"Labels corrected. {words} In edition 1 it keeps its result, MiD {mid(sent, 1)}." in notice
+
+
+def test_file_that_no_edition_could_score_needs_no_notice(
+    signed_in: Client, edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    bad = builders.submit(owner, b'{"0": 0}')
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    publish(second)
+    assert notices(signed_in, bad) == []
+
+
+def test_what_came_after_the_correction_is_not_told_of_it(
+    signed_in: Client, sent: Submission, owner: User, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    publish(second, leave_out=True)
+    late = builders.submit(owner, builders.predictions(second), method="Late")
+    assert notices(signed_in, late) == []
+
+
+def test_reason_in_the_notice_is_text(signed_in: Client, sent: Submission, tmp_path: Path) -> None:
+    publish(open_edition(corrected(tmp_path, factor=1.3)), leave_out=True)
+    Publication.objects.update(reason="<b>bold</b>")
+    (notice,) = notices(signed_in, sent)
+    assert "<b>bold</b>" in notice
+
+
+# --- withdrawing -------------------------------------------------------------------------------------------
+
+
+def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Client, sent: Submission) -> None:
+    (link,) = [a for a in pages.page(signed_in.get(address(sent))).all("a") if a.text.startswith("Withdraw")]
+    root = assert_sound(signed_in.get(link.attributes["href"]))
+    assert "It cannot be undone." in root.one("main").text
+    assert "Its values leave the board and every former edition." in root.one("main").text
+    assert root.one("main").one("button").text == "Withdraw it for good"
+    sent.refresh_from_db()
+    assert sent.withdrawn_at is None
+
+
+@pytest.mark.parametrize("who", ["owner", "teammate"])
+def test_team_withdraws_and_is_told_when(
+    client: Client, sent: Submission, who: str, request: pytest.FixtureRequest
+) -> None:
+    user = request.getfixturevalue(who)
+    client.force_login(user)
+    response = client.post(address(sent, "withdraw/"), follow=True)
+    assert response.redirect_chain == [(address(sent), 302)]
+    assert "The submission is withdrawn." in pages.page(response).one("div", class_="messages").text
+    assert notices(client, sent)[0].startswith(f"Withdrawn by its team on {today()}")
+    assert AuditEvent.objects.get(verb="withdrawn").actor == user
+    board = pages.page(client.get("/board/test/"))
+    (row,) = [row for row in pages.board_rows(board) if row[1].startswith(sent.method.name)]
+    assert f"withdrawn {today()}" in row[1]
+    assert set(row[4:]) == {"–"}
+
+
+def test_next_best_of_the_method_stands_for_it(signed_in: Client, sent: Submission, owner: User) -> None:
+    edition = sent.evaluations.get().edition
+    builders.submit(owner, builders.predictions(edition, factor=1.5), method=sent.method.name)
+    builders.score_all()
+    signed_in.post(address(sent, "withdraw/"))
+    (row,) = [
+        row
+        for row in pages.board_rows(pages.page(signed_in.get("/board/test/")))
+        if row[1].startswith(sent.method.name)
+    ]
+    assert "withdrawn" not in row[1]
+    assert row[4] != "–"
+
+
+def test_what_waits_is_not_scored_once_withdrawn(signed_in: Client, edition: Edition, owner: User) -> None:
+    waiting = builders.submit(owner, builders.predictions(edition))
+    signed_in.post(address(waiting, "withdraw/"))
+    assert builders.score_all() == 0
+    assert waiting.evaluations.get().status == Status.CANCELLED
+
+
+def test_withdrawing_twice_is_withdrawing_once(signed_in: Client, sent: Submission) -> None:
+    for _ in range(2):
+        assert signed_in.post(address(sent, "withdraw/")).status_code == 302
+    assert AuditEvent.objects.filter(verb="withdrawn").count() == 1
+    assert signed_in.get(address(sent, "withdraw/")).headers["Location"] == address(sent)
+    links = [a.text for a in pages.page(signed_in.get(address(sent))).all("a")]
+    assert not [text for text in links if text.startswith("Withdraw")]
+
+
+@pytest.mark.parametrize("method", ["get", "post"])
+@pytest.mark.parametrize("who", ["stranger", "maintainer"])
+def test_nobody_else_withdraws_it_or_learns_that_it_is_there(
+    client: Client, sent: Submission, who: str, method: str, request: pytest.FixtureRequest
+) -> None:
+    client.force_login(request.getfixturevalue(who))
+    for pk in (sent.pk, uuid4()):
+        assert getattr(client, method)(f"/submissions/{pk}/withdraw/").status_code == 404
+    sent.refresh_from_db()
+    assert sent.withdrawn_at is None
+
+
+def test_maintainers_see_a_submission_without_the_way_to_withdraw_it(
+    client: Client, sent: Submission, maintainer: User
+) -> None:
+    client.force_login(maintainer)
+    assert "Withdraw" not in pages.page(client.get(address(sent))).one("main").text
+
+
+def test_visitors_are_asked_to_sign_in_first(client: Client, sent: Submission) -> None:
+    response = client.post(address(sent, "withdraw/"))
+    assert response.headers["Location"] == f"/accounts/login/?next={address(sent, 'withdraw/')}"
+
+
+def test_withdrawing_needs_the_forms_token(sent: Submission, owner: User) -> None:
+    client = Client(enforce_csrf_checks=True)
+    client.force_login(owner)
+    assert client.post(address(sent, "withdraw/")).status_code == 403
+    sent.refresh_from_db()
+    assert sent.withdrawn_at is None
+
+
+def test_state_of_a_withdrawn_submission_is_still_told(
+    signed_in: Client, sent: Submission, owner: User
+) -> None:
+    lifecycle.cancel(submission=sent, actor=owner)
+    signed_in.post(address(sent, "withdraw/"))
+    assert signed_in.get(address(sent, "state/")).status_code == 286
