@@ -123,6 +123,54 @@ def test_the_rule_about_statuses_sees_every_way_to_write_one(source: str) -> Non
     assert status_writes(ast.parse(source)) == [1]
 
 
+# --- models <- verbs <- doors ------------------------------------------------------------------------------
+
+DOORS = {"admin", "api", "management", "tasks", "web"}
+# What holds the rest together: Django's and Celery's entry points, settings and what settings need.
+FRAME = {"__init__", "apps", "celery", "logs", "migrations", "settings", "urls", "wsgi"}
+
+
+def room(module: str) -> str:
+    """The part of the leaderboard that a module belongs to: `leaderboard.web.forms` to `web`."""
+    name = module.partition(".")[2].partition(".")[0]
+    # Django wants what templates call to stand here; it is as much the pages' as the rest of `web`.
+    return "web" if name == "templatetags" else name or "__init__"
+
+
+def rooms_used(path: Path) -> set[str]:
+    """The parts of the leaderboard that a file imports, wherever in it the import stands."""
+    used = set()
+    for node in ast.walk(tree(path)):
+        if isinstance(node, ast.Import):
+            used |= {room(alias.name) for alias in node.names if alias.name.startswith("leaderboard")}
+        if isinstance(node, ast.ImportFrom) and node.module == "leaderboard":
+            used |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("leaderboard."):
+            used.add(room(node.module or ""))
+    return used
+
+
+def kind(name: str) -> str:
+    """What a part of the leaderboard is: every module that is nothing else is a verb's."""
+    if name in DOORS:
+        return "door"
+    return name if name == "models" else "frame" if name in FRAME else "verb"
+
+
+MAY_USE = {"models": {"models"}, "verb": {"models", "verb"}, "door": {"models", "verb"}}
+
+
+def test_imports_in_the_leaderboard_run_one_way() -> None:
+    wrong = [
+        f"{path} ({kind(own)}) imports leaderboard.{used} ({kind(used)})"
+        for path in written_by_hand("leaderboard")
+        for own in [room(".".join(path.with_suffix("").parts))]
+        for used in sorted(rooms_used(path) - {own})
+        if kind(own) != "frame" and kind(used) not in MAY_USE[kind(own)]
+    ]
+    assert wrong == []
+
+
 # --- habits that the house does without --------------------------------------------------------------------
 
 
