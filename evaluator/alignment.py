@@ -31,7 +31,9 @@ class Aligned:
 
 def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
     """Read any file, member by member; raises `Rejected`."""
-    document = read_document(parse(data))
+    # A value and a rate for each sequence, meta, and enough more to name what is too much.
+    max_members = 2 * manifest.n_sequences + 100_000
+    document = read_document(parse(data, max_members=max_members))
     findings = Findings()
     keys = _check_keys(document.predictions, manifest, findings, document.pointer)
     ttc = document.unit == "ttc"

@@ -176,15 +176,17 @@ def _numbers(text: bytearray, n: int) -> Floats | None:
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
     """Read any keys through a dictionary."""
+    n = manifest.n_sequences
+    # Keys of the manifest hold no comma. So if every key is one of them, the commas count the members, and a
+    # doubled key, of which the dictionary keeps the last, shows as one comma too many.
+    if text.count(b",") != n - 1:
+        return None
     try:
         members = _OBJECT.decode(text)
     except (msgspec.MsgspecError, ValueError, RecursionError):
         # Invalid UTF-8 in a text is a UnicodeDecodeError, which is a ValueError.
         return None
-    n = manifest.n_sequences
-    # Keys of the manifest hold no comma. So if every key is one of them, the commas count the members, and a
-    # doubled key, of which the dictionary keeps the last, shows as one comma too many.
-    if len(members) != n or text.count(b",") != n - 1:
+    if len(members) != n:
         return None
     values = np.fromiter(members.values(), dtype=np.float64, count=n)
     kinds: tuple[tuple[KeyKind, tuple[str, ...], dict[str, int]], ...] = (

@@ -23,7 +23,8 @@ MAX_DEPTH: Final = 32
 MAX_META_BYTES: Final = 64 * 1024
 FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 
-_STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+"', re.DOTALL)
+# Also matches a text that never ends, or looking for its end would begin anew at every mark inside it.
+_STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
 
 
@@ -47,9 +48,10 @@ class Document:
         return pointer("predictions", key) if self.enveloped else pointer(key)
 
 
-def parse(data: bytes) -> object:
+def parse(data: bytes, *, max_members: int | None = None) -> object:
     """The JSON value in `data`, objects as `Members`; raises `Rejected` unless it is UTF-8, shallow and JSON.
 
+    Text with more than `max_members` members and items is refused before it takes memory.
     A byte order mark and Python's `NaN`, `Infinity` and `-Infinity` are accepted. Numbers beyond the range of
     float64 are ±Infinity, as in IEEE 754.
     """
@@ -61,6 +63,10 @@ def parse(data: bytes) -> object:
         start = error.start + len(data) - len(body)
         message = f"Byte {start:,} of the file is not UTF-8; expected JSON text encoded in UTF-8.{hint}"
         raise reject("not-utf8", message, f"byte {start}") from None
+    n_members = body.count(b",") + 1
+    if max_members is not None and n_members > max_members:
+        message = f"The file has up to {n_members:,} members and items; expected at most {max_members:,}."
+        raise reject("too-many-members", message)
     if _depth(body) > MAX_DEPTH:
         raise reject(
             "too-deep",
@@ -226,10 +232,16 @@ def _depth(body: bytes) -> int:
     if body.count(b"{") + body.count(b"[") <= MAX_DEPTH:
         return 0
     brackets = _STRING.sub(b"", body).translate(None, delete=_NO_BRACKETS)
-    steps = _STEP[np.frombuffer(brackets, dtype=np.uint8)]
-    return int(np.cumsum(steps, dtype=np.int64).max(initial=0))
+    depth = deepest = 0
+    for start in range(0, len(brackets), _CHUNK):
+        levels = depth + np.cumsum(_STEP[np.frombuffer(brackets[start : start + _CHUNK], dtype=np.uint8)])
+        depth, deepest = int(levels[-1]), max(deepest, int(levels.max()))
+        if deepest > MAX_DEPTH:
+            break
+    return deepest
 
 
+_CHUNK: Final = 1 << 20
 _NO_BRACKETS: Final = bytes(set(range(256)) - set(b"[]{}"))
 _STEP: Final = np.zeros(256, dtype=np.int64)
 _STEP[list(b"[{")] = 1

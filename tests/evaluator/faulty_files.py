@@ -113,6 +113,13 @@ CASES: dict[str, tuple[bytes, Problem]] = {
             "Objects and lists are nested deeper than 32 levels; expected 2, or a few in meta.",
         ),
     ),
+    "members without end": (
+        b"{" + b'"0":1,' * 100_008 + b'"0":1}',
+        Problem(
+            "too-many-members",
+            "The file has up to 100,009 members and items; expected at most 100,008.",
+        ),
+    ),
     "a list": (
         b"[5.31, -12.9]",
         Problem(
