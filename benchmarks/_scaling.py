@@ -1,0 +1,124 @@
+"""The measurement of `benchmarks/scale_out.py`, run in a process that has the site's settings.
+
+200 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued, not yet due.
+Once every worker is up they become due at once, and the clock runs, by the database, until the last is
+decided. The workers share the database, the broker and the files, and nothing else, as those on other
+machines do.
+"""
+
+import os
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from datetime import timedelta
+from pathlib import Path
+from uuid import UUID
+
+import numpy as np
+from django.conf import settings
+from django.core.files.base import ContentFile
+from django.core.management import call_command
+from django.db import connections
+from django.db.models import Max, Sum
+from django.db.models.functions import Now
+from django.utils import timezone
+
+import evaluator
+from leaderboard import broker, clock, ground_truth, submissions
+from leaderboard.demo.truth import simulate
+from leaderboard.models import Evaluation, Status, User
+from tests.journeys.production import BIN, REPOSITORY, await_that
+
+N_WORKERS = (1, 2, 4)
+N_SUBMISSIONS = 200
+N_SEQUENCES = 28_600
+SEED = 20230901
+PATIENCE_S = 600.0
+
+
+def main() -> None:
+    """Print one line per number of workers."""
+    call_command("migrate", verbosity=0)
+    truth = simulate(rng=np.random.default_rng(SEED), n_sequences=N_SEQUENCES)
+    table = Path(settings.DATA_DIR) / "truth.csv"
+    table.write_bytes(truth.to_csv())
+    ground_truth.import_truth(split_name="test", path=table, now=timezone.now())
+    try:
+        for n in N_WORKERS:
+            ids = queue_for_later(truth, n_workers=n)
+            with workers(n):
+                per_s = rate(ids)
+            print(
+                f"scale_out_{n}_{'worker' if n == 1 else 'workers'} = {per_s:.2f} submissions/s", flush=True
+            )
+    finally:
+        connections.close_all()
+
+
+def queue_for_later(truth: evaluator.GroundTruth, *, n_workers: int) -> list[UUID]:
+    """Send different files while nobody works, none of them due yet; returns their evaluations."""
+    user, _ = User.objects.get_or_create(email="scale-out@example.org")
+    method = f"for {n_workers}"
+    rng = np.random.default_rng([SEED, n_workers])
+    for i in range(N_SUBMISSIONS):
+        ttc_s = truth.ttc_s * rng.lognormal(0, 0.15, truth.n_sequences)
+        data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s)
+        submissions.submit(
+            user=user,
+            split_name="test",
+            method_name=method,
+            upload=ContentFile(data, name=f"{i}.json"),
+            via="API",
+            now=timezone.now(),
+        )
+    queued = Evaluation.objects.filter(submission__method__name=method)
+    queued.update(due_at=timezone.now() + timedelta(days=1))
+    return list(queued.values_list("pk", flat=True))
+
+
+def rate(ids: Sequence[UUID]) -> float:
+    """Let them all become due, wait for the last, and return how many were scored per second."""
+    rows = Evaluation.objects.filter(pk__in=ids)
+    began_at = clock.database_now()
+    rows.update(due_at=Now())
+    for evaluation_id in ids:
+        broker.nudge(evaluation_id)
+    undecided = rows.filter(status__in=[Status.QUEUED, Status.RUNNING])
+    await_that(lambda: not undecided.exists(), what="all are decided", patience_s=PATIENCE_S)
+    found = rows.aggregate(last=Max("finished_at"), n_attempts=Sum("attempt"))
+    assert rows.filter(status=Status.SCORED).count() == len(ids)
+    assert found["n_attempts"] == len(ids), "each was claimed once"
+    return len(ids) / float((found["last"] - began_at).total_seconds())
+
+
+@contextmanager
+def workers(n: int) -> Iterator[None]:
+    """So many worker processes, all of them up; ended with the context."""
+    logs = [Path(settings.DATA_DIR) / f"worker-{n}-{i}.log" for i in range(n)]
+    with ExitStack() as started:
+        for i, path in enumerate(logs):
+            log = started.enter_context(path.open("wb"))
+            command = [str(BIN / "celery"), "--app=leaderboard", "worker", "--concurrency=1"]
+            command += [f"--hostname=scale-{i}@%h", "--without-gossip", "--without-mingle"]
+            worker = subprocess.Popen(
+                command,
+                cwd=REPOSITORY,
+                env={**os.environ, "TSTTC_LOG_LEVEL": "INFO"},
+                stdout=log,
+                stderr=log,
+                stdin=subprocess.DEVNULL,
+            )
+            started.callback(end, worker)
+        await_that(lambda: all(b" ready." in path.read_bytes() for path in logs), what="the workers are up")
+        yield
+
+
+def end(worker: "subprocess.Popen[bytes]") -> None:
+    """Ask a worker to finish, and make it if it does not."""
+    worker.terminate()
+    try:
+        worker.wait(timeout=60)
+    finally:
+        if worker.poll() is None:
+            worker.kill()
+            worker.wait()
