@@ -16,7 +16,6 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-import orjson
 
 from evaluator.predictions import read_predictions
 from evaluator.problems import Rejected
@@ -65,7 +64,7 @@ def warm_up(manifest: Manifest) -> None:
             read_predictions(sample, manifest=manifest)
         except Rejected:
             continue
-    for library in (codecs, msgspec, orjson):
+    for library in (codecs, msgspec):
         if library.__name__ not in sys.modules:
             raise RuntimeError(f"{library.__name__} is not loaded")
 
