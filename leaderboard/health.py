@@ -108,8 +108,7 @@ def _broker() -> Check:
             with Connection(
                 settings.CELERY_BROKER_URL, connect_timeout=CHECK_TIMEOUT_S, transport_options=options
             ) as connection:
-                # Asking for the channel is what makes kombu speak to the server.
-                connection.default_channel  # noqa: B018
+                connection.default_channel  # noqa: B018 - asking for it makes kombu speak to the server
     except (KombuError, OSError) as fault:
         log.warning("broker_not_ready", reason=str(fault)[:200])
         return Check("broker", is_ok=False, detail="does not answer")
