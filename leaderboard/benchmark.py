@@ -1,6 +1,7 @@
 """The splits that the benchmark has from the start, and the rows printed in papers."""
 
 import json
+from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "description": "The hidden test set: the numbers that papers quote.",
         "position": 0,
         "is_hidden": True,
+        "quota_limit": 3,
+        "quota_window": timedelta(days=30),
+        "quota_min_gap": timedelta(hours=24),
     },
     {
         "name": "val",
@@ -24,6 +28,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "description": "The validation set, whose ground truth comes with the dataset.",
         "position": 1,
         "is_hidden": False,
+        "quota_limit": 50,
     },
     {
         "name": "demo",
@@ -32,6 +37,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "position": 2,
         "is_hidden": False,
         "is_simulated": True,
+        "quota_limit": 20,
     },
 )
 
@@ -39,11 +45,13 @@ SPLITS: tuple[dict[str, Any], ...] = (
 def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResult) -> None:
     """Make the three splits and the published rows where they are missing; change nothing that is there.
 
-    A migration passes the models as they were in its time.
+    A migration passes the models as they were in its time, without what came later.
     """
+    columns = {field.name for field in split_model._meta.get_fields()}
     with transaction.atomic():
         for fields in SPLITS:
-            split_model.objects.get_or_create(name=fields["name"], defaults=fields)
+            there = {name: value for name, value in fields.items() if name in columns}
+            split_model.objects.get_or_create(name=fields["name"], defaults=there)
         for path in sorted(PUBLISHED_DIR.glob("*.json")):
             _ensure_published(json.loads(path.read_text(encoding="utf-8")), result_model)
 

@@ -132,6 +132,16 @@ def manifest_name(digest: str) -> str:
     return f"manifests/{digest.removeprefix('sha256:')}.csv"
 
 
+def measure(upload: "File[bytes]") -> StoredFile:
+    """Digest and size of an uploaded file; nothing is kept."""
+    digest = hashlib.sha256()
+    size_bytes = 0
+    for chunk in upload.chunks(CHUNK_BYTES):
+        digest.update(chunk)
+        size_bytes += len(chunk)
+    return StoredFile(digest=f"sha256:{digest.hexdigest()}", size_bytes=size_bytes)
+
+
 def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
     """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
 
@@ -140,12 +150,7 @@ def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
 
     Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
     """
-    digest = hashlib.sha256()
-    size_bytes = 0
-    for chunk in upload.chunks(CHUNK_BYTES):
-        digest.update(chunk)
-        size_bytes += len(chunk)
-    kept = StoredFile(digest=f"sha256:{digest.hexdigest()}", size_bytes=size_bytes)
+    kept = measure(upload)
     name = predictions_name(kept.digest)
     if not _is_fresh(name, now=now):
         upload.seek(0)

@@ -183,6 +183,9 @@ DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is strea
 DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
 FILE_UPLOAD_HANDLERS = ["django.core.files.uploadhandler.TemporaryFileUploadHandler"]
 
+# Whether teams have quotas (see leaderboard/quotas.py); off where a machine sends, as in trials of load.
+QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
+
 # --- the life of an evaluation (seconds; see leaderboard/lifecycle.py) ----------------------------------
 
 LEASE_S = env.float("TSTTC_LEASE_S", default=60.0)

@@ -13,7 +13,7 @@ from django.core.validators import URLValidator
 from django.db import IntegrityError, transaction
 from django.db.models import Q
 
-from leaderboard import audit, estimates, files, lifecycle, standings, teams
+from leaderboard import audit, estimates, files, lifecycle, quotas, standings, teams
 from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
 
 log = structlog.get_logger(__name__)
@@ -68,8 +68,8 @@ def submit(
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
-    The same bytes again, for the same split and method, are answered with the first submission. Raises
-    `Refused` (nothing is kept then).
+    The same bytes again, for the same split and method, are answered with the first submission and cost
+    nothing. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
     name = _clean_text("method", method_name, limit=80)
@@ -80,14 +80,20 @@ def submit(
     )
     note = _clean_text("note", note, limit=500, required=False)
     commit = _clean_text("commit", commit, limit=64, required=False)
-    kept = _keep(upload, now=now)
+    upload = _checked(upload)
+    first = _before_the_quota(user=user, split=split, method_name=name, upload=upload, now=now)
+    if first is not None:
+        return Submitted(submission=first, is_new=False)
+    kept = files.keep_predictions(upload, now=now)
     team = teams.team_of(user=user)
     with transaction.atomic():
+        quotas.hold(team=team, split=split)
         method = _method(team=team, name=name, details=details, now=now)
         standing = Submission.objects.standing().filter(split=split, method=method, digest=kept.digest)
         first = standing.first()
         if first is not None:
             return Submitted(submission=first, is_new=False)
+        quotas.require(team=team, split=split, now=now)
         try:
             with transaction.atomic():
                 submission = Submission.objects.create(
@@ -133,35 +139,52 @@ def _open_split(name: str, *, now: datetime) -> Split:
         raise Refused(
             "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
         )
-    if not split.accepts_submissions():
-        raise Refused(
-            "split-not-open",
-            f"Submissions to {name} are not open yet: it has no ground truth.",
-            field="split",
-        )
-    if split.opens_at and now < split.opens_at:
-        raise Refused(
-            "split-not-open",
-            f"Submissions to {name} open at {split.opens_at:%Y-%m-%d %H:%M} UTC.",
-            field="split",
-        )
-    if split.closes_at and now >= split.closes_at:
-        raise Refused(
-            "split-closed",
-            f"Submissions to {name} closed at {split.closes_at:%Y-%m-%d %H:%M} UTC.",
-            field="split",
-        )
+    refusal = refusal_of(split, now=now)
+    if refusal is not None:
+        raise refusal
     return split
 
 
-def _keep(upload: "File[bytes] | None", *, now: datetime) -> files.StoredFile:
+def refusal_of(split: Split, *, now: datetime) -> Refused | None:
+    """Why a split takes nothing from anybody now; None if it does."""
+    code, sentence = "", ""
+    if not split.accepts_submissions():
+        code, sentence = "split-not-open", "are not open yet: it has no ground truth."
+    elif split.opens_at and now < split.opens_at:
+        code, sentence = "split-not-open", f"open at {split.opens_at:%Y-%m-%d %H:%M} UTC."
+    elif split.closes_at and now >= split.closes_at:
+        code, sentence = "split-closed", f"closed at {split.closes_at:%Y-%m-%d %H:%M} UTC."
+    return Refused(code, f"Submissions to {split.pk} {sentence}", field="split") if code else None
+
+
+def _before_the_quota(
+    *, user: User, split: Split, method_name: str, upload: "File[bytes]", now: datetime
+) -> Submission | None:
+    """Where no slot is open, the submission that had these bytes before. None: go on, and ask again.
+
+    So that a file that cannot be taken is not written first. Raises `quotas.QuotaExceeded`.
+    """
+    team = teams.present_team_of(user=user)
+    try:
+        quotas.require(team=team, split=split, now=now)
+    except quotas.QuotaExceeded:
+        methods = Method.objects.filter(team=team, name=method_name)
+        same = {"split": split, "method__in": methods, "digest": files.measure(upload).digest}
+        first = Submission.objects.standing().filter(**same).first()
+        if first is None:
+            raise
+        return first
+    return None
+
+
+def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload is None:
         raise Refused(
             "no-file", "No prediction file was sent; expected one in the field 'file'.", field="file"
         )
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
         raise TooLarge("too-large", too_large(found_bytes=upload.size), field="file")
-    return files.keep_predictions(upload, now=now)
+    return upload
 
 
 def too_large(*, found_bytes: int) -> str:

@@ -6,11 +6,16 @@ from leaderboard import audit
 from leaderboard.models import Membership, Team, User
 
 
+def present_team_of(*, user: User) -> Team | None:
+    """The person's team, if there is one yet."""
+    return Team.objects.filter(memberships__user=user).first()
+
+
 def team_of(*, user: User) -> Team:
     """The person's team; somebody without one becomes a team of one."""
-    membership = Membership.objects.select_related("team").filter(user=user).first()
-    if membership is not None:
-        return membership.team
+    present = present_team_of(user=user)
+    if present is not None:
+        return present
     wanted = user.name.strip()
     # An address is nobody's business: somebody who gave no name gets one that reveals nothing.
     team = _named(wanted or f"Team {user.pk}")

@@ -1,6 +1,7 @@
 """Small worlds for tests: a made-up ground truth, prediction files for it, people and their submissions."""
 
 import random
+from datetime import timedelta
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from django.utils import timezone
 
 import evaluator
 from leaderboard import ground_truth, scoring, submissions
-from leaderboard.models import Edition, Submission, User
+from leaderboard.models import Edition, Split, Submission, User
 
 N_SEQUENCES = 120
 
@@ -27,7 +28,8 @@ def truth_csv(path: Path, *, n: int = N_SEQUENCES, seed: int = 0, n_recordings: 
 
 
 def import_truth(tmp_path: Path, *, split: str = "test", **options: int) -> Edition:
-    """Open a split with made-up ground truth."""
+    """Open a split with made-up ground truth, without the quotas that most tests are not about."""
+    Split.objects.update(quota_limit=None, quota_min_gap=timedelta(0), quota_rejected_limit=None)
     path = truth_csv(tmp_path / f"truth-{split}.csv", **options)
     return ground_truth.import_truth(split_name=split, path=path, now=timezone.now())
 

@@ -5,11 +5,12 @@ from typing import Any
 
 from django.core.exceptions import PermissionDenied
 from django.http import Http404
+from django.utils import timezone
 from rest_framework import exceptions
 from rest_framework.response import Response
 from rest_framework.views import exception_handler as default_handler
 
-from leaderboard import outages, rescoring, standings, submissions
+from leaderboard import outages, quotas, rescoring, standings, submissions
 
 
 def problem(
@@ -58,6 +59,10 @@ def _of_a_verb(exc: Exception) -> Response | None:
         if exc.code in {"split-not-open", "split-closed"}:
             status = 409
         return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
+    if isinstance(exc, quotas.QuotaExceeded):
+        retry_after_s = exc.quota.retry_after_s(now=timezone.now())
+        headers = {"Retry-After": str(retry_after_s)} if retry_after_s else None
+        return problem(status=429, code=exc.code, detail=str(exc), where=exc.field, headers=headers)
     if type(exc) not in OF_VERBS:
         return None
     status, code, where = OF_VERBS[type(exc)]

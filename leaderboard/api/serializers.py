@@ -9,6 +9,7 @@ from rest_framework import serializers
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
 from leaderboard import preview, rescoring, submissions
 from leaderboard.models import Edition, Publication, Split, Status, Submission
+from leaderboard.quotas import Quota
 from leaderboard.standings import Board, Entry
 
 
@@ -128,6 +129,46 @@ class SubmissionSerializer(serializers.Serializer[Submission]):
             "problems": progress.problems,
             "n_problems": progress.n_problems,
         }
+
+
+class SlotsSerializer(serializers.Serializer[Quota]):
+    """What the team has left on a split."""
+
+    limit = serializers.IntegerField(
+        allow_null=True, help_text="Submissions within the window; null: any number."
+    )
+    used = serializers.IntegerField(help_text="Scored or waiting, within the window.")
+    left = serializers.IntegerField(allow_null=True)
+    next_slot_at = serializers.DateTimeField(
+        allow_null=True, help_text="When the next submission is taken; null: now, or never if the limit is 0."
+    )
+
+
+class SubmittedSerializer(SubmissionSerializer):
+    """A submission that has just come in, and what the team has left after it."""
+
+    quota = SlotsSerializer()
+
+    def to_representation(self, instance: Submission) -> dict[str, Any]:
+        """The submission, and the quota that the view hands over."""
+        return {
+            **super().to_representation(instance),
+            "quota": SlotsSerializer(self.context["quota"]).data,
+        }
+
+
+class QuotaSerializer(SlotsSerializer):
+    """What the team has left on one of the splits, with the rules."""
+
+    split = serializers.CharField()
+    is_open = serializers.BooleanField(help_text="Whether the quota lets a submission in now.")
+    window_s = serializers.FloatField(source="rules.window_s", help_text="The rolling window.")
+    min_gap_s = serializers.FloatField(
+        source="rules.min_gap_s", help_text="Least time between two submissions."
+    )
+    rejected_used = serializers.IntegerField(source="n_rejected", help_text="Rejected files within 24 hours.")
+    rejected_limit = serializers.IntegerField(source="rules.rejected_limit", allow_null=True)
+    sentence = serializers.CharField(help_text="The same in words.")
 
 
 class SplitSerializer(serializers.Serializer[Split]):

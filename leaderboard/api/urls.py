@@ -5,11 +5,12 @@ from django.views.generic import RedirectView
 from drf_spectacular.views import SpectacularAPIView
 from rest_framework.permissions import AllowAny
 
-from leaderboard.api import edition_views, views
+from leaderboard.api import account_views, edition_views, views
 
 urlpatterns = [
     path("submissions", views.SubmissionsView.as_view(), name="api-submissions"),
     path("submissions/<uuid:submission_id>", views.SubmissionView.as_view(), name="api-submission"),
+    path("quota", account_views.QuotaView.as_view(), name="api-quota"),
     path("splits", views.SplitsView.as_view(), name="api-splits"),
     path("splits/<slug:split>/board", views.BoardView.as_view(), name="api-board"),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),

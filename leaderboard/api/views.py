@@ -12,13 +12,14 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import files, standings, submissions
+from leaderboard import files, quotas, standings, submissions
 from leaderboard.api.serializers import (
     BoardSerializer,
     ErrorSerializer,
     NewSubmissionSerializer,
     SplitSerializer,
     SubmissionSerializer,
+    SubmittedSerializer,
     absolute,
 )
 from leaderboard.models import Split, Submission, User
@@ -35,17 +36,19 @@ class SubmissionsView(APIView):
         operation_id="submit",
         request={"multipart/form-data": NewSubmissionSerializer},
         responses={
-            201: SubmissionSerializer,
+            201: SubmittedSerializer,
             200: OpenApiResponse(
-                SubmissionSerializer, "The same bytes had come before: the first submission."
+                SubmittedSerializer, "The same bytes had come before: the first submission."
             ),
             (409, "application/problem+json"): ErrorSerializer,
             (413, "application/problem+json"): ErrorSerializer,
             (422, "application/problem+json"): ErrorSerializer,
+            (429, "application/problem+json"): ErrorSerializer,
         },
     )
     def post(self, request: Request) -> Response:
         """Send one file for one split. Answered when it is safely stored; the scores follow."""
+        now = timezone.now()
         form = cast("QueryDict", request.data)  # the only parser here is that of multipart bodies
         upload = request.FILES.get("file")
         submitted = submissions.submit(
@@ -54,14 +57,16 @@ class SubmissionsView(APIView):
             method_name=str(form.get("method", "")),
             upload=upload,
             via=Submission.Via.API,
-            now=timezone.now(),
+            now=now,
             filename=getattr(upload, "name", "") or "",
             **{name: str(form.get(name, "")) for name in TEXT_FIELDS},
         )
+        made = submitted.submission
+        quota = quotas.state(team=made.method.team, split=made.split, now=now)
         return Response(
-            SubmissionSerializer(submitted.submission).data,
+            SubmittedSerializer(made, context={"quota": quota}).data,
             status=201 if submitted.is_new else 200,
-            headers={"Location": absolute("api-submission", submitted.submission.pk)},
+            headers={"Location": absolute("api-submission", made.pk)},
         )
 
     @extend_schema(operation_id="list_submissions", responses=SubmissionSerializer(many=True))

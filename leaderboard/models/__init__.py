@@ -3,6 +3,7 @@
 from leaderboard.models.audit import AuditEvent
 from leaderboard.models.benchmark import Edition, GroundTruth, Publication, PublishedResult, Split
 from leaderboard.models.people import ApiToken, Membership, Team, User
+from leaderboard.models.quotas import QuotaOverride
 from leaderboard.models.submissions import Evaluation, Method, Score, Status, Submission, Visibility
 from leaderboard.models.sweep import SweepBeat
 
@@ -16,6 +17,7 @@ __all__ = [
     "Method",
     "Publication",
     "PublishedResult",
+    "QuotaOverride",
     "Score",
     "Split",
     "Status",

@@ -6,6 +6,7 @@ from django.db import connection, models
 from django.utils import timezone
 
 from leaderboard.models.people import User
+from leaderboard.models.quotas import QuotaRules
 
 
 class SplitQuerySet(models.QuerySet["Split"]):
@@ -24,7 +25,7 @@ class SplitQuerySet(models.QuerySet["Split"]):
         return self.get(pk=name)
 
 
-class Split(models.Model):
+class Split(QuotaRules):
     """A part of the dataset with its own policy and its own board."""
 
     name = models.SlugField(max_length=32, primary_key=True)

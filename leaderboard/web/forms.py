@@ -1,13 +1,18 @@
 """What people fill in. What is wrong with it the verbs say: the same words on page, API and command line."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, Final
 
 from django import forms
 from django.conf import settings
 from django.http import HttpRequest
+from django.utils import timezone
 
+from leaderboard import quotas, submissions, teams
 from leaderboard.models import Method, Split, Submission, User
+from leaderboard.quotas import QuotaExceeded
 from leaderboard.submissions import Refused
 
 _ADDRESS: Final = {"placeholder": "https://", "maxlength": 500}
@@ -30,6 +35,26 @@ class SignupForm(forms.Form):
         """Called once the account exists."""
         user.name = self.cleaned_data["name"].strip()
         user.save(update_fields=["name"])
+
+
+@dataclass(frozen=True)
+class Offer:
+    """A split to choose, and in a sentence what its team has left there, or why it takes nothing now."""
+
+    split: Split
+    is_open: bool
+    sentence: str
+
+
+def offers_for(user: User, *, now: datetime) -> list[Offer]:
+    """Every split as this person finds it."""
+    team = teams.present_team_of(user=user)
+    found = []
+    for split in Split.objects.select_related("published_edition"):
+        refusal = submissions.refusal_of(split, now=now)
+        sentence = str(refusal or quotas.state(team=team, split=split, now=now).sentence)
+        found.append(Offer(split=split, is_open=refusal is None, sentence=sentence))
+    return found
 
 
 class SubmissionForm(forms.Form):
@@ -58,10 +83,10 @@ class SubmissionForm(forms.Form):
     paper_url = forms.CharField(label="Paper", required=False, widget=forms.URLInput(attrs=_ADDRESS))
     code_url = forms.CharField(label="Code", required=False, widget=forms.URLInput(attrs=_ADDRESS))
 
-    def __init__(self, *args: Any, splits: Sequence[Split], methods: Sequence[Method], **kwargs: Any) -> None:
-        """`splits` are all there are, `methods` the team's own to choose from."""
+    def __init__(self, *args: Any, offers: Sequence[Offer], methods: Sequence[Method], **kwargs: Any) -> None:
+        """`offers` are all splits there are, `methods` the team's own to choose from."""
         super().__init__(*args, **kwargs)
-        self.splits = splits
+        self.offers = offers
         self.methods = methods
         self.max_bytes = settings.MAX_PREDICTIONS_BYTES
         for name, field in self.fields.items():
@@ -72,11 +97,11 @@ class SubmissionForm(forms.Form):
     def for_user(cls, user: User, request: HttpRequest) -> "SubmissionForm":
         """The form as this person sees it, filled with what this request sends."""
         sent = (request.POST, request.FILES) if request.method == "POST" else ()
-        splits = list(Split.objects.select_related("published_edition"))
-        open_names = [split.name for split in splits if split.accepts_submissions()]
+        offers = offers_for(user, now=timezone.now())
+        open_names = [offer.split.name for offer in offers if offer.is_open]
         chosen = request.GET.get("split") or (open_names[0] if len(open_names) == 1 else "")
         methods = Method.objects.filter(team__memberships__user=user).order_by("name")
-        return cls(*sent, splits=splits, methods=list(methods), initial={"split": chosen})
+        return cls(*sent, offers=offers, methods=list(methods), initial={"split": chosen})
 
     @property
     def has_details(self) -> bool:
@@ -99,6 +124,6 @@ class SubmissionForm(forms.Form):
             "code_url": fields["code_url"],
         }
 
-    def refuse(self, refusal: Refused) -> None:
+    def refuse(self, refusal: Refused | QuotaExceeded) -> None:
         """Put the verb's sentence at the field that it is about."""
         self.add_error(refusal.field if refusal.field in self.fields else None, str(refusal))

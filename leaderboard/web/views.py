@@ -13,7 +13,7 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import editions, methods, standings
+from leaderboard import editions, methods, quotas, standings
 from leaderboard import submissions as verbs
 from leaderboard.models import Edition, Evaluation, Method, Split, Submission, User
 from leaderboard.web import api_reference as api
@@ -68,7 +68,7 @@ def submit(request: HttpRequest) -> HttpResponse:
     if request.method == "POST" and form.is_valid():
         try:
             submitted = verbs.submit(user=user, now=timezone.now(), **form.submission())
-        except verbs.Refused as refusal:
+        except (verbs.Refused, quotas.QuotaExceeded) as refusal:
             form.refuse(refusal)
         else:
             if not submitted.is_new:

@@ -27,8 +27,8 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
         services.chromium()
     except services.ServiceMissing as missing:
         services.skip_or_fail(missing)
-    limit = {"TSTTC_MAX_PREDICTIONS_BYTES": str(MAX_PREDICTIONS_BYTES)}
-    with web_alone(tmp_path_factory.mktemp("site"), **limit) as running:
+    limits = {"TSTTC_MAX_PREDICTIONS_BYTES": str(MAX_PREDICTIONS_BYTES), "TSTTC_QUOTAS": "0"}
+    with web_alone(tmp_path_factory.mktemp("site"), **limits) as running:
         yield running
 
 

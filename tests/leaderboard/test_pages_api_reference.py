@@ -33,7 +33,7 @@ def test_submitting_says_what_to_send_and_that_it_needs_an_account(client: Clien
     assert "Needs an account" in section.text
     fields = [row.all("td")[0].text for row in section.one("tbody").all("tr")]
     assert fields[:3] == ["split", "method", "file"]
-    assert [dt.text for dt in section.one("dl").all("dt")] == ["200", "201", "409", "413", "422"]
+    assert [dt.text for dt in section.one("dl").all("dt")] == ["200", "201", "409", "413", "422", "429"]
 
 
 def test_boards_need_no_account(client: Client, benchmark: None) -> None:

@@ -2,15 +2,20 @@
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
 from threading import Barrier
 from typing import TypeVar
 
 import pytest
+from django.core.files.base import ContentFile
 from django.db import connection
 
-from leaderboard import audit
+from leaderboard import audit, quotas, submissions, teams
+from leaderboard.models import Edition, Evaluation, Split, Submission, User
+from tests import builders
 
 T = TypeVar("T")
+FIRST_DAY = datetime(2026, 11, 1, 12, 0, tzinfo=UTC)
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.services,
@@ -21,19 +26,36 @@ pytestmark = [
 ]
 
 
+def n_connections(wanted: int) -> int:
+    """How many connections may be opened without taking them all from whoever else uses this server."""
+    with connection.cursor() as cursor:
+        cursor.execute(
+            "SELECT current_setting('max_connections')::int - count(*) FROM pg_stat_activity"
+            " WHERE backend_type = 'client backend'"
+        )
+        n_free: int = cursor.fetchone()[0]
+    return max(10, min(wanted, n_free * 2 // 3))
+
+
 def at_once(n: int, deed: Callable[[int], T]) -> list[T]:
-    """Do it `n` times, each in a thread with a connection of its own, all let go at the same time."""
-    barrier = Barrier(n, timeout=60)
+    """Do it `n` times, in threads with connections of their own that are let go at the same time.
+
+    All of them run at once where the server allows as many connections; otherwise as many as it does, and
+    the rest as soon as one is free.
+    """
+    n_threads = n_connections(n)
+    barrier = Barrier(n_threads, timeout=60)
 
     def one(number: int) -> T:
         try:
             connection.ensure_connection()
-            barrier.wait()
+            if number < n_threads:
+                barrier.wait()
             return deed(number)
         finally:
             connection.close()
 
-    with ThreadPoolExecutor(n) as pool:
+    with ThreadPoolExecutor(n_threads) as pool:
         return list(pool.map(one, range(n)))
 
 
@@ -46,3 +68,43 @@ def test_twenty_writers_of_fifty_events_each_keep_one_unbroken_chain() -> None:
     found = audit.verify()
     assert (found.n_events, found.breaks) == (1000, ())
     assert len(set(audit.events().values_list("noun_id", flat=True))) == 1000
+
+
+def test_a_hundred_submissions_at_once_take_exactly_the_five_slots_there_are(
+    edition: Edition, owner: User
+) -> None:
+    Split.objects.filter(pk="test").update(quota_limit=5, quota_window=timedelta(days=1))
+    teams.team_of(user=owner)
+    data = [builders.predictions(edition, factor=1 + number / 1000) for number in range(100)]
+    rounds = []
+    for day in range(20):
+        now = FIRST_DAY + timedelta(days=day)
+
+        def submit(number: int, now: datetime = now) -> bool:
+            try:
+                submitted = submissions.submit(
+                    user=owner,
+                    split_name="test",
+                    method_name=f"Foo {now:%d}",
+                    upload=ContentFile(data[number], name="p.json"),
+                    via=Submission.Via.API,
+                    now=now,
+                )
+            except quotas.QuotaExceeded:
+                return False
+            return submitted.is_new
+
+        accepted = at_once(100, submit)
+        n_kept = Submission.objects.filter(submitted_at=now).count()
+        rounds.append((sum(accepted), n_kept))
+    assert rounds == [(5, 5)] * 20
+    assert Evaluation.objects.count() == 100
+    assert audit.verify().breaks == ()
+
+
+def test_the_same_bytes_at_once_are_one_submission_and_one_slot(edition: Edition, owner: User) -> None:
+    Split.objects.filter(pk="test").update(quota_limit=1, quota_window=timedelta(days=1))
+    teams.team_of(user=owner)
+    data = builders.predictions(edition)
+    assert len({submission.pk for submission in at_once(20, lambda _: builders.submit(owner, data))}) == 1
+    assert Submission.objects.count() == 1

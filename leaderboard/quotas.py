@@ -1,0 +1,304 @@
+"""Quotas: how much a team may still send to a split, and when the next slot opens.
+
+Nothing is counted up or down. What is spent follows from the submissions and what came of them, so no counter
+can drift: a submission costs a slot while it waits or runs, and for good once it is scored. Rejected,
+cancelled or failed by our fault it costs none; rejected files have a limit of their own.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from django.conf import settings
+from django.db import transaction
+from django.db.models import Exists, OuterRef
+
+from leaderboard import audit
+from leaderboard.models import Evaluation, QuotaOverride, Split, Status, Submission, Team, User
+from leaderboard.models.quotas import QuotaRules
+
+REJECTED_WINDOW = timedelta(hours=24)
+
+
+class QuotaExceeded(Exception):
+    """The team has no slot now; `quota` says how many it has, and when the next one opens."""
+
+    code = "quota-exceeded"
+    field = "split"
+
+    def __init__(self, quota: "Quota") -> None:
+        super().__init__(quota.sentence)
+        self.quota = quota
+
+
+class NotMaintainer(Exception):
+    """Only maintainers give a team other rules."""
+
+
+@dataclass(frozen=True)
+class Rules:
+    """What holds for a team on a split; None is without limit."""
+
+    limit: int | None
+    window: timedelta
+    min_gap: timedelta
+    rejected_limit: int | None
+
+    @property
+    def window_s(self) -> float:
+        """The window in seconds."""
+        return self.window.total_seconds()
+
+    @property
+    def min_gap_s(self) -> float:
+        """The gap in seconds."""
+        return self.min_gap.total_seconds()
+
+    @property
+    def are_none(self) -> bool:
+        """Whether nothing is limited."""
+        return self.limit is None and self.rejected_limit is None and not self.min_gap
+
+
+UNLIMITED = Rules(limit=None, window=timedelta(days=1), min_gap=timedelta(0), rejected_limit=None)
+
+
+@dataclass(frozen=True)
+class Quota:
+    """What a team has spent on a split, and what is left at a moment.
+
+    `next_slot_at` is None while a slot is open, and where none will ever open by itself.
+    """
+
+    split: str
+    rules: Rules
+    used: int
+    n_rejected: int
+    is_open: bool
+    next_slot_at: datetime | None
+    sentence: str
+
+    @property
+    def limit(self) -> int | None:
+        """Submissions within the window; None is without limit."""
+        return self.rules.limit
+
+    @property
+    def left(self) -> int | None:
+        """How many of them are not spent."""
+        return None if self.limit is None else max(0, self.limit - self.used)
+
+    def retry_after_s(self, *, now: datetime) -> int | None:
+        """Whole seconds until the next slot; None where none opens by itself."""
+        if self.next_slot_at is None:
+            return None
+        return max(1, math.ceil((self.next_slot_at - now).total_seconds()))
+
+
+def state(*, team: Team | None, split: Split, now: datetime) -> Quota:
+    """What the team has left on the split. Somebody without a team has not sent anything yet."""
+    return _state(team=team, split=split, rules=rules_of(team=team, split=split), now=now)
+
+
+def hold(*, team: Team, split: Split) -> None:
+    """Let the team's other submissions wait until this transaction ends, so that two cannot take one slot.
+
+    To be called before anything is looked up that `require` or an answer depends on.
+    """
+    # SQLite has one writer at a time, and needs no lock.
+    if not rules_of(team=team, split=split).are_none:
+        Team.objects.select_for_update(no_key=True).get(pk=team.pk)
+
+
+def require(*, team: Team | None, split: Split, now: datetime) -> None:
+    """Raise `QuotaExceeded` unless a slot is open. What it says is certain for whoever has called `hold`."""
+    rules = rules_of(team=team, split=split)
+    if rules.are_none:
+        return
+    quota = _state(team=team, split=split, rules=rules, now=now)
+    if not quota.is_open:
+        raise QuotaExceeded(quota)
+
+
+def rules_of(*, team: Team | None, split: Split) -> Rules:
+    """The split's rules, or the team's own."""
+    if not settings.QUOTAS:
+        return UNLIMITED
+    own = QuotaOverride.objects.filter(team=team, split=split).first() if team else None
+    row: QuotaRules = own or split
+    return Rules(
+        limit=row.quota_limit,
+        window=row.quota_window,
+        min_gap=row.quota_min_gap,
+        rejected_limit=row.quota_rejected_limit,
+    )
+
+
+def _state(*, team: Team | None, split: Split, rules: Rules, now: datetime) -> Quota:
+    spent, rejected = _spent(team=team, split=split, rules=rules, now=now)
+    return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
+
+
+def _spent(
+    *, team: Team | None, split: Split, rules: Rules, now: datetime
+) -> tuple[list[datetime], list[datetime]]:
+    """When the team sent what costs a slot, and what was rejected, oldest first."""
+    if team is None:
+        return [], []
+    since = now - max(rules.window, rules.min_gap, REJECTED_WINDOW)
+    evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
+    # Scoring anew after a correction costs nothing and gives nothing back.
+    live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
+    rows = (
+        Submission.objects.filter(method__team=team, split=split, submitted_at__gt=since)
+        .annotate(
+            is_scored=Exists(evaluations.filter(status=Status.SCORED)),
+            is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),
+            is_rejected=Exists(live.filter(status=Status.REJECTED)),
+        )
+        .order_by("submitted_at")
+        .values_list("submitted_at", "is_scored", "is_pending", "is_rejected")
+    )
+    spent, rejected = [], []
+    for submitted_at, is_scored, is_pending, is_rejected in rows:
+        if is_scored or is_pending:
+            spent.append(submitted_at)
+        elif is_rejected:
+            rejected.append(submitted_at)
+    return spent, rejected
+
+
+def weigh(
+    *, split: Split, rules: Rules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
+) -> Quota:
+    """The quota of a team that sent at these times, oldest first, what costs a slot and what was rejected."""
+    in_window = [at for at in spent if at > now - rules.window]
+    rejected = [at for at in rejected if at > now - REJECTED_WINDOW]
+    full_until = _until(in_window, limit=rules.limit, window=rules.window)
+    gap_until = spent[-1] + rules.min_gap if spent and rules.min_gap else None
+    rejected_until = _until(rejected, limit=rules.rejected_limit, window=REJECTED_WINDOW)
+    opens_at = max((at for at in (full_until, gap_until, rejected_until) if at and at > now), default=None)
+    is_never = 0 in {rules.limit, rules.rejected_limit}
+    if is_never:
+        sentence = f"Your team may not submit to {split.pk}."
+    elif opens_at is None:
+        sentence = _left(rules, n_used=len(in_window))
+    else:
+        said = {
+            full_until: f"Your team has spent the {_n(rules.limit)} to {split.pk} that it has in "
+            f"{span(rules.window)}",
+            gap_until: f"Submissions of a team to {split.pk} are at least {span(rules.min_gap)} apart",
+            rejected_until: f"{len(rejected)} files that your team sent to {split.pk} within 24 hours were "
+            f"rejected, and no more are taken",
+        }
+        sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
+    return Quota(
+        split=split.pk,
+        rules=rules,
+        used=len(in_window),
+        n_rejected=len(rejected),
+        is_open=opens_at is None and not is_never,
+        next_slot_at=None if is_never else opens_at,
+        sentence=sentence,
+    )
+
+
+def _until(times: Sequence[datetime], *, limit: int | None, window: timedelta) -> datetime | None:
+    """When fewer than `limit` of these lie in the rolling window; None if that is so already, or never."""
+    if not limit or len(times) < limit:
+        return None
+    return times[len(times) - limit] + window
+
+
+def _left(rules: Rules, *, n_used: int) -> str:
+    if rules.limit is None:
+        said = "As many as you like"
+    else:
+        n_left = max(0, rules.limit - n_used)
+        said = f"{n_left} of {_n(rules.limit)} left within {span(rules.window)}"
+    return f"{said}, at least {span(rules.min_gap)} apart." if rules.min_gap else f"{said}."
+
+
+def _n(count: int | None) -> str:
+    return "1 submission" if count == 1 else f"{count} submissions"
+
+
+def span(time: timedelta) -> str:
+    """A span of time in words.
+
+    >>> span(timedelta(days=30)), span(timedelta(days=1)), span(timedelta(minutes=90))
+    ('30 days', '24 hours', '90 minutes')
+    """
+    seconds = round(time.total_seconds())
+    for unit_s, name, least in ((86_400, "day", 2), (3_600, "hour", 1), (60, "minute", 1), (1, "second", 0)):
+        if seconds % unit_s == 0 and seconds >= least * unit_s:
+            n = seconds // unit_s
+            return f"1 {name}" if n == 1 else f"{n:,} {name}s"
+    raise AssertionError("whole seconds are a multiple of one second")
+
+
+def _minute_after(at: datetime) -> datetime:
+    """The first whole minute that is not before this moment: whoever waits until then is not early."""
+    whole = at.replace(second=0, microsecond=0)
+    return whole if whole == at else whole + timedelta(minutes=1)
+
+
+# --- rules for one team ----------------------------------------------------------------------------------
+
+
+def override(
+    *,
+    team: Team,
+    split: Split,
+    limit: int | None,
+    window: timedelta,
+    min_gap: timedelta,
+    rejected_limit: int | None,
+    reason: str,
+    actor: User | None,
+    now: datetime,
+) -> QuotaOverride:
+    """Give a team rules of its own on a split, in place of any it had. `actor` None is the command line.
+
+    Raises `NotMaintainer`.
+    """
+    _require_maintainer(actor)
+    rules = {
+        "quota_limit": limit,
+        "quota_window": window,
+        "quota_min_gap": min_gap,
+        "quota_rejected_limit": rejected_limit,
+    }
+    with transaction.atomic():
+        row, _ = QuotaOverride.objects.update_or_create(
+            team=team, split=split, defaults={**rules, "reason": reason, "set_by": actor, "set_at": now}
+        )
+        told = {name: str(value) if isinstance(value, timedelta) else value for name, value in rules.items()}
+        audit.record(
+            verb="quota_overridden",
+            noun="Team",
+            noun_id=team.pk,
+            actor=actor,
+            details={"split": split.pk, "reason": reason, **told},
+        )
+    return row
+
+
+def end_override(*, row: QuotaOverride, actor: User | None) -> None:
+    """Let the split's rules hold for the team again. Raises `NotMaintainer`."""
+    _require_maintainer(actor)
+    with transaction.atomic():
+        row.delete()
+        audit.record(
+            verb="quota_restored",
+            noun="Team",
+            noun_id=row.team_id,
+            actor=actor,
+            details={"split": row.split_id},
+        )
+
+
+def _require_maintainer(actor: User | None) -> None:
+    if actor is not None and not actor.is_maintainer:
+        raise NotMaintainer("Only maintainers give a team other quotas.")

@@ -1,0 +1,337 @@
+"""Quotas: what costs a slot, what gives it back, and when the next one opens."""
+
+import json
+import random
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import pytest
+from django.conf import settings as site
+from django.core.files.base import ContentFile
+from django.utils import timezone
+from hypothesis import given
+from hypothesis import strategies as st
+
+from leaderboard import benchmark, lifecycle, quotas, rescoring, submissions, teams
+from leaderboard.lifecycle import Strike
+from leaderboard.models import (
+    AuditEvent,
+    Edition,
+    Evaluation,
+    PublishedResult,
+    QuotaOverride,
+    Split,
+    Status,
+    Submission,
+    User,
+)
+from leaderboard.quotas import Quota, QuotaExceeded, Rules
+from tests import builders
+from tests.leaderboard import queue_rows
+
+DAY = timedelta(days=1)
+HOUR = timedelta(hours=1)
+NOW = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
+TEST_RULES = {"quota_limit": 3, "quota_window": 30 * DAY, "quota_min_gap": DAY}
+
+
+def limit(split: str = "test", **rules: object) -> None:
+    Split.objects.filter(pk=split).update(**{f"quota_{name}": value for name, value in rules.items()})
+
+
+def send(user: User, data: bytes, *, at: datetime = NOW, method: str = "Foo") -> submissions.Submitted:
+    return submissions.submit(
+        user=user,
+        split_name="test",
+        method_name=method,
+        upload=ContentFile(data, name="p.json"),
+        via=Submission.Via.API,
+        now=at,
+    )
+
+
+def other(edition: Edition, number: int) -> bytes:
+    """A valid file that no other number has."""
+    return builders.predictions(edition, factor=1 + number / 100)
+
+
+def bad(number: int) -> bytes:
+    return json.dumps({"bad": number}).encode()
+
+
+def state(user: User, *, at: datetime = NOW, split: str = "test") -> Quota:
+    row = Split.objects.get(pk=split)
+    return quotas.state(team=teams.present_team_of(user=user), split=row, now=at)
+
+
+# --- the rules of the benchmark --------------------------------------------------------------------------
+
+
+def test_the_three_splits_have_their_quotas_from_the_start(db: None) -> None:
+    PublishedResult.objects.all().delete()
+    Split.objects.all().delete()
+    benchmark.ensure_splits()
+    found = {
+        split.pk: (split.quota_limit, split.quota_window, split.quota_min_gap, split.quota_rejected_limit)
+        for split in Split.objects.all()
+    }
+    assert found == {
+        "test": (3, 30 * DAY, DAY, 20),
+        "val": (50, DAY, timedelta(0), 20),
+        "demo": (20, DAY, timedelta(0), 20),
+    }
+
+
+# --- what costs, and until when --------------------------------------------------------------------------
+
+
+def test_a_submission_costs_a_slot_as_soon_as_it_waits(edition: Edition, owner: User) -> None:
+    limit(limit=2)
+    assert (state(owner).used, state(owner).left) == (0, 2)
+    send(owner, other(edition, 1))
+    assert (state(owner).used, state(owner).left, state(owner).is_open) == (1, 1, True)
+
+
+def test_one_more_than_the_limit_is_refused_until_the_oldest_leaves_the_window(
+    edition: Edition, owner: User
+) -> None:
+    limit(limit=3, window=30 * DAY)
+    for number in range(3):
+        send(owner, other(edition, number), at=NOW + number * DAY)
+    with pytest.raises(QuotaExceeded) as caught:
+        send(owner, other(edition, 3), at=NOW + 3 * DAY)
+    opens_at = NOW + 30 * DAY
+    assert str(caught.value) == (
+        "Your team has spent the 3 submissions to test that it has in 30 days; "
+        "the next slot opens at 2026-12-20 12:00 UTC."
+    )
+    assert (caught.value.quota.left, caught.value.quota.next_slot_at) == (0, opens_at)
+    with pytest.raises(QuotaExceeded):
+        send(owner, other(edition, 3), at=opens_at - timedelta(microseconds=1))
+    assert send(owner, other(edition, 3), at=opens_at).is_new
+
+
+def test_two_submissions_are_apart_by_the_gap(edition: Edition, owner: User) -> None:
+    limit(limit=3, window=30 * DAY, min_gap=DAY)
+    send(owner, other(edition, 1), at=NOW + timedelta(seconds=30))
+    with pytest.raises(QuotaExceeded) as caught:
+        send(owner, other(edition, 2), at=NOW + 23 * HOUR)
+    assert str(caught.value) == (
+        "Submissions of a team to test are at least 24 hours apart; "
+        "the next slot opens at 2026-11-21 12:01 UTC."
+    )
+    assert caught.value.quota.left == 2
+    assert send(owner, other(edition, 2), at=NOW + 25 * HOUR).is_new
+
+
+def test_the_team_shares_one_quota_and_strangers_have_their_own(
+    edition: Edition, owner: User, teammate: User, stranger: User
+) -> None:
+    limit(limit=1)
+    send(owner, other(edition, 1))
+    with pytest.raises(QuotaExceeded):
+        send(teammate, other(edition, 2), method="Bar")
+    assert send(stranger, other(edition, 2)).is_new
+
+
+def test_each_split_has_its_own_quota(edition: Edition, owner: User, tmp_path: Path) -> None:
+    builders.import_truth(tmp_path, split="val", seed=1)
+    limit(limit=1)
+    limit("val", limit=1)
+    send(owner, other(edition, 1))
+    assert state(owner).left == 0
+    assert state(owner, split="val").left == 1
+
+
+def test_a_refused_file_is_not_kept_and_leaves_nothing(edition: Edition, owner: User) -> None:
+    limit(limit=1)
+    send(owner, other(edition, 1))
+    n_files = len(list(Path(site.FILES_DIR).rglob("*.json")))
+    with pytest.raises(QuotaExceeded):
+        send(owner, other(edition, 2), method="Bar")
+    assert len(list(Path(site.FILES_DIR).rglob("*.json"))) == n_files
+    assert Submission.objects.count() == 1
+
+
+def test_the_same_bytes_again_cost_nothing_and_are_answered_when_nothing_is_left(
+    edition: Edition, owner: User, teammate: User
+) -> None:
+    limit(limit=2)
+    first = send(owner, other(edition, 1))
+    assert not send(teammate, other(edition, 1)).is_new
+    assert state(owner).used == 1
+    send(owner, other(edition, 2))
+    again = send(teammate, other(edition, 1))
+    assert (again.submission, again.is_new) == (first.submission, False)
+
+
+def test_a_scored_submission_costs_its_slot_even_if_it_is_withdrawn(edition: Edition, owner: User) -> None:
+    limit(limit=1)
+    submission = send(owner, other(edition, 1)).submission
+    builders.score_all()
+    submissions.withdraw(submission=submission, actor=owner, now=NOW)
+    assert state(owner).left == 0
+
+
+# --- what is given back ----------------------------------------------------------------------------------
+
+
+def test_a_rejected_file_costs_nothing(edition: Edition, owner: User) -> None:
+    limit(limit=1)
+    send(owner, bad(1))
+    assert state(owner).left == 0
+    builders.score_all()
+    assert Evaluation.objects.get().status == Status.REJECTED
+    assert (state(owner).left, state(owner).n_rejected) == (1, 1)
+
+
+def test_a_submission_cancelled_before_it_was_scored_costs_nothing(edition: Edition, owner: User) -> None:
+    limit(limit=1)
+    submission = send(owner, other(edition, 1)).submission
+    submissions.withdraw(submission=submission, actor=owner, now=NOW)
+    assert state(owner).left == 1
+
+
+def test_our_fault_costs_nothing_until_a_maintainer_has_it_scored_after_all(
+    edition: Edition, owner: User, maintainer: User
+) -> None:
+    limit(limit=1)
+    send(owner, other(edition, 1))
+    for _ in range(lifecycle.MAX_POISON_STRIKES):
+        queue_rows.make_due()
+        lifecycle.give_back(queue_rows.claim(), strike=Strike.POISON, reason="tried", rng=random.Random(0))
+    evaluation = Evaluation.objects.get()
+    assert (evaluation.status, state(owner).left) == (Status.SYSTEM_ERROR, 1)
+    lifecycle.retry(evaluation=evaluation, actor=maintainer)
+    assert state(owner).left == 0
+
+
+def test_scoring_anew_costs_nothing_and_gives_nothing_back(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    limit(limit=2)
+    send(owner, other(edition, 1))
+    send(owner, bad(1))
+    builders.score_all()
+    assert (state(owner).used, state(owner).n_rejected) == (1, 1)
+    rescoring.open_edition(split_name="test", protocol="toolkit", now=timezone.now(), actor=None)
+    assert Evaluation.objects.filter(status=Status.QUEUED).count() == 2
+    assert (state(owner).used, state(owner).n_rejected) == (1, 1)
+    builders.score_all()
+    assert (state(owner).used, state(owner).n_rejected) == (1, 1)
+
+
+def test_rejected_files_have_a_limit_of_their_own(edition: Edition, owner: User) -> None:
+    limit(limit=50, rejected_limit=2)
+    for number in range(2):
+        send(owner, bad(number), at=NOW + number * HOUR)
+    builders.score_all()
+    with pytest.raises(QuotaExceeded) as caught:
+        send(owner, other(edition, 1), at=NOW + 2 * HOUR)
+    assert str(caught.value) == (
+        "2 files that your team sent to test within 24 hours were rejected, and no more are taken; "
+        "the next slot opens at 2026-11-21 12:00 UTC."
+    )
+    assert caught.value.quota.left == 50
+    assert send(owner, other(edition, 1), at=NOW + DAY).is_new
+
+
+# --- without quota, and with another one -----------------------------------------------------------------
+
+
+def test_a_split_without_limits_takes_any_number(edition: Edition, owner: User) -> None:
+    for number in range(5):
+        send(owner, other(edition, number))
+    assert (state(owner).limit, state(owner).left, state(owner).used) == (None, None, 5)
+    assert state(owner).sentence == "As many as you like."
+
+
+def test_quotas_can_be_off_altogether(edition: Edition, owner: User, settings) -> None:
+    limit(limit=0)
+    with pytest.raises(QuotaExceeded, match="may not submit to test") as caught:
+        send(owner, other(edition, 1))
+    assert caught.value.quota.retry_after_s(now=NOW) is None
+    settings.QUOTAS = False
+    assert send(owner, other(edition, 1)).is_new
+
+
+def test_a_team_can_have_rules_of_its_own_with_a_reason(
+    edition: Edition, owner: User, stranger: User, maintainer: User
+) -> None:
+    limit(limit=1)
+    send(owner, other(edition, 1))
+    send(stranger, other(edition, 1))
+    row = quotas.override(
+        team=teams.team_of(user=owner),
+        split=edition.split,
+        limit=2,
+        window=DAY,
+        min_gap=timedelta(0),
+        rejected_limit=None,
+        reason="The camera-ready deadline is tomorrow.",
+        actor=maintainer,
+        now=NOW,
+    )
+    assert (state(owner).left, state(stranger).left) == (1, 0)
+    event = AuditEvent.objects.get(verb="quota_overridden", actor=maintainer)
+    assert event.details["reason"] == "The camera-ready deadline is tomorrow."
+    assert (event.details["split"], event.details["quota_limit"]) == ("test", 2)
+    quotas.end_override(row=row, actor=maintainer)
+    assert state(owner).left == 0
+    assert AuditEvent.objects.filter(verb="quota_restored", noun_id=row.team_id).count() == 1
+
+
+def test_nobody_but_a_maintainer_gives_other_rules(edition: Edition, owner: User) -> None:
+    with pytest.raises(quotas.NotMaintainer):
+        quotas.override(
+            team=teams.team_of(user=owner),
+            split=edition.split,
+            limit=None,
+            window=DAY,
+            min_gap=timedelta(0),
+            rejected_limit=None,
+            reason="I want more.",
+            actor=owner,
+            now=NOW,
+        )
+    assert not QuotaOverride.objects.exists()
+
+
+def test_somebody_without_a_team_has_spent_nothing(edition: Edition, owner: User) -> None:
+    limit(**{name.removeprefix("quota_"): value for name, value in TEST_RULES.items()})
+    found = state(owner)
+    assert (found.used, found.left, found.is_open, found.next_slot_at) == (0, 3, True, None)
+    assert found.sentence == "3 of 3 submissions left within 30 days, at least 24 hours apart."
+
+
+# --- the arithmetic --------------------------------------------------------------------------------------
+
+minutes = st.integers(0, 4 * 24 * 60).map(lambda n: NOW + timedelta(minutes=n))
+spans = st.integers(1, 3 * 24 * 60).map(lambda n: timedelta(minutes=n))
+rules = st.builds(
+    Rules,
+    limit=st.none() | st.integers(1, 4),
+    window=spans,
+    min_gap=st.just(timedelta(0)) | spans,
+    rejected_limit=st.none() | st.integers(1, 4),
+)
+
+
+@given(rules=rules, spent=st.lists(minutes, max_size=8), rejected=st.lists(minutes, max_size=8), now=minutes)
+def test_the_next_slot_opens_exactly_when_it_is_said_to(
+    rules: Rules, spent: list[datetime], rejected: list[datetime], now: datetime
+) -> None:
+    split = Split(name="test")
+
+    def weighed(at: datetime) -> Quota:
+        return quotas.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
+
+    found = weighed(now)
+    if found.is_open:
+        assert found.next_slot_at is None
+        assert found.limit is None or found.left
+        return
+    assert found.next_slot_at is not None
+    assert weighed(found.next_slot_at).is_open
+    assert not weighed(found.next_slot_at - timedelta(microseconds=1)).is_open
+    assert found.retry_after_s(now=now) == (found.next_slot_at - now).total_seconds()
