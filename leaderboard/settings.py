@@ -181,7 +181,7 @@ STATICFILES_DIRS = [BASE_DIR / "static", ("examples", BASE_DIR / "examples")]
 MAX_PREDICTIONS_BYTES = env.int("TSTTC_MAX_PREDICTIONS_BYTES", default=20_000_000)
 DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is streamed to disk
 DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
-FILE_UPLOAD_HANDLERS = ["django.core.files.uploadhandler.TemporaryFileUploadHandler"]
+FILE_UPLOAD_HANDLERS = ["leaderboard.web.uploads.UnnamedFileUploadHandler"]
 
 # Whether teams have quotas (see leaderboard/quotas.py); off where a machine sends, as in trials of load.
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)

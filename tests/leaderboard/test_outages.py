@@ -1,15 +1,18 @@
 """What stands beneath the leaderboard fails: a clear answer on every door, and nothing half kept."""
 
 import errno
+import io
 import os
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 
 import psycopg
 import pytest
-from django.core.files.base import ContentFile
+from django.core.files.base import ContentFile, File
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.db import InterfaceError, OperationalError, connection
 from django.http import HttpResponse
@@ -199,3 +202,42 @@ def test_leftovers_of_killed_processes_are_removed_after_an_hour(settings: Setti
     os.utime(old, (time.time() - files.LEFTOVER_S - 60,) * 2)
     files.keep_predictions(ContentFile(b"{}"), now=timezone.now())
     assert [path.name for path in incoming.iterdir()] == ["new"]
+
+
+# --- uploads on their way in ------------------------------------------------------------------------------
+
+
+class FullFile(io.BytesIO):
+    """A file on a disk without room for more than ten bytes."""
+
+    def write(self, data: bytes) -> int:  # type: ignore[override]  # narrower: nothing else is written here
+        if self.tell() + len(data) > 10:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        return super().write(data)
+
+
+def test_upload_that_fills_the_disk_gives_its_room_back(
+    edition: Edition, api: Callable[[bytes], HttpResponse], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = FullFile()
+    monkeypatch.setattr(tempfile, "TemporaryFile", lambda: full)
+    assert api(b"x" * 11).status_code == 507
+    assert full.closed
+
+
+def test_upload_has_no_name_that_a_killed_process_could_leave_behind(
+    edition: Edition, api: Callable[[bytes], HttpResponse], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    incoming = tmp_path / "incoming"
+    incoming.mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(incoming))
+    seen: list[list[str]] = []
+    real = files.keep_predictions
+
+    def keep(upload: "File[bytes]", *, now: datetime) -> files.StoredFile:
+        seen.append([path.name for path in incoming.iterdir()])
+        return real(upload, now=now)
+
+    monkeypatch.setattr(files, "keep_predictions", keep)
+    assert api(builders.predictions(edition)).status_code == 201
+    assert seen == [[]]
