@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from evaluator.protocol import METRICS
 from evaluator.scale import Floats
@@ -18,6 +18,10 @@ class IntervalScore:
     mid: float | None
     rte: float | None
     count: int
+
+    def as_dict(self) -> dict[str, float | int | None]:
+        """The score as plain data. Written out: `dataclasses.asdict` copies for longer than scoring takes."""
+        return {"mid": self.mid, "rte": self.rte, "count": self.count}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +61,7 @@ class Report:
             "n_sequences": self.n_sequences,
             "n_out_of_range": self.n_out_of_range,
             "truncated": dict(self.truncated),
-            "scores": {name: asdict(score) for name, score in self.scores.items()},
+            "scores": {name: score.as_dict() for name, score in self.scores.items()},
         }
 
     def to_json(self) -> str:
