@@ -181,7 +181,7 @@ def keep_aligned(predictions: Predictions) -> None:
     manifest = predictions.manifest
     name = aligned_name(manifest_digest=manifest.digest, digest=predictions.digest)
     if not store().exists(name):
-        ascending = predictions.ttc_s[np.argsort(manifest.anno_id, kind="stable")]
+        ascending = predictions.ttc_s[manifest.rows_by_id]
         store().save(name, ContentFile(ascending.astype("<f8", copy=False).tobytes()))
 
 
@@ -195,7 +195,7 @@ def load_aligned(*, manifest: Manifest, digest: str) -> Predictions | None:
     if ascending.shape != (manifest.n_sequences,):
         return None
     ttc_s = np.empty_like(ascending)
-    ttc_s[np.argsort(manifest.anno_id, kind="stable")] = ascending
+    ttc_s[manifest.rows_by_id] = ascending
     return Predictions(manifest=manifest, ttc_s=ttc_s, digest=digest)
 
 
