@@ -14,6 +14,7 @@ from django.db import connection, transaction
 from django.db.models import QuerySet
 from django.utils import timezone
 
+from leaderboard import bulk
 from leaderboard.models import AuditEvent, User
 from leaderboard.models.audit import GENESIS
 
@@ -37,37 +38,42 @@ def record(
     never a value of a hidden ground truth. Raises `TypeError` for anything else, also for floats, which no
     two databases give back alike.
     """
-    [event] = _append([(verb, noun, noun_id, details or {})], actor=actor)
+    with transaction.atomic():
+        [event] = _chained([(verb, noun, noun_id, details or {})], actor=actor)
+        event.save(force_insert=True)
     return event
 
 
 def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
     """Write many deeds of the machine itself at once: verb, noun, noun_id, details."""
-    _append(list(deeds), actor=None)
+    columns = ["at", "verb", "noun", "noun_id", "details", "previous_hash", "hash"]
+    with transaction.atomic():
+        events = _chained(list(deeds), actor=None)
+        bulk.insert(AuditEvent, columns, [[getattr(event, name) for name in columns] for event in events])
 
 
-def _append(
+def _chained(
     deeds: Sequence[tuple[str, str, object, Mapping[str, Any]]], *, actor: User | None
 ) -> list[AuditEvent]:
+    """The deeds as events that follow the last one, to be written before the transaction ends."""
     if not deeds:
         return []
-    with transaction.atomic():
-        previous_hash = _locked_tip()
-        at = timezone.now()
-        events = []
-        for verb, noun, noun_id, details in deeds:
-            event = AuditEvent(
-                at=at,
-                actor=actor,
-                verb=verb,
-                noun=noun,
-                noun_id=_storable(str(noun_id)),
-                details=_plain(details),
-                previous_hash=previous_hash,
-            )
-            event.hash = previous_hash = event.expected_hash()
-            events.append(event)
-        return AuditEvent.objects.bulk_create(events)
+    previous_hash = _locked_tip()
+    at = timezone.now()
+    events = []
+    for verb, noun, noun_id, details in deeds:
+        event = AuditEvent(
+            at=at,
+            actor=actor,
+            verb=verb,
+            noun=noun,
+            noun_id=_storable(str(noun_id)),
+            details=_plain(details),
+            previous_hash=previous_hash,
+        )
+        event.hash = previous_hash = event.expected_hash()
+        events.append(event)
+    return events
 
 
 def _locked_tip() -> str:

@@ -32,7 +32,7 @@ def insert(model: type[Model], columns: Sequence[str], rows: Rows, *, ignore_con
     _execute(
         fields,
         [(*row, *(field.get_default() for field in others)) for row in rows],
-        by_column=f"{head} SELECT * FROM {_unnested(fields)} {tail}",  # noqa: S608 - names of our own models
+        by_column=f"{head} SELECT * FROM {_unnested(fields)} {tail}",  # noqa: S608 - names of our models
         by_row=f"{head} VALUES ({', '.join(['%s'] * len(fields))}) {tail}",
     )
 
@@ -45,11 +45,12 @@ def update(model: type[Model], columns: Sequence[str], rows: Rows) -> None:
     by_column = ", ".join(f"{_column(field)} = given.{_column(field)}" for field in changed)
     by_row = ", ".join(f"{_column(field)} = %s" for field in changed)
     given = f"{_unnested(fields)} AS given ({', '.join(map(_column, fields))})"
+    head = f"UPDATE {table} SET"  # the names of our own models, as in all of these statements
     _execute(
         fields,
         rows,
-        by_column=f"UPDATE {table} SET {by_column} FROM {given} WHERE {table}.{key} = given.{key}",  # noqa: S608
-        by_row=f"UPDATE {table} SET {by_row} WHERE {key} = %s",  # noqa: S608 - as above
+        by_column=f"{head} {by_column} FROM {given} WHERE {table}.{key} = given.{key}",
+        by_row=f"{head} {by_row} WHERE {key} = %s",
     )
 
 

@@ -18,6 +18,7 @@ import random
 import uuid
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from enum import Enum
 from functools import partial
 from typing import Any
@@ -39,7 +40,7 @@ MAX_INFRASTRUCTURE_STRIKES = 10
 MAX_BACKOFF_S = 60.0
 # Large enough that a batch's round trips and COMMITs are nothing beside its arithmetic; small enough that the
 # workers of an edition end together, and that a live submission waits for a fraction of a second.
-RESCORE_BATCH = 50
+RESCORE_BATCH = 100
 
 
 class LostRace(Exception):
@@ -209,20 +210,16 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
     with transaction.atomic():
         held = _locked([lease for lease, _ in outcomes])
         decided = [(lease, outcome) for lease, outcome in outcomes if lease.evaluation_id in held]
-        for status in (Status.SCORED, Status.REJECTED):
-            ids = [lease.evaluation_id for lease, outcome in decided if outcome.status is status]
-            Evaluation.objects.filter(pk__in=ids, status=Status.RUNNING).update(
-                status=status, finished_at=Now(), finished_attempt=F("attempt"), last_error=""
-            )
         bulk.update(
             Evaluation,
-            ["report", "report_digest", "problems", "n_problems"],
+            [
+                *("status", "finished_at", "finished_attempt", "last_error"),
+                *("report", "report_digest", "problems", "n_problems"),
+            ],
             [
                 (
-                    outcome.report,
-                    outcome.report_digest,
-                    list(outcome.problems),
-                    outcome.n_problems,
+                    *(outcome.status, held[lease.evaluation_id], lease.attempt, ""),
+                    *(outcome.report, outcome.report_digest, list(outcome.problems), outcome.n_problems),
                     lease.evaluation_id,
                 )
                 for lease, outcome in decided
@@ -249,16 +246,19 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
     return {lease.evaluation_id for lease, _ in decided}
 
 
-def _locked(leases: Sequence[Lease]) -> set[uuid.UUID]:
-    """The evaluations that are still these leases' to decide, locked until the transaction ends."""
+def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
+    """The evaluations that are still these leases' to decide, locked until the transaction ends.
+
+    With each the present time, by the database's clock.
+    """
     rows = (
         Evaluation.objects.select_for_update()
         .filter(pk__in=[lease.evaluation_id for lease in leases], status=Status.RUNNING)
         .order_by("pk")  # every batch locks in the same order, so that two cannot wait for each other
-        .values_list("pk", "attempt", "lease_token")
+        .values_list("pk", "attempt", "lease_token", Now())
     )
     valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
-    return {row[0] for row in rows if row in valid}
+    return {row[0]: row[3] for row in rows if row[:3] in valid}
 
 
 def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> Status:

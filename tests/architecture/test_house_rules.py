@@ -93,6 +93,10 @@ def writes_a_status(call: ast.Call) -> bool:
         return (
             len(call.args) > 1 and isinstance(call.args[1], ast.Constant) and call.args[1].value == "status"
         )
+    if name in {"update", "insert"}:  # of `leaderboard.bulk`, which takes the names of columns
+        texts = {node.value for arg in call.args for node in ast.walk(arg) if isinstance(node, ast.Constant)}
+        if "status" in texts:
+            return True
     writers = {"update", "create", "acreate", "aupdate", "get_or_create", "update_or_create", "Evaluation"}
     if name not in writers:
         return False
@@ -117,6 +121,8 @@ def test_only_lifecycle_writes_a_status() -> None:
         "Evaluation(status='SCORED').save()",
         "Evaluation.objects.update_or_create(pk=1, defaults={'status': 'SCORED'})",
         "setattr(evaluation, 'status', 'SCORED')",
+        "bulk.update(Evaluation, ['status'], rows)",
+        "bulk.insert(Evaluation, ['submission', *('status', 'edition')], rows)",
     ],
 )
 def test_the_rule_about_statuses_sees_every_way_to_write_one(source: str) -> None:
