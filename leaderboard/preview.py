@@ -1,7 +1,7 @@
 """What an edition in preparation would change, before anything is public."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any, Final
 from uuid import UUID
 
@@ -133,6 +133,28 @@ def rows(found: Preview) -> list[dict[str, Any]]:
         }
         for change in found.changes
     ]
+
+
+def document(found: Preview) -> dict[str, Any]:
+    """The preview as one document for programs: totals, progress, and the flat rows."""
+    truth, progress = found.edition.ground_truth, found.progress
+    return {
+        "edition": found.edition.number,
+        "replaces": found.replaces,
+        "n_added": truth.n_added,
+        "n_removed": truth.n_removed,
+        "n_changed_sequences": truth.n_changed,
+        "n_changed": found.n_changed,
+        "n_moved": found.n_moved,
+        "n_newly_rejected": found.n_newly_rejected,
+        "progress": {
+            **asdict(progress),
+            "n_done": progress.n_done,
+            "n_waiting": progress.n_waiting,
+            "percent": progress.percent,
+        },
+        "changes": rows(found),
+    }
 
 
 def _evaluations(edition: Edition) -> dict[UUID, Evaluation]:

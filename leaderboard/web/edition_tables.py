@@ -21,6 +21,7 @@ _WHY_UNSCORABLE: Final = {
     "unknown-keys": "Edition {} removed sequences that its file predicts.",
     "undefined-error": "Edition {} has a protocol for which its file predicts too close to 0.",
 }
+_ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
@@ -80,7 +81,9 @@ def with_reasons(table: BoardTable, board: Board) -> BoardTable:
         for submission_id, problems in rejected.values_list("submission", "problems")
     }
     rows = [
-        replace(row, note=reasons.get(row.entry.submission_id, "")) if row.entry.is_unscorable else row
+        replace(row, note=reasons.get(row.entry.submission_id, ""))
+        if row.entry.is_unscorable and not row.entry.withdrawn_at
+        else row
         for row in table.rows
     ]
     return replace(table, rows=tuple(rows))
@@ -226,9 +229,10 @@ class ChangeRow:
     old_rank: str
     new_rank: str
     status: str
-    is_worse_off: bool  # was scored and is not
+    is_worse_off: bool  # was scored and will not be
     differences: tuple[Difference, ...]
-    reason: str = ""
+    summary: str = ""  # why it is rejected now and was not, to the first colon
+    reason: str = ""  # the same, whole
     n_more_problems: int = 0
 
     @property
@@ -263,29 +267,32 @@ def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
     if truth is not None:
         sequences = (
             ("sequences added", grouped(truth.n_added)),
-            ("removed", grouped(truth.n_removed)),
+            ("sequences removed", grouped(truth.n_removed)),
             ("labels changed", grouped(truth.n_changed)),
         )
     return (
         *sequences,
         ("entries", grouped(len(found.changes))),
-        ("change", grouped(found.n_changed)),
-        ("move", grouped(found.n_moved)),
+        ("entries change", grouped(found.n_changed)),
+        ("change rank", grouped(found.n_moved)),
         ("become rejected", grouped(found.n_newly_rejected)),
     )
 
 
 def _change_row(change: Change) -> ChangeRow:
     old_status, new_status = (_STATUS_LABELS[s] for s in (change.old_status, change.new_status))
+    is_news = change.problems and change.old_status != change.new_status
+    reason = change.problems[0]["message"] if is_news else ""
     return ChangeRow(
         change=change,
         old_rank=_rank(change.old_rank),
         new_rank=_rank(change.new_rank),
         status=new_status if old_status == new_status else f"{new_status}, was {old_status}",
-        is_worse_off=change.old_status == Status.SCORED and change.new_status != Status.SCORED,
+        is_worse_off=change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
         differences=tuple(_difference(name, change) for name in SCORE_NAMES),
-        reason=change.problems[0]["message"] if change.problems else "",
-        n_more_problems=max(0, change.n_problems - 1),
+        summary=reason.partition(": ")[0],
+        reason=reason,
+        n_more_problems=max(0, len(change.problems) - 1),
     )
 
 

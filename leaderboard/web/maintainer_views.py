@@ -8,20 +8,19 @@ from functools import wraps
 from typing import Any, cast
 
 from django.contrib import messages
-from django.http import Http404, HttpRequest, HttpResponse, JsonResponse
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
 from leaderboard import editions, exports, preview, rescoring
-from leaderboard.api.serializers import PreviewSerializer
 from leaderboard.models import Edition, Split, User
 from leaderboard.web import edition_tables
 from leaderboard.web.maintainer_forms import DiscardForm, OpenForm, PublishForm, RollBackForm, VerbForm
 from leaderboard.web.views import STOP_POLLING
 
-View = Callable[..., HttpResponse]
+View = Callable[..., HttpResponseBase]
 asks_first = require_http_methods(["GET", "HEAD", "POST"])
 
 
@@ -30,7 +29,7 @@ def maintainers_only(view: View) -> View:
     uncached = never_cache(view)
 
     @wraps(view)
-    def guarded(request: HttpRequest, *args: Any, **kwargs: Any) -> HttpResponse:
+    def guarded(request: HttpRequest, *args: Any, **kwargs: Any) -> HttpResponseBase:
         if not (request.user.is_authenticated and request.user.is_maintainer):
             raise Http404
         try:
@@ -106,7 +105,7 @@ def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
 def preview_json(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """The comparison as the API gives it."""
     return JsonResponse(
-        PreviewSerializer(preview.preview(_edition(split, number))).data,
+        preview.document(preview.preview(_edition(split, number))),
         headers={"Content-Disposition": _attachment(split, number, "json")},
     )
 
