@@ -3,11 +3,12 @@
 from pathlib import Path
 
 import pytest
+from django.test import Client
 
 from leaderboard import teams
 from leaderboard.models import Edition, Membership, Submission, User
 from tests import builders
-from tests.editions import FACTORS
+from tests.editions import FACTORS, corrected, open_edition
 
 
 @pytest.fixture
@@ -51,3 +52,23 @@ def entries(edition: Edition, owner: User) -> list[Submission]:
     ]
     builders.score_all()
     return made
+
+
+@pytest.fixture
+def second(entries: list[Submission], tmp_path: Path) -> Edition:
+    """An edition in preparation beside the board, with everything of it waiting."""
+    return open_edition(corrected(tmp_path, factor=1.3))
+
+
+@pytest.fixture
+def rescored(second: Edition) -> Edition:
+    """The same, with everything of it scored."""
+    builders.score_all()
+    return second
+
+
+@pytest.fixture
+def keeper(client: Client, maintainer: User) -> Client:
+    """A maintainer's browser."""
+    client.force_login(maintainer)
+    return client

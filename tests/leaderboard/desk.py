@@ -1,0 +1,39 @@
+"""The maintainers' pages as their tests read them."""
+
+from django.test import Client
+
+from leaderboard.models import Split
+from tests import pages
+from tests.leaderboard.test_pages_everywhere import assert_sound
+
+HUB, OPEN = "/maintain/", "/maintain/test/open/"
+FIRST, SECOND = "/maintain/test/editions/1/", "/maintain/test/editions/2/"
+
+
+def get(client: Client, address: str) -> pages.Element:
+    response = client.get(address)
+    assert response.status_code == 200, address
+    return assert_sound(response)
+
+
+def said(client: Client, address: str) -> str:
+    return get(client, address).one("main").text
+
+
+def board_number() -> int:
+    published = Split.objects.get(pk="test").published_edition
+    assert published is not None
+    return published.number
+
+
+def refusal(client: Client, address: str, data: dict[str, object]) -> str:
+    """What a form says that was refused; nothing is the board but the first edition."""
+    before = board_number()
+    response = client.post(address, data)
+    assert response.status_code == 422
+    assert board_number() == before
+    return assert_sound(response).one("div", class_="form-errors").text
+
+
+def totals(root: pages.Element) -> dict[str, str]:
+    return {div.one("dt").text: div.one("dd").text for div in root.one("dl", class_="totals").all("div")}

@@ -1,0 +1,321 @@
+"""The maintainers' desk: who gets in, how far a re-scoring is, and what it would change."""
+
+import csv
+import io
+import json
+import random
+import re
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from django.http import HttpResponseBase
+from django.test import Client
+from django.utils import timezone
+from pytest_django import DjangoAssertNumQueries
+
+from evaluator.protocol import SCORE_NAMES
+from leaderboard import preview, scoring
+from leaderboard.models import (
+    AuditEvent,
+    Edition,
+    Evaluation,
+    Method,
+    Status,
+    Submission,
+    Team,
+    User,
+    Visibility,
+)
+from tests import builders, pages
+from tests.editions import corrected, open_edition, publish
+from tests.leaderboard.desk import FIRST, HUB, OPEN, SECOND, board_number, get, said, totals
+
+PAGES = (HUB, OPEN, SECOND, f"{SECOND}publish/", f"{SECOND}discard/", f"{FIRST}roll-back/")
+FILES = (f"{SECOND}preview.csv", f"{SECOND}preview.json")
+ROUTES = (*PAGES, *FILES, f"{SECOND}progress/")
+ABSENT = ("/maintain/nowhere/", "/maintain/test/editions/9/", "/maintain/nowhere/open/")
+
+
+# --- who gets in -----------------------------------------------------------------------------------------
+
+
+def without_tokens(content: bytes) -> list[bytes]:
+    return [line for line in content.splitlines() if b"csrfmiddlewaretoken" not in line]
+
+
+def headers(response: HttpResponseBase) -> dict[str, str]:
+    return {name: value for name, value in response.headers.items() if name != "X-Request-ID"}
+
+
+@pytest.mark.parametrize("method", ["get", "post", "put", "head"])
+@pytest.mark.parametrize("who", ["nobody", "owner", "stranger"])
+def test_to_others_the_pages_do_not_exist(
+    client: Client, rescored: Edition, who: str, method: str, request: pytest.FixtureRequest
+) -> None:
+    if who != "nobody":
+        client.force_login(request.getfixturevalue(who))
+    absent = getattr(client, method)("/nowhere/")
+    for address in (*ROUTES, *ABSENT):
+        response = getattr(client, method)(address)
+        assert response.status_code == absent.status_code == 404, address
+        assert without_tokens(response.content) == without_tokens(absent.content)
+        assert headers(response) == headers(absent)
+    assert board_number() == 1
+
+
+def test_former_maintainer_is_let_in_no_more(client: Client, rescored: Edition, maintainer: User) -> None:
+    client.force_login(maintainer)
+    assert client.get(HUB).status_code == 200
+    User.objects.filter(pk=maintainer.pk).update(is_staff=False)
+    assert client.get(HUB).status_code == 404
+
+
+@pytest.mark.parametrize("address", ROUTES)
+def test_maintainers_get_every_page_and_no_cache_keeps_it(
+    keeper: Client, rescored: Edition, address: str
+) -> None:
+    response = keeper.get(address)
+    assert response.status_code == (286 if address.endswith("progress/") else 200)
+    assert {"no-store", "private"} <= set(response.headers["Cache-Control"].split(", "))
+
+
+@pytest.mark.parametrize("address", PAGES)
+def test_every_page_is_sound(keeper: Client, rescored: Edition, address: str) -> None:
+    get(keeper, address)
+
+
+def test_maintainers_are_told_of_what_is_not_there(keeper: Client, rescored: Edition) -> None:
+    for address in (*ABSENT, f"/maintain/test/editions/{10**30}/"):
+        assert keeper.get(address).status_code == 404
+
+
+@pytest.mark.parametrize("verb", ["publish", "roll-back", "discard"])
+def test_forms_without_their_token_change_nothing(rescored: Edition, maintainer: User, verb: str) -> None:
+    client = Client(enforce_csrf_checks=True)
+    client.force_login(maintainer)
+    response = client.post(f"{SECOND}{verb}/", {"reason": "x", "replaces": 1})
+    assert response.status_code == 403
+    assert board_number() == 1
+    rescored.refresh_from_db()
+    assert rescored.is_in_preparation
+
+
+def test_asking_for_a_page_changes_nothing(keeper: Client, rescored: Edition) -> None:
+    n_events = AuditEvent.objects.count()
+    for address in ROUTES:
+        keeper.get(address)
+    assert AuditEvent.objects.count() == n_events
+
+
+# --- the desk --------------------------------------------------------------------------------------------
+
+
+def test_desk_shows_each_split_with_its_board_and_what_is_prepared(keeper: Client, second: Edition) -> None:
+    root = get(keeper, HUB)
+    assert [h2.text for h2 in root.all("h2")] == ["Test", "Validation", "Demo"]
+    test, val, _ = (section.text for section in root.all("section", class_="desk"))
+    assert "edition 1 published" in test
+    assert "Edition 2 in preparation since" in test
+    assert "0 %: 0 of 4." in test
+    assert "python manage.py import_truth val PATH" in val
+    bar = root.one("progress")
+    assert (bar.attributes["value"], bar.attributes["max"]) == ("0", "4")
+
+
+def test_desk_leads_to_what_failed_by_our_fault(keeper: Client, rescored: Edition) -> None:
+    Evaluation.objects.filter(edition=rescored).update(status=Status.SYSTEM_ERROR)
+    link = next(a for a in get(keeper, HUB).all("a") if a.text == "look and retry")
+    assert "4 evaluations in edition 2, by our fault" in said(keeper, HUB)
+    answer = keeper.get(link.attributes["href"])
+    assert answer.status_code == 200
+    assert answer.content.count(b"failed by our fault</td>") == 4
+
+
+def test_desk_offers_to_roll_back_only_where_there_is_something_to_go_back_to(
+    keeper: Client, rescored: Edition
+) -> None:
+    assert "Roll back" not in said(keeper, HUB)
+    publish(rescored)
+    assert "Roll back to edition 1" in said(keeper, HUB)
+
+
+def test_desk_names_former_editions(keeper: Client, rescored: Edition) -> None:
+    publish(rescored)
+    links = [a.attributes["href"] for a in get(keeper, HUB).one("main").all("a")]
+    assert FIRST in links
+    assert SECOND in links
+
+
+# --- progress --------------------------------------------------------------------------------------------
+
+
+def poll(client: Client, query: str = "") -> HttpResponseBase:
+    return client.get(f"{SECOND}progress/{query}")
+
+
+def test_progress_is_told_when_it_changes_and_ends_with_the_comparison(
+    keeper: Client, second: Edition
+) -> None:
+    assert poll(keeper).status_code == 200
+    assert poll(keeper, "?seen=0-4").status_code == 204
+    assert get(keeper, SECOND).one("div", class_="progress").attributes["hx-get"].endswith("comparison=1")
+    builders.score_all()
+    last = poll(keeper, "?seen=0-4&comparison=1")
+    assert last.status_code == 286
+    root = pages.page(last)
+    assert "Finished: 4 of 4." in root.text
+    assert root.one("div", id="comparison").one("table", class_="changes")
+
+
+def test_finished_progress_on_the_desk_comes_without_the_comparison(
+    keeper: Client, rescored: Edition
+) -> None:
+    assert pages.page(poll(keeper)).all("table") == []
+
+
+def test_finished_page_asks_no_more(keeper: Client, rescored: Edition) -> None:
+    root = get(keeper, SECOND)
+    assert root.all("script") == []
+    assert "hx-get" not in root.one("div", class_="progress").attributes
+
+
+def test_rate_and_time_left_are_told_while_it_runs(keeper: Client, second: Edition) -> None:
+    assert scoring.run_next(rng=random.Random(0))
+    Evaluation.objects.filter(edition=second).update(started_at=timezone.now() - timedelta(seconds=50))
+    first = Evaluation.objects.filter(edition=second)[:1].values("pk")
+    Evaluation.objects.filter(edition=second).exclude(pk__in=first).update(status=Status.QUEUED)
+    assert re.search(r"25 %: 1 of 4\. 1 a minute, about 3 min left\.", said(keeper, SECOND))
+
+
+def test_split_without_submissions_has_nothing_to_score_anew(
+    keeper: Client, edition: Edition, tmp_path: Path
+) -> None:
+    open_edition(corrected(tmp_path, factor=1.3))
+    assert "there is nothing to score anew" in said(keeper, SECOND)
+    assert "has no standing submission" in said(keeper, SECOND)
+    assert keeper.get(f"{SECOND}preview.csv").content.decode().splitlines() == [",".join(preview.COLUMNS)]
+
+
+# --- the comparison --------------------------------------------------------------------------------------
+
+
+def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Edition) -> None:
+    found = preview.preview(rescored)
+    root = get(keeper, SECOND)
+    assert totals(root) == {
+        "sequences added": "0",
+        "sequences removed": "0",
+        "labels changed": "5",
+        "entries": "4",
+        "entries change": str(found.n_changed),
+        "change rank": str(found.n_moved),
+        "become rejected": "0",
+    }
+    rows = root.one("table", class_="changes").one("tbody").all("tr")
+    assert [row.one("th").one("a").text for row in rows] == [change.method for change in found.changes]
+    for row, change in zip(rows, found.changes, strict=True):
+        cells = row.all("td")
+        assert cells[-1].text == "scored"
+        for cell, name in zip(cells[1:-1], SCORE_NAMES, strict=True):
+            old, new, delta = change.old[name], change.new[name], change.delta[name]
+            assert f"{old:.2f}" in cell.text
+            assert f"{new:.2f}" in cell.text
+            assert cell.one("span", class_="delta").text == (f"{delta:+.2f}" if delta else "0.00").replace(
+                "-", "−"
+            )
+
+
+def test_moved_entries_come_first_with_both_ranks(
+    keeper: Client, edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    for method, factor in (("Even", 1.2), ("Odd", 1.21)):
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=method)
+    builders.score_all()
+    path = corrected(tmp_path, factor=1.25)
+    second = open_edition(path)
+    builders.score_all()
+    found = preview.preview(second)
+    rows = get(keeper, SECOND).one("table", class_="changes").one("tbody").all("tr")
+    shown = [row.one("td", class_="rank").text for row in rows]
+    for text, change in zip(shown, found.changes, strict=True):
+        moved = change.old_rank != change.new_rank
+        assert text == (f"{change.old_rank} becomes → {change.new_rank}" if moved else str(change.new_rank))
+    distances = [change.rank_change for change in found.changes]
+    assert distances == sorted(distances, reverse=True)
+
+
+def test_entries_that_become_rejected_say_why(
+    keeper: Client, entries: list[Submission], tmp_path: Path
+) -> None:
+    open_edition(corrected(tmp_path, drop="0003"))
+    builders.score_all()
+    root = get(keeper, SECOND)
+    assert totals(root)["become rejected"] == "4"
+    for row in root.one("table", class_="changes").one("tbody").all("tr"):
+        status = row.one("td", class_="status")
+        assert status.one("summary").text == "5 keys name no sequence of the manifest"
+        assert "expected its anno_ids" in status.one("p").text
+        assert status.text.startswith("rejected, was scored")
+        assert "worse" in status.classes
+    listed = said(keeper, f"{SECOND}publish/")
+    assert "4 scored entries cannot be scored in it: M1.05 (Owls)" in listed
+
+
+def test_private_entries_are_marked_for_maintainers(keeper: Client, rescored: Edition) -> None:
+    Method.objects.filter(name="M1.1").update(visibility=Visibility.PRIVATE)
+    rows = get(keeper, SECOND).one("table", class_="changes").one("tbody").all("tr")
+    assert [row.one("a").text for row in rows if row.all("span", class_="tag")] == ["M1.1"]
+
+
+def test_editions_whose_truths_were_never_compared_say_so(
+    keeper: Client, entries: list[Submission], tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    open_edition(corrected(tmp_path, factor=1.4))
+    builders.score_all()
+    publish(second)
+    root = get(keeper, "/maintain/test/editions/3/")
+    assert totals(root)["sequences"] == "not compared"
+    assert "another ground truth" in root.one("h2").text
+
+
+def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition) -> None:
+    Method.objects.filter(name="M1.05").update(name='=HYPERLINK("https://example.org")')
+    Team.objects.update(name="@team")
+    response = keeper.get(f"{SECOND}preview.csv")
+    assert response.headers["Content-Type"] == "text/csv; charset=utf-8"
+    assert response.headers["Content-Disposition"] == (
+        'attachment; filename="tsttc-test-edition-2-preview.csv"'
+    )
+    rows = list(csv.DictReader(io.StringIO(response.content.decode())))
+    expected = preview.rows(preview.preview(rescored))
+    assert len(rows) == len(expected) == 4
+    for row, plain in zip(rows, expected, strict=True):
+        assert row["team"] == "'@team"
+        assert row["method"] == ("'" if plain["method"].startswith("=") else "") + plain["method"]
+        assert {name: row[name] for name in plain if name.startswith(("old_mid", "new_mid", "delta_"))} == {
+            name: str(value)
+            for name, value in plain.items()
+            if name.startswith(("old_mid", "new_mid", "delta_"))
+        }
+
+
+def test_json_is_what_the_api_gives(keeper: Client, rescored: Edition) -> None:
+    response = keeper.get(f"{SECOND}preview.json")
+    document = json.loads(response.content)
+    assert document == json.loads(keeper.get("/api/v1/splits/test/editions/2/preview").content)
+    assert (document["edition"], document["replaces"], len(document["changes"])) == (2, 1, 4)
+
+
+def test_number_of_queries_does_not_grow_with_the_entries(
+    keeper: Client, rescored: Edition, owner: User, django_assert_max_num_queries: DjangoAssertNumQueries
+) -> None:
+    with django_assert_max_num_queries(40) as before:
+        keeper.get(SECOND)
+    for factor in (1.6, 1.7, 1.8):
+        edition = Edition.objects.get(number=1)
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"More {factor}")
+    builders.score_all()
+    with django_assert_max_num_queries(len(before.captured_queries)):
+        keeper.get(SECOND)
