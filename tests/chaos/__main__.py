@@ -56,7 +56,7 @@ def run(options: argparse.Namespace, directory: Path) -> bool:
     rng = np.random.default_rng(options.seed)
     truth = simulate(rng=rng, n_sequences=n_sequences, n_recordings=max(n_sequences // 40, 2))
     uploads = make_uploads(truth, n=options.uploads, n_bombs=options.bombs, seed=options.seed)
-    with running_site(directory, truth=truth.to_csv(), n_workers=options.workers) as site:
+    with running_site(directory, truth=truth, n_workers=options.workers) as site:
         token = site.manage("create_token", "chaos@example.org", "--name", "chaos").strip()
         clients = Clients(url=site.url, token=token, split=SPLIT)
         faults = Faults(site, rng=random.Random(options.seed), rarity=options.rarity)

@@ -45,6 +45,11 @@ class Process:
         """Whether it runs, or is stopped."""
         return self._child is not None and self._child.poll() is None
 
+    @property
+    def returncode(self) -> int | None:
+        """How it ended; None while it has not."""
+        return self._child.poll() if self._child is not None else None
+
     def start(self) -> None:
         """Start it, in a session of its own."""
         with self.log_path.open("ab") as log:

@@ -8,8 +8,10 @@ from pathlib import Path
 
 import httpx
 
+import evaluator
 from tests.chaos.processes import REPOSITORY, Process
 from tests.chaos.services import Postgres, Redis
+from tests.chaos.uploads import reader_memory_bytes
 from tests.journeys.production import BIN, await_that, free_port, settings_for
 
 # Seconds. Lease, heartbeat and wall are a tenth of the real ones, so that a run of minutes sees many of them.
@@ -20,8 +22,8 @@ PACE = {
     "TSTTC_SWEEP_S": "15",
     "TSTTC_POLL_S": "5",
     "TSTTC_BACKOFF_S": "0.5",
-    # A file that needs more than this is poison.
-    "TSTTC_CHILD_MEMORY_BYTES": "200000000",
+    # One account sends everything.
+    "TSTTC_QUOTAS": "0",
 }
 SPLIT = "test"
 
@@ -84,10 +86,16 @@ class Site:
 
 @contextmanager
 def running_site(
-    directory: Path, *, truth: bytes, n_workers: int, changes: Mapping[str, str] | None = None
+    directory: Path,
+    *,
+    truth: evaluator.GroundTruth,
+    n_workers: int,
+    changes: Mapping[str, str] | None = None,
 ) -> Iterator[Site]:
     """A site whose split `test` is open; everything that was started ends with the context."""
-    site = Site(directory, n_workers=n_workers, changes=changes or {})
+    memory_bytes = reader_memory_bytes(truth, directory=directory)
+    limits = {"TSTTC_CHILD_MEMORY_BYTES": str(memory_bytes)}
+    site = Site(directory, n_workers=n_workers, changes=limits | dict(changes or {}))
     with ExitStack() as ends:
         ends.callback(site.postgres.end)
         ends.callback(site.redis.server.ask_to_end)
@@ -98,7 +106,7 @@ def running_site(
         site.manage("migrate", "--no-input")
         site.manage("collectstatic", "--no-input")
         table = directory / "truth.csv"
-        table.write_bytes(truth)
+        table.write_bytes(truth.to_csv())
         site.manage("import_truth", SPLIT, str(table))
         for process in site.processes:
             process.start()

@@ -1,18 +1,24 @@
 """Prediction files with what must come of them, and clients that send them until they are acknowledged."""
 
 import json
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import httpx
 import numpy as np
 
 import evaluator
 from evaluator import Rejected, published
+from evaluator.quarantine import READY
+from tests.chaos.processes import REPOSITORY
 
-BOMB_ENTRIES = 1_500_000
+BOMB_ENTRIES = 3_150_000
+ROOM_BYTES = 30_000_000  # for reading a file: much for the good ones here, little for a bomb
 RETRY_S = 0.5
 
 
@@ -43,7 +49,7 @@ def make_uploads(truth: evaluator.GroundTruth, *, n: int, n_bombs: int, seed: in
     uploads = []
     for i in range(n):
         if i < n_bombs:
-            uploads.append(Upload(name=f"bomb-{i}", data=_bomb(i), state="SYSTEM_ERROR"))
+            uploads.append(Upload(name=f"bomb-{i}", data=bomb_file(i), state="SYSTEM_ERROR"))
             continue
         ttc_s = truth.ttc_s * np.exp(rng.normal(0.0, 0.2, truth.n_sequences))
         data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s)
@@ -76,9 +82,27 @@ def _faulty(good: bytes, *, kind: int) -> bytes:
     return text[: len(text) // 2].encode() if kind == 3 else text.encode()
 
 
-def _bomb(number: int) -> bytes:
-    """Well below the size limit, and far above the reader's memory once it is parsed."""
+def bomb_file(number: int) -> bytes:
+    """Just below the size limit; its bytes, their text and its keys are more than the reader has room for."""
     return b'{"0":%d' % number + b',"0":1' * BOMB_ENTRIES + b"}"
+
+
+def reader_memory_bytes(truth: evaluator.GroundTruth, *, directory: Path) -> int:
+    """What the process that reads a file has in hand before it begins, and a little room.
+
+    Measured, since it hangs on the versions of the libraries.
+    """
+    path = directory / "manifest.npz"
+    truth.manifest.save(path)
+    command = [sys.executable, "-m", "evaluator.quarantine", str(path), "4000000000", "60"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=REPOSITORY) as reader:
+        assert reader.stdout is not None
+        if reader.stdout.readline() != READY:
+            raise RuntimeError("the process that reads files does not start")
+        status = Path(f"/proc/{reader.pid}/status").read_text().splitlines()
+        [size_kb] = [int(line.split()[1]) for line in status if line.startswith("VmSize:")]
+        reader.kill()
+    return size_kb * 1024 + ROOM_BYTES
 
 
 @dataclass
