@@ -1,13 +1,16 @@
 """Django's admin, read-mostly; its actions call the same verbs as every other door."""
 
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, ClassVar, cast
 
 from django.contrib import admin, messages
+from django.contrib.admin.models import LogEntry
 from django.contrib.auth.admin import UserAdmin as DjangoUserAdmin
 from django.db.models import Model, QuerySet
 from django.http import HttpRequest, HttpResponse
+from django.utils import timezone
 
-from leaderboard import lifecycle
+from leaderboard import audit, lifecycle, quotas
 from leaderboard.models import (
     ApiToken,
     AuditEvent,
@@ -17,6 +20,7 @@ from leaderboard.models import (
     Membership,
     Method,
     PublishedResult,
+    QuotaOverride,
     Split,
     Status,
     Submission,
@@ -39,6 +43,40 @@ class ReadOnlyAdmin(admin.ModelAdmin):
     def has_delete_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
         """Nobody deletes here."""
         return False
+
+
+class AuditedAdmin(admin.ModelAdmin):
+    """What is changed here is told to the audit trail as well: which fields, and what these hold now."""
+
+    audited_fields: ClassVar[Sequence[str]] = ()
+
+    def log_addition(self, request: HttpRequest, obj: Model, message: Any) -> LogEntry:
+        """Somebody added a row."""
+        self._record(request, obj, verb="added", message=message)
+        return super().log_addition(request, obj, message)
+
+    def log_change(self, request: HttpRequest, obj: Model, message: Any) -> LogEntry:
+        """Somebody changed a row, or an account's password."""
+        self._record(request, obj, verb="changed", message=message)
+        return super().log_change(request, obj, message)
+
+    def log_deletions(self, request: HttpRequest, queryset: QuerySet[Any]) -> list[LogEntry]:
+        """Somebody deleted rows."""
+        for obj in queryset:
+            self._record(request, obj, verb="deleted", message="")
+        return super().log_deletions(request, queryset)
+
+    def _record(self, request: HttpRequest, obj: Model, *, verb: str, message: Any) -> None:
+        audit.record(
+            verb=verb,
+            noun=type(obj).__name__,
+            noun_id=obj.pk,
+            actor=cast("User", request.user),
+            details={
+                "said": message,
+                **{name: str(getattr(obj, name)) for name in self.audited_fields},
+            },
+        )
 
 
 @admin.register(Evaluation)
@@ -106,10 +144,18 @@ class SubmissionAdmin(ReadOnlyAdmin):
 
 
 @admin.register(Split)
-class SplitAdmin(admin.ModelAdmin):
-    """A split's texts and times. Its published edition changes by publishing only."""
+class SplitAdmin(AuditedAdmin):
+    """A split's texts, times and quotas. Its published edition changes by publishing only."""
 
-    list_display = ["name", "title", "is_hidden", "published_edition", "opens_at", "closes_at"]
+    list_display = ["name", "title", "is_hidden", "published_edition", "opens_at", "closes_at", "quota_limit"]
+    audited_fields = (
+        "opens_at",
+        "closes_at",
+        "quota_limit",
+        "quota_window",
+        "quota_min_gap",
+        "quota_rejected_limit",
+    )
     readonly_fields = ["name", "published_edition", "is_hidden", "is_simulated"]
 
     def has_add_permission(self, request: HttpRequest) -> bool:
@@ -119,6 +165,57 @@ class SplitAdmin(admin.ModelAdmin):
     def has_delete_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
         """Splits stay."""
         return False
+
+
+@admin.register(QuotaOverride)
+class QuotaOverrideAdmin(admin.ModelAdmin):
+    """Rules of single teams. The verbs write them, and tell the audit trail."""
+
+    list_display = ["team", "split", "quota_limit", "quota_window", "reason", "set_by", "set_at"]
+    list_filter = ["split"]
+    search_fields = ["team__name", "reason"]
+    autocomplete_fields = ["team"]
+    readonly_fields = ["set_by", "set_at"]
+
+    def get_readonly_fields(self, request: HttpRequest, obj: QuotaOverride | None = None) -> list[str]:
+        """Whose rules they are stays."""
+        fixed = super().get_readonly_fields(request, obj)
+        return [*fixed, "team", "split"] if obj else list(fixed)
+
+    def save_model(self, request: HttpRequest, obj: QuotaOverride, form: Any, change: bool) -> None:
+        """Give the team these rules."""
+        row = quotas.override(
+            team=obj.team,
+            split=obj.split,
+            limit=obj.quota_limit,
+            window=obj.quota_window,
+            min_gap=obj.quota_min_gap,
+            rejected_limit=obj.quota_rejected_limit,
+            reason=obj.reason,
+            actor=cast("User", request.user),
+            now=timezone.now(),
+        )
+        obj.pk = row.pk
+
+    def delete_model(self, request: HttpRequest, obj: QuotaOverride) -> None:
+        """Let the split's rules hold for the team again."""
+        quotas.end_override(row=obj, actor=cast("User", request.user))
+
+    def delete_queryset(self, request: HttpRequest, queryset: QuerySet[QuotaOverride]) -> None:
+        """The same for many."""
+        for row in queryset:
+            self.delete_model(request, row)
+
+
+@admin.register(AuditEvent)
+class AuditEventAdmin(ReadOnlyAdmin):
+    """The audit trail; a page of its own lets it be exported."""
+
+    list_display = ["id", "at", "actor", "verb", "noun", "noun_id"]
+    list_filter = ["verb", "noun"]
+    search_fields = ["noun_id", "actor__email"]
+    list_select_related = ["actor"]
+    date_hierarchy = "at"
 
 
 @admin.register(Method)
@@ -146,9 +243,10 @@ class ApiTokenAdmin(ReadOnlyAdmin):
 
 
 @admin.register(User)
-class UserAdmin(DjangoUserAdmin):
+class UserAdmin(AuditedAdmin, DjangoUserAdmin):
     """Accounts."""
 
+    audited_fields = ("email", "is_active", "is_staff", "is_superuser")
     ordering = ["email"]
     list_display = ["email", "name", "is_staff", "is_active", "date_joined"]
     search_fields = ["email", "name"]
@@ -162,5 +260,5 @@ class UserAdmin(DjangoUserAdmin):
     ]
 
 
-for model in (AuditEvent, Edition, GroundTruth, Membership, PublishedResult):
+for model in (Edition, GroundTruth, Membership, PublishedResult):
     admin.site.register(model, ReadOnlyAdmin)

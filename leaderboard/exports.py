@@ -2,7 +2,7 @@
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Final
 
 # A spreadsheet takes a cell that begins like this for a formula and runs it; the wide forms as well.
@@ -20,9 +20,17 @@ def guarded(text: str) -> str:
 
 def csv_text(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> str:
     """Rows as CSV with a header (RFC 4180). Texts are guarded, numbers stay, None is an empty cell."""
-    table = io.StringIO()
-    writer = csv.DictWriter(table, fieldnames=columns)
+    return "".join(csv_lines(rows, columns=columns))
+
+
+def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
+    """The same, one row after the other, for tables that are too long to be held."""
+    line = io.StringIO()
+    writer = csv.DictWriter(line, fieldnames=columns)
     writer.writeheader()
     for row in rows:
+        yield line.getvalue()
+        line.seek(0)
+        line.truncate()
         writer.writerow({name: guarded(v) if isinstance(v, str) else v for name, v in row.items()})
-    return table.getvalue()
+    yield line.getvalue()

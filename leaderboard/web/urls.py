@@ -2,7 +2,7 @@
 
 from django.urls import include, path
 
-from leaderboard.web import edition_views, maintainer_views, views
+from leaderboard.web import audit_views, edition_views, maintainer_views, views
 
 MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
@@ -27,6 +27,9 @@ urlpatterns = [
     path("docs/", views.docs, name="docs"),
     path("docs/api/", views.api_reference, name="api_reference"),
     path("maintain/", maintainer_views.hub, name="maintain"),
+    path("maintain/audit/", audit_views.events, name="maintain_audit"),
+    path("maintain/audit/events.csv", audit_views.events_csv, name="maintain_audit_csv"),
+    path("maintain/audit/events.json", audit_views.events_json, name="maintain_audit_json"),
     path("maintain/<slug:split>/open/", maintainer_views.open_edition, name="maintain_open"),
     path("maintain/<slug:split>/editions/<int:number>/", include(MAINTAINED_EDITION)),
 ]

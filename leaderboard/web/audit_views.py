@@ -1,0 +1,81 @@
+"""The audit trail for maintainers: to look through, and to take along."""
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+from django.core.paginator import Paginator
+from django.http import HttpRequest, HttpResponse, StreamingHttpResponse
+from django.shortcuts import render
+from django.views.decorators.http import require_safe
+
+from leaderboard import audit, exports
+from leaderboard.models import AuditEvent
+from leaderboard.web.audit_forms import AuditFilter
+from leaderboard.web.maintainer_views import maintainers_only
+
+PER_PAGE = 100
+COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "previous_hash", "hash")
+
+
+@maintainers_only
+@require_safe
+def events(request: HttpRequest) -> HttpResponse:
+    """Who did what to what, the newest first."""
+    asked = AuditFilter(request.GET)
+    if not asked.is_valid():
+        return render(request, "maintainers/audit.html", {"form": asked}, status=400)
+    page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
+    return render(request, "maintainers/audit.html", {"form": asked, "page": page, "query": asked.query()})
+
+
+@maintainers_only
+@require_safe
+def events_csv(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
+    """The same as a table for spreadsheets; `details` is JSON."""
+    asked = AuditFilter(request.GET)
+    if not asked.is_valid():
+        return render(request, "maintainers/audit.html", {"form": asked}, status=400)
+    rows = ({**row, "details": json.dumps(row["details"], ensure_ascii=False)} for row in _rows(asked))
+    return _download(exports.csv_lines(rows, columns=COLUMNS), kind="csv", content_type="text/csv")
+
+
+@maintainers_only
+@require_safe
+def events_json(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
+    """The same as one JSON list."""
+    asked = AuditFilter(request.GET)
+    if not asked.is_valid():
+        return render(request, "maintainers/audit.html", {"form": asked}, status=400)
+    return _download(_json_list(_rows(asked)), kind="json", content_type="application/json")
+
+
+def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
+    """Every event that fits, a few at a time: a trail is as long as the site is old."""
+    return (_row(event) for event in audit.events(**asked.wanted()).iterator(chunk_size=1000))
+
+
+def _row(event: AuditEvent) -> dict[str, Any]:
+    """One event, column by column."""
+    return {
+        "id": event.pk,
+        "at": event.at.isoformat(),
+        "actor": event.actor.email if event.actor else None,
+        **{name: getattr(event, name) for name in COLUMNS[3:]},
+    }
+
+
+def _json_list(rows: Iterator[dict[str, Any]]) -> Iterator[str]:
+    opening = "["
+    for row in rows:
+        yield f"{opening}\n{json.dumps(row, ensure_ascii=False)}"
+        opening = ","
+    yield "[]\n" if opening == "[" else "\n]\n"
+
+
+def _download(lines: Iterator[str], *, kind: str, content_type: str) -> StreamingHttpResponse:
+    return StreamingHttpResponse(
+        lines,
+        content_type=f"{content_type}; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="tsttc-audit.{kind}"'},
+    )
