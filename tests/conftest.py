@@ -14,6 +14,30 @@ from leaderboard import benchmark as benchmark_verbs
 os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 
 
+# Files whose tests score many predictions, each in a child process as a worker does, or make whole worlds.
+SLOW_FILES = {
+    "test_cli_against_server.py",
+    "test_demo.py",
+    "test_files_s3.py",
+    "test_lifecycle_states.py",
+    "test_pages_board.py",
+    "test_pages_editions.py",
+    "test_pages_maintainers.py",
+    "test_pages_publishing.py",
+    "test_pages_withdrawing.py",
+    "test_preview.py",
+    "test_rescoring.py",
+    "test_scoring.py",
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark the tests of whole files as slow."""
+    for item in items:
+        if item.path.name in SLOW_FILES and "evaluator" not in item.path.parts:
+            item.add_marker(pytest.mark.slow)
+
+
 @pytest.fixture(scope="session")
 def django_db_setup(django_db_setup: None, django_db_blocker: DjangoDbBlocker) -> None:
     """The test database, in which a transactional test may empty the audit trail when it ends."""
