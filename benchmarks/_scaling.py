@@ -46,11 +46,15 @@ def main() -> None:
     try:
         for n in N_WORKERS:
             ids = queue_for_later(truth, n_workers=n)
-            with workers(n):
+            name = f"scale_out_{n}_{'worker' if n == 1 else 'workers'}"
+            # What else the machine is doing, without which the rates cannot be read.
+            print(f"{name}_load_before = {os.getloadavg()[0]:.1f} processes", flush=True)
+            with workers(n) as processes:
+                before_s = sum(map(processor_s, processes))
                 per_s = rate(ids)
-            print(
-                f"scale_out_{n}_{'worker' if n == 1 else 'workers'} = {per_s:.2f} submissions/s", flush=True
-            )
+                used_s = sum(map(processor_s, processes)) - before_s
+            print(f"{name} = {per_s:.2f} submissions/s", flush=True)
+            print(f"{name}_processor = {used_s / len(ids):.3f} s/submission", flush=True)
     finally:
         connections.close_all()
 
@@ -92,8 +96,9 @@ def rate(ids: Sequence[UUID]) -> float:
 
 
 @contextmanager
-def workers(n: int) -> Iterator[None]:
-    """So many worker processes, all of them up; ended with the context."""
+def workers(n: int) -> Iterator[list[int]]:
+    """So many worker processes, all of them up, by their numbers; ended with the context."""
+    processes: list[int] = []
     logs = [Path(settings.DATA_DIR) / f"worker-{n}-{i}.log" for i in range(n)]
     with ExitStack() as started:
         for i, path in enumerate(logs):
@@ -109,8 +114,19 @@ def workers(n: int) -> Iterator[None]:
                 stdin=subprocess.DEVNULL,
             )
             started.callback(end, worker)
+            processes.append(worker.pid)
         await_that(lambda: all(b" ready." in path.read_bytes() for path in logs), what="the workers are up")
-        yield
+        yield processes
+
+
+def processor_s(process: int) -> float:
+    """Processor seconds of a process and all that it has started, those that have ended included."""
+    folder = Path("/proc", str(process))
+    # The fields after the name, which may have spaces in it; times of its own, and of children that ended.
+    fields = (folder / "stat").read_text().rpartition(")")[2].split()
+    own_s = sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
+    children = (folder / "task" / str(process) / "children").read_text().split()
+    return own_s + sum(processor_s(int(child)) for child in children)
 
 
 def end(worker: "subprocess.Popen[bytes]") -> None:

@@ -33,6 +33,7 @@ def main() -> None:
             **settings,
             "DJANGO_SETTINGS_MODULE": "leaderboard.settings",
             "TSTTC_LOG_LEVEL": "WARNING",
+            "TSTTC_QUOTAS": "0",
         }
         print(f"scale_out_processors = {os.cpu_count()} processors")
         sys.stdout.flush()
