@@ -141,7 +141,7 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
             )
             messages.success(request, f"The board of {split} is what it was before edition {number}.")
             return redirect("board", split)
-    context = _comparison(former) if former else {}
+    context = {**_comparison(former), "undone": edition_tables.change_words(former, found)} if former else {}
     return _form(request, "maintainers/roll_back.html", form, leaving=found, former=former, **context)
 
 

@@ -158,7 +158,10 @@ def test_rolling_back_returns_the_board_as_it_was(
     before = pages.board_rows(pages.page(keeper.get("/board/test/")))
     publish(rescored)
     root = get(keeper, f"{SECOND}roll-back/")
-    assert "Edition 1 becomes the board again: 5 labels corrected." in root.one("main").text
+    assert (
+        "becomes the board again, without what edition 2 brought: 5 labels corrected."
+        in root.one("main").text
+    )
     assert root.one("input", name="replaces").attributes["value"] == "2"
     response = keeper.post(f"{SECOND}roll-back/", {"reason": "A mistake.", "replaces": 2}, follow=True)
     assert pages.board_rows(pages.page(response)) == before
