@@ -68,7 +68,7 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
         values = predictions(truth, number)
         digest, size_bytes = values.digest, 0
         if number < n_files:
-            kept = files.keep_predictions(ContentFile(contents(truth, number)))
+            kept = files.keep_predictions(ContentFile(contents(truth, number)), now=now)
             digest, size_bytes = kept.digest, kept.size_bytes
         files.keep_aligned(
             evaluator.Predictions.from_arrays(ttc_s=values.ttc_s, manifest=truth.manifest, digest=digest)

@@ -1,0 +1,326 @@
+"""A correction while people read, teams upload and a worker dies: nobody sees anything but a whole board.
+
+Real processes (gunicorn, two Celery workers, beat), a PostgreSQL and a Redis of their own. Five hundred
+submissions are scored anew; four readers ask for the board without pause. What every submission must show
+in each edition is computed here, by the evaluator alone, so that every number of every answer can be held
+against the edition that the answer names.
+"""
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import groupby
+from typing import Any
+
+import httpx
+import numpy as np
+import pytest
+
+import evaluator
+from leaderboard.demo.truth import simulate
+from tests import crowd
+from tests.chaos.services import postgres_folder, redis_program
+from tests.chaos.site import SPLIT, Site, running_site
+from tests.journeys.production import REPOSITORY, await_that
+from tests.services import ServiceMissing, skip_or_fail
+
+pytestmark = [pytest.mark.services, pytest.mark.slow]
+
+N_SUBMISSIONS = 500
+N_READERS = 4
+MAX_UPLOADS = 40
+UPLOAD_EVERY_S = 0.5
+BOARD = f"/api/v1/splits/{SPLIT}/board"
+
+Scores = dict[str, float | None]
+Expected = Mapping[int, Mapping[str, Scores]]  # edition number → method → the ten numbers
+
+
+@pytest.fixture(scope="module")
+def truth() -> evaluator.GroundTruth:
+    """400 made-up sequences."""
+    return simulate(rng=np.random.default_rng(11), n_sequences=400, n_recordings=25)
+
+
+@pytest.fixture(scope="module")
+def corrected(truth: evaluator.GroundTruth) -> evaluator.GroundTruth:
+    """The same sequences; those of every third recording have a longer time to contact."""
+    is_changed = truth.manifest.recording_index % 3 == 0
+    table = truth.to_table()
+    table.ttc_s = np.where(is_changed, truth.ttc_s * 1.1, truth.ttc_s).tolist()
+    return evaluator.GroundTruth.from_table(table)
+
+
+@pytest.fixture(scope="module")
+def expected(truth: evaluator.GroundTruth, corrected: evaluator.GroundTruth) -> Expected:
+    """What every submission must show, in edition 1 and in edition 2."""
+    return {
+        number: {
+            crowd.method_name(i): crowd.published_scores(truth, i, against=against)
+            for i in range(N_SUBMISSIONS + MAX_UPLOADS)
+        }
+        for number, against in ((1, truth), (2, corrected))
+    }
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory, truth: evaluator.GroundTruth) -> Iterator[Site]:
+    """A site with two workers, on whose board five hundred submissions stand."""
+    try:
+        postgres_folder()
+        redis_program()
+    except ServiceMissing as missing:
+        skip_or_fail(missing)
+    with running_site(tmp_path_factory.mktemp("site"), truth=truth, n_workers=2) as running:
+        subprocess.run(
+            [sys.executable, "-m", "tests.crowd", SPLIT, str(N_SUBMISSIONS)],
+            cwd=REPOSITORY,
+            env=running.environment,
+            check=True,
+        )
+        await_that(lambda: n_undecided(running) == 0, what="everything is scored in the first edition")
+        yield running
+
+
+def ask(site: Site, question: str) -> int:
+    """A number from the database."""
+    with site.postgres.connect() as connection:
+        [row] = connection.execute(question).fetchall()  # type: ignore[call-overload]  # a fixed text
+        return int(str(row[0]))
+
+
+def n_undecided(site: Site) -> int:
+    return ask(site, "SELECT count(*) FROM leaderboard_evaluation WHERE status NOT IN ('SCORED', 'REJECTED')")
+
+
+def n_held(site: Site) -> int:
+    """Evaluations of the second edition that a worker has in hand."""
+    return ask(
+        site,
+        "SELECT count(*) FROM leaderboard_evaluation e JOIN leaderboard_edition d ON d.id = e.edition_id "
+        "WHERE d.number = 2 AND e.status = 'RUNNING'",
+    )
+
+
+# --- those who read, and those who upload ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One answer of the board: when it was asked for and was there, and what it said."""
+
+    reader: int
+    asked_s: float
+    came_s: float
+    edition: int
+    methods: frozenset[str]
+    faults: tuple[str, ...]
+
+
+class Readers:
+    """People who ask for the board again and again, each as soon as the last answer has come."""
+
+    def __init__(self, site: Site, expected: Expected) -> None:
+        self.answers: list[Answer] = []
+        self.failures: list[str] = []
+        self._site = site
+        self._expected = expected
+        self._stopping = threading.Event()
+        self._threads = [threading.Thread(target=self._read, args=(i,)) for i in range(N_READERS)]
+
+    def __enter__(self) -> "Readers":
+        for thread in self._threads:
+            thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        for thread in self._threads:
+            thread.join()
+
+    def await_answers(self, n: int, *, asked_after_s: float) -> None:
+        """Until every reader has had `n` answers to what it asked after that moment."""
+
+        def have_come() -> bool:
+            assert not self.failures, self.failures
+            late = [answer.reader for answer in self.answers.copy() if answer.asked_s >= asked_after_s]
+            return all(late.count(reader) >= n for reader in range(N_READERS))
+
+        await_that(have_come, what=f"every reader has {n} more answers")
+
+    def _read(self, reader: int) -> None:
+        with httpx.Client(base_url=self._site.url, timeout=60, trust_env=False) as http:
+            while not self._stopping.is_set():
+                asked_s = time.monotonic()
+                response = http.get(BOARD)
+                came_s = time.monotonic()
+                if response.status_code != 200:
+                    self.failures.append(f"{response.status_code}: {response.text[:200]}")
+                    return
+                answer = Answer(reader, asked_s, came_s, 0, frozenset(), ())
+                self.answers.append(self._judged(answer, response.json()))
+
+    def _judged(self, answer: Answer, board: dict[str, Any]) -> Answer:
+        """Every number of the answer, held against those of the edition that it names."""
+        shown = {e["method"]: e["scores"] for e in board["entries"] if e["kind"] == "submission"}
+        right = self._expected[board["edition"]]
+        faults = [
+            f"edition {board['edition']}, {method}: {scores}, expected {right.get(method)}"
+            for method, scores in shown.items()
+            if scores != right.get(method)
+        ]
+        return replace(answer, edition=board["edition"], methods=frozenset(shown), faults=tuple(faults[:3]))
+
+
+class Uploader:
+    """A team's script: sends one file after another through the API."""
+
+    def __init__(self, site: Site, truth: evaluator.GroundTruth) -> None:
+        self.n_sent = 0
+        self.failures: list[str] = []
+        self._url = site.url
+        self._token = site.manage("create_token", "team@example.org", "--name", "journey").strip()
+        self._truth = truth
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._send)
+
+    def __enter__(self) -> "Uploader":
+        self._thread.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stopping.set()
+        self._thread.join()
+
+    def _send(self) -> None:
+        headers = {"Authorization": f"Bearer {self._token}"}
+        with httpx.Client(base_url=self._url, headers=headers, timeout=60, trust_env=False) as http:
+            while self.n_sent < MAX_UPLOADS and not self._stopping.wait(UPLOAD_EVERY_S):
+                number = N_SUBMISSIONS + self.n_sent
+                answer = http.post(
+                    "/api/v1/submissions",
+                    data={"split": SPLIT, "method": crowd.method_name(number)},
+                    files={"file": ("p.json", crowd.contents(self._truth, number), "application/json")},
+                )
+                if answer.status_code != 201:
+                    self.failures.append(f"{answer.status_code}: {answer.text[:200]}")
+                    return
+                self.n_sent += 1
+
+
+# --- what happens to them -----------------------------------------------------------------------------------
+
+
+def kill_a_worker_with_a_batch(site: Site, is_opened: Callable[[], bool]) -> int:
+    """SIGKILL the only worker at work while it holds evaluations of the second edition. Returns how many.
+
+    It is stopped first, so that what it holds can be counted; the other one has been stopped by the caller.
+    """
+    working = site.workers[0]
+
+    def has_hands_full() -> bool:
+        if n_held(site) == 0:
+            return is_opened() and n_undecided(site) == 0
+        working.send(signal.SIGSTOP)
+        if n_held(site) > 0:
+            return True
+        working.send(signal.SIGCONT)
+        return False
+
+    deadline_s = time.monotonic() + 60
+    while not has_hands_full():
+        assert time.monotonic() < deadline_s, "the second edition was never in hand"
+    n_lost = n_held(site)
+    working.kill()
+    return n_lost
+
+
+def timed(act: Callable[[], object]) -> tuple[float, float]:
+    """When something began and was over."""
+    began_s = time.monotonic()
+    act()
+    return began_s, time.monotonic()
+
+
+def went_back(answers: Sequence[Answer], *, to: int) -> list[tuple[Answer, Answer]]:
+    """Pairs of an answer of edition `to`, and a later question that was answered with another edition."""
+    first = min((answer for answer in answers if answer.edition == to), key=lambda a: a.came_s)
+    return [(first, a) for a in answers if a.edition != to and a.asked_s >= first.came_s]
+
+
+def test_readers_see_whole_boards_only_and_nothing_is_doubled(
+    site: Site,
+    truth: evaluator.GroundTruth,
+    corrected: evaluator.GroundTruth,
+    expected: Expected,
+) -> None:
+    # A number of the wrong edition would show: no submission has the same ten in both.
+    assert all(expected[1][method] != expected[2][method] for method in expected[1])
+    path = site.directory / "corrected.csv"
+    path.write_bytes(corrected.to_csv())
+    uploader = Uploader(site, truth)
+
+    with Readers(site, expected) as readers, ThreadPoolExecutor(1) as maintainer:
+        with uploader:
+            readers.await_answers(1, asked_after_s=0)
+            site.workers[1].send(signal.SIGSTOP)
+            opening = maintainer.submit(site.manage, "open_edition", SPLIT, "--truth", str(path))
+            n_lost = kill_a_worker_with_a_batch(site, opening.done)
+            site.workers[1].send(signal.SIGCONT)
+            opening.result()
+            site.workers[0].start()  # as its supervisor does
+            readers.await_answers(2, asked_after_s=time.monotonic())
+        assert n_lost > 0, "the worker was killed with empty hands"
+        await_that(lambda: n_undecided(site) == 0, what="everything is decided in both editions")
+        before = httpx.get(site.url + BOARD, trust_env=False, timeout=60).content
+
+        forward = timed(lambda: publish(site))
+        readers.await_answers(3, asked_after_s=forward[1])
+        back = timed(lambda: publish(site, "--roll-back"))
+        readers.await_answers(3, asked_after_s=back[1])
+        after = httpx.get(site.url + BOARD, trust_env=False, timeout=60).content
+
+    assert (readers.failures, uploader.failures) == ([], [])
+    assert uploader.n_sent > 0
+    assert_whole_and_in_order(readers.answers, forward=forward, back=back)
+    assert after == before
+    assert_nothing_doubled(site, n=N_SUBMISSIONS + uploader.n_sent, n_lost=n_lost)
+
+
+def publish(site: Site, *more: str) -> None:
+    site.manage("publish_edition", SPLIT, "2", "--reason", "Every third recording was labelled anew.", *more)
+
+
+def assert_whole_and_in_order(
+    answers: Sequence[Answer], *, forward: tuple[float, float], back: tuple[float, float]
+) -> None:
+    assert [fault for answer in answers for fault in answer.faults] == []
+    everybody = {crowd.method_name(i) for i in range(N_SUBMISSIONS)}
+    assert [sorted(everybody - answer.methods)[:3] for answer in answers if everybody - answer.methods] == []
+    for reader in range(N_READERS):
+        own = [answer.edition for answer in answers if answer.reader == reader]
+        assert [edition for edition, _ in groupby(own)] == [1, 2, 1]
+    assert went_back([answer for answer in answers if answer.asked_s < back[0]], to=2) == []
+    assert went_back([answer for answer in answers if answer.asked_s >= forward[1]], to=1) == []
+    assert {a.edition for a in answers if a.came_s <= forward[0] or a.asked_s >= back[1]} == {1}
+    assert {a.edition for a in answers if a.asked_s >= forward[1] and a.came_s <= back[0]} == {2}
+
+
+def assert_nothing_doubled(site: Site, *, n: int, n_lost: int) -> None:
+    """Every submission has one evaluation in each edition, decided once, with ten numbers."""
+    evaluations = "FROM leaderboard_evaluation e"
+    assert ask(site, f"SELECT count(*) {evaluations} WHERE status = 'SCORED'") == 2 * n
+    assert ask(site, f"SELECT count(DISTINCT (submission_id, edition_id)) {evaluations}") == 2 * n
+    assert ask(site, "SELECT count(*) FROM leaderboard_score") == 2 * n * len(evaluator.SCORE_NAMES)
+    decisions = "FROM leaderboard_auditevent WHERE verb = 'scored'"
+    assert ask(site, f"SELECT count(*) {decisions}") == ask(
+        site, f"SELECT count(DISTINCT noun_id) {decisions}"
+    )
+    assert ask(site, f"SELECT count(*) {decisions}") == 2 * n
+    # What the dead worker had in hand was claimed again.
+    assert ask(site, f"SELECT count(*) {evaluations} WHERE attempt > 1") >= n_lost
