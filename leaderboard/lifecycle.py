@@ -30,7 +30,7 @@ from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
 from leaderboard import audit, broker, bulk
-from leaderboard.clock import after, database_now
+from leaderboard.clock import after, database_now, just_before
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 
 log = structlog.get_logger(__name__)
@@ -117,7 +117,7 @@ def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> No
     bulk.insert(
         Evaluation,
         ["submission", "edition", "priority", "queued_at", "due_at"],
-        [(pk, edition.pk, Evaluation.PRIORITY_RESCORE, now, now) for pk in submission_ids],
+        [(pk, edition.pk, Evaluation.PRIORITY_RESCORE, now, just_before(now)) for pk in submission_ids],
         ignore_conflicts=True,
     )
     transaction.on_commit(partial(_announce_many, len(submission_ids)), robust=True)
