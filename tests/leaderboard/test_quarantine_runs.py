@@ -1,6 +1,8 @@
 """A run that goes wrong: who is blamed, how often it is tried, and that the next file does not notice."""
 
+import os
 import random
+import signal
 from collections import deque
 from pathlib import Path
 
@@ -16,6 +18,7 @@ from leaderboard.scoring import Pulse
 from tests import builders
 from tests.chaos.uploads import bomb_file, reader_memory_bytes
 from tests.leaderboard import queue_rows
+from tests.leaderboard.child_processes import children
 from tests.leaderboard.queue_rows import LEASE_S, WALL_S
 
 
@@ -53,11 +56,20 @@ def test_file_that_kills_its_reader_is_given_up_after_three_runs_and_the_next_is
 
 
 def test_run_that_takes_too_long_is_ended_and_held_against_the_file(
-    edition: Edition, owner: User, settings: Settings
+    edition: Edition, owner: User, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings.WALL_S, settings.LEASE_S, settings.HEARTBEAT_S = 0.2, 0.1, 0.05
-    submission = builders.submit(owner, bomb_file(0))
+    settings.WALL_S, settings.LEASE_S, settings.HEARTBEAT_S = 0.3, 0.1, 0.02
+    submission = builders.submit(owner, builders.predictions(edition))
+    real = lifecycle.heartbeat
+
+    def hang_then_beat(lease: Lease, *, lease_s: float) -> bool:
+        for pid in children():
+            os.kill(pid, signal.SIGSTOP)
+        return real(lease, lease_s=lease_s)
+
+    monkeypatch.setattr(lifecycle, "heartbeat", hang_then_beat)
     assert run_next()
+    assert not children()
     assert strikes(submission) == (1, 0)
     assert evaluation_of(submission).last_error == "the run reached its time limit or was taken away"
 
@@ -117,11 +129,13 @@ def test_outcome_that_the_database_refuses_is_a_strike_and_leaves_nothing(
 def test_cancelled_run_is_dropped_without_a_strike(
     edition: Edition, owner: User, settings: Settings, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    settings.HEARTBEAT_S = 0.05
-    submission = builders.submit(owner, bomb_file(0))
+    settings.HEARTBEAT_S = 0.02
+    submission = builders.submit(owner, builders.predictions(edition))
     real = lifecycle.heartbeat
 
     def cancel_then_beat(lease: Lease, *, lease_s: float) -> bool:
+        for pid in children():
+            os.kill(pid, signal.SIGSTOP)
         lifecycle.cancel(submission=submission, actor=owner)
         return real(lease, lease_s=lease_s)
 

@@ -1,0 +1,36 @@
+"""The processes that this one has started, as the kernel sees them."""
+
+import signal
+from contextlib import suppress
+from pathlib import Path
+
+
+def children() -> set[int]:
+    """Processes that this one has started and not yet buried."""
+    found = set()
+    for task in Path("/proc/self/task").iterdir():
+        found |= {int(pid) for pid in (task / "children").read_text().split()}
+    return found
+
+
+def kernel_says(pid: int, name: str) -> str:
+    """A file of the process's folder in /proc; empty once the process has ended."""
+    with suppress(ProcessLookupError, FileNotFoundError):
+        return Path(f"/proc/{pid}/{name}").read_text()
+    return ""
+
+
+def limits(pid: int) -> dict[str, list[str]]:
+    """Soft and hard limit by name."""
+    return {line[:26].strip(): line[26:].split()[:2] for line in kernel_says(pid, "limits").splitlines()}
+
+
+def is_reading(pid: int) -> bool:
+    """Whether the child has given up all it gives up, and reads its file."""
+    return limits(pid).get("Max open files") == ["3", "3"]
+
+
+def ignores(pid: int, number: signal.Signals) -> bool:
+    """Whether the process has said that it will not hear this signal."""
+    masks = [line.partition(":")[2] for line in kernel_says(pid, "status").splitlines() if "SigIgn:" in line]
+    return any(int(mask, 16) & 1 << (number - 1) for mask in masks)
