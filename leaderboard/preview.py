@@ -9,7 +9,7 @@ from django.contrib.auth.models import AnonymousUser
 
 from evaluator.protocol import SCORE_NAMES
 from leaderboard import rescoring, standings
-from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
+from leaderboard.models import Edition, Evaluation, Status, Submission, Visibility
 
 ABSENT = "ABSENT"  # not evaluated in that edition
 COLUMNS: Final = (
@@ -99,10 +99,9 @@ def preview(edition: Edition) -> Preview:
     published = edition.split.published_edition
     if published is None:
         raise rescoring.Refused(f"The split {edition.split_id!r} has no published edition to compare with.")
-    old, new = _evaluations(published), _evaluations(edition)
-    old_ranks, new_ranks = _ranks(published), _ranks(edition)
+    old, new = _side(published), _side(edition)
     changes = [
-        _change(submission, old.get(submission.pk), new.get(submission.pk), old_ranks, new_ranks)
+        _change(submission, old, new)
         for submission in Submission.objects.standing()
         .filter(split=edition.split_id)
         .select_related("method__team")
@@ -157,45 +156,52 @@ def document(found: Preview) -> dict[str, Any]:
     }
 
 
-def _evaluations(edition: Edition) -> dict[UUID, Evaluation]:
-    rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None).prefetch_related(
-        "scores"
-    )
-    return {evaluation.submission_id: evaluation for evaluation in rows}
+@dataclass(frozen=True)
+class _Side:
+    """One edition of a comparison: evaluations and ranks by submission, values by evaluation."""
+
+    evaluations: Mapping[UUID, Evaluation]
+    scores: Mapping[UUID, Mapping[str, float | None]]
+    ranks: Mapping[UUID, int | None]
+
+    def values(self, submission: Submission) -> Mapping[str, float | None]:
+        """The ten values of a submission, None where it has none."""
+        evaluation = self.evaluations.get(submission.pk)
+        return (self.scores.get(evaluation.pk) if evaluation else None) or standings.flat_scores([])
+
+    def status(self, submission: Submission) -> str:
+        """The state of a submission's evaluation."""
+        evaluation = self.evaluations.get(submission.pk)
+        return evaluation.status if evaluation else ABSENT
 
 
-def _ranks(edition: Edition) -> dict[UUID, int | None]:
-    """Rank on the board of that edition, by the submission that stands for its method."""
+def _side(edition: Edition) -> _Side:
+    """An edition's evaluations and values, and the rank of each submission that stands for its method."""
     board = standings.board(split=edition.split, edition=edition, viewer=AnonymousUser())
-    return {entry.submission_id: entry.rank for entry in board.entries if entry.submission_id}
+    rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
+    return _Side(
+        evaluations={evaluation.submission_id: evaluation for evaluation in rows},
+        scores=standings.scores_in(edition),
+        ranks={entry.submission_id: entry.rank for entry in board.entries if entry.submission_id},
+    )
 
 
-def _change(
-    submission: Submission,
-    old: Evaluation | None,
-    new: Evaluation | None,
-    old_ranks: Mapping[UUID, int | None],
-    new_ranks: Mapping[UUID, int | None],
-) -> Change:
+def _change(submission: Submission, old: _Side, new: _Side) -> Change:
+    evaluation = new.evaluations.get(submission.pk)
     return Change(
         submission_id=submission.pk,
         method=submission.method.name,
         team=submission.method.team.name,
         is_public=submission.method.visibility == Visibility.PUBLIC,
-        old_status=old.status if old else ABSENT,
-        new_status=new.status if new else ABSENT,
-        old=_values(old),
-        new=_values(new),
-        old_rank=old_ranks.get(submission.pk),
-        new_rank=new_ranks.get(submission.pk),
-        problems=tuple(new.problems) if new else (),
-        n_problems=new.n_problems if new else 0,
+        old_status=old.status(submission),
+        new_status=new.status(submission),
+        old=old.values(submission),
+        new=new.values(submission),
+        old_rank=old.ranks.get(submission.pk),
+        new_rank=new.ranks.get(submission.pk),
+        problems=tuple(evaluation.problems) if evaluation else (),
+        n_problems=evaluation.n_problems if evaluation else 0,
     )
-
-
-def _values(evaluation: Evaluation | None) -> dict[str, float | None]:
-    scores: list[Score] = list(evaluation.scores.all()) if evaluation else []
-    return standings.flat_scores(scores)
 
 
 def _difference(old: float | None, new: float | None) -> float | None:

@@ -6,7 +6,7 @@ from datetime import UTC, datetime, time
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
-from django.db.models import Prefetch, Q, QuerySet
+from django.db.models import Q, QuerySet
 from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator import ranking
@@ -99,9 +99,21 @@ def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
     """The ten names and their values; None where an interval is empty."""
     values: dict[str, float | None] = dict.fromkeys(SCORE_NAMES)
     for score in scores:
-        name = score.metric if score.interval == "overall" else f"{score.metric}_{score.interval}"
-        values[name] = score.value
+        values[_name(score.metric, score.interval)] = score.value
     return values
+
+
+def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
+    """The ten names and their values of every evaluation in an edition: one query, whatever their number."""
+    found: dict[UUID, dict[str, float | None]] = {}
+    rows = Score.objects.filter(evaluation__edition=edition)
+    for pk, metric, interval, value in rows.values_list("evaluation_id", "metric", "interval", "value"):
+        found.setdefault(pk, dict.fromkeys(SCORE_NAMES))[_name(metric, interval)] = value
+    return found
+
+
+def _name(metric: str, interval: str) -> str:
+    return metric if interval == "overall" else f"{metric}_{interval}"
 
 
 def parse_moment(text: str) -> datetime:
@@ -183,21 +195,24 @@ def _submitted_entries(
     split: Split, edition: Edition, viewer: User | AnonymousUser, at: datetime | None
 ) -> list[Entry]:
     """One entry for each method that the viewer may see: the best of its standing submissions."""
-    rows = (
-        Evaluation.objects.filter(
-            edition=edition, status=Status.SCORED, submission__method__in=_shown_methods(viewer)
-        )
-        .select_related("submission__method__team")
-        .prefetch_related(Prefetch("scores", queryset=Score.objects.order_by("pk")))
-    )
+    rows = Evaluation.objects.filter(
+        edition=edition, status=Status.SCORED, submission__method__in=_shown_methods(viewer)
+    ).select_related("submission__method__team")
     if at is not None:
         rows = rows.filter(finished_at__lte=at)
     mine = _team_ids(viewer)
     unscorable = _unscorable(split, edition)
+    # The evaluations first: one that is scored has its scores already, written in the same transaction.
+    evaluations = list(rows)
+    scores = scores_in(edition)
     best: dict[UUID, Entry] = {}
-    for evaluation in rows:
+    for evaluation in evaluations:
         entry = _submitted_entry(
-            evaluation, mine, at=at, is_unscorable=evaluation.submission_id in unscorable
+            evaluation,
+            scores.get(evaluation.pk) or flat_scores([]),
+            mine,
+            at=at,
+            is_unscorable=evaluation.submission_id in unscorable,
         )
         method_id = evaluation.submission.method_id
         rival = best.get(method_id)
@@ -229,7 +244,12 @@ def _team_ids(viewer: User | AnonymousUser) -> set[UUID]:
 
 
 def _submitted_entry(
-    evaluation: Evaluation, mine: set[UUID], *, at: datetime | None, is_unscorable: bool
+    evaluation: Evaluation,
+    scores: Mapping[str, float | None],
+    mine: set[UUID],
+    *,
+    at: datetime | None,
+    is_unscorable: bool,
 ) -> Entry:
     submission = evaluation.submission
     method = submission.method
@@ -241,7 +261,7 @@ def _submitted_entry(
         method=method.name,
         team=method.team.name,
         description=method.description,
-        scores=flat_scores([] if withdrawn_at else evaluation.scores.all()),
+        scores=flat_scores([]) if withdrawn_at else scores,
         date=submission.submitted_at,
         method_id=method.pk,
         submission_id=submission.pk,
