@@ -10,7 +10,7 @@ from django.db.models import Model, QuerySet
 from django.http import HttpRequest, HttpResponse
 from django.utils import timezone
 
-from leaderboard import audit, lifecycle, quotas
+from leaderboard import audit, lifecycle, quotas, tokens
 from leaderboard.models import (
     ApiToken,
     AuditEvent,
@@ -238,8 +238,24 @@ class TeamAdmin(ReadOnlyAdmin):
 class ApiTokenAdmin(ReadOnlyAdmin):
     """Tokens, without their secrets."""
 
-    list_display = ["name", "token_key", "user", "created", "expiry"]
-    fields = ["name", "token_key", "user", "created", "expiry"]
+    list_display = ["name", "token_key", "user", "created", "expiry", "last_used_at", "revoked_at"]
+    fields = [
+        *("name", "token_key", "user", "may_read", "may_submit", "split"),
+        *("created", "expiry", "last_used_at", "revoked_at"),
+    ]
+    search_fields = ["token_key", "name", "user__email"]
+    list_select_related = ["user"]
+    actions = ["revoke"]
+
+    @admin.action(description="Revoke", permissions=["view"])
+    def revoke(self, request: HttpRequest, queryset: QuerySet[ApiToken]) -> None:
+        """End the chosen tokens at once."""
+        actor = cast("User", request.user)
+        n_revoked = sum(
+            tokens.revoke(token=row, now=timezone.now(), actor=actor, how="by a maintainer")
+            for row in queryset
+        )
+        self.message_user(request, f"Revoked: {n_revoked}.", messages.SUCCESS)
 
 
 @admin.register(User)

@@ -282,6 +282,9 @@ vars().update(EMAIL_CONFIG)
 DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
 # Without a mail server nobody could follow the link; with one, an address counts once it is proved.
 ACCOUNT_EMAIL_VERIFICATION = "mandatory" if env.str("TSTTC_EMAIL_URL", default="") else "none"
+# Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
+TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
+ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
 ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key"}
 
 # --- API -------------------------------------------------------------------------------------------------
@@ -305,7 +308,21 @@ REST_FRAMEWORK = {
     "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.MultiPartParser", "rest_framework.parsers.JSONParser"],
     "DEFAULT_SCHEMA_CLASS": "drf_spectacular.openapi.AutoSchema",
     "EXCEPTION_HANDLER": "leaderboard.api.problems.exception_handler",
+    "DEFAULT_THROTTLE_CLASSES": [
+        "leaderboard.api.throttles.SignedInThrottle",
+        "leaderboard.api.throttles.VisitorThrottle",
+    ],
+    "NUM_PROXIES": TRUSTED_PROXIES,
 }
+# How often one account or one address may ask; counted by each web process on its own.
+API_RATES: dict[str, str | None] = {
+    "signed_in": "600/min",
+    "visitor": "240/min",
+    "submit": "60/min",
+    "revoke": "10/min",
+}
+if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
+    API_RATES = dict.fromkeys(API_RATES)
 SPECTACULAR_SETTINGS = {
     "TITLE": "TSTTC leaderboard API",
     "DESCRIPTION": "Submit prediction files, follow their evaluation, read the boards.",

@@ -1,24 +1,192 @@
-"""Tokens for CI jobs: hashed at rest, shown once."""
+"""Tokens for CI jobs: hashed at rest, shown once, good for what they were made for and for so long."""
 
-from datetime import timedelta
+import re
+from collections.abc import Collection
+from datetime import datetime, timedelta
 
+from django.conf import settings
 from django.db import transaction
+from django.db.models import Q
+from knox.crypto import hash_token
+from knox.models import get_digest_token
+from knox.settings import CONSTANTS
 
 from leaderboard import audit
-from leaderboard.models import ApiToken, User
+from leaderboard.models import ApiToken, Scope, Split, User
 
-LIFETIME = timedelta(days=90)
+DAYS = 90
+MAX_DAYS = 365
+MAX_STANDING = 50
+ALL_SCOPES = (Scope.READ, Scope.SUBMIT)
+# What `create` makes; anything else is refused before the database is asked.
+PATTERN = re.compile(r"tsttc_[0-9a-f]{64}")
+USED_EVERY = timedelta(minutes=1)
 
 
-def create(*, user: User, name: str, actor: User | None = None) -> str:
-    """A new token of that person. The return value is the only place where it ever stands."""
+class Refused(Exception):
+    """The token cannot be made like that. `field` names the input at fault, `code` is stable."""
+
+    def __init__(self, code: str, message: str, *, field: str = "") -> None:
+        super().__init__(message)
+        self.code = code
+        self.field = field
+
+
+class Unusable(Exception):
+    """The token opens nothing (any more); the text says why, `code` is stable."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def create(
+    *,
+    user: User,
+    name: str,
+    now: datetime,
+    scopes: Collection[str] = ALL_SCOPES,
+    split_name: str = "",
+    days: int = DAYS,
+    actor: User | None = None,
+) -> str:
+    """A new token of that person. The return value is the only place where it ever stands.
+
+    Without `split_name` it is good for every split. Raises `Refused`.
+    """
+    name = _name(name)
+    _check(scopes=scopes, days=days)
+    split = _split(split_name)
     with transaction.atomic():
-        row, token = ApiToken.objects.create(user=user, name=name[:80], expiry=LIFETIME)
+        n_standing = ApiToken.objects.filter(user=user, revoked_at=None, expiry__gt=now).count()
+        if n_standing >= MAX_STANDING:
+            raise Refused(
+                "too-many-tokens", f"There are {n_standing} tokens in use, the most there may be; revoke one."
+            )
+        digest, secret = get_digest_token()
+        row = ApiToken(
+            digest=digest,
+            token_key=secret[: CONSTANTS.TOKEN_KEY_LENGTH],
+            user=user,
+            name=name,
+            expiry=now + timedelta(days=days),
+            may_read=Scope.READ in scopes,
+            may_submit=Scope.SUBMIT in scopes,
+            split=split,
+        )
+        row.save(force_insert=True)
         audit.record(
             verb="created",
             noun="ApiToken",
             noun_id=row.token_key,
             actor=actor or user,
-            details={"name": name[:80]},
+            details={"name": name, "scopes": list(row.scopes), "split": split_name or None, "days": days},
         )
-    return token
+    return secret
+
+
+def _name(text: str) -> str:
+    name = text.strip()
+    if not name:
+        raise Refused("missing-field", "The token has no name; expected what it is for.", field="name")
+    if len(name) > 80:
+        raise Refused(
+            "text-too-long", f"The name has {len(name)} characters; expected at most 80.", field="name"
+        )
+    if not name.isprintable():
+        raise Refused(
+            "bad-character", "The name has characters that cannot be shown; expected text.", field="name"
+        )
+    return name
+
+
+def _check(*, scopes: Collection[str], days: int) -> None:
+    unknown = [scope for scope in scopes if scope not in Scope.values]
+    if unknown or not scopes:
+        found = f"the scope {unknown[0][:40]!r}" if unknown else "no scope"
+        raise Refused("bad-scope", f"The token has {found}; expected read, submit, or both.", field="scopes")
+    if not 1 <= days <= MAX_DAYS:
+        raise Refused(
+            "bad-days", f"The token ends after {days} days; expected 1 to {MAX_DAYS}.", field="days"
+        )
+
+
+def _split(name: str) -> Split | None:
+    if not name:
+        return None
+    split = Split.objects.filter(pk=name).first()
+    if split is None:
+        known = ", ".join(Split.objects.values_list("pk", flat=True))
+        raise Refused(
+            "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
+        )
+    return split
+
+
+# --- using one -------------------------------------------------------------------------------------------
+
+
+def use(*, secret: str, now: datetime) -> ApiToken:
+    """The token of this secret, with its owner. When it was last used is noted to the minute.
+
+    Raises `Unusable`. What does not look like a token never reaches the database.
+    """
+    if not PATTERN.fullmatch(secret):
+        raise Unusable(
+            "token-malformed", "The bearer token is malformed; expected tsttc_ and 64 hexadecimal digits."
+        )
+    row = ApiToken.objects.select_related("user").filter(pk=hash_token(secret)).first()
+    if row is None:
+        raise Unusable("token-unknown", "The bearer token is none of this leaderboard's.")
+    _require_standing(row, now=now)
+    if row.last_used_at is None or now - row.last_used_at >= USED_EVERY:
+        stale = Q(last_used_at=None) | Q(last_used_at__lte=now - USED_EVERY)
+        ApiToken.objects.filter(stale, pk=row.pk).update(last_used_at=now)
+    return row
+
+
+def _require_standing(row: ApiToken, *, now: datetime) -> None:
+    another = f"make another one at {settings.SITE_URL}/tokens/"
+    if row.revoked_at is not None:
+        raise Unusable(
+            "token-revoked", f"The token was revoked on {row.revoked_at:%Y-%m-%d %H:%M} UTC; {another}."
+        )
+    if row.expiry is not None and row.expiry <= now:
+        raise Unusable("token-expired", f"The token expired on {row.expiry:%Y-%m-%d %H:%M} UTC; {another}.")
+    if not row.user.is_active:
+        raise Unusable("account-closed", "The account that this token belongs to is closed.")
+
+
+def is_standing(row: ApiToken, *, now: datetime) -> bool:
+    """Whether it still opens something."""
+    return row.revoked_at is None and (row.expiry is None or row.expiry > now)
+
+
+def state_of(row: ApiToken, *, now: datetime) -> str:
+    """In one word: in use, expired or revoked."""
+    if row.revoked_at is not None:
+        return "revoked"
+    return "in use" if is_standing(row, now=now) else "expired"
+
+
+def revoke(*, token: ApiToken, now: datetime, actor: User | None, how: str = "") -> bool:
+    """End a token at once. Returns False if it was revoked already."""
+    with transaction.atomic():
+        changed = ApiToken.objects.filter(pk=token.pk, revoked_at=None).update(revoked_at=now)
+        if changed:
+            audit.record(
+                verb="revoked",
+                noun="ApiToken",
+                noun_id=token.token_key,
+                actor=actor,
+                details={"name": token.name, "how": how} if how else {"name": token.name},
+            )
+    return bool(changed)
+
+
+def revoke_leaked(*, secret: str, now: datetime) -> None:
+    """End the token of this secret, whoever found it. Whether there was one is told to nobody."""
+    if PATTERN.fullmatch(secret):
+        row = ApiToken.objects.filter(pk=hash_token(secret)).first()
+        if row is not None:
+            revoke(token=row, now=now, actor=None, how="reported as leaked")

@@ -3,13 +3,14 @@
 import random
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from django.core.files.base import ContentFile
 from django.utils import timezone
 
 import evaluator
-from leaderboard import ground_truth, scoring, submissions
+from leaderboard import ground_truth, scoring, submissions, tokens
 from leaderboard.models import Edition, Split, Submission, User
 
 N_SEQUENCES = 120
@@ -52,6 +53,11 @@ def submit(user: User, data: bytes, *, split: str = "test", method: str = "Foo",
         filename="predictions.json",
         **fields,
     ).submission
+
+
+def token(user: User, **options: Any) -> str:
+    """A new token of that person, which may do everything."""
+    return tokens.create(user=user, name="CI", now=timezone.now(), **options)
 
 
 def score_all() -> int:

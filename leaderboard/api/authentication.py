@@ -1,29 +1,68 @@
-"""Bearer tokens."""
+"""Bearer tokens: whose they are, and what they are good for."""
 
-import re
+from collections.abc import Collection
 from typing import Any
 
+from django.utils import timezone
 from drf_spectacular.extensions import OpenApiAuthenticationExtension
 from knox.auth import TokenAuthentication
-from knox.models import AbstractAuthToken
 from rest_framework import exceptions
+from rest_framework.permissions import SAFE_METHODS
+from rest_framework.request import Request
 
-from leaderboard.models import User
-
-# What `tokens.create` makes; anything else is refused before the database is asked.
-TOKEN = re.compile(rb"tsttc_[0-9a-f]{64}")
+from leaderboard import tokens
+from leaderboard.models import ApiToken, Scope, User
 
 
 class BearerAuthentication(TokenAuthentication):
-    """`Authorization: Bearer tsttc_…`, hashed at rest."""
+    """`Authorization: Bearer tsttc_…`, and nowhere else.
 
-    def authenticate_credentials(self, token: bytes) -> tuple[User, AbstractAuthToken]:
-        """The token's owner. Raises `AuthenticationFailed`."""
-        if not TOKEN.fullmatch(token):
-            raise exceptions.AuthenticationFailed(
-                "The bearer token is malformed; expected tsttc_ and 64 hexadecimal digits."
-            )
-        return super().authenticate_credentials(token)
+    A token's limits are looked at here, before any view, so that no view can forget them. Asking needs the
+    scope `read` and everything else `submit`; a view whose `token_scopes` says otherwise needs one of those.
+    """
+
+    def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
+        """Who it is. Raises `AuthenticationFailed`, or `PermissionDenied` for what the token is not for."""
+        found: tuple[User, ApiToken] | None = super().authenticate(request)
+        if found is not None:
+            view = request.parser_context["view"]
+            usual = Scope.READ if request.method in SAFE_METHODS else Scope.SUBMIT
+            _require_scope(found[1], getattr(view, "token_scopes", (usual,)))
+            if "split" in view.kwargs:
+                require_split(found[1], view.kwargs["split"])
+        return found
+
+    def authenticate_credentials(self, token: bytes) -> tuple[User, ApiToken]:
+        """The token's owner, and the token. Raises `AuthenticationFailed`."""
+        try:
+            row = tokens.use(secret=token.decode("latin-1"), now=timezone.now())
+        except tokens.Unusable as fault:
+            raise exceptions.AuthenticationFailed(str(fault), code=fault.code) from None
+        return row.user, row
+
+
+def _require_scope(token: ApiToken, wanted: Collection[Scope]) -> None:
+    if not set(wanted) & set(token.scopes):
+        names = " or ".join(wanted)
+        raise exceptions.PermissionDenied(
+            f"The token has the scope {' '.join(token.scopes)!r}; expected {names!r} for this.",
+            code="token-scope",
+        )
+
+
+def require_split(token: object, split_name: str) -> None:
+    """Raise `PermissionDenied` for a token that is good for another split alone."""
+    only = split_of(token)
+    if only is not None and only != split_name:
+        raise exceptions.PermissionDenied(
+            f"The token is good for the split {only!r} alone; expected that, found {split_name[:80]!r}.",
+            code="token-split",
+        )
+
+
+def split_of(token: object) -> str | None:
+    """The only split that a request's token is good for; None without such a limit."""
+    return token.split_id if isinstance(token, ApiToken) else None
 
 
 class BearerScheme(OpenApiAuthenticationExtension):
@@ -37,5 +76,5 @@ class BearerScheme(OpenApiAuthenticationExtension):
         return {
             "type": "http",
             "scheme": "bearer",
-            "description": "A token made by a maintainer: tsttc_ and 64 hexadecimal digits.",
+            "description": "A token made at /tokens/: tsttc_ and 64 hexadecimal digits.",
         }

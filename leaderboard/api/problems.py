@@ -1,5 +1,6 @@
 """Errors of the API, in one shape: RFC 9457 `application/problem+json`."""
 
+import math
 from http import HTTPStatus
 from typing import Any
 
@@ -78,12 +79,16 @@ def _of_the_framework(exc: Exception, context: dict[str, Any]) -> Response | Non
     response = default_handler(exc, context)
     if response is None:
         return None
-    code = getattr(exc, "default_code", "error").replace("_", "-")
+    codes = exc.get_codes() if isinstance(exc, exceptions.APIException) else "error"
+    code = (codes if isinstance(codes, str) else "invalid").replace("_", "-")
     headers = {name: value for name, value in response.items() if name != "Content-Type"}
     return problem(status=response.status_code, code=code, detail=_sentence(exc), headers=headers)
 
 
 def _sentence(exc: Exception) -> str:
+    if isinstance(exc, exceptions.Throttled):
+        wait_s: float = getattr(exc, "wait", None) or 0
+        return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
     detail = getattr(exc, "detail", "")
     return (
         str(detail)

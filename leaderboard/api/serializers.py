@@ -171,6 +171,18 @@ class QuotaSerializer(SlotsSerializer):
     sentence = serializers.CharField(help_text="The same in words.")
 
 
+class LeakedTokenSerializer(serializers.Serializer[Any]):
+    """A token that leaked."""
+
+    token = serializers.CharField(max_length=1000, help_text="The whole token, as it was found.")
+
+
+class RevokedSerializer(serializers.Serializer[Any]):
+    """The same for every token, whether it was one or not."""
+
+    detail = serializers.CharField(default="If that was a token of this leaderboard, it is revoked now.")
+
+
 class SplitSerializer(serializers.Serializer[Split]):
     """A split and what may be done with it."""
 

@@ -11,6 +11,7 @@ urlpatterns = [
     path("submissions", views.SubmissionsView.as_view(), name="api-submissions"),
     path("submissions/<uuid:submission_id>", views.SubmissionView.as_view(), name="api-submission"),
     path("quota", account_views.QuotaView.as_view(), name="api-quota"),
+    path("tokens/revoke", account_views.RevokeView.as_view(), name="api-revoke-token"),
     path("splits", views.SplitsView.as_view(), name="api-splits"),
     path("splits/<slug:split>/board", views.BoardView.as_view(), name="api-board"),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),

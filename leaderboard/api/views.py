@@ -13,6 +13,7 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from leaderboard import files, quotas, standings, submissions
+from leaderboard.api.authentication import require_split, split_of
 from leaderboard.api.serializers import (
     BoardSerializer,
     ErrorSerializer,
@@ -22,15 +23,25 @@ from leaderboard.api.serializers import (
     SubmittedSerializer,
     absolute,
 )
+from leaderboard.api.throttles import SubmitThrottle
 from leaderboard.models import Split, Submission, User
+from leaderboard.models.submissions import SubmissionQuerySet
 
 TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
+
+
+def visible(request: Request) -> SubmissionQuerySet:
+    """The submissions that whoever asks may see, with a token for one split only those to it."""
+    rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
+    only = split_of(request.auth)
+    return rows.filter(split=only) if only is not None else rows
 
 
 class SubmissionsView(APIView):
     """Submit a prediction file; list one's own submissions."""
 
     parser_classes = [MultiPartParser]
+    throttle_classes = [*APIView.throttle_classes, SubmitThrottle]
 
     @extend_schema(
         operation_id="submit",
@@ -50,6 +61,7 @@ class SubmissionsView(APIView):
         """Send one file for one split. Answered when it is safely stored; the scores follow."""
         now = timezone.now()
         form = cast("QueryDict", request.data)  # the only parser here is that of multipart bodies
+        require_split(request.auth, str(form.get("split", "")))
         upload = request.FILES.get("file")
         submitted = submissions.submit(
             user=cast("User", request.user),
@@ -72,7 +84,7 @@ class SubmissionsView(APIView):
     @extend_schema(operation_id="list_submissions", responses=SubmissionSerializer(many=True))
     def get(self, request: Request) -> Response:
         """The newest hundred submissions of one's own team."""
-        rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")[:100]
+        rows = visible(request)[:100]
         return Response(SubmissionSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
@@ -85,8 +97,7 @@ class SubmissionView(APIView):
     )
     def get(self, request: Request, submission_id: str) -> Response:
         """State, then scores or problems. What is not one's own does not exist."""
-        rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
-        return Response(SubmissionSerializer(get_object_or_404(rows, pk=submission_id)).data)
+        return Response(SubmissionSerializer(get_object_or_404(visible(request), pk=submission_id)).data)
 
 
 class WithdrawView(APIView):
@@ -99,8 +110,7 @@ class WithdrawView(APIView):
     )
     def post(self, request: Request, submission_id: str) -> Response:
         """Cancel what waits; what was published leaves a tombstone. Cannot be undone."""
-        rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
-        submission = get_object_or_404(rows, pk=submission_id)
+        submission = get_object_or_404(visible(request), pk=submission_id)
         submissions.withdraw(submission=submission, actor=cast("User", request.user), now=timezone.now())
         return Response(SubmissionSerializer(submission).data)
 

@@ -2,7 +2,7 @@
 
 from leaderboard.models.audit import AuditEvent
 from leaderboard.models.benchmark import Edition, GroundTruth, Publication, PublishedResult, Split
-from leaderboard.models.people import ApiToken, Membership, Team, User
+from leaderboard.models.people import ApiToken, Membership, Scope, Team, User
 from leaderboard.models.quotas import QuotaOverride
 from leaderboard.models.submissions import Evaluation, Method, Score, Status, Submission, Visibility
 from leaderboard.models.sweep import SweepBeat
@@ -18,6 +18,7 @@ __all__ = [
     "Publication",
     "PublishedResult",
     "QuotaOverride",
+    "Scope",
     "Score",
     "Split",
     "Status",

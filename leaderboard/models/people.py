@@ -25,7 +25,7 @@ class UserManager(BaseUserManager["User"]):
         return self.create_user(email, password, is_staff=True, is_superuser=True, **fields)
 
 
-class User(AbstractBaseUser, PermissionsMixin):
+class User(AbstractBaseUser, PermissionsMixin):  # type: ignore[django-manager-missing]  # knox has no types
     """An account. Maintainers are those with `is_staff`."""
 
     email = models.EmailField("e-mail address", unique=True)
@@ -72,14 +72,44 @@ class Membership(models.Model):
         return f"{self.user} in {self.team}"
 
 
+class Scope(models.TextChoices):
+    """What a token may be used for."""
+
+    READ = "read", "read"
+    SUBMIT = "submit", "submit"
+
+
 class ApiToken(AbstractAuthToken):
     """A CI job's key: hashed at rest, shown once, with a name to tell it from its siblings."""
 
     name = models.CharField(max_length=80)
-    last_used_at = models.DateTimeField(null=True, blank=True)
+    may_read = models.BooleanField(default=True)
+    may_submit = models.BooleanField(default=True)
+    split = models.ForeignKey(
+        "Split",
+        null=True,
+        blank=True,
+        on_delete=models.CASCADE,
+        related_name="+",
+        help_text="The only split that it is good for; empty: all of them.",
+    )
+    last_used_at = models.DateTimeField(null=True, blank=True, help_text="To the minute.")
+    revoked_at = models.DateTimeField(null=True, blank=True)
 
     class Meta:
         verbose_name = "API token"
+        constraints = [
+            models.CheckConstraint(
+                condition=models.Q(may_read=True) | models.Q(may_submit=True),
+                name="token_is_good_for_something",
+            ),
+        ]
 
     def __str__(self) -> str:
         return f"{self.name} ({self.token_key}…)"
+
+    @property
+    def scopes(self) -> tuple[str, ...]:
+        """What it may be used for, as words."""
+        held = {Scope.READ: self.may_read, Scope.SUBMIT: self.may_submit}
+        return tuple(scope.value for scope, is_held in held.items() if is_held)

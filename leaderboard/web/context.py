@@ -17,6 +17,7 @@ _SECTIONS = {
     "submissions": "submissions",
     "submission": "submissions",
     "withdraw": "submissions",
+    "tokens": "account",
     "docs": "docs",
     "api_reference": "api",
 }

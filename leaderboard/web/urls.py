@@ -2,7 +2,7 @@
 
 from django.urls import include, path
 
-from leaderboard.web import audit_views, edition_views, maintainer_views, views
+from leaderboard.web import audit_views, edition_views, maintainer_views, token_views, views
 
 MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
@@ -24,6 +24,8 @@ urlpatterns = [
     path("submissions/<uuid:submission_id>/state/", views.submission_state, name="submission_state"),
     path("submissions/<uuid:submission_id>/withdraw/", views.withdraw, name="withdraw"),
     path("methods/<uuid:method_id>/", views.method, name="method"),
+    path("tokens/", token_views.tokens, name="tokens"),
+    path("tokens/revoke/", token_views.revoke, name="revoke_token"),
     path("docs/", views.docs, name="docs"),
     path("docs/api/", views.api_reference, name="api_reference"),
     path("maintain/", maintainer_views.hub, name="maintain"),

@@ -15,7 +15,7 @@ from pytest_django.live_server_helper import LiveServer
 
 from evaluator.client import Client
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import ground_truth, tokens
+from leaderboard import ground_truth
 from leaderboard.models import Submission, User
 from tests import builders
 from tests.journeys.people import Visitor
@@ -56,7 +56,7 @@ def owner(transactional_db: None) -> User:
 def tsttc(live_server: LiveServer, owner: User, benchmark: None) -> Tsttc:
     """The owner's command; the split `val` has the truth of the examples."""
     ground_truth.import_truth(split_name="val", path=EXAMPLES / "truth.csv", now=timezone.now())
-    return command(live_server.url, tokens.create(user=owner, name="CI"))
+    return command(live_server.url, builders.token(owner))
 
 
 def submit(tsttc: Tsttc, predictions: str, *more: str, method: str = "Foo++") -> Done:
@@ -147,7 +147,7 @@ def test_manifest_of_the_server_checks_files_like_the_local_one(
 def test_stranger_s_submission_does_not_exist(live_server: LiveServer, tsttc: Tsttc) -> None:
     identity = submitted(tsttc, "predictions.json")
     stranger = User.objects.create_user("stranger@example.org", "correct horse", name="Strangers")
-    done = command(live_server.url, tokens.create(user=stranger, name="CI"))("status", identity)
+    done = command(live_server.url, builders.token(stranger))("status", identity)
     assert (done.returncode, done.stdout) == (3, "")
     assert "The server knows no such thing" in done.stderr
 

@@ -6,7 +6,6 @@ import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
 from rest_framework.test import APIClient
 
-from leaderboard import tokens
 from leaderboard.models import ApiToken, Edition, Submission, User
 from tests import builders
 
@@ -15,7 +14,7 @@ def client_of(user: User | None = None) -> APIClient:
     """A client with a fresh token of that person, or with none."""
     client = APIClient()
     if user is not None:
-        client.credentials(HTTP_AUTHORIZATION=f"Bearer {tokens.create(user=user, name='CI')}")
+        client.credentials(HTTP_AUTHORIZATION=f"Bearer {builders.token(user)}")
     return client
 
 
@@ -133,7 +132,7 @@ def test_without_a_token_nothing_is_taken(edition: Edition) -> None:
 
 
 def test_token_is_hashed_at_rest(owner: User) -> None:
-    token = tokens.create(user=owner, name="CI")
+    token = builders.token(owner)
     row = ApiToken.objects.get()
     assert token.startswith("tsttc_")
     assert token not in {row.digest, row.token_key}

@@ -20,7 +20,7 @@ from django.utils import timezone
 from moto.server import ThreadedMotoServer
 from pytest_django import Settings
 
-from leaderboard import cleaning, files, s3, scoring, tokens
+from leaderboard import cleaning, files, s3, scoring
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from tests import builders
 
@@ -78,7 +78,7 @@ def _names(bucket: Any) -> list[str]:
 
 
 def _send(user: User, data: bytes) -> Any:
-    token = tokens.create(user=user, name="CI")
+    token = builders.token(user)
     return Client(headers={"Authorization": f"Bearer {token}"}, raise_request_exception=False).post(
         "/api/v1/submissions",
         {"split": "test", "method": "Foo", "file": SimpleUploadedFile("p.json", data)},

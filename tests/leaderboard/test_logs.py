@@ -14,7 +14,7 @@ from django.test import Client, RequestFactory
 from django.utils.functional import SimpleLazyObject
 from pytest_django import Settings
 
-from leaderboard import files, ground_truth, logs, tokens
+from leaderboard import files, ground_truth, logs
 from leaderboard.models import Edition, User
 from leaderboard.web.request_log import RequestLogMiddleware
 from tests import builders
@@ -61,7 +61,7 @@ def events(found: list[dict[str, Any]]) -> list[str]:
 def test_every_line_from_upload_to_score_names_the_submission(
     opened: Edition, owner: User, lines: Lines
 ) -> None:
-    sent = _send(tokens.create(user=owner, name="CI"), builders.predictions(opened))
+    sent = _send(builders.token(owner), builders.predictions(opened))
     submission_id = sent.json()["id"]
     assert builders.score_all() == 1
     found = lines()
@@ -83,7 +83,7 @@ def test_every_line_from_upload_to_score_names_the_submission(
 def test_lines_of_one_request_share_its_id_and_the_answer_bears_it(
     opened: Edition, owner: User, lines: Lines
 ) -> None:
-    token = tokens.create(user=owner, name="CI")
+    token = builders.token(owner)
     sent = _send(token, builders.predictions(opened))
     _send(token, builders.predictions(opened, factor=1.2))
     ids = [line["request_id"] for line in lines()]
@@ -94,7 +94,7 @@ def test_lines_of_one_request_share_its_id_and_the_answer_bears_it(
 def test_no_secret_no_address_and_no_true_value_is_ever_written(
     opened: Edition, owner: User, written: io.StringIO
 ) -> None:
-    token = tokens.create(user=owner, name="CI")
+    token = builders.token(owner)
     assert _send(token, builders.predictions(opened)).status_code == 201
     assert _send(token, b'{"0": "nonsense"}').status_code == 201
     assert _send(token[:-1] + "x", b"{}").status_code == 401

@@ -20,7 +20,7 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django import Settings
 
-from leaderboard import files, outages, tokens
+from leaderboard import files, outages
 from leaderboard.models import Edition, Evaluation, Method, Submission, User
 from tests import builders
 
@@ -42,7 +42,7 @@ def page(owner: User) -> Callable[[bytes], HttpResponse]:
 def api(owner: User) -> Callable[[bytes], HttpResponse]:
     """Submit through the API."""
     client = Client(raise_request_exception=False)
-    headers = {"Authorization": f"Bearer {tokens.create(user=owner, name='test')}"}
+    headers = {"Authorization": f"Bearer {builders.token(owner)}"}
     return lambda data: client.post("/api/v1/submissions", sent(data), headers=headers)  # type: ignore[return-value]  # the test client's own
 
 

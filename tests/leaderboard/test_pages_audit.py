@@ -11,7 +11,7 @@ from django.test import Client
 from django.urls import reverse
 from django.utils import timezone
 
-from leaderboard import audit, ground_truth, teams, tokens
+from leaderboard import audit, ground_truth, teams
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
 from tests import builders, pages
 from tests.leaderboard.test_pages_everywhere import assert_sound
@@ -213,7 +213,7 @@ def test_who_became_a_maintainer_is_audited(keeper: Client, owner: User, maintai
 def test_no_secret_and_no_true_value_stands_in_the_trail(
     edition: Edition, owner: User, maintainer: User, client: Client
 ) -> None:
-    token = tokens.create(user=owner, name="CI")
+    token = builders.token(owner)
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()
     client.force_login(maintainer)

@@ -37,6 +37,7 @@ PUBLIC = [
 PRIVATE = [
     "/submit/",
     "/submissions/",
+    "/tokens/",
     "/accounts/email/",
     "/accounts/password/change/",
     "/accounts/logout/",

@@ -1,0 +1,112 @@
+"""The page of one's API tokens."""
+
+import re
+from datetime import timedelta
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+from rest_framework.test import APIClient
+
+from leaderboard.models import ApiToken, User
+from tests import builders, pages
+from tests.leaderboard.test_pages_everywhere import assert_sound
+
+PAGE = "/tokens/"
+FIELDS = {"name": "nightly CI", "scopes": ["read", "submit"], "split": "", "days": "90"}
+
+
+@pytest.fixture
+def signed_in(client: Client, owner: User) -> Client:
+    client.force_login(owner)
+    return client
+
+
+def make(client: Client, **fields: object) -> pages.Element:
+    response = client.post(PAGE, {**FIELDS, **fields})
+    assert response.status_code == 200
+    assert "no-store" in response.headers["Cache-Control"]
+    return assert_sound(response)
+
+
+def listed(client: Client) -> list[list[str]]:
+    root = assert_sound(client.get(PAGE))
+    return [[cell.text for cell in row.all("td")] for body in root.all("tbody") for row in body.all("tr")]
+
+
+def test_a_visitor_is_led_to_sign_in(client: Client, db: None) -> None:
+    assert client.get(PAGE).headers["Location"] == "/accounts/login/?next=/tokens/"
+    assert client.post(PAGE, FIELDS).status_code == 302
+    assert not ApiToken.objects.exists()
+
+
+def test_a_new_token_is_shown_once_and_works(signed_in: Client, benchmark: None) -> None:
+    secret = make(signed_in).one("code", id="secret").text
+    assert re.fullmatch(r"tsttc_[0-9a-f]{64}", secret)
+    response = APIClient().get("/api/v1/submissions", HTTP_AUTHORIZATION=f"Bearer {secret}")
+    assert response.status_code == 200
+    again = signed_in.get(PAGE)
+    assert secret.encode() not in again.content
+    assert secret[:15].encode() in again.content
+
+
+def test_the_list_tells_name_use_and_end(signed_in: Client, benchmark: None) -> None:
+    make(signed_in, name="val only", scopes=["read"], split="val", days="30")
+    [row] = listed(signed_in)
+    ends_at = timezone.now() + timedelta(days=30)
+    assert row[1:3] == ["val only", "read; val alone"]
+    assert (row[4], row[5]) == ("never", f"{ends_at:%Y-%m-%d}")
+
+
+@pytest.mark.parametrize(
+    ("fields", "field", "said"),
+    [
+        ({"name": ""}, "name", "The token has no name"),
+        ({"name": "x" * 81}, "name", "has 81 characters; expected at most 80"),
+        ({"scopes": []}, "scopes", "The token has no scope"),
+        ({"days": "366"}, "days", "ends after 366 days; expected 1 to 365"),
+        ({"days": "soon"}, "days", "no whole number of days"),
+        ({"split": "nowhere"}, "split", "nowhere"),
+    ],
+)
+def test_what_is_wrong_stands_at_its_field(
+    signed_in: Client, benchmark: None, fields: dict[str, object], field: str, said: str
+) -> None:
+    response = signed_in.post(PAGE, {**FIELDS, **fields})
+    assert response.status_code == 422
+    assert said in assert_sound(response).one("div", id=f"{field}-error").text
+    assert not ApiToken.objects.exists()
+
+
+def test_revoking_ends_a_token_at_once(signed_in: Client, owner: User) -> None:
+    secret = builders.token(owner)
+    form = pages.page(signed_in.get(PAGE)).one("form", action="/tokens/revoke/")
+    data = {"token": form.one("input", name="token").attributes["value"]}
+    assert signed_in.post("/tokens/revoke/", data).headers["Location"] == PAGE
+    response = APIClient().get("/api/v1/submissions", HTTP_AUTHORIZATION=f"Bearer {secret}")
+    assert response.status_code == 401
+    assert listed(signed_in)[0][6] == "revoked"
+
+
+def test_an_ended_token_stays_in_the_list(signed_in: Client, owner: User) -> None:
+    builders.token(owner)
+    ApiToken.objects.update(expiry=timezone.now())
+    assert listed(signed_in)[0][6] == "expired"
+
+
+def test_others_tokens_are_neither_seen_nor_revoked(signed_in: Client, stranger: User) -> None:
+    builders.token(stranger)
+    row = ApiToken.objects.get()
+    assert listed(signed_in) == []
+    for value in (row.digest, "nonsense", "", "a\x00b"):
+        assert signed_in.post("/tokens/revoke/", {"token": value}).status_code == 404
+    assert signed_in.get("/tokens/revoke/").status_code == 405
+    assert ApiToken.objects.get().revoked_at is None
+
+
+def test_a_foreign_form_makes_and_revokes_nothing(owner: User) -> None:
+    client = Client(enforce_csrf_checks=True)
+    client.force_login(owner)
+    assert client.post(PAGE, FIELDS).status_code == 403
+    assert client.post("/tokens/revoke/", {"token": "x"}).status_code == 403
+    assert not ApiToken.objects.exists()

@@ -1,0 +1,102 @@
+"""How often one may ask, and that nobody chooses who they are counted as."""
+
+from typing import Any
+
+import pytest
+from django.core.cache import cache
+from pytest_django import Settings
+from rest_framework.test import APIClient
+
+from leaderboard.models import Edition, User
+from tests import builders
+from tests.leaderboard.test_api_submissions import client_of, post
+
+BOARD = "/api/v1/splits/test/board"
+REVOKE = "/api/v1/tokens/revoke"
+
+
+@pytest.fixture(autouse=True)
+def rates(settings: Settings) -> None:
+    """Three a minute of everything, counted from nothing."""
+    cache.clear()
+    settings.API_RATES = dict.fromkeys(settings.API_RATES, "3/min")
+
+
+def behind(settings: Settings, n_proxies: int) -> None:
+    settings.REST_FRAMEWORK = {**settings.REST_FRAMEWORK, "NUM_PROXIES": n_proxies}
+
+
+def statuses(client: APIClient, address: str = BOARD, *, n: int = 4, **headers: Any) -> list[int]:
+    return [client.get(address, **headers).status_code for _ in range(n)]
+
+
+def test_one_too_many_is_a_429_that_says_when_to_come_back(edition: Edition) -> None:
+    assert statuses(APIClient(), n=3) == [200, 200, 200]
+    response = APIClient().get(BOARD)
+    body = response.json()
+    assert (response.status_code, body["code"]) == (429, "throttled")
+    assert response.headers["Content-Type"] == "application/problem+json"
+    assert 1 <= int(response.headers["Retry-After"]) <= 60
+    assert body["detail"].startswith("Too many requests in a short time; the next one is answered in ")
+
+
+def test_a_forwarding_header_makes_nobody_somebody_else(edition: Edition) -> None:
+    client = APIClient()
+    found = [
+        client.get(BOARD, HTTP_X_FORWARDED_FOR=f"10.0.0.{n}", HTTP_FORWARDED=f"for=10.0.0.{n}").status_code
+        for n in range(5)
+    ]
+    assert found == [200, 200, 200, 429, 429]
+
+
+def test_behind_a_proxy_what_it_wrote_counts_and_nothing_before_it(
+    edition: Edition, settings: Settings
+) -> None:
+    behind(settings, 1)
+    client = APIClient()
+    spoofed = [client.get(BOARD, HTTP_X_FORWARDED_FOR=f"10.0.0.{n}, 192.0.2.7").status_code for n in range(4)]
+    assert spoofed == [200, 200, 200, 429]
+    assert client.get(BOARD, HTTP_X_FORWARDED_FOR="192.0.2.8").status_code == 200
+
+
+def test_addresses_of_one_ipv6_network_count_as_one(edition: Edition) -> None:
+    found = [APIClient(REMOTE_ADDR=f"2001:db8::{n:x}").get(BOARD).status_code for n in range(1, 5)]
+    assert found == [200, 200, 200, 429]
+    assert APIClient(REMOTE_ADDR="2001:db8:0:1::1").get(BOARD).status_code == 200
+
+
+def test_an_account_is_counted_whatever_its_token_and_address(
+    edition: Edition, owner: User, stranger: User
+) -> None:
+    found = [client_of(owner).get(BOARD, REMOTE_ADDR=f"192.0.2.{n}").status_code for n in range(4)]
+    assert found == [200, 200, 200, 429]
+    assert client_of(stranger).get(BOARD).status_code == 200
+    assert APIClient().get(BOARD).status_code == 200
+
+
+def test_files_have_a_rate_of_their_own(edition: Edition, owner: User, settings: Settings) -> None:
+    settings.API_RATES = {**settings.API_RATES, "signed_in": None}
+    client = client_of(owner)
+    data = builders.predictions(edition)
+    assert [post(client, data).status_code for _ in range(4)] == [201, 200, 200, 429]
+    assert statuses(client, "/api/v1/submissions") == [200] * 4
+
+
+def test_reports_of_leaked_tokens_are_throttled(db: None) -> None:
+    found = [
+        APIClient()
+        .post(REVOKE, {"token": "x"}, format="json", HTTP_X_FORWARDED_FOR=f"10.0.0.{n}")
+        .status_code
+        for n in range(4)
+    ]
+    assert found == [200, 200, 200, 429]
+
+
+def test_rates_can_be_off(edition: Edition, settings: Settings) -> None:
+    settings.API_RATES = dict.fromkeys(settings.API_RATES)
+    assert statuses(APIClient(), n=10) == [200] * 10
+
+
+@pytest.mark.parametrize("address", ["", "nonsense", "unix:", "300.0.0.1"])
+def test_a_connection_without_an_address_is_counted_too(edition: Edition, address: str) -> None:
+    assert statuses(APIClient(REMOTE_ADDR=address)) == [200, 200, 200, 429]

@@ -1,0 +1,258 @@
+"""API tokens: what they are good for, and when they are good for nothing any more."""
+
+from datetime import timedelta
+from itertools import product
+
+import pytest
+from django.db import IntegrityError, transaction
+from django.test import Client
+from django.utils import timezone
+from pytest_django import DjangoAssertNumQueries
+from rest_framework.test import APIClient
+
+from leaderboard import tokens
+from leaderboard.models import ApiToken, AuditEvent, Edition, Submission, User
+from tests import builders
+from tests.leaderboard.test_api_submissions import post
+
+REVOKE = "/api/v1/tokens/revoke"
+
+
+def client_with(secret: str) -> APIClient:
+    client = APIClient()
+    client.credentials(HTTP_AUTHORIZATION=f"Bearer {secret}")
+    return client
+
+
+@pytest.fixture
+def secret(owner: User) -> str:
+    return builders.token(owner)
+
+
+# --- the table -------------------------------------------------------------------------------------------
+
+SCOPES = [("read",), ("submit",), ("read", "submit")]
+TABLE = list(product(SCOPES, ["standing", "expired"], ["standing", "revoked"], ["", "test", "val"]))
+
+
+@pytest.mark.parametrize(("scopes", "expiry", "revocation", "split"), TABLE)
+def test_a_token_opens_what_it_was_made_for_and_nothing_else(
+    edition: Edition, owner: User, scopes: tuple[str, ...], expiry: str, revocation: str, split: str
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition))
+    client = client_with(builders.token(owner, scopes=scopes, split_name=split))
+    row = ApiToken.objects.get()
+    if expiry == "expired":
+        ApiToken.objects.update(expiry=timezone.now() - timedelta(days=1))
+    if revocation == "revoked":
+        tokens.revoke(token=row, now=timezone.now(), actor=owner)
+    is_dead = expiry == "expired" or revocation == "revoked"
+    is_elsewhere = split == "val"
+    may_read, may_submit = "read" in scopes, "submit" in scopes
+
+    def wanted(*, may: bool, answer: int) -> int:
+        return 401 if is_dead else answer if may else 403
+
+    submission = f"/api/v1/submissions/{sent.pk}"
+    found = {
+        "board": client.get("/api/v1/splits/test/board").status_code,
+        "list": client.get("/api/v1/submissions").status_code,
+        "one": client.get(submission).status_code,
+        "quota": client.get("/api/v1/quota").status_code,
+        "withdraw": client.post(f"{submission}/withdraw").status_code,
+        "submit": post(client, builders.predictions(edition, factor=1.3)).status_code,
+    }
+    assert found == {
+        "board": wanted(may=may_read and not is_elsewhere, answer=200),
+        "list": wanted(may=may_read, answer=200),
+        "one": wanted(may=may_read, answer=404 if is_elsewhere else 200),
+        "quota": wanted(may=True, answer=200),
+        "withdraw": wanted(may=may_submit, answer=404 if is_elsewhere else 200),
+        "submit": wanted(may=may_submit and not is_elsewhere, answer=201),
+    }
+    assert Submission.objects.count() == 1 + (found["submit"] == 201)
+
+
+def test_a_token_for_one_split_lists_that_split_alone(edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    elsewhere = client_with(builders.token(owner, split_name="val"))
+    assert elsewhere.get("/api/v1/submissions").json() == []
+    assert [row["split"] for row in elsewhere.get("/api/v1/quota").json()] == ["val"]
+
+
+# --- what is said ----------------------------------------------------------------------------------------
+
+
+def refusal(client: APIClient, address: str = "/api/v1/submissions") -> tuple[int, str, str]:
+    response = client.get(address)
+    assert response.headers["Content-Type"] == "application/problem+json"
+    return response.status_code, response.json()["code"], response.json()["detail"]
+
+
+def test_an_expired_token_says_when_it_ended_and_stays_to_say_so(owner: User, secret: str) -> None:
+    ended_at = timezone.now() - timedelta(days=3)
+    ApiToken.objects.update(expiry=ended_at)
+    for _ in range(2):
+        status, code, detail = refusal(client_with(secret))
+        assert (status, code) == (401, "token-expired")
+        assert f"expired on {ended_at:%Y-%m-%d %H:%M} UTC" in detail
+        assert "/tokens/" in detail
+
+
+def test_a_revoked_token_says_so_at_once(owner: User, secret: str) -> None:
+    client = client_with(secret)
+    assert client.get("/api/v1/submissions").status_code == 200
+    tokens.revoke(token=ApiToken.objects.get(), now=timezone.now(), actor=owner)
+    assert refusal(client)[:2] == (401, "token-revoked")
+
+
+def test_a_closed_account_closes_its_tokens(owner: User, secret: str) -> None:
+    User.objects.filter(pk=owner.pk).update(is_active=False)
+    assert refusal(client_with(secret))[:2] == (401, "account-closed")
+
+
+def test_a_missing_scope_is_named(owner: User) -> None:
+    client = client_with(builders.token(owner, scopes=["submit"]))
+    assert refusal(client) == (
+        403,
+        "token-scope",
+        "The token has the scope 'submit'; expected 'read' for this.",
+    )
+
+
+def test_another_split_is_named(edition: Edition, owner: User) -> None:
+    client = client_with(builders.token(owner, split_name="val"))
+    said = "The token is good for the split 'val' alone; expected that, found 'test'."
+    assert refusal(client, "/api/v1/splits/test/board") == (403, "token-split", said)
+    response = post(client, builders.predictions(edition))
+    assert (response.status_code, response.json()["detail"]) == (403, said)
+
+
+# --- where it may stand ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["token", "access_token", "key", "authorization", "api_key"])
+def test_a_token_in_the_address_or_the_body_opens_nothing(edition: Edition, secret: str, name: str) -> None:
+    client = APIClient()
+    assert client.get(f"/api/v1/submissions?{name}={secret}").status_code == 401
+    assert client.get("/api/v1/submissions", headers={"Cookie": f"{name}={secret}"}).status_code == 401
+    assert post(client, builders.predictions(edition), **{name: secret}).status_code == 401
+
+
+@pytest.mark.parametrize(
+    "secret", ["", "x", "tsttc_" + "g" * 64, "tsttc_" + "A" * 64, "tsttc_" + "0" * 65, "é"]
+)
+def test_what_is_no_token_never_reaches_the_database(
+    db: None, django_assert_num_queries: DjangoAssertNumQueries, secret: str
+) -> None:
+    with django_assert_num_queries(0):
+        assert APIClient().post(REVOKE, {"token": secret}, format="json").status_code in {200, 422}
+        with pytest.raises(tokens.Unusable):
+            tokens.use(secret=secret, now=timezone.now())
+
+
+# --- last used -------------------------------------------------------------------------------------------
+
+
+def test_the_last_use_is_noted_once_a_minute(owner: User, secret: str) -> None:
+    now = timezone.now()
+    for seconds in (0, 1, 59):
+        tokens.use(secret=secret, now=now + timedelta(seconds=seconds))
+    assert ApiToken.objects.get().last_used_at == now
+    tokens.use(secret=secret, now=now + timedelta(seconds=60))
+    assert ApiToken.objects.get().last_used_at == now + timedelta(seconds=60)
+
+
+def test_a_refused_token_is_not_used(owner: User, secret: str) -> None:
+    ApiToken.objects.update(expiry=timezone.now())
+    client_with(secret).get("/api/v1/submissions")
+    assert ApiToken.objects.get().last_used_at is None
+
+
+# --- making one ------------------------------------------------------------------------------------------
+
+
+def test_a_token_ends_after_ninety_days_unless_asked_otherwise(owner: User) -> None:
+    now = timezone.now()
+    tokens.create(user=owner, name="usual", now=now)
+    tokens.create(user=owner, name="year", days=365, now=now)
+    ends = dict(ApiToken.objects.values_list("name", "expiry"))
+    assert ends == {"usual": now + timedelta(days=90), "year": now + timedelta(days=365)}
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "field"),
+    [
+        ({"name": "  "}, "missing-field", "name"),
+        ({"name": "x" * 81}, "text-too-long", "name"),
+        ({"name": "a\x00b"}, "bad-character", "name"),
+        ({"scopes": []}, "bad-scope", "scopes"),
+        ({"scopes": ["read", "admin"]}, "bad-scope", "scopes"),
+        ({"days": 0}, "bad-days", "days"),
+        ({"days": 366}, "bad-days", "days"),
+        ({"split_name": "nowhere"}, "unknown-split", "split"),
+    ],
+)
+def test_a_token_that_makes_no_sense_is_refused(
+    owner: User, options: dict[str, object], code: str, field: str
+) -> None:
+    with pytest.raises(tokens.Refused) as caught:
+        tokens.create(**{"user": owner, "name": "CI", "now": timezone.now(), **options})  # type: ignore[arg-type]  # that is the point
+    assert (caught.value.code, caught.value.field) == (code, field)
+    assert not ApiToken.objects.exists()
+
+
+def test_the_database_knows_no_token_that_is_good_for_nothing(owner: User, secret: str) -> None:
+    with pytest.raises(IntegrityError), transaction.atomic():
+        ApiToken.objects.update(may_read=False, may_submit=False)
+
+
+def test_nobody_piles_up_tokens(owner: User) -> None:
+    for number in range(tokens.MAX_STANDING):
+        tokens.create(user=owner, name=str(number), now=timezone.now())
+    with pytest.raises(tokens.Refused, match="50 tokens in use"):
+        builders.token(owner)
+    row = ApiToken.objects.first()
+    assert row is not None
+    tokens.revoke(token=row, now=timezone.now(), actor=owner)
+    assert builders.token(owner)
+
+
+def test_making_and_revoking_are_audited_without_the_secret(owner: User, secret: str) -> None:
+    row = ApiToken.objects.get()
+    assert tokens.revoke(token=row, now=timezone.now(), actor=owner)
+    assert not tokens.revoke(token=row, now=timezone.now(), actor=owner)
+    revoked, created = AuditEvent.objects.filter(noun="ApiToken", noun_id=row.token_key)
+    assert (revoked.verb, created.verb, revoked.actor) == ("revoked", "created", owner)
+    assert created.details == {"name": "CI", "scopes": ["read", "submit"], "split": None, "days": 90}
+    assert secret not in str(created.details) + created.noun_id
+
+
+# --- a leaked one ----------------------------------------------------------------------------------------
+
+
+def test_whoever_finds_a_token_can_end_it(owner: User, secret: str) -> None:
+    response = APIClient().post(REVOKE, {"token": f" {secret}\n"}, format="json")
+    assert response.status_code == 200
+    assert refusal(client_with(secret))[:2] == (401, "token-revoked")
+    event = AuditEvent.objects.get(verb="revoked")
+    assert (event.actor, event.details["how"]) == (None, "reported as leaked")
+
+
+def test_the_answer_does_not_tell_whether_it_was_a_token(owner: User, secret: str) -> None:
+    reported = [secret, secret, "tsttc_" + "0" * 64, "nonsense"]
+    answers = [APIClient().post(REVOKE, {"token": each}, format="json") for each in reported]
+    assert len({(answer.status_code, answer.content) for answer in answers}) == 1
+    assert AuditEvent.objects.filter(verb="revoked").count() == 1
+
+
+@pytest.mark.parametrize("body", [{}, [], "text", {"token": ""}, {"token": [1]}, {"token": "a\x00"}, None])
+def test_a_report_without_a_token_says_what_is_expected(db: None, body: object) -> None:
+    response = APIClient().post(REVOKE, body, format="json")
+    assert response.status_code == 422
+    assert response.json()["problems"][0]["where"] == "token"
+
+
+def test_a_session_is_no_obstacle_to_a_report(client: Client, owner: User, secret: str) -> None:
+    client.force_login(owner)
+    assert client.post(REVOKE, {"token": secret}, content_type="application/json").status_code == 200
