@@ -1,0 +1,108 @@
+"""The command that opens an edition, killed in the middle: nothing half-made stays, and it is run again."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import psycopg
+import pytest
+
+import evaluator
+from tests.journeys.production import REPOSITORY, Site, await_that, settings_for
+from tests.services import ServiceMissing, skip_or_fail, throwaway_database, throwaway_redis
+
+pytestmark = [pytest.mark.services, pytest.mark.slow]
+
+N_SUBMISSIONS = 120
+TABLES = ("leaderboard_groundtruth", "leaderboard_edition", "leaderboard_evaluation")  # as they are written
+COUNTS = """
+SELECT (SELECT count(*) FROM leaderboard_edition), (SELECT count(*) FROM leaderboard_groundtruth),
+       count(*), count(DISTINCT submission_id), count(*) FILTER (WHERE status = 'QUEUED')
+FROM leaderboard_evaluation e JOIN leaderboard_edition d ON d.id = e.edition_id AND d.number = 2
+"""
+
+
+@pytest.fixture
+def site(tmp_path: Path, truth: evaluator.GroundTruth) -> Iterator[Site]:
+    """A leaderboard with submissions, on which nobody works at the moment."""
+    table = tmp_path / "truth.csv"
+    table.write_bytes(truth.to_csv())
+    url = "http://127.0.0.1:9"  # nothing is served here
+    try:
+        with throwaway_database() as postgres, throwaway_redis() as redis:
+            environment = settings_for(tmp_path, url=url, postgres_url=postgres, redis_url=redis)
+            site = Site(url=url, directory=tmp_path, environment=environment)
+            site.manage("migrate", "--no-input")
+            site.manage("import_truth", "test", str(table))
+            command = [sys.executable, "-m", "tests.crowd", "test", str(N_SUBMISSIONS)]
+            subprocess.run(command, cwd=REPOSITORY, env=environment, check=True)
+            yield site
+    except ServiceMissing as missing:
+        skip_or_fail(missing)
+
+
+@contextmanager
+def locked(postgres_url: str, table: str) -> Iterator[None]:
+    """Nobody writes to the table meanwhile."""
+    with psycopg.connect(postgres_url) as connection:
+        connection.execute(f"LOCK TABLE {table} IN SHARE MODE")  # type: ignore[arg-type]  # our own names
+        yield
+        connection.rollback()
+
+
+@pytest.mark.parametrize(
+    "table", ["leaderboard_groundtruth", "leaderboard_edition", "leaderboard_evaluation"]
+)
+def test_opening_an_edition_is_killed_between_its_rows_and_goes_on_when_it_is_run_again(
+    site: Site, truth: evaluator.GroundTruth, table: str
+) -> None:
+    """The row that it waits to write is the one that it never writes."""
+    postgres_url = site.environment["TSTTC_DATABASE_URL"]
+    path = site.directory / "corrected.csv"
+    corrected = truth.to_table()
+    corrected.ttc_s = np.where(truth.manifest.recording_index == 0, truth.ttc_s * 1.1, truth.ttc_s).tolist()
+    path.write_bytes(evaluator.GroundTruth.from_table(corrected).to_csv())
+
+    def counts() -> tuple[int, ...]:
+        with psycopg.connect(postgres_url) as connection:
+            [row] = connection.execute(COUNTS).fetchall()
+            return tuple(map(int, row))
+
+    def waits_for_the_lock() -> bool:
+        question = "SELECT count(*) FROM pg_locks WHERE NOT granted AND relation = %s::regclass"
+        with psycopg.connect(postgres_url) as connection:
+            [[n]] = connection.execute(question, [table]).fetchall()
+            return bool(n)
+
+    def is_gone() -> bool:
+        question = "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database()"
+        with psycopg.connect(postgres_url) as connection:
+            [[n]] = connection.execute(question).fetchall()
+            return int(n) == 1
+
+    with locked(postgres_url, table):
+        command = [sys.executable, "manage.py", "open_edition", "test", "--truth", str(path)]
+        opening = subprocess.Popen(
+            command,
+            cwd=REPOSITORY,
+            env=site.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        await_that(waits_for_the_lock, what=f"the command is about to write to {table}")
+        os.kill(opening.pid, signal.SIGKILL)
+        opening.wait()
+    await_that(is_gone, what="the database has noticed")
+
+    n_truths = 1 if table == "leaderboard_groundtruth" else 2
+    assert counts() == (1, n_truths, 0, 0, 0)
+    site.manage("open_edition", "test", "--truth", str(path))
+    complete = (2, 2, N_SUBMISSIONS, N_SUBMISSIONS, N_SUBMISSIONS)
+    assert counts() == complete
+    site.manage("open_edition", "test", "--truth", str(path))
+    assert counts() == complete

@@ -1,0 +1,133 @@
+"""Re-scoring in batches: what a worker had in hand when it died, and what it says when it comes back."""
+
+import random
+import uuid
+from pathlib import Path
+
+import pytest
+from django.utils import timezone
+
+import evaluator
+from leaderboard import broker, ground_truth, lifecycle, scoring, standings
+from leaderboard.lifecycle import Lease
+from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status
+from tests import builders, crowd
+from tests.leaderboard import queue_rows
+
+N_SUBMISSIONS = lifecycle.RESCORE_BATCH + 50
+
+
+@pytest.fixture
+def edition(benchmark: None, tmp_path: Path) -> Edition:
+    """An edition for which more submissions wait to be scored anew than one batch holds."""
+    path = builders.truth_csv(tmp_path / "truth-test.csv")
+    edition = ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
+    truth = ground_truth.load(edition.ground_truth_id)
+    crowd.join(split_name="test", truth=truth, n=N_SUBMISSIONS, n_files=5)
+    return edition
+
+
+def claim_batch() -> list[Lease]:
+    return lifecycle.claim(
+        lease_s=queue_rows.LEASE_S, wall_s=queue_rows.WALL_S, batch=lifecycle.RESCORE_BATCH
+    )
+
+
+def assert_all_scored_once(edition: Edition) -> None:
+    """Every submission has the ten numbers that the evaluator alone gives, and was decided once."""
+    truth = ground_truth.load(edition.ground_truth_id)
+    rows = Evaluation.objects.filter(edition=edition).select_related("submission__method")
+    assert {row.status for row in rows} == {Status.SCORED}
+    found = {row.submission.method.name: standings.flat_scores(row.scores.all()) for row in rows}
+    assert found == {
+        crowd.method_name(number): crowd.published_scores(truth, number) for number in range(N_SUBMISSIONS)
+    }
+    assert Score.objects.count() == N_SUBMISSIONS * len(evaluator.SCORE_NAMES)
+    decided = list(AuditEvent.objects.filter(verb="scored").values_list("noun_id", flat=True))
+    assert len(decided) == len(set(decided)) == N_SUBMISSIONS
+
+
+def test_a_batch_takes_no_more_than_its_size_and_leaves_the_rest_to_others(edition: Edition) -> None:
+    first, second = claim_batch(), claim_batch()
+    assert (len(first), len(second)) == (lifecycle.RESCORE_BATCH, 50)
+    assert not {lease.evaluation_id for lease in first} & {lease.evaluation_id for lease in second}
+    assert claim_batch() == []
+
+
+def test_a_batch_is_of_one_edition(edition: Edition, tmp_path: Path) -> None:
+    path = builders.truth_csv(tmp_path / "truth-val.csv", seed=1)
+    other = ground_truth.import_truth(split_name="val", path=path, now=timezone.now())
+    crowd.join(split_name="val", truth=ground_truth.load(other.ground_truth_id), n=5, n_files=0)
+    while leases := claim_batch():
+        ids = [lease.evaluation_id for lease in leases]
+        assert Evaluation.objects.filter(pk__in=ids).values("edition").distinct().count() == 1
+
+
+def test_a_batch_whose_worker_died_is_finished_by_another_and_nothing_is_doubled(edition: Edition) -> None:
+    lost = claim_batch()
+    assert len(lost) == lifecycle.RESCORE_BATCH
+    for lease in lost:
+        queue_rows.expire(lease)
+    assert queue_rows.release_expired() == len(lost)
+    queue_rows.make_due()
+    builders.score_all()
+    assert_all_scored_once(edition)
+    attempts = dict(Evaluation.objects.values_list("pk", "attempt"))
+    assert all(attempts[lease.evaluation_id] == 2 for lease in lost)
+    assert sorted(attempts.values()).count(1) == 50
+
+
+def test_a_worker_that_comes_back_with_a_batch_that_others_finished_changes_nothing(edition: Edition) -> None:
+    zombie = claim_batch()
+    for lease in zombie:
+        queue_rows.expire(lease)
+    queue_rows.release_expired()
+    queue_rows.make_due()
+    builders.score_all()
+    assert scoring.rescore(zombie, edition=edition) == []
+    assert_all_scored_once(edition)
+
+
+def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edition: Edition) -> None:
+    leases = claim_batch()
+    taken, kept = leases[:7], leases[7:]
+    for lease in taken:
+        queue_rows.expire(lease)
+    queue_rows.release_expired()
+    scoring.rescore(leases, edition=edition)
+    scored = set(Evaluation.objects.filter(status=Status.SCORED).values_list("pk", flat=True))
+    assert scored == {lease.evaluation_id for lease in kept}
+    queue_rows.make_due()
+    builders.score_all()
+    assert_all_scored_once(edition)
+
+
+def test_a_file_without_kept_values_is_read_again_beside_the_batch(edition: Edition) -> None:
+    truth = ground_truth.load(edition.ground_truth_id)
+    digest = evaluator.read_predictions(crowd.contents(truth, 3), manifest=truth.manifest).digest
+    store = scoring.files.store()
+    store.delete(scoring.files.aligned_name(manifest_digest=truth.manifest.digest, digest=digest))
+    builders.score_all()
+    assert_all_scored_once(edition)
+
+
+def test_workers_hear_of_every_batch(
+    benchmark: None, tmp_path: Path, django_capture_on_commit_callbacks, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nudged: list[uuid.UUID] = []
+
+    def nudge(evaluation_id: uuid.UUID) -> bool:
+        nudged.append(evaluation_id)
+        return True
+
+    monkeypatch.setattr(broker, "nudge", nudge)
+    path = builders.truth_csv(tmp_path / "truth-test.csv")
+    edition = ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
+    with django_capture_on_commit_callbacks(execute=True):
+        truth = ground_truth.load(edition.ground_truth_id)
+        crowd.join(split_name="test", truth=truth, n=N_SUBMISSIONS, n_files=0)
+    assert len(nudged) == 2
+    n_runs = 0
+    while scoring.run_next(rng=random.Random(0)):
+        n_runs += 1
+    assert n_runs == len(nudged)

@@ -1,0 +1,161 @@
+"""Corrections of real ground truth: what the preview says is what `tsttc score` says, number by number and
+word by word.
+
+The data may not be copied into this repository. It is used in place where `TSTTC_SHARED_DATA`, or
+`shared/data` beside the checkout, has it; elsewhere these tests are skipped.
+"""
+
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.utils import timezone
+
+import evaluator
+from leaderboard import ground_truth, preview, standings
+from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from tests import builders
+from tests.editions import open_edition
+from tests.services import REPOSITORY, shared_data
+
+pytestmark = pytest.mark.slow
+
+ESTIMATORS = ("box-height", "box-sqrt-area", "box-area", "pointrcnn-height")
+FORMS = ("ttc", "scale_ratio")
+PERTURBED = "0005"
+DROPPED = "0003"
+
+
+@dataclass(frozen=True)
+class Offline:
+    """What `tsttc score` says of a file."""
+
+    exit_code: int
+    answer: dict[str, Any]
+
+    @property
+    def scores(self) -> dict[str, float | None]:
+        """The ten numbers as they are published."""
+        return {
+            name: evaluator.published(self.answer["scores"][interval or "overall"][metric])
+            for name in evaluator.SCORE_NAMES
+            for metric, _, interval in [name.partition("_")]
+        }
+
+
+def tsttc_score(predictions: Path, *, truth: Path) -> Offline:
+    """Run the command as a researcher does."""
+    command = [sys.executable, "-m", "evaluator", "score", str(predictions), "--truth", str(truth), "--json"]
+    done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
+    return Offline(exit_code=done.returncode, answer=json.loads(done.stdout))
+
+
+@pytest.fixture(scope="module")
+def kitti() -> Path:
+    """The folder of the data."""
+    shared = shared_data()
+    if shared is None or not (shared / "kitti-dev").is_dir():
+        pytest.skip("kitti-dev is not here: TSTTC_SHARED_DATA names no folder that has it")
+    return shared / "kitti-dev"
+
+
+@pytest.fixture
+def published(benchmark: None, kitti: Path, settings: Any) -> Edition:
+    """The split `test` with the real ground truth; the owner may send as much as there is."""
+    settings.QUOTAS = False
+    return ground_truth.import_truth(split_name="test", path=kitti / "truth.csv", now=timezone.now())
+
+
+@pytest.fixture
+def sent(published: Edition, kitti: Path, owner: User) -> dict[Submission, Path]:
+    """The four estimators in both forms, scored, and their files."""
+    files = {
+        f"{estimator} ({form})": kitti / "predictions" / f"{estimator}.{form}.json"
+        for estimator in ESTIMATORS
+        for form in FORMS
+    }
+    made = {builders.submit(owner, path.read_bytes(), method=name): path for name, path in files.items()}
+    builders.score_all()
+    return made
+
+
+def correction(kitti: Path, tmp_path: Path, *, drop: str = "") -> Path:
+    """The truth with one recording a little farther in time, and without another."""
+    head, *rows = [line.split(",") for line in (kitti / "truth.csv").read_text().splitlines()]
+    kept = [
+        [*key, repr(float(ttc_s) * 1.07) if key[1] == PERTURBED else ttc_s]
+        for *key, ttc_s in rows
+        if key[1] != drop
+    ]
+    path = tmp_path / f"corrected{drop}.csv"
+    path.write_text("\n".join(",".join(row) for row in [head, *kept]) + "\n")
+    return path
+
+
+def test_preview_of_a_corrected_recording_has_the_figures_of_two_offline_runs(
+    sent: dict[Submission, Path], kitti: Path, tmp_path: Path
+) -> None:
+    path = correction(kitti, tmp_path)
+    edition = open_edition(path)
+    builders.score_all()
+    found = preview.preview(edition)
+    truth = edition.ground_truth
+    assert (truth.n_added, truth.n_removed, truth.n_changed) == (0, 0, 900)
+    files = {submission.pk: file for submission, file in sent.items()}
+    assert {change.submission_id for change in found.changes} == set(files)
+    for change in found.changes:
+        file = files[change.submission_id]
+        before, after = tsttc_score(file, truth=kitti / "truth.csv"), tsttc_score(file, truth=path)
+        assert (before.exit_code, after.exit_code) == (0, 0)
+        assert change.old == before.scores
+        assert change.new == after.scores
+        assert change.old != change.new
+        assert (change.old_status, change.new_status) == (Status.SCORED, Status.SCORED)
+
+
+def test_files_that_a_new_manifest_does_not_fit_are_rejected_in_the_words_of_the_command_line(
+    sent: dict[Submission, Path], kitti: Path, tmp_path: Path
+) -> None:
+    path = correction(kitti, tmp_path, drop=DROPPED)
+    edition = open_edition(path)
+    builders.score_all()
+    found = preview.preview(edition)
+    truth = edition.ground_truth
+    assert (truth.n_added, truth.n_removed, truth.n_changed) == (0, 301, 900)
+    assert found.n_newly_rejected == len(sent) == len(found.changes)
+    files = {submission.pk: file for submission, file in sent.items()}
+    for change in found.changes:
+        offline = tsttc_score(files[change.submission_id], truth=path)
+        assert offline.exit_code == 1
+        assert change.new_status == Status.REJECTED
+        assert list(change.problems) == offline.answer["problems"]
+        assert change.n_problems == offline.answer["n_problems"]
+        assert all(value is None for value in change.new.values())
+        assert change.old == tsttc_score(files[change.submission_id], truth=kitti / "truth.csv").scores
+
+
+def test_a_file_for_the_new_manifest_is_scored_in_the_new_edition_as_offline(
+    published: Edition, kitti: Path, owner: User, tmp_path: Path
+) -> None:
+    path = correction(kitti, tmp_path, drop=DROPPED)
+    edition = open_edition(path)
+    kept = {row.split(",")[0] for row in path.read_text().splitlines()[1:]}
+    file = tmp_path / "predictions.json"
+    values = json.loads((kitti / "predictions" / "box-height.ttc.json").read_text())
+    file.write_text(json.dumps({key: value for key, value in values.items() if key in kept}))
+
+    submission = builders.submit(owner, file.read_bytes(), method="For the new manifest")
+    builders.score_all()
+
+    states = dict(submission.evaluations.values_list("edition__number", "status"))
+    assert states == {1: Status.REJECTED, 2: Status.SCORED}
+    new = Evaluation.objects.get(submission=submission, edition=edition)
+    assert standings.flat_scores(new.scores.all()) == tsttc_score(file, truth=path).scores
+    old = Evaluation.objects.get(submission=submission, edition=published)
+    offline = tsttc_score(file, truth=kitti / "truth.csv")
+    assert offline.exit_code == 1
+    assert old.problems == offline.answer["problems"]
