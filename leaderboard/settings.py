@@ -183,8 +183,8 @@ DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is strea
 DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
 FILE_UPLOAD_HANDLERS = ["leaderboard.web.uploads.UnnamedFileUploadHandler"]
 
-# Whether teams have quotas (see leaderboard/quotas.py); off where a machine sends, as in trials of load.
-QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
+# Whether teams have quotas (see leaderboard/quotas.py): to be turned on before strangers may submit.
+QUOTAS = env.bool("TSTTC_QUOTAS", default=False)
 
 # --- the life of an evaluation (seconds; see leaderboard/lifecycle.py) ----------------------------------
 
@@ -321,7 +321,7 @@ API_RATES: dict[str, str | None] = {
     "submit": "60/min",
     "revoke": "10/min",
 }
-if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
+if TESTING or not env.bool("TSTTC_THROTTLES", default=False):
     API_RATES = dict.fromkeys(API_RATES)
 SPECTACULAR_SETTINGS = {
     "TITLE": "TSTTC leaderboard API",

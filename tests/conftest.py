@@ -70,3 +70,9 @@ def private_directories(tmp_path: Path, settings: Settings) -> None:
 def quick_passwords(settings: Settings) -> None:
     """A hash that is slow on purpose protects passwords that are worth something; here it costs minutes."""
     settings.PASSWORD_HASHERS = ["django.contrib.auth.hashers.MD5PasswordHasher"]
+
+
+@pytest.fixture(autouse=True)
+def quotas_hold(settings: Settings) -> None:
+    """Tests meet the stricter world, whatever the default is."""
+    settings.QUOTAS = True
