@@ -63,7 +63,7 @@ def test_claim_gives_attempt_token_lease_and_deadline(edition: Edition, owner: U
     evaluation = queue_rows.queued(edition, owner)
     lease = queue_rows.claim()
     evaluation.refresh_from_db()
-    assert (lease.evaluation_id, lease.attempt) == (evaluation.pk, 1)
+    assert (lease.evaluation_id, lease.attempt, evaluation.attempt) == (evaluation.pk, 1, 1)
     assert (evaluation.status, evaluation.lease_token) == (Status.RUNNING, lease.token)
     assert evaluation.started_at is not None
     assert evaluation.leased_until == evaluation.started_at + timedelta(seconds=LEASE_S)
