@@ -26,7 +26,8 @@ def events(request: HttpRequest) -> HttpResponse:
     if not asked.is_valid():
         return render(request, "maintainers/audit.html", {"form": asked}, status=400)
     page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
-    return render(request, "maintainers/audit.html", {"form": asked, "page": page, "query": asked.query()})
+    context = {"form": asked, "page": page, "query": asked.query(), "rows": [(e, _told(e)) for e in page]}
+    return render(request, "maintainers/audit.html", context)
 
 
 @maintainers_only
@@ -48,6 +49,15 @@ def events_json(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
     if not asked.is_valid():
         return render(request, "maintainers/audit.html", {"form": asked}, status=400)
     return _download(_json_list(_rows(asked)), kind="json", content_type="application/json")
+
+
+def _told(event: AuditEvent) -> list[tuple[str, str]]:
+    """The details as a person reads them; what is empty says nothing."""
+    told = {
+        name: ", ".join(map(str, value)) if isinstance(value, list) else value
+        for name, value in event.details.items()
+    }
+    return [(name, str(value)) for name, value in told.items() if value not in ("", None)]
 
 
 def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
