@@ -18,7 +18,7 @@ DEV_STAMP := $(VENV)/.installed-dev-$(call checksum,requirements-dev.lock)
 # The development environment has everything that the server needs, in the same versions.
 READY := $(or $(wildcard $(DEV_STAMP)),$(SERVER_STAMP))
 
-.PHONY: help demo test test-fast bench lint format screenshots lock clean
+.PHONY: help demo test test-fast chaos sabotage bench lint format screenshots lock clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,6 +34,12 @@ test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
 
 test-fast: $(DEV_STAMP) ## what takes less than a minute: no services, no browser, nothing slow
 	$(PY) -m pytest -q -m "not slow and not services and not browser"
+
+chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
+	@$(PY) -m tests.chaos
+
+sabotage: $(DEV_STAMP) ## break one line of the code at a time; a named test must notice each
+	@$(PY) -m tests.sabotage
 
 bench: $(DEV_STAMP) ## measure; one line per figure, `name = value unit`
 	@$(PY) -m benchmarks
