@@ -42,7 +42,7 @@ class Split(QuotaRules):
         "Edition", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
     )
 
-    objects: ClassVar[SplitQuerySet] = SplitQuerySet.as_manager()  # type: ignore[assignment]
+    objects: ClassVar[SplitQuerySet] = SplitQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     class Meta:
         ordering = ["position", "name"]

@@ -47,7 +47,7 @@ class Method(models.Model):
     visibility = models.CharField(max_length=12, choices=Visibility, default=Visibility.PUBLIC)
     created_at = models.DateTimeField(default=timezone.now)
 
-    objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]
+    objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     class Meta:
         constraints = [
@@ -96,7 +96,7 @@ class Submission(models.Model):
     commit = models.CharField("commit of the code", max_length=64, blank=True)
     withdrawn_at = models.DateTimeField(null=True, blank=True)
 
-    objects: ClassVar[SubmissionQuerySet] = SubmissionQuerySet.as_manager()  # type: ignore[assignment]
+    objects: ClassVar[SubmissionQuerySet] = SubmissionQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     class Meta:
         ordering = ["-submitted_at"]
