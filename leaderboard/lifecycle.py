@@ -133,16 +133,18 @@ def _announce_many(n: int) -> None:
 # --- a worker's verbs ------------------------------------------------------------------------------------
 
 
-def claim(*, lease_s: float, wall_s: float, limit: int = 1, batch: int = 1) -> list[Lease]:
+def claim(
+    *, lease_s: float, wall_s: float, limit: int = 1, batch: int = 1, token: uuid.UUID | None = None
+) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
     If the first is one of an edition's re-scoring, up to `batch` of that edition's. Two workers never get the
-    same one: PostgreSQL skips rows that another claim holds, SQLite has one writer.
+    same one. Whoever brings a new `token` can find what it got if the answer is lost.
     """
-    token = uuid.uuid4()
+    token = token or uuid.uuid4()
     with transaction.atomic():
         waiting = (
-            Evaluation.objects.select_for_update(skip_locked=True)
+            Evaluation.objects.select_for_update(skip_locked=True)  # SQLite has one writer, and skips nothing
             .filter(status=Status.QUEUED, due_at__lte=Now())
             .order_by("priority", "queued_at")
             .values_list("pk", "attempt", "priority", "edition")
@@ -188,8 +190,7 @@ def finalise(lease: Lease, outcome: Outcome) -> bool:
     Returns True if this call wrote it, False if an earlier call of the same lease had (its COMMIT succeeded
     and the answer was lost). Raises `LostRace` if the lease is no longer valid: nothing is written then.
     """
-    written = finalise_many([(lease, outcome)])
-    if written:
+    if finalise_many([(lease, outcome)]):
         return True
     if Evaluation.objects.filter(
         pk=lease.evaluation_id, finished_attempt=lease.attempt, lease_token=lease.token, status=outcome.status

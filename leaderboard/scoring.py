@@ -3,8 +3,10 @@
 import hashlib
 import random
 import time
+import uuid
 from collections import deque
 from collections.abc import Callable, Sequence
+from typing import TypeVar
 
 import structlog
 from django.conf import settings
@@ -19,6 +21,8 @@ from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
 from leaderboard.models import Edition, Evaluation, Status
 
 log = structlog.get_logger(__name__)
+
+T = TypeVar("T")
 
 
 class TruthDamaged(Exception):
@@ -43,7 +47,7 @@ FAULTS_OF_THE_FILE = (
     TypeError,
     ValueError,
 )
-FINALISE_ATTEMPTS = 8
+PAUSES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0)
 MAX_STORED_PROBLEMS = 100
 
 
@@ -53,10 +57,10 @@ def run_next(*, rng: random.Random) -> bool:
     False: nothing was waiting.
     """
     claimed_s = time.monotonic()
-    leases = lifecycle.claim(lease_s=settings.LEASE_S, wall_s=settings.WALL_S, batch=lifecycle.RESCORE_BATCH)
+    leases = _claimed()
     if not leases:
         return False
-    first = _evaluations(leases[:1])[0]
+    first = _insist(lambda: _evaluations(leases[:1]))[0]
     if first.priority == Evaluation.PRIORITY_RESCORE:
         leases = rescore(leases, edition=first.edition)
     waiting = deque(leases)
@@ -65,6 +69,27 @@ def run_next(*, rng: random.Random) -> bool:
         if time.monotonic() - claimed_s > settings.LEASE_S / 2:
             _hand_back(waiting)
     return True
+
+
+def _claimed() -> list[Lease]:
+    """What this worker gets to decide. Raises the database's error if it stays away."""
+    token = uuid.uuid4()
+    try:
+        return lifecycle.claim(
+            lease_s=settings.LEASE_S, wall_s=settings.WALL_S, batch=lifecycle.RESCORE_BATCH, token=token
+        )
+    except (OperationalError, InterfaceError) as fault:
+        # It may have been committed and only the answer lost; nobody else would look at it for a whole lease.
+        log.warning("claim_not_answered", reason=str(fault)[:200])
+        connection.close()
+        return _insist(lambda: _leases_of(token))
+
+
+def _leases_of(token: uuid.UUID) -> list[Lease]:
+    rows = Evaluation.objects.filter(status=Status.RUNNING, lease_token=token).order_by(
+        "priority", "queued_at"
+    )
+    return [Lease(pk, attempt, token) for pk, attempt in rows.values_list("pk", "attempt")]
 
 
 def _hand_back(waiting: deque[Lease]) -> None:
@@ -88,7 +113,8 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     answer is theirs to report as well.
     """
     ids = [lease.evaluation_id for lease in leases]
-    digests = dict(Evaluation.objects.filter(pk__in=ids).values_list("pk", "submission__digest"))
+    rows = Evaluation.objects.filter(pk__in=ids).values_list("pk", "submission__digest")
+    digests = _insist(lambda: dict(rows))
     try:
         truth = _truth(edition)
     except (OSError, TruthDamaged):
@@ -107,7 +133,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
             log.info("not_rescored_in_the_batch", evaluation_id=str(lease.evaluation_id), reason=str(fault))
         rest.append(lease)
     if outcomes:
-        _persist(lambda: lifecycle.finalise_many(outcomes))
+        _insist(lambda: lifecycle.finalise_many(outcomes))
     log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
     return rest
 
@@ -119,7 +145,7 @@ def run(lease: Lease, *, rng: random.Random, waiting: deque[Lease] | None = None
     the loss of the database is raised; the lease then runs out by itself.
     """
     waiting = deque() if waiting is None else waiting
-    evaluation = _evaluations([lease])[0]
+    evaluation = _insist(lambda: _evaluations([lease]))[0]
     # Every line from here on says what it is about, also those of modules that know of no submission.
     with structlog.contextvars.bound_contextvars(
         submission_id=str(evaluation.submission_id),
@@ -136,7 +162,7 @@ def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: ra
             evaluation,
             heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
         )
-        _persist(lambda: lifecycle.finalise(lease, outcome))
+        _insist(lambda: lifecycle.finalise(lease, outcome))
     except LostRace as race:
         log.warning("evaluation_lost", reason=str(race))
     except OUR_FAULTS as fault:
@@ -250,26 +276,23 @@ def rejection(rejected: Rejected) -> Outcome:
 
 def _give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> None:
     try:
-        _persist(lambda: lifecycle.give_back(lease, strike=strike, reason=reason, rng=rng))
+        _insist(lambda: lifecycle.give_back(lease, strike=strike, reason=reason, rng=rng))
     except LostRace as race:
         log.warning("evaluation_lost", evaluation_id=str(lease.evaluation_id), reason=str(race))
 
 
-def _persist(write: Callable[[], object]) -> None:
-    """Write to the database, again after a lost connection: the writes are compare-and-set, so it is safe.
+def _insist(ask: Callable[[], T]) -> T:
+    """Ask the database, again after a lost connection: questions and compare-and-set may be repeated.
 
-    Raises `LostRace` from the write, or the database's error when it stays away; the lease then runs out and
+    Raises what the question raises, or the database's error when it stays away; the lease then runs out and
     the work is done anew.
     """
-    for attempt in range(1, FINALISE_ATTEMPTS + 1):
+    for pause_s in PAUSES_S:
         try:
-            write()
+            return ask()
         except (OperationalError, InterfaceError) as fault:
-            if attempt == FINALISE_ATTEMPTS:
-                raise
-            log.warning("database_unreachable", attempt=attempt, reason=str(fault)[:200])
+            log.warning("database_unreachable", reason=str(fault)[:200])
             connection.close()
             # The server is restarting: there is no event to wait for, only its port to try again.
-            time.sleep(min(0.1 * 2**attempt, 5.0))
-        else:
-            return
+            time.sleep(pause_s)
+    return ask()

@@ -4,13 +4,16 @@ Each change is made in a copy of the tree. One line a change; the exit code says
 change whose line is gone, or a test that fails without it, is an error as well: the list is then out of date.
 """
 
-import re
+import os
 import shutil
 import subprocess
 import sys
 import tempfile
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from queue import Queue
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 LEFT_OUT = shutil.ignore_patterns(
@@ -274,6 +277,13 @@ SABOTAGES = (
         f"{RUNS}::test_reader_that_cannot_start_is_not_held_against_the_file",
     ),
     Sabotage(
+        "a claim whose answer was lost waits for its lease",
+        "leaderboard/scoring.py",
+        "        return _insist(lambda: _leases_of(token))",
+        "        raise",
+        f"{RUNS}::test_claim_whose_answer_was_lost_is_found_by_its_token",
+    ),
+    Sabotage(
         "a silent database ends the run",
         "leaderboard/scoring.py",
         "            connection.close()\n            return True",
@@ -289,31 +299,41 @@ def run(tests: list[str], *, tree: Path) -> "subprocess.CompletedProcess[str]":
     return subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
 
 
+def verdict(sabotage: Sabotage, *, trees: "Queue[Path]") -> str:
+    """Make the change in a tree that nobody else uses now, run its test, and undo it."""
+    tree = trees.get()
+    try:
+        before = sabotage.apply(tree)
+        done = run([sabotage.test], tree=tree)
+        (tree / sabotage.path).write_text(before)
+    except OutOfDate as fault:
+        return f"OUT OF DATE ({fault})"
+    finally:
+        trees.put(tree)
+    is_red = done.returncode == TESTS_FAILED and "\nFAILED " in done.stdout
+    return "red" if is_red else "NOT NOTICED"
+
+
 def main() -> int:
     """0 if every change turned its test red, and only the change did."""
     tell = sys.stdout.write
-    with tempfile.TemporaryDirectory(prefix="tsttc-sabotage-") as folder:
-        tree = Path(folder) / "tree"
-        shutil.copytree(REPOSITORY, tree, ignore=LEFT_OUT)
-        untouched = run(sorted({sabotage.test for sabotage in SABOTAGES}), tree=tree)
+    n_at_once = os.cpu_count() or 1
+    n_noticed = 0
+    with (
+        tempfile.TemporaryDirectory(prefix="tsttc-sabotage-") as folder,
+        ThreadPoolExecutor(n_at_once) as threads,
+    ):
+        trees: Queue[Path] = Queue()
+        for number in range(n_at_once):
+            trees.put(Path(shutil.copytree(REPOSITORY, Path(folder) / str(number), ignore=LEFT_OUT)))
+        untouched = run(sorted({sabotage.test for sabotage in SABOTAGES}), tree=Path(folder) / "0")
         if untouched.returncode != 0:
             tell(f"sabotage: the tests fail without any change:\n{untouched.stdout[-4000:]}\n")
             return 1
-        n_noticed = 0
-        for sabotage in SABOTAGES:
-            try:
-                before = sabotage.apply(tree)
-            except OutOfDate as fault:
-                tell(f"OUT OF DATE  {sabotage.what}: {fault}\n")
-                continue
-            done = run([sabotage.test], tree=tree)
-            (tree / sabotage.path).write_text(before)
-            is_red = done.returncode == TESTS_FAILED and bool(
-                re.search(r"^FAILED ", done.stdout, re.MULTILINE)
-            )
-            n_noticed += is_red
-            verdict = "red" if is_red else "NOT NOTICED"
-            tell(f"{verdict}  {sabotage.what}  ({sabotage.test.partition('::')[2]})\n")
+        found = threads.map(partial(verdict, trees=trees), SABOTAGES)
+        for sabotage, said in zip(SABOTAGES, found, strict=True):
+            n_noticed += said == "red"
+            tell(f"{said}  {sabotage.what}  ({sabotage.test.partition('::')[2]})\n")
             sys.stdout.flush()
     tell(f"sabotage: changes={len(SABOTAGES)} noticed={n_noticed}\n")
     return 0 if n_noticed == len(SABOTAGES) else 1
