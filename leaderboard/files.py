@@ -186,16 +186,16 @@ def keep_aligned(predictions: Predictions) -> None:
 
 
 def load_aligned(*, manifest: Manifest, digest: str) -> Predictions | None:
-    """The values that were kept of a file, in the order of `manifest`; None if they are not there."""
+    """The values that were kept of a file, in the order of `manifest`; None if they are not all there."""
     try:
         with store().open(aligned_name(manifest_digest=manifest.digest, digest=digest), "rb") as kept:
-            ascending = np.frombuffer(kept.read(), dtype="<f8")
+            data = kept.read()
     except OSError:
         return None
-    if ascending.shape != (manifest.n_sequences,):
+    ttc_s = np.empty(manifest.n_sequences)
+    if len(data) != ttc_s.nbytes:
         return None
-    ttc_s = np.empty_like(ascending)
-    ttc_s[manifest.rows_by_id] = ascending
+    ttc_s[manifest.rows_by_id] = np.frombuffer(data, dtype="<f8")
     return Predictions(manifest=manifest, ttc_s=ttc_s, digest=digest)
 
 

@@ -5,10 +5,11 @@ import uuid
 from pathlib import Path
 
 import pytest
+from django.core.files.base import ContentFile
 from django.utils import timezone
 
 import evaluator
-from leaderboard import broker, ground_truth, lifecycle, scoring, standings
+from leaderboard import broker, files, ground_truth, lifecycle, scoring, standings
 from leaderboard.lifecycle import Lease
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status
 from tests import builders, crowd
@@ -102,11 +103,17 @@ def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edit
     assert_all_scored_once(edition)
 
 
-def test_a_file_without_kept_values_is_read_again_beside_the_batch(edition: Edition) -> None:
+@pytest.mark.parametrize("left", [None, b"", b"\0" * 17], ids=["none", "empty", "cut off"])
+def test_a_file_without_its_kept_values_is_read_again_beside_the_batch(
+    edition: Edition, left: bytes | None
+) -> None:
     truth = ground_truth.load(edition.ground_truth_id)
     digest = evaluator.read_predictions(crowd.contents(truth, 3), manifest=truth.manifest).digest
-    store = scoring.files.store()
-    store.delete(scoring.files.aligned_name(manifest_digest=truth.manifest.digest, digest=digest))
+    store = files.store()
+    name = files.aligned_name(manifest_digest=truth.manifest.digest, digest=digest)
+    store.delete(name)
+    if left is not None:
+        store.save(name, ContentFile(left))
     builders.score_all()
     assert_all_scored_once(edition)
 
