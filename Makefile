@@ -41,12 +41,6 @@ chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says wha
 sabotage: $(DEV_STAMP) ## break one line of the code at a time; a named test must notice each
 	@$(PY) -m tests.sabotage
 
-chaos: $(DEV_STAMP) ## send 200 files while everything is killed and restarted (docs/reliability.md)
-	@$(PY) -m tests.chaos
-
-sabotage: $(DEV_STAMP) ## break one line at a time and see that a test notices
-	@$(PY) -m tests.sabotage
-
 bench: $(DEV_STAMP) ## measure; one line per figure, `name = value unit`
 	@$(PY) -m benchmarks
 
