@@ -191,6 +191,12 @@ QUOTAS = env.bool("TSTTC_QUOTAS", default=False)
 LEASE_S = env.float("TSTTC_LEASE_S", default=60.0)
 HEARTBEAT_S = env.float("TSTTC_HEARTBEAT_S", default=LEASE_S / 4)
 WALL_S = env.float("TSTTC_WALL_S", default=300.0)
+if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
+    # A lease as long as the run itself could not tell a worker that vanished from a file that takes too long.
+    raise ImproperlyConfigured(
+        f"TSTTC_HEARTBEAT_S is {HEARTBEAT_S:g}, TSTTC_LEASE_S {LEASE_S:g}, TSTTC_WALL_S {WALL_S:g}; "
+        "expected each to be shorter than the next."
+    )
 SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
 POLL_S = env.float("TSTTC_POLL_S", default=5.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)

@@ -1,6 +1,9 @@
 """`leaderboard.queue`: what waits is found again, with or without a broker."""
 
+import os
 import random
+import subprocess
+import sys
 import threading
 import uuid
 from collections.abc import Iterator
@@ -65,6 +68,26 @@ def test_a_sweep_is_written_down_also_when_the_broker_is_silent(
         queue_rows.queued(edition, owner)
     queue.sweep(rng=random.Random(0))
     assert health.sweep_age_s() is not None
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        {"TSTTC_LEASE_S": "300", "TSTTC_HEARTBEAT_S": "15"},
+        {"TSTTC_LEASE_S": "10", "TSTTC_HEARTBEAT_S": "10"},
+        {"TSTTC_HEARTBEAT_S": "0"},
+    ],
+)
+def test_times_that_could_not_tell_a_dead_worker_from_a_long_run_are_refused(times: dict[str, str]) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", "import leaderboard.settings"],
+        env=os.environ | times,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "expected each to be shorter than the next" in done.stderr
 
 
 @pytest.fixture
