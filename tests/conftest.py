@@ -16,6 +16,8 @@ os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 
 # Files whose tests score many predictions, each in a child process as a worker does, or make whole worlds.
 SLOW_FILES = {
+    "test_admin_retry.py",
+    "test_clean_files.py",
     "test_cli_against_server.py",
     "test_demo.py",
     "test_files_s3.py",
@@ -23,9 +25,13 @@ SLOW_FILES = {
     "test_pages_board.py",
     "test_pages_editions.py",
     "test_pages_maintainers.py",
+    "test_pages_method.py",
     "test_pages_publishing.py",
+    "test_pages_submission.py",
     "test_pages_withdrawing.py",
     "test_preview.py",
+    "test_quarantine.py",
+    "test_quotas.py",
     "test_rescoring.py",
     "test_scoring.py",
 }
