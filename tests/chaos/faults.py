@@ -1,6 +1,7 @@
 """What can go wrong, gone wrong on purpose: a seeded plan of faults against a running site."""
 
 import heapq
+import json
 import os
 import random
 import signal
@@ -12,12 +13,13 @@ from typing import cast
 
 import redis
 
-from tests.chaos.processes import Process
+from tests.chaos.processes import Process, children_of
 from tests.chaos.site import Site
 
 KILL_EVERY_S = 2.0
 ZOMBIE_S = 9.0  # longer than a lease
-QUEUE = "celery"  # the name of Celery's list in Redis
+QUEUE, UNACKED = "celery", "unacked"  # where Celery keeps messages in Redis
+MOMENT_S = 0.5
 
 
 class Faults:
@@ -102,32 +104,40 @@ class Faults:
         candidates = [worker for worker in self._site.workers if worker not in self._stopped]
         if len(candidates) < 2:
             return
-        worker = self._rng.choice(candidates)
+        worker = self._reading(candidates) or self._rng.choice(candidates)
         worker.send(signal.SIGSTOP)
         self._stopped[worker] = time.monotonic() + ZOMBIE_S
         self.counts["zombies"] += 1
+
+    def _reading(self, workers: list[Process]) -> Process | None:
+        """A worker that reads a file right now, if there is one within a moment."""
+        until_s = time.monotonic() + MOMENT_S
+        while time.monotonic() < until_s:
+            for worker in workers:
+                if any(children_of(pid) for pid in worker.children()):
+                    return worker
+        return None
 
     def _wake(self, process: Process) -> None:
         process.send(signal.SIGCONT)
         del self._stopped[process]
 
     def _duplicate_messages(self) -> None:
+        """Those that wait and those that are being worked on, twice more each."""
+        broker = self._site.redis.client
         with suppress(redis.RedisError):
-            for message in self._messages():
-                self._site.redis.client.rpush(QUEUE, message, message)
+            waiting = cast("list[bytes]", broker.lrange(QUEUE, 0, 19))  # this client is the blocking one
+            taken = cast("dict[bytes, bytes]", broker.hgetall(UNACKED))
+            for message in [*waiting, *(json.dumps(json.loads(raw)[0]) for raw in taken.values())]:
+                broker.rpush(QUEUE, message, message)
                 self.counts["messages_duplicated"] += 1
 
     def _drop_messages(self) -> None:
+        """Every one that comes within a moment: a worker that listens is quicker than a single look."""
+        until_s = time.monotonic() + MOMENT_S
         with suppress(redis.RedisError):
-            for message in self._messages()[::2]:
-                self.counts["messages_dropped"] += self._removed(message)
-
-    def _messages(self) -> list[bytes]:
-        found = self._site.redis.client.lrange(QUEUE, 0, 19)
-        return list(cast("list[bytes]", found))  # this client is the blocking one
-
-    def _removed(self, message: bytes) -> int:
-        return int(self._site.redis.client.lrem(QUEUE, 1, message.decode()))
+            while time.monotonic() < until_s:
+                self.counts["messages_dropped"] += self._site.redis.client.lpop(QUEUE) is not None
 
     def _flush_the_broker(self) -> None:
         with suppress(redis.RedisError):

@@ -93,15 +93,20 @@ class Process:
 
     def children(self) -> list[int]:
         """Processes that it has started itself, in the order of their numbers."""
-        found: set[int] = set()
-        with suppress(FileNotFoundError, ProcessLookupError):
-            for task in Path(f"/proc/{self.pid}/task").iterdir():
-                found |= {int(pid) for pid in (task / "children").read_text().split()}
-        return sorted(found)
+        return children_of(self.pid)
 
     def said(self) -> str:
         """Everything that it has written so far."""
         return self.log_path.read_text(errors="replace") if self.log_path.exists() else ""
+
+
+def children_of(pid: int) -> list[int]:
+    """Processes that this one has started itself, in the order of their numbers."""
+    found: set[int] = set()
+    with suppress(FileNotFoundError, ProcessLookupError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            found |= {int(child) for child in (task / "children").read_text().split()}
+    return sorted(found)
 
 
 def _guard(user: str | None) -> list[str]:
