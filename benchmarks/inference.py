@@ -1,0 +1,107 @@
+"""What intervals and ranges cost a worker of a real board: 28,600 sequences in 700 recordings, PostgreSQL.
+
+`all` is a board of which nothing is inferred yet, `one_more` the same after one submission more, `pause` the
+longest that a live submission has to wait for the former, and `look` what it costs to see that nothing is to
+do. Processor time of the worker, with OpenBLAS on one core; the database's own comes on top.
+`python -m benchmarks.inference [N_ENTRIES …]`.
+"""
+
+import os
+
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import itertools
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.evaluator import figure
+from tests.services import ServiceMissing, throwaway_database
+
+SIZES = (200, 1_000)
+
+
+def main() -> None:
+    """Measure each size in a process and a database of its own."""
+    for n in map(int, sys.argv[1:] or SIZES):
+        try:
+            with tempfile.TemporaryDirectory() as folder, throwaway_database() as postgres:
+                environment = os.environ | {
+                    "TSTTC_DATABASE_URL": postgres,
+                    "TSTTC_DATA_DIR": folder,
+                    "TSTTC_LOG_LEVEL": "ERROR",
+                }
+                command = [sys.executable, "-c", f"from benchmarks import inference as i; i.measure({n})"]
+                subprocess.run(command, env=environment, cwd=Path(__file__).parents[1], check=True)
+        except ServiceMissing as missing:
+            print(f"inference is not measured: {missing}")
+            return
+
+
+def measure(n: int) -> None:
+    """In a fresh process whose environment names an empty database: print the figures of n entries."""
+    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
+    import django  # noqa: PLC0415 - its settings are read from the environment
+
+    django.setup()
+    from django.core.management import call_command  # noqa: PLC0415
+    from django.utils import timezone  # noqa: PLC0415
+
+    from benchmarks._correction import open_split  # noqa: PLC0415
+    from leaderboard import analyses, bags, comparisons, ground_truth, inference  # noqa: PLC0415
+    from leaderboard.demo.truth import simulate  # noqa: PLC0415
+    from leaderboard.models import Comparison, Submission  # noqa: PLC0415
+
+    call_command("migrate", "--no-input", "--verbosity=0")
+    truth = simulate(rng=np.random.default_rng(1))
+    with tempfile.TemporaryDirectory() as folder:
+        edition = open_split(split="test", truth=truth, n=n, directory=Path(folder))
+    held = ground_truth.held()
+    pauses: list[float] = []
+    rests = (hours * timedelta(hours=1) for hours in itertools.count(1))
+
+    def infer() -> object:
+        # After its rest, which a large board takes between two of these.
+        now = timezone.now() + next(rests)
+        (stale,) = inference.stale(now=now, held=held)
+        pauses.append(time.process_time())
+        return inference.infer(edition=stale, now=now, between=lambda: pauses.append(time.process_time()))
+
+    last = Submission.objects.order_by("pk").last()
+    assert last is not None
+    Submission.objects.filter(pk=last.pk).update(withdrawn_at=timezone.now())
+    figure("inference", n, "all", _took_s(infer), "s")
+    Submission.objects.filter(pk=last.pk).update(withdrawn_at=None)
+    figure("inference", n, "pause", float(np.diff(pauses).max()), "s")
+    figure("inference", n, "one_more", _took_s(infer), "s")
+    assert not inference.stale(now=timezone.now() + next(rests), held=held)
+    looks = [_took_s(lambda: inference.stale(now=timezone.now() + next(rests), held=held)) for _ in range(10)]
+    figure("inference", n, "look", min(looks) * 1e3, "ms")
+    first, second = edition.evaluations.order_by("pk")[:2]
+    rows = [Comparison.objects.create(edition=edition, first=first, second=second)]
+    figure(
+        "inference",
+        n,
+        "comparison",
+        _took_s(lambda: comparisons.compute(rows[0], now=timezone.now())) * 1e3,
+        "ms",
+    )
+    values = bags.predictions_of(edition, digest=first.submission.digest)
+    closer = _took_s(lambda: analyses.content_of(values, truth, protocol=edition.protocol))
+    figure("inference", n, "analysis", closer * 1e3, "ms")
+
+
+def _took_s(action: Callable[[], object]) -> float:
+    started_s = time.process_time()
+    action()
+    return time.process_time() - started_s
+
+
+if __name__ == "__main__":
+    main()
