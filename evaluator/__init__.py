@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from evaluator.report import IntervalScore, Report, format_published, published
     from evaluator.scoring import evaluate, evaluate_many
     from evaluator.truth import GroundTruth, Manifest, read_manifest, read_truth
+    from evaluator.uncertainty import Difference, compare_predictions, confidence_intervals
     from evaluator.writing import write_predictions
 else:
     # Each name is imported when it is first asked for: `tsttc --help` then answers without loading numpy.
@@ -27,6 +28,7 @@ else:
         "report": ("IntervalScore", "Report", "format_published", "published"),
         "scoring": ("evaluate", "evaluate_many"),
         "truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
+        "uncertainty": ("Difference", "compare_predictions", "confidence_intervals"),
         "writing": ("write_predictions",),
     }
     _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}
@@ -44,6 +46,7 @@ __all__ = [
     "PROBLEM_CODES",
     "PROTOCOLS",
     "SCORE_NAMES",
+    "Difference",
     "GroundTruth",
     "IntervalScore",
     "Manifest",
@@ -52,6 +55,8 @@ __all__ = [
     "Protocol",
     "Rejected",
     "Report",
+    "compare_predictions",
+    "confidence_intervals",
     "evaluate",
     "evaluate_many",
     "format_published",

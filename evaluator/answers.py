@@ -34,6 +34,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     document: JSON
     split: str = ""
     method: str = ""
+    method_id: str | None = None
     url: str | None = None
     scores: dict[str, float | None] | None = None
     counts: dict[str, int] | None = None
@@ -50,15 +51,29 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
         return self.state in FINAL_STATES
 
 
+class Method(msgspec.Struct, frozen=True, kw_only=True):
+    """A method as one may see it; `document` is the server's answer unabridged."""
+
+    id: str
+    name: str
+    document: JSON
+    visibility: str = ""
+    pseudonym: str | None = None
+    reveal_at: str | None = None
+    url: str = ""
+
+
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One row of a board: scores by their ten names, None where an interval has no value."""
 
     method: str
     scores: dict[str, float | None]
+    method_id: str | None = None
     rank: int | None = None
     team: str | None = None
     date: str | None = None
     kind: str = "submission"
+    withdrawn_at: str | None = None
 
 
 class Board(msgspec.Struct, frozen=True, kw_only=True):
@@ -69,6 +84,58 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     document: JSON
     edition: Any = None
     updated_at: str | None = None
+
+
+class Difference(msgspec.Struct, frozen=True, kw_only=True):
+    """First minus second in one column: below 0 the first is better.
+
+    `low` and `high` are its 95 % interval, `p` that of the two-sided test; None for too few recordings.
+    """
+
+    difference: float
+    low: float | None = None
+    high: float | None = None
+    p: float | None = None
+
+
+class Pair(msgspec.Struct, frozen=True, kw_only=True):
+    """Two methods and their differences by score name; None until a worker has computed them."""
+
+    differences: dict[str, Difference | None] | None = None
+    sentence: str = ""
+
+
+class Compared(msgspec.Struct, frozen=True, kw_only=True):
+    """Methods of a board side by side; `document` is the server's answer unabridged.
+
+    `reason` says why there are no intervals where there are none.
+    """
+
+    document: JSON
+    split: str = ""
+    edition: Any = None
+    entries: list[BoardEntry] = []
+    pairs: list[Pair] = []
+    is_complete: bool = True
+    reason: str = ""
+
+    def differences(self) -> dict[str, Difference]:
+        """Those of the first pair that there are, by score name."""
+        found = (self.pairs[0].differences or {}) if self.pairs else {}
+        return {name: difference for name, difference in found.items() if difference is not None}
+
+
+class Quota(msgspec.Struct, frozen=True, kw_only=True):
+    """What one's own team has left on a split; None is without limit. `document` is the server's answer."""
+
+    split: str
+    document: JSON
+    limit: int | None = None
+    used: int = 0
+    left: int | None = None
+    next_slot_at: str | None = None
+    is_open: bool = True
+    sentence: str = ""
 
 
 class ClientError(Exception):
@@ -140,3 +207,12 @@ class TimedOut(ClientError):
         self.submission_id = submission_id
         self.timeout_s = timeout_s
         self.submission = submission
+
+
+class NotReady(ClientError):
+    """What workers compute was not there within the time allowed; asked again later it may be."""
+
+    def __init__(self, *, what: str, timeout_s: float) -> None:
+        super().__init__(f"{what} is not ready after {timeout_s:g} s")
+        self.what = what
+        self.timeout_s = timeout_s

@@ -35,12 +35,24 @@ class SequenceErrors:
     rte: Floats
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class BagSums:
+    """Sums of both errors per recording ("bag"), and how many sequences each sum has.
+
+    Both are float64 (G, 10): the recordings as in `Manifest.recordings`, the columns as in `SCORE_NAMES`. For
+    a hidden split they never leave the worker.
+    """
+
+    sums: Floats
+    counts: Floats
+
+
 @dataclass(frozen=True, slots=True)
 class Report:
     """What the predictions scored: means per interval, counts, and what was truncated at which boundary.
 
     `scores` runs overall, crucial, small, large, negative; `n_out_of_range` counts the sequences that lie in
-    no interval. `sequences` is kept only on request and is no part of the JSON.
+    no interval. `sequences` and `bags` are kept only on request and are no part of the JSON.
     """
 
     protocol: str
@@ -51,6 +63,7 @@ class Report:
     truncated: Mapping[str, int]
     scores: Mapping[str, IntervalScore]
     sequences: SequenceErrors | None = None
+    bags: BagSums | None = None
 
     def as_dict(self) -> dict[str, object]:
         """The report as plain data, in the shape of `tsttc score --json`."""

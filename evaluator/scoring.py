@@ -20,16 +20,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NoReturn
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evaluator.alignment import ZERO_MESSAGE
 from evaluator.metrics import depth_error, relative_ttc_error
 from evaluator.predictions import Predictions
 from evaluator.problems import Findings
-from evaluator.protocol import DEFAULT_PROTOCOL, INTERVAL_NAMES, Protocol, get_protocol
-from evaluator.report import IntervalScore, Report, SequenceErrors
+from evaluator.protocol import DEFAULT_PROTOCOL, INTERVAL_NAMES, METRICS, Protocol, get_protocol
+from evaluator.report import BagSums, IntervalScore, Report, SequenceErrors
 from evaluator.scale import Floats, scale_ratio_10hz
 from evaluator.truth import GroundTruth
 
@@ -40,14 +42,16 @@ def evaluate(
     *,
     protocol: str | Protocol = DEFAULT_PROTOCOL,
     keep_sequences: bool = False,
+    keep_bags: bool = False,
 ) -> Report:
     """Score `predictions` against `truth`.
 
     Raises `Rejected` for values that the protocol forbids, `ValueError` for an unknown protocol and for
     predictions that were aligned with another manifest. With `keep_sequences` the report carries both errors
-    of every sequence.
+    of every sequence, with `keep_bags` their sums per recording.
     """
-    return evaluate_many([predictions], truth, protocol=protocol, keep_sequences=keep_sequences)[0]
+    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
+    return Scorer(truth, rules).report(predictions, keep_sequences=keep_sequences, keep_bags=keep_bags)
 
 
 def evaluate_many(
@@ -91,7 +95,31 @@ class Scorer:
             for i in protocol.intervals
         }
 
-    def report(self, predictions: Predictions, *, keep_sequences: bool = False) -> Report:
+    @cached_property
+    def _recordings(self) -> NDArray[np.int64]:
+        """The recording of every sequence, in ascending τ."""
+        return self._truth.manifest.recording_index[self._truth.ascending_rows]
+
+    @cached_property
+    def bag_counts(self) -> Floats:
+        """Sequences per recording in every column: the counts of all `BagSums` of this truth."""
+        n_bags = self._truth.manifest.n_recordings
+        parts = [self._recordings[part] for part in self._slices.values()] * len(METRICS)
+        counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)
+        return counts.astype(np.float64)
+
+    def _bag_sums(self, errors: _Errors) -> BagSums:
+        n_bags = self._truth.manifest.n_recordings
+        columns = [
+            np.bincount(self._recordings[part], weights=values[part], minlength=n_bags)
+            for values in (errors.mid, errors.rte)
+            for part in self._slices.values()
+        ]
+        return BagSums(sums=np.stack(columns, axis=1), counts=self.bag_counts)
+
+    def report(
+        self, predictions: Predictions, *, keep_sequences: bool = False, keep_bags: bool = False
+    ) -> Report:
         """The report on one set of predictions; raises as `evaluate` does."""
         predictions = _in_order_of(self._truth, predictions)
         errors = self._errors(predictions)
@@ -104,6 +132,7 @@ class Scorer:
             truncated=dict(zip(self._protocol.boundaries, errors.n_truncated, strict=True)),
             scores={name: self._score(errors, self._slices[name]) for name in INTERVAL_NAMES},
             sequences=self._in_file_order(errors) if keep_sequences else None,
+            bags=self._bag_sums(errors) if keep_bags else None,
         )
 
     def _score(self, errors: _Errors, part: slice) -> IntervalScore:

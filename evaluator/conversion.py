@@ -1,0 +1,136 @@
+"""A prediction file in another unit or at another rate: the same times to contact, said otherwise."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+
+import numpy as np
+
+from evaluator.documents import Document, Members, Unit, kind_of, parse, read_document
+from evaluator.problems import Findings, listed, pointer, quoted
+from evaluator.scale import (
+    FRAME_RATE_HZ,
+    N_FRAMES,
+    Floats,
+    fps_of_gap,
+    scale_ratio_to_ttc,
+    ttc_to_scale_ratio,
+)
+from evaluator.writing import write_predictions
+
+
+def convert(
+    data: bytes,
+    *,
+    to: Unit = "ttc",
+    fps_hz: float | None = None,
+    frame_gap: int | None = None,
+    to_fps_hz: float | None = None,
+    to_frame_gap: int | None = None,
+) -> bytes:
+    """A prediction file with the same predictions in the unit `to`.
+
+    A file in the toolkit's flat form has times to contact, or scale ratios at the rate that `fps_hz` or
+    `frame_gap` says; an envelope says itself what it has. Scale ratios are written at `to_fps_hz` or
+    `to_frame_gap`, by themselves at 2 Hz (gap 5), the dataset's own. Keys stay as they are; whether they are
+    those of a split, `read_predictions` knows.
+
+    Raises `Rejected` for what no prediction file may hold, `ValueError` for rates that do not fit together.
+    """
+    document = read_document(parse(data))
+    _require_one_rate(document, fps_hz, frame_gap)
+    findings = Findings()
+    names = _names(document, findings)
+    values = _numbers(document.predictions, findings, document.pointer)
+    is_ratio = document.unit == "scale_ratio" or fps_hz is not None or frame_gap is not None
+    rates: Floats | None = None
+    if document.unit == "scale_ratio":
+        rates = _rates(document, names, findings)
+    elif is_ratio:
+        rates = np.asarray(fps_hz if fps_hz is not None else fps_of_gap(_gap(frame_gap)))
+    if is_ratio:
+        for row in np.flatnonzero(values <= 0).tolist():
+            message = f"The value is {values[row]!s}; expected a scale ratio greater than 0."
+            findings.add("not-positive", message, document.pointer(names[row]))
+    findings.raise_if_any()
+    ttc_s = values if rates is None else scale_ratio_to_ttc(values, fps_hz=rates)
+    meta = document.meta
+    if to == "ttc":
+        return write_predictions(keys=names, ttc_s=ttc_s, meta=meta)
+    if to_fps_hz is None and to_frame_gap is None:
+        to_frame_gap = N_FRAMES - 1
+    new_hz = to_fps_hz if to_fps_hz is not None else FRAME_RATE_HZ / _gap(to_frame_gap)
+    ratios = ttc_to_scale_ratio(ttc_s, fps_hz=new_hz)
+    return write_predictions(
+        keys=names, scale_ratio=ratios, fps_hz=to_fps_hz, frame_gap=to_frame_gap, meta=meta
+    )
+
+
+def _require_one_rate(document: Document, fps_hz: float | None, frame_gap: int | None) -> None:
+    if fps_hz is not None and frame_gap is not None:
+        raise ValueError("Give either fps_hz or frame_gap.")
+    if document.enveloped and (fps_hz is not None or frame_gap is not None):
+        raise ValueError(
+            "The file says itself what its unit and rate are; give neither fps_hz nor frame_gap."
+        )
+
+
+def _gap(frame_gap: int | None) -> int:
+    if frame_gap is None or frame_gap not in range(1, N_FRAMES):
+        raise ValueError(f"The frame gap is {frame_gap}; expected 1 to {N_FRAMES - 1}.")
+    return frame_gap
+
+
+def _names(document: Document, findings: Findings) -> list[str]:
+    names = [name for name, _ in document.predictions]
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        shown = listed([quoted(name) for name in repeated])
+        message = f"{len(repeated):,} keys appear more than once: {shown}; expected every key once."
+        findings.group("duplicate-keys", message, document.pointer(repeated[0]), n_faults=len(repeated))
+    return names
+
+
+def _numbers(members: Members, findings: Findings, place: object) -> Floats:
+    """The values of an object, NaN where one is no number; faults are noted."""
+    values = np.full(len(members), math.nan)
+    for row, (name, value) in enumerate(members):
+        where = place(name) if callable(place) else ""
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            findings.add("not-a-number", f"The value is {kind_of(value)}; expected a number.", where)
+        elif math.isnan(value):
+            findings.add("nan", "The value is NaN; expected a number.", where)
+        else:
+            values[row] = value
+    return values
+
+
+def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
+    """The pair rates in Hz, (n,) or (); faults are noted."""
+    name, rate = str(document.rate_name), document.rate
+    if not isinstance(rate, Members):
+        rates = _numbers(Members([(name, rate)]), findings, lambda key: f"/{key}")
+        return np.asarray(_checked_rates(rates, [name], name, findings)[0])
+    by_key = dict(rate)
+    missing = [key for key in names if key not in by_key]
+    if missing:
+        message = (
+            f"{len(missing):,} keys have no {name}: {listed(missing)}; expected one for each prediction."
+        )
+        findings.group("missing-keys", message, pointer(name, missing[0]), n_faults=len(missing))
+    chosen = Members((key, by_key.get(key, 1)) for key in names)
+    rates = _numbers(chosen, findings, lambda key: pointer(name, key))
+    return _checked_rates(rates, names, name, findings)
+
+
+def _checked_rates(rates: Floats, names: list[str], name: str, findings: Findings) -> Floats:
+    is_gap = name == "frame_gap"
+    is_good = np.isin(rates, range(1, N_FRAMES)) if is_gap else np.isfinite(rates) & (rates > 0)
+    expected = (
+        f"a whole number of frames from 1 to {N_FRAMES - 1}" if is_gap else "a finite rate greater than 0"
+    )
+    for row in np.flatnonzero(~is_good & ~np.isnan(rates)).tolist():
+        where = f"/{name}" if names[row] == name else pointer(name, names[row])
+        findings.add("bad-rate", f"{name} is {rates[row]:g}; expected {expected}.", where)
+    return fps_of_gap(np.where(is_good, rates, 1)) if is_gap else rates

@@ -1,0 +1,136 @@
+"""Texts of strangers inside LaTeX, BibTeX and Markdown: shown as they are, without power over what is around.
+
+LaTeX comes out as ASCII that every engine takes, with no package but booktabs.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from typing import Final
+
+_COMMANDS: Final = {
+    "\\": r"\textbackslash{}",
+    "{": r"\textbraceleft{}",  # named: BibTeX counts braces, also those behind a backslash
+    "}": r"\textbraceright{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    **{character: f"\\{character}" for character in "&%$#_"},
+    # What the first fonts of TeX have something else in the place of, and what would join with its neighbour.
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+    "|": r"\textbar{}",
+    '"': r"\textquotedblright{}",
+    "`": r"\textquoteleft{}",
+    "–": r"\textendash{}",
+    "—": r"\textemdash{}",
+    "‘": r"\textquoteleft{}",
+    "’": r"\textquoteright{}",
+    "“": r"\textquotedblleft{}",
+    "”": r"\textquotedblright{}",
+    "…": r"\ldots{}",
+    "ß": r"\ss{}",
+    "æ": r"\ae{}",
+    "Æ": r"\AE{}",
+    "œ": r"\oe{}",
+    "Œ": r"\OE{}",
+    "ø": r"\o{}",
+    "Ø": r"\O{}",
+    "ł": r"\l{}",
+    "Ł": r"\L{}",
+    "ı": r"\i{}",
+    "©": r"\copyright{}",
+    "·": r"$\cdot$",
+    "×": r"$\times$",
+    "±": r"$\pm$",
+    "−": "$-$",
+    "→": r"$\to$",
+    "↓": r"$\downarrow$",
+    "↑": r"$\uparrow$",
+    "≤": r"$\leq$",
+    "≥": r"$\geq$",
+    "°": r"$^{\circ}$",
+    "²": "$^{2}$",
+    "³": "$^{3}$",
+    "∞": r"$\infty$",
+    "†": r"\dag{}",
+    "‡": r"\ddag{}",
+    "§": r"\S{}",
+}
+_ACCENTS: Final = {
+    "\u0300": "`",
+    "\u0301": "'",
+    "\u0302": "^",
+    "\u0303": "~",
+    "\u0304": "=",
+    "\u0306": "u",
+    "\u0307": ".",
+    "\u0308": '"',
+    "\u030a": "r",
+    "\u030b": "H",
+    "\u030c": "v",
+    "\u0327": "c",
+}
+_CAPITALS: Final = "ΓΔΘΛΞΠΣΦΨΩ"  # the others look like Latin letters, and have no command
+_GREEK: Final = {
+    letter: rf"$\{name.title() if letter in _CAPITALS else name}$"
+    for letter in f"αβγδεζηθικλμνξπρστυφχψω{_CAPITALS}"
+    for name in [unicodedata.name(letter).split()[-1].lower().replace("lamda", "lambda")]
+}
+_MARKDOWN: Final = re.compile(r"([\\`*_{}\[\]()#+!|~$^=-])")
+
+
+def one_line(text: str) -> str:
+    """A text on one line, without characters that cannot be seen or that turn others round.
+
+    >>> one_line("Deep\\n Scale\\u202e")
+    'Deep Scale'
+    """
+    seen = "".join(c if c.isprintable() else " " for c in text if unicodedata.category(c) != "Cf")
+    return " ".join(seen.split())
+
+
+def latex(text: str) -> str:
+    r"""A text as LaTeX prints it. What its first fonts lack comes as its code point.
+
+    >>> print(latex("50 % of x_1 & Müller–Łoś β 中"))
+    50 \% of x\_1 \& M\"{u}ller\textendash{}\L{}o\'{s} $\beta$ [U+4E2D]
+    """
+    printed = "".join(map(_latex_character, unicodedata.normalize("NFC", one_line(text))))
+    # Two of these would be printed as one longer mark.
+    return re.sub(r"-(?=-)|'(?=')", r"\g<0>{}", printed)
+
+
+def _latex_character(character: str) -> str:
+    known = _COMMANDS.get(character) or _GREEK.get(character)
+    if known is not None:
+        return known
+    if character.isascii():
+        return character
+    base, *marks = list(unicodedata.normalize("NFKD", character))
+    if base.isascii() and base.isalnum() and all(mark in _ACCENTS for mark in marks):
+        for mark in marks:
+            base = f"\\{_ACCENTS[mark]}{{{base}}}"
+        return base
+    return f"[U+{ord(character):04X}]"
+
+
+def latex_comment(text: str) -> str:
+    """A line that LaTeX does not read.
+
+    >>> latex_comment("edition 2\\n\\\\input{x}")
+    '% edition 2 \\\\input{x}'
+    """
+    return f"% {one_line(text)}".rstrip()
+
+
+def markdown(text: str) -> str:
+    r"""A text as Markdown prints it, also in a table: no emphasis, no markup, no address turned into a link.
+
+    >>> print(markdown("a|b *c* <i> www.example.org"))
+    a\|b \*c\* &lt;i&gt; www&#46;example.org
+    """
+    plain = one_line(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    plain = _MARKDOWN.sub(r"\\\1", plain)
+    plain = re.sub(r"(?i)\b(www)\.", r"\1&#46;", plain)
+    return plain.replace("://", "&#58;//").replace("@", "&#64;")

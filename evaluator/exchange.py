@@ -1,0 +1,114 @@
+"""One exchange with a server: what its answer means, and when it makes sense to try again."""
+
+from __future__ import annotations
+
+import email.utils
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+import httpx
+import msgspec
+
+from evaluator.answers import Redirected, Refused, Unreachable
+from evaluator.problems import Problem
+
+PASSING_STATUSES = frozenset({429, 502, 503, 504})  # the same request may succeed a little later
+QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide, however soon it is
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Patience:
+    """How often and how long to try again: delays grow by `factor`, each shortened by up to `jitter`.
+
+    As it stands it bears with a server that is away for a quarter of a minute, as for a restart.
+    """
+
+    n_tries: int = 9
+    first_delay_s: float = 0.25
+    longest_delay_s: float = 10.0
+    longest_retry_after_s: float = 60.0  # who asks for more than this gets their answer reported instead
+    factor: float = 1.6
+    jitter: float = 0.2
+
+    def delay_s(self, *, n_failed: int, retry_after_s: float | None, rng: random.Random) -> float:
+        """Seconds to wait after `n_failed` tries (from 1); never less than the server asked for."""
+        grown = min(self.longest_delay_s, self.first_delay_s * self.factor ** (n_failed - 1))
+        return max(grown * (1 - self.jitter * rng.random()), retry_after_s or 0.0)
+
+    def may_pass(self, fault: Refused) -> bool:
+        """Whether the same request may be answered otherwise within a bearable time."""
+        if fault.code == QUOTA_EXCEEDED:
+            return False
+        if fault.status in {409, 429} and fault.retry_after_s is None:
+            return False
+        is_passing = fault.status in PASSING_STATUSES or fault.status == httpx.codes.CONFLICT
+        return is_passing and (fault.retry_after_s or 0.0) <= self.longest_retry_after_s
+
+
+def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
+    """The response, if it is one of success; raises Unreachable, Redirected or Refused."""
+    try:
+        response = send()
+    except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
+        raise Unreachable(url=url, reason=str(error), was_connected=False) from error
+    except (httpx.ConnectError, httpx.ConnectTimeout, httpx.ProxyError) as error:
+        raise Unreachable(url=url, reason=_reason(error), was_connected=False) from error
+    except (httpx.TransportError, httpx.DecodingError) as error:
+        raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
+    if response.is_success:
+        return response
+    if response.is_redirect:
+        raise Redirected(url=url, location=response.headers["location"])
+    raise _refused(response)
+
+
+def retry_after_s(headers: Mapping[str, str]) -> float | None:
+    """Seconds from a Retry-After header (a number, or an HTTP date), None where it is absent or senseless."""
+    value = headers.get("retry-after", "").strip()
+    if value.isascii() and value.isdigit():
+        return float(value)
+    try:
+        until = email.utils.parsedate_to_datetime(value)
+    except ValueError:
+        return None
+    if until.tzinfo is None:
+        return None
+    # The one place that reads the calendar: the header names a time of day instead of a duration.
+    seconds = (until - datetime.now(UTC)).total_seconds()
+    return max(0.0, seconds)
+
+
+def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
+    if isinstance(error, httpx.TimeoutException):
+        return "it took too long"
+    return str(error).strip() or type(error).__name__
+
+
+def _refused(response: httpx.Response) -> Refused:
+    """An error answer read leniently: whatever stands between client and server may have written it."""
+    try:
+        document = msgspec.json.decode(response.content)
+    except msgspec.DecodeError:
+        document = None
+    if not isinstance(document, dict):
+        document = {}
+    try:
+        problems = msgspec.convert(document.get("problems", ()), tuple[Problem, ...])
+    except msgspec.ValidationError:
+        problems = ()
+    return Refused(
+        url=str(response.url),
+        status=response.status_code,
+        title=_text(document.get("title")) or response.reason_phrase,
+        detail=_text(document.get("detail")),
+        code=_text(document.get("code")),
+        problems=problems,
+        retry_after_s=retry_after_s(response.headers),
+        document=document or None,
+    )
+
+
+def _text(value: object) -> str:
+    return value if isinstance(value, str) else ""

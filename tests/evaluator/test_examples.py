@@ -1,0 +1,86 @@
+"""The programs of examples/ run as they stand, and the page about CI shows parts of them."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from evaluator import INTERVALS, evaluate, read_predictions, read_truth
+from evaluator.cli import main
+from evaluator.cli.exits import Exit
+from tests.evaluator.worlds import REPOSITORY
+
+EXAMPLES = REPOSITORY / "examples"
+PROGRAMS = sorted(EXAMPLES.glob("*.py"))
+PAGE = (REPOSITORY / "docs" / "ci.md").read_text(encoding="utf-8")
+
+
+def printed(program: Path, folder: Path) -> list[str]:
+    """What a program prints, run elsewhere than in its folder; warnings are errors."""
+    return subprocess.run(
+        [sys.executable, "-W", "error", program],
+        capture_output=True,
+        text=True,
+        check=True,
+        cwd=folder,
+        env={"PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8"},
+    ).stdout.splitlines()
+
+
+def test_arrays_come_straight_to_a_report(tmp_path: Path) -> None:
+    lines = printed(EXAMPLES / "from_arrays.py", tmp_path)
+    assert re.fullmatch(r"MiD \d+\.\d\d, crucial \d+\.\d\d", lines[0])
+    assert lines[1].endswith("of 60 sequences")
+
+
+def test_a_frame_comes_straight_to_a_report(tmp_path: Path) -> None:
+    values = dict(line.split() for line in printed(EXAMPLES / "from_frame.py", tmp_path))
+    assert len(values) == 2 * (1 + len(INTERVALS))
+    assert values["rte_crucial"] == "5.00", "five percent too long, where nothing is truncated"
+
+
+def test_ratios_at_every_gap_score_the_same(tmp_path: Path) -> None:
+    lines = printed(EXAMPLES / "from_scale_ratios.py", tmp_path)
+    assert len(lines) == 5
+    assert len({line.partition(": ")[2] for line in lines}) == 1
+
+
+def test_toolkit_s_result_file_is_taken_as_it_is(tmp_path: Path) -> None:
+    truth = read_truth(EXAMPLES / "truth.csv")
+    predictions = read_predictions((EXAMPLES / "predictions.json").read_bytes(), manifest=truth.manifest)
+    expected = [
+        f"{name}: MiD {report.scores['overall'].mid:.2f}, RTE {report.scores['overall'].rte:.2f} %"
+        for name in ("toolkit", "tsttc-1")
+        for report in [evaluate(predictions, truth, protocol=name)]
+    ]
+    assert printed(EXAMPLES / "toolkit_results.py", tmp_path) == expected
+
+
+def test_better_model_is_better_by_more_than_chance(tmp_path: Path) -> None:
+    lines = printed(EXAMPLES / "intervals.py", tmp_path)
+    assert re.fullmatch(r"MiD of the new one: \d+\.\d \[\d+\.\d, \d+\.\d\]", lines[0])
+    assert lines[1].startswith("new − old: -")
+    assert float(lines[1].rpartition("p = ")[2]) < 0.05
+
+
+def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None:
+    for text in (PAGE, (EXAMPLES / "README.md").read_text(encoding="utf-8")):
+        assert [path.name for path in PROGRAMS if f"`{path.name}`" not in text] == []
+
+
+@pytest.mark.parametrize("snippet", re.findall(r"```python\n(.*?)```", PAGE, re.DOTALL))
+def test_snippet_of_the_page_is_part_of_a_program_that_runs(snippet: str) -> None:
+    assert any(snippet in program.read_text(encoding="utf-8") for program in PROGRAMS)
+
+
+def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:
+    shown = re.findall(r"`tsttc ([a-z]+)|^tsttc ([a-z]+)", PAGE, re.MULTILINE)
+    assert {first or second for first, second in shown} <= set(main.commands)
+    known = {flag for command in main.commands.values() for option in command.params for flag in option.opts}
+    assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", PAGE)) - {"--fail-with-body"} <= known
+    codes = {int(code) for code in re.findall(r"[Cc]ode (\d)", PAGE)}
+    assert codes <= {code.value for code in Exit}
