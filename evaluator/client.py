@@ -1,4 +1,4 @@
-"""The leaderboard's API from a laptop or a CI job: the only module that speaks HTTP.
+"""The leaderboard's API from a laptop or a CI job: the only module that speaks HTTP for the command line.
 
     with Client(url="https://example.org", token=token) as client:
         submission = client.submit(file, filename="predictions.json", split="val", method="Foo++")
@@ -6,17 +6,19 @@
             print(submission.state)
 
 Every failure is an `answers.ClientError` that states facts (address, status, code, problems); the command
-line words them. Sending is safe to repeat: bytes that the server holds get their first submission as answer.
+line words them. Sending is safe to repeat: a key that is made once per call tells the server that a request
+is the same one again, and bytes that it holds get their first submission as answer.
 """
 
 from __future__ import annotations
 
-import email.utils
+import hashlib
+import json
 import random
 import time
-from collections.abc import Callable, Iterator, Mapping
+import uuid
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from typing import BinaryIO, Self, TypeVar
 from urllib.parse import quote, urlsplit
 
@@ -24,39 +26,41 @@ import httpx
 import msgspec
 
 from evaluator.answers import (
+    JSON,
     BadAnswer,
     Board,
-    Redirected,
+    Compared,
+    Method,
+    NotReady,
+    Quota,
     Refused,
     Submission,
     TimedOut,
     Unreachable,
 )
-from evaluator.problems import Problem
+from evaluator.exchange import PASSING_STATUSES, Patience, checked, retry_after_s
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "::1", "localhost"})
-PASSING_STATUSES = frozenset({429, 502, 503, 504})  # the same request may succeed a little later
+LONGEST_WAIT_S = (
+    20  # for one answer to "is it final?"; what stands in between cuts silence after 30 s or more
+)
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Patience:
-    """How often and how long to try again: delays grow by `factor`, each shortened by up to `jitter`."""
+class _Counted:
+    """A file that tells how many of its bytes have been read, as often as they are sent."""
 
-    n_tries: int = 4
-    first_delay_s: float = 0.25
-    longest_delay_s: float = 10.0
-    longest_retry_after_s: float = (
-        30.0  # a server that asks for more than this gets its answer reported instead
-    )
-    factor: float = 1.6
-    jitter: float = 0.2
+    def __init__(self, file: BinaryIO, on_progress: Callable[[int], None]) -> None:
+        self._file = file
+        self._on_progress = on_progress
+        self.seek = file.seek
+        self.tell = file.tell
 
-    def delay_s(self, *, n_failed: int, retry_after_s: float | None, rng: random.Random) -> float:
-        """Seconds to wait after `n_failed` tries (from 1); never less than the server asked for."""
-        grown = min(self.longest_delay_s, self.first_delay_s * self.factor ** (n_failed - 1))
-        return max(grown * (1 - self.jitter * rng.random()), retry_after_s or 0.0)
+    def read(self, size: int = -1, /) -> bytes:
+        data = self._file.read(size)
+        self._on_progress(self._file.tell())
+        return data
 
 
 @dataclass(kw_only=True)
@@ -69,7 +73,7 @@ class Client:
     url: str
     token: str | None = field(default=None, repr=False)
     timeout_s: float = 30.0
-    patience: Patience = Patience()
+    patience: Patience = field(default_factory=Patience)
     user_agent: str = "tsttc"
     sleep: Callable[[float], None] = time.sleep
     monotonic_s: Callable[[], float] = time.monotonic
@@ -86,6 +90,7 @@ class Client:
             # A proxy from the environment never leads to this very machine.
             trust_env=urlsplit(self.url).hostname not in LOOPBACK_HOSTS,
         )
+        self._was_answered = False
 
     def __enter__(self) -> Self:
         return self
@@ -101,24 +106,34 @@ class Client:
         split: str,
         method: str,
         details: Mapping[str, str] | None = None,
+        idempotency_key: str | None = None,
+        on_progress: Callable[[int], None] | None = None,
     ) -> Submission:
         """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
 
-        `file` must be seekable; it is streamed, never read whole. `details` are the form's optional fields
-        (description, paper_url, code_url, note, commit). Raises ClientError.
+        `file` must be seekable; it is streamed, never read whole, and `on_progress` is told how many of its
+        bytes are sent. `details` are the form's optional fields (description, paper_url, code_url, note,
+        commit). Requests under one `idempotency_key` are one request, however often they are made; without
+        one each call has its own. Raises ClientError.
         """
         fields = {"split": split, "method": method, **(details or {})}
+        key = idempotency_key or fresh_key(file, fields)
+        body = _Counted(file, on_progress) if on_progress else file
 
         def send() -> httpx.Response:
             file.seek(0)
             return self._http.post(
                 self._address("submissions"),
                 data=fields,
-                files={"file": (filename, file, "application/json")},
+                files={"file": (filename, body, "application/json")},  # type: ignore[dict-item]  # reads, seeks and tells, which is all that is done with it
+                headers={"Idempotency-Key": json.dumps(key)},
             )
 
         response = self._insist(send)
-        return self._read(response, Submission, is_new=response.status_code == httpx.codes.CREATED)
+        # A request of this very call may have made it, of which only the answer was lost.
+        is_ours = idempotency_key is None and "Idempotent-Replayed" in response.headers
+        is_new = is_ours or response.status_code == httpx.codes.CREATED
+        return self._read(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
         """The present state of a submission. Raises ClientError."""
@@ -131,19 +146,86 @@ class Client:
     def manifest(self, split: str) -> bytes:
         """The split's manifest, CSV: the ground truth's columns but the values. Raises ClientError."""
         address = self._address("splits", split, "manifest")
-        return self._insist(lambda: self._http.get(address, headers={"Accept": "text/csv, */*"})).content
+        return self._insist(lambda: self._get_as_anybody(address, accept="text/csv, */*")).content
+
+    def manifest_digest(self, split: str) -> str | None:
+        """The digest of that manifest; None for a split that has none yet. Raises ClientError."""
+        address = self._address("splits", split, "editions")
+        response = self._insist(lambda: self._get_as_anybody(address, accept="application/json"))
+        for edition in _rows(response, JSON):
+            if edition.get("is_board"):
+                digest = edition.get("manifest")
+                return digest if isinstance(digest, str) else None
+        return None
+
+    def quota(self) -> list[Quota]:
+        """What one's own team has left, split by split. Raises ClientError."""
+        address = self._address("quota")
+        return _rows(self._insist(lambda: self._http.get(address)), Quota)
+
+    def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
+        """Methods of a split's board, by id, side by side. Raises ClientError.
+
+        Workers compare what nobody has compared before; it is asked for until they have, at most `timeout_s`.
+        """
+        until_s = self.monotonic_s() + timeout_s
+        params = {"split": split, "m": list(methods)}
+        address, n_asked = self._address("compare"), 0
+        while True:
+            response = self._insist(lambda: self._http.get(address, params=params))
+            found = self._read(response, Compared)
+            if found.is_complete:
+                return found
+            n_asked += 1
+            asked_s = retry_after_s(response.headers)
+            delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=asked_s, rng=self.rng)
+            if self.monotonic_s() + delay_s >= until_s:
+                raise NotReady(what="The comparison", timeout_s=timeout_s)
+            self.sleep(delay_s)
+
+    def own_method(self, name_or_id: str) -> Method | None:
+        """The method of one's own team of that name or id. Raises ClientError."""
+        address = self._address("methods")
+        rows = _rows(self._insist(lambda: self._http.get(address)), Method)
+        return next((row for row in rows if name_or_id in {row.id, row.name}), None)
+
+    def method(self, method_id: str) -> Method:
+        """A method, as one may see it. Raises ClientError."""
+        return self._get(Method, "methods", method_id)
+
+    def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
+        """Show a method of one's own to everybody, "PUBLIC" or "ANONYMOUS"; there is no way back.
+
+        An anonymous one turns public by itself at `reveal_at` (ISO 8601), if that is given. Raises
+        ClientError.
+        """
+        address = self._address("methods", method_id, "visibility")
+        body = {"visibility": visibility, "confirm": True, "reveal_at": reveal_at}
+        return self._read(self._insist(lambda: self._http.post(address, json=body)), Method)
+
+    def receipt(self, submission_id: str) -> bytes:
+        """The signed receipt of a scored submission, JSON as it came. Raises ClientError."""
+        address = self._address("submissions", submission_id, "receipt")
+        return self._insist(lambda: self._http.get(address)).content
+
+    def receipt_keys(self) -> bytes:
+        """The keys that sign the site's receipts, or once did: a JSON Web Key Set. Raises ClientError."""
+        address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
+        return self._insist(lambda: self._http.get(address)).content
 
     def watch(self, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
         """Ask until the submission is final, giving every state seen, the final one last.
 
-        A server that is away or busy meanwhile is asked again, less and less often. Raises TimedOut after
-        `timeout_s` seconds; of the other errors only those that waiting cannot cure.
+        The server is asked to answer when there is something to tell; one that answers sooner, is away or
+        busy is asked again less and less often. Raises TimedOut after `timeout_s` seconds; of the other
+        errors only those that waiting cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
         last: Submission | None = None
         state, n_same = "", 0
         while True:
-            answer = self._look(submission_id)
+            asked_s = self.monotonic_s()
+            answer = self._look(submission_id, wait_s=until_s - asked_s if last else 0)
             if answer.submission is not None:
                 last = answer.submission
                 yield last
@@ -152,15 +234,18 @@ class Client:
             seen = last.state if last else ""
             state, n_same = seen, (n_same + 1 if seen == state else 1)  # a change of state: ask often again
             delay_s = self.patience.delay_s(n_failed=n_same, retry_after_s=answer.retry_after_s, rng=self.rng)
-            if self.monotonic_s() + delay_s > until_s:
+            delay_s = max(delay_s - (self.monotonic_s() - asked_s), answer.retry_after_s or 0.0)
+            if self.monotonic_s() + delay_s >= until_s:
                 raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
             self.sleep(delay_s)
 
-    def _look(self, submission_id: str) -> _Glance:
+    def _look(self, submission_id: str, *, wait_s: float) -> _Glance:
         """One question about a submission; a fault that passes by itself is no answer, not an error."""
         address = self._address("submissions", submission_id)
+        # The first answer comes at once, so that whoever waits sees the place in the queue.
+        wait = {"wait": str(int(min(wait_s, LONGEST_WAIT_S)))} if wait_s >= 1 else None
         try:
-            response = _checked(lambda: self._http.get(address), url=self.url)
+            response = self._checked(lambda: self._http.get(address, params=wait, timeout=self._longest_s))
         except Unreachable:
             return _Glance()
         except Refused as refused:
@@ -168,55 +253,66 @@ class Client:
                 raise
             return _Glance(retry_after_s=refused.retry_after_s)
         return _Glance(
-            submission=self._read(response, Submission), retry_after_s=_retry_after_s(response.headers)
+            submission=self._read(response, Submission), retry_after_s=retry_after_s(response.headers)
         )
+
+    @property
+    def _longest_s(self) -> float:
+        """For the answer to a question that the server may keep for a while."""
+        return self.timeout_s + LONGEST_WAIT_S
 
     def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
         address = self._address(*path)
         return self._read(self._insist(lambda: self._http.get(address, params=params)), kind)
 
+    def _get_as_anybody(self, address: str, *, accept: str) -> httpx.Response:
+        """What everybody may read is read without the token, which may not be good for reading."""
+        request = self._http.build_request("GET", address, headers={"Accept": accept})
+        request.headers.pop("Authorization", None)
+        return self._http.send(request)
+
     def _address(self, *path: str) -> str:
         return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
+
+    def _checked(self, send: Callable[[], httpx.Response]) -> httpx.Response:
+        """As `checked`; remembers that the server is one that answers."""
+        try:
+            response = checked(send, url=self.url)
+        except Unreachable as fault:
+            self._was_answered = self._was_answered or fault.was_connected
+            raise
+        except Refused:
+            self._was_answered = True
+            raise
+        self._was_answered = True
+        return response
 
     def _insist(self, send: Callable[[], httpx.Response]) -> httpx.Response:
         """Send until answered, at most `patience.n_tries` times, as long as trying again makes sense."""
         n_failed = 0
         while True:
             try:
-                return _checked(send, url=self.url)
+                return self._checked(send)
             except (Unreachable, Refused) as fault:
                 n_failed += 1
                 if n_failed >= self.patience.n_tries or not self._may_pass(fault):
                     raise
-                retry_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
-            self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=retry_after_s, rng=self.rng))
+                delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
+            self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng))
 
     def _may_pass(self, fault: Unreachable | Refused) -> bool:
         if isinstance(fault, Unreachable):
-            return (
-                fault.was_connected
-            )  # an address where nothing listens is a mistake more often than a pause
-        if fault.status == httpx.codes.TOO_MANY_REQUESTS and fault.retry_after_s is None:
-            return False
-        return (
-            fault.status in PASSING_STATUSES
-            and (fault.retry_after_s or 0.0) <= self.patience.longest_retry_after_s
-        )
+            # An address where nothing ever answered is a mistake more often than a pause.
+            return self._was_answered
+        return self.patience.may_pass(fault)
 
     def _read(self, response: httpx.Response, kind: type[T], **more: object) -> T:
         """The JSON answer as `kind`, with the whole of it as its `document`."""
         url = str(response.url)
-        try:
-            document = msgspec.json.decode(response.content)
-        except msgspec.DecodeError:
-            found = response.headers.get("content-type", "no content type")
-            raise BadAnswer(url=url, found=f"not JSON ({found})") from None
+        document = _decoded(response)
         if not isinstance(document, dict):
             raise BadAnswer(url=url, found="JSON, but no object")
-        try:
-            return msgspec.convert({**document, "document": document, **more}, kind)
-        except msgspec.ValidationError as error:
-            raise BadAnswer(url=url, found=str(error)) from None
+        return _converted(document, kind, url=url, **more)
 
 
 @dataclass(frozen=True, slots=True)
@@ -225,68 +321,38 @@ class _Glance:
     retry_after_s: float | None = None
 
 
-def _checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """The response, if it is one of success; raises Unreachable, Redirected or Refused."""
+def fresh_key(file: BinaryIO, fields: Mapping[str, str]) -> str:
+    """A key for one call: of the file's bytes, the fields, and an id that no other call has."""
+    file.seek(0)
+    digest = hashlib.sha256()
+    while block := file.read(1 << 20):
+        digest.update(block)
+    what = json.dumps([digest.hexdigest(), sorted(fields.items()), uuid.uuid4().hex])
+    return hashlib.sha256(what.encode()).hexdigest()
+
+
+def _decoded(response: httpx.Response) -> object:
     try:
-        response = send()
-    except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
-        raise Unreachable(url=url, reason=str(error), was_connected=False) from error
-    except (httpx.ConnectError, httpx.ConnectTimeout, httpx.ProxyError) as error:
-        raise Unreachable(url=url, reason=_reason(error), was_connected=False) from error
-    except (httpx.TransportError, httpx.DecodingError) as error:
-        raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
-    if response.is_success:
-        return response
-    if response.is_redirect:
-        raise Redirected(url=url, location=response.headers["location"])
-    raise _refused(response)
-
-
-def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
-    if isinstance(error, httpx.TimeoutException):
-        return "it took too long"
-    return str(error).strip() or type(error).__name__
-
-
-def _refused(response: httpx.Response) -> Refused:
-    """An error answer read leniently: whatever stands between client and server may have written it."""
-    try:
-        document = msgspec.json.decode(response.content)
+        return msgspec.json.decode(response.content)
     except msgspec.DecodeError:
-        document = None
-    if not isinstance(document, dict):
-        document = {}
+        found = response.headers.get("content-type", "no content type")
+        raise BadAnswer(url=str(response.url), found=f"not JSON ({found})") from None
+
+
+def _rows(response: httpx.Response, kind: type[T]) -> list[T]:
+    """The JSON answer as a list of `kind`."""
+    url, found = str(response.url), _decoded(response)
+    if not isinstance(found, list):
+        raise BadAnswer(url=url, found="JSON, but no list")
+    return [_converted(row, kind, url=url) for row in found]
+
+
+def _converted(document: object, kind: type[T], *, url: str, **more: object) -> T:
+    """`document` as `kind`; a struct gets the whole of it as its member `document`."""
+    value = document
+    if isinstance(document, dict) and hasattr(kind, "__struct_fields__"):
+        value = {**document, "document": document, **more}
     try:
-        problems = msgspec.convert(document.get("problems", ()), tuple[Problem, ...])
-    except msgspec.ValidationError:
-        problems = ()
-    return Refused(
-        url=str(response.url),
-        status=response.status_code,
-        title=_text(document.get("title")) or response.reason_phrase,
-        detail=_text(document.get("detail")),
-        code=_text(document.get("code")),
-        problems=problems,
-        retry_after_s=_retry_after_s(response.headers),
-        document=document or None,
-    )
-
-
-def _text(value: object) -> str:
-    return value if isinstance(value, str) else ""
-
-
-def _retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Seconds from a Retry-After header (a number, or an HTTP date), None where it is absent or senseless."""
-    value = headers.get("retry-after", "").strip()
-    if value.isascii() and value.isdigit():
-        return float(value)
-    try:
-        until = email.utils.parsedate_to_datetime(value)
-    except ValueError:
-        return None
-    if until.tzinfo is None:
-        return None
-    # The one place that reads the calendar: the header names a time of day instead of a duration.
-    seconds = (until - datetime.now(UTC)).total_seconds()
-    return max(0.0, seconds)
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise BadAnswer(url=url, found=str(error)) from None

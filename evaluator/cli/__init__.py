@@ -1,6 +1,6 @@
 """The `tsttc` command: one small module per kind of subcommand, nothing heavy imported before it is needed.
 
-Exit codes: 0 good, 1 the file is at fault, 2 the command was called wrongly, 3 the server.
+The exit codes are in `exits`.
 """
 
 from __future__ import annotations
@@ -11,9 +11,15 @@ import sys
 
 import click
 
+from evaluator.cli.access import login, logout, publish, quota
+from evaluator.cli.comparisons import compare
+from evaluator.cli.completion import completion
 from evaluator.cli.connection import version
-from evaluator.cli.failures import INTERRUPTED, Failure
+from evaluator.cli.conversions import convert
+from evaluator.cli.exits import MEANINGS, Exit
+from evaluator.cli.failures import Failure
 from evaluator.cli.offline import check, manifest, score
+from evaluator.cli.receipts import receipt, verify
 from evaluator.cli.standings import board
 from evaluator.cli.submissions import status, submit
 
@@ -36,7 +42,7 @@ class _Group(click.Group):
             ctx.exit(failure.exit_code)
         except KeyboardInterrupt:
             click.echo("Interrupted.", err=True)
-            ctx.exit(INTERRUPTED)
+            ctx.exit(Exit.INTERRUPTED)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(self.commands)  # in the order in which they are used, not of the alphabet
@@ -48,10 +54,20 @@ def _show_version(context: click.Context, _parameter: click.Parameter, wanted: b
         context.exit()
 
 
+EPILOG = """\b
+Examples:
+  tsttc check predictions.json --manifest manifest.csv
+  tsttc submit predictions.json --split val --method "Foo++" --wait
+
+\b
+Exit codes:
+""" + "\n".join(f"  {code:>3}  {meaning}" for code, meaning in MEANINGS.items())
+
+
 @click.group(
     cls=_Group,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
-    epilog="Exit codes: 0 good, 1 the file is at fault, 2 wrong usage, 3 the server.",
+    epilog=EPILOG,
 )
 @click.option(
     "--version",
@@ -64,9 +80,15 @@ def _show_version(context: click.Context, _parameter: click.Parameter, wanted: b
 def main() -> None:
     """Check, score and submit time-to-contact predictions for the TSTTC benchmark.
 
-    check, score and manifest need files alone; submit, status and board speak to the leaderboard.
+    check, score, compare --truth, convert and manifest need files alone; the others speak to the leaderboard.
     """
 
 
-for _command in (check, score, manifest, submit, status, board):
+COMMANDS = (
+    *(check, score, convert, manifest),
+    *(login, logout, submit, status, publish, quota),
+    *(board, compare, receipt, verify),
+    completion,
+)
+for _command in COMMANDS:
     main.add_command(_command)

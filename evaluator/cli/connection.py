@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -10,40 +9,29 @@ from urllib.parse import urlsplit
 
 import click
 
-from evaluator.cli.failures import FILE_AT_FAULT, SERVER, USAGE, Failure
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure
 from evaluator.cli.options import TOKEN_VARIABLE
+from evaluator.cli.tokens import token_for
 
 if TYPE_CHECKING:
     from evaluator.answers import ClientError, Refused
     from evaluator.client import Client
 
 # A problem that names one of these is about the command's options; any other is about the file.
-OPTIONS = frozenset({"split", "method", "description", "paper_url", "code_url", "note", "commit", "sort"})
-
-
-def token() -> str:
-    """The token from the environment, never from the command line, where every process could read it."""
-    value = os.environ.get(TOKEN_VARIABLE, "").strip()
-    if not value:
-        raise Failure(
-            f"{TOKEN_VARIABLE} is not set, and this needs a token.",
-            exit_code=USAGE,
-            code="no-token",
-            hint=f"Make a token on your account page, then: export {TOKEN_VARIABLE}=…",
-        )
-    if not value.isascii() or not value.isprintable() or " " in value:
-        raise Failure(
-            f"{TOKEN_VARIABLE} is no token: it contains characters that no token has.",
-            exit_code=USAGE,
-            code="no-token",
-        )
-    return value
+OPTIONS = frozenset(
+    {"split", "method", "description", "paper_url", "code_url", "note", "commit", "sort", "m", "visibility"}
+)
+WORDS_OF_403 = frozenset({"token-scope", "token-split"})
 
 
 @contextmanager
-def connect(url: str, *, with_token: bool) -> Iterator[Client]:
-    """A client for the site at `url`; its errors leave as failures worded for a person."""
-    bearer = token() if with_token else None
+def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator[Client]:
+    """A client for the site at `url`, with `token` or the one that is kept for it.
+
+    Its errors leave as failures worded for a person.
+    """
+    bearer = token or (token_for(url) if with_token else None)
     from evaluator.answers import ClientError  # noqa: PLC0415 -- loads msgspec
     from evaluator.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
 
@@ -54,7 +42,7 @@ def connect(url: str, *, with_token: bool) -> Iterator[Client]:
         with Client(url=url, token=bearer, user_agent=f"tsttc/{version()}") as client:
             yield client
     except ClientError as error:
-        raise in_words(error) from error
+        raise in_words(error, url=url) from error
 
 
 def version() -> str:
@@ -67,15 +55,23 @@ def version() -> str:
         return "0"
 
 
-def in_words(error: ClientError) -> Failure:
+def in_words(error: ClientError, *, url: str) -> Failure:
     """What happened, whose fault it is and what to do next."""
-    from evaluator.answers import BadAnswer, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- msgspec
+    from evaluator.answers import (  # noqa: PLC0415 -- loads msgspec
+        BadAnswer,
+        NotReady,
+        Redirected,
+        Refused,
+        TimedOut,
+        Unreachable,
+    )
 
-    hint = "Check --url (or TSTTC_URL), your network, and whether the server is up."
+    hint = "Check --server (or TSTTC_URL), your network, and whether the server is up."
+    exit_code = Exit.NETWORK
     more: dict[str, Any] = {}
     match error:
         case Refused():
-            return _refused(error)
+            return _refused(error, url=url)
         case Unreachable(was_connected=False):
             code, words = "unreachable", f"Nothing answers at {error.url} ({error.reason})."
         case Unreachable():
@@ -87,67 +83,80 @@ def in_words(error: ClientError) -> Failure:
             code, words = "bad-answer", f"{error.url} gave no leaderboard's answer: {error.found}."
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
-            code, words = "timeout", f"{_sentence(str(error))}{last}"
+            exit_code, code, words = Exit.TIMEOUT, "timeout", f"{_sentence(str(error))}{last}"
             more = {"submission": error.submission.document if error.submission else None}
             hint = f"It goes on by itself; follow it with: tsttc status {error.submission_id} --watch"
+        case NotReady():
+            exit_code, code, words = Exit.TIMEOUT, "timeout", _sentence(str(error))
+            hint = "The workers are busy; ask again a little later."
         case _:
             code, words = "client", _sentence(str(error))
-    return Failure(words, exit_code=SERVER, code=code, hint=hint, more=more)
+    return Failure(words, exit_code=exit_code, code=code, hint=hint, more=more)
 
 
 def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:]}."
+    return f"{text[:1].upper()}{text[1:].removesuffix('.')}."
 
 
-def _refused(error: Refused) -> Failure:
-    said = (error.detail or error.title).rstrip(".")
-    words, hint = _words_for(error.status, said=said, retry_after_s=error.retry_after_s)
+def _refused(error: Refused, *, url: str) -> Failure:
+    """The server's own words where it gave any; else what its status means."""
+    words = _sentence(error.detail) if error.detail else _words_for(error)
     return Failure(
         words,
-        exit_code=_exit_code(error),
+        exit_code=exit_code_of(error),
         code=error.code or f"http-{error.status}",
         problems=[p for p in error.problems if p.message != error.detail],  # the words above say it already
-        hint=hint,
+        hint=_hint_for(error, url=url),
         document=error.document,
     )
 
 
-def _exit_code(error: Refused) -> int:
-    """Whose fault a refusal is: the file's, the command's, or a matter between user and server."""
-    if error.status in {413, 415}:
-        return FILE_AT_FAULT
+def exit_code_of(error: Refused) -> Exit:
+    """Whose turn it is after a refusal."""
     if error.status in {400, 422}:
         about_options = error.problems and all(p.where in OPTIONS for p in error.problems)
-        return USAGE if about_options else FILE_AT_FAULT
-    return SERVER
-
-
-def _words_for(status: int, *, said: str, retry_after_s: float | None) -> tuple[str, str]:
-    again = f"Try again in {_duration(retry_after_s)}." if retry_after_s else "Try again later."
+        return Exit.USAGE if about_options else Exit.REJECTED
     known = {
-        400: (f"The server does not understand the request: {said}.", ""),
-        401: (
-            f"The server does not accept the token: {said}.",
-            f"Make a new one and set {TOKEN_VARIABLE} to it.",
-        ),
-        403: (f"This token may not do that: {said}.", ""),
-        404: (f"The server knows no such thing: {said}.", "Check the name, or the id, and --url."),
-        409: (f"The server cannot take it now: {said}.", ""),
-        413: (f"The file is too large: {said}.", ""),
-        415: (f"The file is of the wrong kind: {said}.", ""),
-        422: (f"The server does not accept the submission: {said}.", ""),
-        429: (f"Too much at once: {said}.", again),
+        401: Exit.AUTH,
+        403: Exit.AUTH,
+        413: Exit.REJECTED,
+        415: Exit.REJECTED,
+        429: Exit.QUOTA,
     }
-    if status in known:
-        return known[status]
-    if status >= 500:
-        return f"The server failed ({status}: {said}). The fault is not yours.", again
-    return f"The server refused ({status}: {said}).", ""
+    if error.status in known:
+        return known[error.status]
+    return Exit.SYSTEM if error.status >= 500 else Exit.REFUSED
 
 
-def _duration(seconds: float) -> str:
+def _words_for(error: Refused) -> str:
+    """For answers that are no problem document: whatever stands in between may have given them."""
+    if error.status >= 500:
+        return f"The server failed ({error.status}: {error.title}). The fault is not yours."
+    if error.status in {401, 403}:
+        return f"The server does not accept the token ({error.status}: {error.title})."
+    return f"The server refused ({error.status}: {error.title})."
+
+
+def _hint_for(error: Refused, *, url: str) -> str:
+    again = f"Try again in {duration(error.retry_after_s)}." if error.retry_after_s else ""
+    if error.status == 401:
+        return (
+            f"Make a new one at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE} to it."
+        )
+    if error.status == 403 and error.code in WORDS_OF_403:
+        return f"Make one that is good for it at {url.rstrip('/')}/tokens/"
+    if error.status == 404:
+        return "Check the name, or the id, and --server."
+    if error.status == 429:
+        return again or "See what is left with: tsttc quota"
+    if error.status >= 500:
+        return f"The fault is not yours. {again or 'Try again later.'}"
+    return again
+
+
+def duration(seconds: float) -> str:
     """
-    >>> _duration(45), _duration(600), _duration(7200)
+    >>> duration(45), duration(600), duration(7200)
     ('45 s', '10 min', '2 h')
     """
     if seconds < 120:

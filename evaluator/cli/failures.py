@@ -11,13 +11,9 @@ from typing import Any
 
 import click
 
+from evaluator.cli.exits import Exit
 from evaluator.cli.layout import printable
 from evaluator.problems import Problem, Rejected
-
-FILE_AT_FAULT = 1
-USAGE = 2
-SERVER = 3
-INTERRUPTED = 130
 
 
 class Failure(Exception):
@@ -31,7 +27,7 @@ class Failure(Exception):
         self,
         message: str,
         *,
-        exit_code: int,
+        exit_code: Exit,
         code: str,
         problems: Sequence[Problem] = (),
         n_problems: int | None = None,
@@ -64,14 +60,15 @@ class Failure(Exception):
             echo_json(self.document)
 
 
-def rejected(name: str, fault: Rejected) -> Failure:
+def rejected(name: str, fault: Rejected, *, hint: str = "") -> Failure:
     """The failure for a file that the library found at fault."""
     return Failure(
         f"{name} is rejected: {n_problems_in_words(fault.n_problems)}",
-        exit_code=FILE_AT_FAULT,
+        exit_code=Exit.REJECTED,
         code="rejected",
         problems=fault.problems,
         n_problems=fault.n_problems,
+        hint=hint,
     )
 
 

@@ -2,24 +2,21 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli.failures import echo_json, rejected
+from evaluator.cli import gates
+from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import result_in_words
 from evaluator.cli.options import json_option, predictions_argument
-from evaluator.problems import Rejected
+from evaluator.cli.reading import TABLE, bytes_of, name_of, naming, write_bytes
 from evaluator.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 
 if TYPE_CHECKING:
     from evaluator import Report
-
-TABLE = click.Path(exists=True, path_type=Path)
 
 
 @click.command(short_help="Say whether a prediction file is complete and well-formed.")
@@ -44,10 +41,10 @@ def check(*, predictions: Path, manifest_path: Path, as_json: bool) -> None:
     """
     from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- numpy, which --help can do without
 
-    with _naming(manifest_path):
+    with naming(manifest_path):
         sequences = read_manifest(manifest_path)
-    with _naming(predictions):
-        found = read_predictions(_bytes_of(predictions), manifest=sequences)
+    with naming(predictions):
+        found = read_predictions(bytes_of(predictions), manifest=sequences)
     if as_json:
         echo_json(
             {
@@ -58,7 +55,9 @@ def check(*, predictions: Path, manifest_path: Path, as_json: bool) -> None:
             }
         )
     else:
-        click.echo(f"{_name(predictions)} is good: {sequences.n_sequences:,} sequences, each predicted once.")
+        click.echo(
+            f"{name_of(predictions)} is good: {sequences.n_sequences:,} sequences, each predicted once."
+        )
 
 
 @click.command(short_help="Score a prediction file against ground truth that you have.")
@@ -78,8 +77,11 @@ def check(*, predictions: Path, manifest_path: Path, as_json: bool) -> None:
     show_default=True,
     help="The rules: tsttc-1 is the board's, toolkit the dataset's own toolkit to the bit.",
 )
+@gates.fail_if_option
 @json_option
-def score(*, predictions: Path, truth_path: Path, protocol: str, as_json: bool) -> None:
+def score(
+    *, predictions: Path, truth_path: Path, protocol: str, fail_if: list[gates.Condition], as_json: bool
+) -> None:
     """Score PREDICTIONS, a JSON file or - for standard input, against ground truth that you have.
 
     The numbers are the server's: two decimals as the board publishes them, all of float64 with --json.
@@ -88,19 +90,21 @@ def score(*, predictions: Path, truth_path: Path, protocol: str, as_json: bool) 
     Examples:
       tsttc score predictions.json --truth val.csv
       tsttc score predictions.json --truth val.csv --json | jq .scores.overall.mid
+      tsttc score predictions.json --truth val.csv --fail-if "mid > 15.0 or rte > 13"
     """
     from evaluator import evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy, as above
 
-    with _naming(truth_path):
+    with naming(truth_path):
         truth = read_truth(truth_path)
-    with _naming(predictions):
-        found = read_predictions(_bytes_of(predictions), manifest=truth.manifest)
+    with naming(predictions):
+        found = read_predictions(bytes_of(predictions), manifest=truth.manifest)
         report = evaluate(found, truth, protocol=protocol)
-    if as_json:
-        echo_json(report.as_dict())
-        return
-    for line in _in_words(report):
-        click.echo(line)
+    gates.told(
+        report.as_dict(),
+        show=lambda: click.echo("\n".join(_in_words(report))),
+        judge=lambda: gates.judge(fail_if, report.flat()),
+        as_json=as_json,
+    )
 
 
 @click.command(short_help="Write the public half of ground truth: what sequences there are.")
@@ -126,12 +130,12 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
     """
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
 
-    with _naming(truth):
+    with naming(truth):
         table = read_manifest(truth)
     if output is not None:
         if output.exists() and output.samefile(truth):
             raise click.BadParameter("this is the ground truth itself; name another file.", param_hint="-o")
-        _write(output, table.to_csv())
+        write_bytes(output, table.to_csv())
     if as_json:
         echo_json(
             {
@@ -159,33 +163,3 @@ def _in_words(report: Report) -> Iterator[str]:
     yield f"protocol     {report.protocol}"
     yield f"truth        {report.truth_digest}"
     yield f"predictions  {report.predictions_digest}"
-
-
-@contextmanager
-def _naming(path: Path) -> Iterator[None]:
-    """Turns the library's rejection into a failure that names the file."""
-    try:
-        yield
-    except Rejected as fault:
-        raise rejected(_name(path), fault) from None
-
-
-def _name(path: Path) -> str:
-    return "standard input" if str(path) == "-" else str(path)
-
-
-def _bytes_of(path: Path) -> bytes:
-    """The bytes of a file or of standard input."""
-    if str(path) == "-":
-        return sys.stdin.buffer.read()
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
-
-
-def _write(path: Path, data: bytes) -> None:
-    try:
-        path.write_bytes(data)
-    except OSError as error:
-        raise click.BadParameter(f"{path} cannot be written: {error.strerror}.", param_hint="-o") from None

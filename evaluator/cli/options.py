@@ -10,6 +10,8 @@ from urllib.parse import urlsplit
 
 import click
 
+from evaluator.cli.places import server_of_login
+
 DEFAULT_URL = "http://127.0.0.1:8000"
 TOKEN_VARIABLE = "TSTTC_TOKEN"  # noqa: S105 -- the name of a variable, not a token
 
@@ -28,12 +30,15 @@ def predictions_argument(command: Command) -> Command:
 
 
 def url_option(command: Command) -> Command:
-    """--url: which leaderboard."""
+    """--server: which leaderboard."""
     return click.option(
+        "--server",
         "--url",
+        "url",
+        metavar="URL",
         envvar="TSTTC_URL",
-        default=DEFAULT_URL,
-        show_default=True,
+        default=lambda: server_of_login() or DEFAULT_URL,
+        show_default=f"that of tsttc login, else {DEFAULT_URL}",
         show_envvar=True,
         callback=_site,
         help="Address of the leaderboard.",

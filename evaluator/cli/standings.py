@@ -13,6 +13,7 @@ from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, UNITS, Cell, aligned, printable, short_name, width_of
 from evaluator.cli.options import json_option, sendable, slug, url_option
+from evaluator.cli.values import authors_or_team, texts_of
 from evaluator.protocol import SCORE_NAMES
 
 if TYPE_CHECKING:
@@ -29,26 +30,45 @@ if TYPE_CHECKING:
     metavar="COLUMN",
     help=f"Order by rank, method, team, date, {', '.join(SCORE_NAMES)}; -COLUMN for the reverse.",
 )
+@click.option(
+    "--format",
+    "as_format",
+    type=click.Choice(["table", "json", "csv", "latex", "markdown"]),
+    default="table",
+    show_default=True,
+    help="What to print.",
+)
+@click.option("--mine", is_flag=True, help="With your own team's private methods.")
 @url_option
 @json_option
-def board(*, split: str, sort: str, url: str, as_json: bool) -> None:
+def board(*, split: str, sort: str, as_format: str, mine: bool, url: str, as_json: bool) -> None:
     """Show the ranked results of SPLIT (test by default): submissions and published baselines.
 
-    Needs no token. On a terminal the best value of a column is bold and the second underlined.
+    Needs no token, but for --mine. On a terminal the best value of a column is bold and the second
+    underlined.
 
     \b
     Examples:
       tsttc board
       tsttc board val --sort rte_crucial
+      tsttc board val --format latex > table.tex
     """
-    with connect(url, with_token=False) as client:
+    with connect(url, with_token=mine) as client:
         found = client.board(split, sort=sort)
-    if as_json:
+    if as_json or as_format == "json":
         echo_json(found.document)
+        return
+    if as_format != "table":
+        from evaluator.cli import formats  # noqa: PLC0415 -- tables of signs for LaTeX, seldom needed
+
+        write = {"csv": formats.as_csv, "latex": formats.as_latex, "markdown": formats.as_markdown}[as_format]
+        click.echo(write(found), nl=False)
         return
     width = shutil.get_terminal_size().columns if sys.stdout.isatty() else None
     for line in in_words(found, width=width):
         click.echo(line)
+    if mine:
+        click.echo("\nPrivate methods of your team stand where they would; they take nobody's rank.")
 
 
 def in_words(found: Board, *, width: int | None) -> Iterator[str]:
@@ -79,32 +99,13 @@ def _table(entries: Sequence[BoardEntry], *, texts: Sequence[str], scores: Seque
     marks = {name: best_and_second([entry.scores.get(name) for entry in entries]) for name in scores}
     for i, entry in enumerate(entries):
         row = [Cell(NO_VALUE if entry.rank is None else str(entry.rank)), Cell(printable(entry.method))]
-        row += [Cell(_team(entry) if name == "team" else printable(entry.date or "")) for name in texts]
-        values = _values(entry, scores=scores)
+        row += [
+            Cell(printable(authors_or_team(entry)) if name == "team" else printable(entry.date or ""))
+            for name in texts
+        ]
+        values = texts_of(entry, missing=NO_VALUE, scores=tuple(scores))
         for name, value in zip(scores, values, strict=True):
             best, second = marks[name]
             row.append(Cell(value, is_bold=i in best, is_underlined=i in second))
         rows.append(row)
     return aligned(rows, align="><" + "<" * len(texts) + "." * len(scores))
-
-
-def _team(entry: BoardEntry) -> str:
-    """The team; for a row printed in a paper its authors, and that it was published."""
-    team = entry.team or ""
-    if entry.kind != "published":
-        return printable(team)
-    first, *others = team.split(",")
-    authors = f"{first.split()[-1]} et al." if others and first.split() else team
-    return printable(f"{authors} (published)")
-
-
-def _values(entry: BoardEntry, *, scores: Sequence[str]) -> list[str]:
-    """A submission's scores with two decimals, a published row's with as many as were printed."""
-    from evaluator.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
-
-    known = [value for value in entry.scores.values() if value is not None]
-    is_short = entry.kind == "published" and all(round(value, 1) == value for value in known)
-    return [
-        format_published(entry.scores.get(name), decimals=1 if is_short else 2, missing=NO_VALUE)
-        for name in scores
-    ]

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
-import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING
 from urllib.parse import urljoin
 
 import click
 
+from evaluator.cli import gates
 from evaluator.cli.connection import connect
-from evaluator.cli.failures import FILE_AT_FAULT, SERVER, Failure, echo_json, n_problems_in_words
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, n_problems_in_words
+from evaluator.cli.following import followed, state_in_words
 from evaluator.cli.layout import printable, result_in_words
 from evaluator.cli.options import (
     is_utf8,
@@ -25,10 +25,24 @@ from evaluator.cli.options import (
     timeout_option,
     url_option,
 )
+from evaluator.cli.sending import opened, require_good, sent
 
 if TYPE_CHECKING:
     from evaluator.answers import Submission
     from evaluator.client import Client
+
+MAX_KEY_CHARACTERS = 255
+
+
+def _key(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
+    """A key as the API takes it."""
+    if not value:  # an empty variable is none
+        return None
+    if len(value) > MAX_KEY_CHARACTERS or not value.isascii() or not value.isprintable():
+        raise click.BadParameter(
+            f"found {value[:60]!r}, expected at most {MAX_KEY_CHARACTERS} printable ASCII characters."
+        )
+    return value
 
 
 @click.command(short_help="Send a prediction file to the leaderboard.")
@@ -44,6 +58,16 @@ if TYPE_CHECKING:
 @click.option("--commit", callback=sendable, help="The commit that produced the file.")
 @click.option("--wait", is_flag=True, help="Wait for the scores.")
 @timeout_option
+@gates.fail_if_option
+@gates.worse_than_options
+@click.option(
+    "--idempotency-key",
+    callback=_key,
+    envvar="TSTTC_IDEMPOTENCY_KEY",
+    metavar="TEXT",
+    help="Requests under one key are one request, also those of another run of the job.",
+)
+@click.option("--no-check", is_flag=True, help="Send the file without checking it here first.")
 @url_option
 @json_option
 def submit(
@@ -53,105 +77,105 @@ def submit(
     method: str,
     wait: bool,
     timeout_s: float,
+    fail_if: list[gates.Condition],
+    worse_than: str | None,
+    significant: bool,
+    idempotency_key: str | None,
+    no_check: bool,
     url: str,
     as_json: bool,
     **details: str | None,
 ) -> None:
     """Send PREDICTIONS, a JSON file or - for standard input, to the leaderboard.
 
-    The token is read from the environment variable TSTTC_TOKEN. Sending the same file again is
-    harmless: the server answers with the first submission.
+    The file is checked here first, by the server's own code, so that a bad one costs nothing. Sending the
+    same file again is harmless: the server answers with the first submission. A gate (--fail-if…) waits for
+    the scores as --wait does.
 
     \b
     Examples:
       tsttc submit predictions.json --split val --method "Foo++" --wait
       tsttc submit predictions.json --split test --method "Foo++" --wait --json > scores.json
+      tsttc submit predictions.json --split val --method "Foo++" --fail-if "mid > 15.0 or rte > 13"
+      tsttc submit predictions.json --split val --method "Bar" --fail-if-worse-than "Foo++" --significant
     """
-    with connect(url, with_token=True) as client, _opened(predictions) as file:
-        submission = client.submit(
-            file,
-            filename=_name_to_send(predictions),
-            split=split,
-            method=method,
-            details={field: value for field, value in details.items() if value},
-        )
-        if wait or not as_json:
+    _require_rival(worse_than, significant)
+    with connect(url, with_token=True) as client:
+        with opened(predictions) as file:
+            if not no_check:
+                require_good(client, file, split=split, name=str(predictions))
+            rival = None
+            if worse_than:
+                rival = gates.rival(
+                    client, split=split, method=worse_than, own=method, is_significant_only=significant
+                )
+            submission = sent(
+                client,
+                file,
+                filename=_name_to_send(predictions),
+                split=split,
+                method=method,
+                details={field: value for field, value in details.items() if value},
+                idempotency_key=idempotency_key,
+            )
+        is_waiting = wait or bool(fail_if) or bool(worse_than)
+        if is_waiting or not as_json:
             _announce(submission, site=url, err=as_json)
-        if wait and not submission.is_final:
-            submission = _followed(client, submission.id, timeout_s=timeout_s)
-    _conclude(submission, as_json=as_json)
+        if is_waiting and not submission.is_final:
+            submission = followed(client, submission.id, timeout_s=timeout_s)
+
+        def judge() -> None:
+            gates.judge(fail_if, submission.scores)
+            if rival is not None:
+                mid = (submission.scores or {}).get("mid")
+                gates.judge_against(client, rival, split=split, method_id=submission.method_id, mid=mid)
+
+        conclude(submission, as_json=as_json, judge=judge)
+        if not as_json:
+            _say_if_private(client, submission)
 
 
 @click.command(short_help="Show the state, the scores or the problems of a submission.")
 @click.argument("submission_id", metavar="ID", callback=slug)
 @click.option("--watch", is_flag=True, help="Wait until the state is final.")
 @timeout_option
+@gates.fail_if_option
 @url_option
 @json_option
-def status(*, submission_id: str, watch: bool, timeout_s: float, url: str, as_json: bool) -> None:
+def status(
+    *,
+    submission_id: str,
+    watch: bool,
+    timeout_s: float,
+    fail_if: list[gates.Condition],
+    url: str,
+    as_json: bool,
+) -> None:
     """Show the state of submission ID: its place in the queue, its scores, or what is wrong in the file.
 
-    The token is read from the environment variable TSTTC_TOKEN.
-
     \b
-    Example:
-      tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 --watch
+    Examples:
+      tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11
+      tsttc status 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 --watch --fail-if "mid > 15.0"
     """
     with connect(url, with_token=True) as client:
         submission = (
-            _followed(client, submission_id, timeout_s=timeout_s)
+            followed(client, submission_id, timeout_s=timeout_s)
             if watch
             else client.submission(submission_id)
         )
-    _conclude(submission, as_json=as_json)
+    conclude(submission, as_json=as_json, judge=lambda: gates.judge(fail_if, submission.scores))
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
-    """The file to send. What can be read only once is kept first, so that sending can be repeated."""
-    try:
-        source = nullcontext(sys.stdin.buffer) if str(path) == "-" else path.open("rb")
-        with source as file, tempfile.TemporaryFile() as kept:
-            if not file.seekable():
-                shutil.copyfileobj(file, kept)
-            yield file if file.seekable() else kept
-    except OSError as error:
-        raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
+def _require_rival(worse_than: str | None, significant: bool) -> None:
+    if significant and not worse_than:
+        raise click.UsageError(
+            "--significant says how to judge --fail-if-worse-than METHOD, which is missing."
+        )
 
 
 def _name_to_send(path: Path) -> str:
     return path.name if str(path) != "-" and is_utf8(path.name) else "predictions.json"
-
-
-def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
-    """The submission when it is final; until then standard error tells each state, live on a terminal."""
-    states = client.watch(submission_id, timeout_s=timeout_s)
-    if sys.stderr.isatty():
-        from rich.console import Console  # noqa: PLC0415 -- only a terminal needs it
-        from rich.live import Live  # noqa: PLC0415 -- as above
-        from rich.spinner import Spinner  # noqa: PLC0415 -- as above
-        from rich.text import Text  # noqa: PLC0415 -- as above
-
-        with Live(console=Console(stderr=True), transient=True) as line:
-            for submission in states:
-                line.update(Spinner("dots", Text(state_in_words(submission))), refresh=True)
-        return submission
-    told = ""
-    for submission in states:
-        if submission.state != told and not submission.is_final:
-            click.echo(state_in_words(submission), err=True)
-            told = submission.state
-    return submission
-
-
-def state_in_words(submission: Submission) -> str:
-    """One line: the state, and for a waiting one how many are ahead and about how long that takes."""
-    words = printable(submission.state)
-    if submission.queue is not None:
-        words += f", {submission.queue.ahead:,} ahead"
-        if submission.queue.estimate_s is not None:
-            words += f", about {submission.queue.estimate_s:.0f} s"
-    return words
 
 
 def _announce(submission: Submission, *, site: str, err: bool) -> None:
@@ -162,23 +186,28 @@ def _announce(submission: Submission, *, site: str, err: bool) -> None:
         click.echo("This file was sent before; this is its first submission.", err=err)
 
 
-def _conclude(submission: Submission, *, as_json: bool) -> None:
-    """Print what is known of a submission; raises Failure when it ended without scores."""
+def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]) -> None:
+    """Print what is known of a submission; raises Failure when it ended without scores, or a gate fails."""
     named = (
         f"{submission.method} on {submission.split}" if submission.method else f"submission {submission.id}"
     )
     match submission.state:
         case "REJECTED":
             n_problems = submission.n_problems or len(submission.problems)
-            message, exit_code = f"The file is rejected: {n_problems_in_words(n_problems)}.", FILE_AT_FAULT
+            message, exit_code = f"The file is rejected: {n_problems_in_words(n_problems)}.", Exit.REJECTED
             hint = "It does not count against your quota. Check a corrected file with: tsttc check"
         case "SYSTEM_ERROR":
-            message, exit_code = f"The server failed to score {named}. The fault is not the file's.", SERVER
+            message, exit_code = (
+                f"The server failed to score {named}. The fault is not the file's.",
+                Exit.SYSTEM,
+            )
             hint = "It does not count against your quota."
         case "CANCELLED":
-            message, exit_code, hint = f"{named} was cancelled, so it has no scores.", SERVER, ""
+            message, exit_code, hint = f"{named} was cancelled, so it has no scores.", Exit.REFUSED, ""
         case _:
-            _show(submission, named=named, as_json=as_json)
+            gates.told(
+                submission.document, show=partial(_show, submission, named), judge=judge, as_json=as_json
+            )
             return
     raise Failure(
         message,
@@ -190,18 +219,31 @@ def _conclude(submission: Submission, *, as_json: bool) -> None:
     )
 
 
-def _show(submission: Submission, *, named: str, as_json: bool) -> None:
-    if as_json:
-        echo_json(submission.document)
-        return
+def _show(submission: Submission, named: str) -> None:
     click.echo(f"{state_in_words(submission)}: {printable(named)}")
-    if submission.scores is None:
+    if submission.scores is not None:
+        click.echo("")
+        for line in result_in_words(
+            submission.scores,
+            counts=submission.counts or {},
+            n_out_of_range=submission.n_out_of_range or 0,
+            truncated=submission.truncated or {},
+        ):
+            click.echo(line)
+
+
+def _say_if_private(client: Client, submission: Submission) -> None:
+    """Who sends for the first time may wonder why the board does not show it."""
+    from evaluator.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+
+    if not (submission.is_new and submission.method_id):
         return
-    click.echo("")
-    for line in result_in_words(
-        submission.scores,
-        counts=submission.counts or {},
-        n_out_of_range=submission.n_out_of_range or 0,
-        truncated=submission.truncated or {},
-    ):
-        click.echo(line)
+    try:
+        method = client.method(submission.method_id)
+    except ClientError:  # a token that may only submit; the file is there all the same
+        return
+    if method.visibility == "PRIVATE":
+        name = printable(method.name)
+        click.echo(
+            f'\n{name} is private: its results are your team\'s alone. Show them with: tsttc publish "{name}"'
+        )

@@ -2,18 +2,35 @@
 
 from __future__ import annotations
 
+import random
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
+import keyring
 import pytest
 from click.testing import CliRunner, Result
 from hypothesis import settings
 
 from evaluator.cli import main
+from evaluator.client import Client
+from tests.evaluator.fake_time import FakeTime
+from tests.evaluator.keyrings import NoKeyring
 from tests.evaluator.recorded_site import RecordedSite
 
 # How long an example takes says more about the machine than about the code.
 settings.register_profile("unhurried", deadline=None)
 settings.load_profile("unhurried")
+
+
+@pytest.fixture(autouse=True)
+def places(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Settings and copies of each test are its own, and there is no keyring, as on a machine for CI."""
+    home = tmp_path / "home"
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(home / "config"))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "cache"))
+    monkeypatch.setenv("PYTHON_KEYRING_BACKEND", "keyring.backends.fail.Keyring")
+    keyring.set_keyring(NoKeyring())
+    return home
 
 
 @pytest.fixture
@@ -38,3 +55,22 @@ def at_site(site: RecordedSite, monkeypatch: pytest.MonkeyPatch) -> None:
     """The command speaks to the recorded site, with a token."""
     monkeypatch.setenv("TSTTC_URL", site.url)
     monkeypatch.setenv("TSTTC_TOKEN", "secret-token")
+
+
+@pytest.fixture
+def clock() -> FakeTime:
+    """Time in which waiting costs nothing."""
+    return FakeTime()
+
+
+@pytest.fixture
+def client(site: RecordedSite, clock: FakeTime) -> Iterator[Client]:
+    """A client of the recorded site, in that time."""
+    with Client(
+        url=site.url + "/",
+        token="secret-token",
+        sleep=clock.sleep,
+        monotonic_s=lambda: clock.now_s,
+        rng=random.Random(0),
+    ) as connected:
+        yield connected

@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from evaluator import read_manifest, receipts
 from evaluator.protocol import SCORE_NAMES
 from tests.evaluator.recorded_site import RecordedSite, Reply, problem
 
@@ -27,7 +28,30 @@ DOCUMENTS = (REPOSITORY / "docs" / "cli.md", EXAMPLES / "README.md")
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
 REJECTED_ID = "8c1e2b9a-3f47-4d0c-a6e1-5b7d90c2e4f6"
 
+METHOD_ID = "5d2c1f8e-0b7a-4c36-9f41-7a3e6b9d2c10"
+
 Run = Callable[[str], str]
+
+VALUES = [13.92, 26.11, 15.02, 10.71, 13.18, 11.84, 6.21, 8.39, 12.77, 14.36]
+COUNTS = {"overall": 28_600, "crucial": 3_832, "small": 3_775, "large": 12_470, "negative": 8_523}
+_SEED = bytes(range(32))  # of a key that signs nothing but this example
+RECEIPT_KEYS = receipts.key_set([receipts.public_key(_SEED)])
+RECEIPT = receipts.sign(
+    {
+        "site": "https://leaderboard.example.org",
+        "submission": ID,
+        "split": "val",
+        "edition": 2,
+        "protocol": "tsttc-1",
+        "ground_truth": "sha256:" + "9f" * 32,
+        "file": "sha256:" + "1c" * 32,
+        "method": {"id": METHOD_ID, "name": "Foo++"},
+        "scores": {name: f"{value:.2f}" for name, value in zip(SCORE_NAMES, VALUES, strict=True)},
+        "counts": COUNTS,
+        "scored_at": "2026-11-20T12:00:00Z",
+    },
+    private_key=_SEED,
+)
 
 _BLOCK = re.compile(r"(?<=^```console\n).*?(?=^```$)", re.MULTILINE | re.DOTALL)
 _COMMAND = re.compile(r"^\$ .*(?:\\\n.*)*$", re.MULTILINE)
@@ -59,6 +83,7 @@ def shell(tsttc: list[str], environment: Mapping[str, str]) -> Iterator[Run]:
     with tempfile.TemporaryDirectory() as folder:
         work, programs = Path(folder, "examples"), Path(folder, "bin")
         shutil.copytree(EXAMPLES, work)
+        Path(work, "tsttc-receipt-keys.json").write_text(json.dumps(RECEIPT_KEYS))
         programs.mkdir()
         program = programs / "tsttc"
         program.write_text(f'#!/bin/sh\nexec {" ".join(tsttc)} "$@"\n')
@@ -84,12 +109,16 @@ def shell(tsttc: list[str], environment: Mapping[str, str]) -> Iterator[Run]:
 @contextmanager
 def documented_shell() -> Iterator[Run]:
     """A shell in which the checkout's own `tsttc` speaks to a server that gives the documented answers."""
-    with RecordedSite() as site:
+    with RecordedSite() as site, tempfile.TemporaryDirectory() as home:
         put_documented_answers(site)
+        put_more_documented_answers(site)
         environment = {
             "TSTTC_URL": site.url,
             "TSTTC_TOKEN": "tsttc_" + "0" * 64,
             "PYTHONPATH": str(REPOSITORY),
+            "PYTHON_KEYRING_BACKEND": "keyring.backends.fail.Keyring",
+            "XDG_CONFIG_HOME": home,
+            "XDG_CACHE_HOME": home,
         }
         with shell([sys.executable, "-m", "evaluator"], environment) as run:
             yield run
@@ -102,6 +131,7 @@ def put_documented_answers(site: RecordedSite) -> None:
         "state": "QUEUED",
         "split": "val",
         "method": "Foo++",
+        "method_id": METHOD_ID,
         "url": f"https://leaderboard.example.org/submissions/{ID}/",
         "queue": {"ahead": 2, "estimate_s": 4.0},
         "scores": None,
@@ -111,13 +141,12 @@ def put_documented_answers(site: RecordedSite) -> None:
         "problems": [],
         "n_problems": 0,
     }
-    values = [13.92, 26.11, 15.02, 10.71, 13.18, 11.84, 6.21, 8.39, 12.77, 14.36]
-    scores = dict(zip(SCORE_NAMES, values, strict=True))
+    scores = dict(zip(SCORE_NAMES, VALUES, strict=True))
     scored = submission | {
         "state": "SCORED",
         "queue": None,
         "scores": scores,
-        "counts": {"overall": 28_600, "crucial": 3_832, "small": 3_775, "large": 12_470, "negative": 8_523},
+        "counts": COUNTS,
         "n_out_of_range": 458,
         "truncated": {"-20": 171, "-0.15": 0, "0.05": 0, "20": 302},
     }
@@ -142,6 +171,41 @@ def put_documented_answers(site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/trial/board", Reply(unknown, status=404))
 
 
+def put_more_documented_answers(site: RecordedSite) -> None:
+    """Of the same leaderboard: quotas, a comparison, a receipt, a method, a split with a manifest."""
+    window_s = 30 * 86400.0
+    quotas = [
+        {"split": "val", "limit": 50, "used": 2, "left": 48, "next_slot_at": None, "is_open": True},
+        {"split": "test", "limit": 3, "used": 3, "left": 0, "is_open": False, "window_s": window_s}
+        | {
+            "next_slot_at": "2026-12-04T09:13:00Z",
+            "sentence": "Your team has spent the 3 submissions to test that it has in 30 days; the next slot "
+            "opens at 2026-12-04 09:13 UTC.",
+        },
+    ]
+    site.put("GET /api/v1/quota", Reply(quotas))
+    digest = read_manifest(EXAMPLES / "manifest.csv").digest
+    site.put(
+        "GET /api/v1/splits/demo/editions", Reply([{"edition": 1, "is_board": True, "manifest": digest}])
+    )
+    table = (EXAMPLES / "manifest.csv").read_bytes()
+    site.put("GET /api/v1/splits/demo/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
+    found = {"difference": -1.18, "low": -1.73, "high": -0.62, "p": 0.0004}
+    differences = dict.fromkeys(SCORE_NAMES, found)
+    sentence = "Foo++'s MiD is 1.18 ± 0.56 lower than Bar's; p = 0.0004."
+    compared = {"split": "val", "edition": 2, "is_complete": True, "reason": "", "entries": []}
+    pair = {"differences": differences, "sentence": sentence}
+    site.put("GET /api/v1/compare", Reply(compared | {"pairs": [pair]}))
+    site.put(f"GET /api/v1/submissions/{ID}/receipt", Reply(RECEIPT))
+    mine = {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE", "pseudonym": "Anonymous 5d2c1f"}
+    site.put("GET /api/v1/methods", Reply([mine]))
+    site.put(f"GET /api/v1/methods/{METHOD_ID}", Reply(mine))
+    url = f"https://leaderboard.example.org/methods/{METHOD_ID}/"
+    site.put(
+        f"POST /api/v1/methods/{METHOD_ID}/visibility", Reply(mine | {"visibility": "PUBLIC", "url": url})
+    )
+
+
 def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object]:
     """The paper's five baselines and one submission, by rank."""
     paper = json.loads((REPOSITORY / "leaderboard" / "published" / "tsttc-2023.json").read_text())
@@ -158,7 +222,12 @@ def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object
     ]
     entries.append(
         {"method": "Foo++", "team": "TJU-V", "date": "2026-11-20", "kind": "submission", "scores": scores}
+        | {"method_id": METHOD_ID}
     )
+    if split == "val":
+        worse = {name: round(value + 1.18, 2) for name, value in scores.items()}
+        row = {"method": "Bar", "team": "Owls", "date": "2026-11-18", "kind": "submission", "scores": worse}
+        entries.append(row | {"method_id": REJECTED_ID})
     entries.sort(key=lambda entry: entry["scores"]["mid"])
     ranked = [{"rank": rank, **entry} for rank, entry in enumerate(entries, start=1)]
     return {"split": split, "edition": 2, "updated_at": "2026-11-20T12:00:00Z", "entries": ranked}
@@ -168,7 +237,7 @@ def main() -> None:
     """Write the present output into every document."""
     for document in DOCUMENTS:
         with documented_shell() as run:
-            document.write_text(recorded(document.read_text(), run))
+            document.write_text(recorded(document.read_text(encoding="utf-8"), run), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -73,6 +73,11 @@ class RecordedSite:
     def url(self) -> str:
         return f"http://127.0.0.1:{self._server.server_port}"
 
+    @property
+    def posts(self) -> list[Request]:
+        """The requests that sent something."""
+        return [request for request in self.requests if request.method == "POST"]
+
     def __enter__(self) -> Self:
         self._thread.start()
         return self

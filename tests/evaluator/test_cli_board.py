@@ -74,7 +74,7 @@ def test_unreachable_server_is_told_with_its_address(tsttc: Tsttc, monkeypatch: 
         result = tsttc("board")
     assert result.exit_code == 3
     assert result.stderr.startswith(f"Error: Nothing answers at {url} (")
-    assert "Check --url" in result.stderr
+    assert "Check --server" in result.stderr
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,16 @@ from pathlib import Path
 import click
 import pytest
 
-from evaluator.cli import main
+from evaluator.cli import EPILOG, main
+from evaluator.cli.exits import MEANINGS, Exit
+from evaluator.cli.gates import OPERATORS
+from evaluator.protocol import SCORE_NAMES
 from tests.evaluator.console import DOCUMENTS, REPOSITORY, documented_shell, recorded
 
 GUIDE = REPOSITORY / "docs" / "cli.md"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("document", DOCUMENTS, ids=lambda path: path.relative_to(REPOSITORY).as_posix())
 def test_examples_show_what_the_command_prints(document: Path) -> None:
     text = document.read_text()
@@ -35,6 +39,19 @@ def options() -> list[tuple[str, str]]:
         if isinstance(parameter, click.Option)
         for flag in parameter.opts
     ]
+
+
+def test_guide_lists_every_exit_code_with_its_meaning() -> None:
+    common = GUIDE.read_text().partition("## What every command has in common")[2].partition("\n## ")[0]
+    listed = re.findall(r"^\| (\d+) \| (.*) \|$", common, re.MULTILINE)
+    assert listed == [(str(code.value), meaning) for code, meaning in MEANINGS.items()]
+    assert set(MEANINGS) == set(Exit)
+    assert all(f"{code.value:>3}  {meaning}" in EPILOG for code, meaning in MEANINGS.items())
+
+
+def test_guide_names_every_score_and_operator_of_a_gate() -> None:
+    gate = GUIDE.read_text().partition("**A gate sets the exit code**")[2].partition("\n## ")[0]
+    assert [name for name in (*SCORE_NAMES, *OPERATORS) if f"`{name}`" not in gate] == []
 
 
 @pytest.mark.parametrize("command", main.commands)

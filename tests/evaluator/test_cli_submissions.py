@@ -76,19 +76,19 @@ def test_submit_sends_what_was_said_and_names_the_submission(tsttc: Tsttc, site:
         f"Submission {ID}  {site.url}/submissions/{ID}/",
         "QUEUED, 2 ahead, about 4 s: Foo++ on val",
     ]
-    sent = site.requests[0].parts()
+    sent = site.posts[0].parts()
     assert sent.pop("file") == ("predictions.json", PREDICTIONS.read_bytes())
     expected = {"split": "val", "method": "Foo++"} | {k.replace("-", "_"): v for k, v in said.items()}
     assert {name: content.decode() for name, (_, content) in sent.items()} == expected
-    assert site.requests[0].headers["Authorization"] == "Bearer secret-token"
-    assert site.requests[0].headers["User-Agent"].startswith("tsttc/")
+    assert site.posts[0].headers["Authorization"] == "Bearer secret-token"
+    assert site.posts[0].headers["User-Agent"].startswith("tsttc/")
 
 
 def test_submit_takes_standard_input(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(fault=CUT), Reply(QUEUED, status=201))
     result = tsttc("submit", "-", "--split", "val", "--method", "Foo++", stdin=b'{"0": 1.5}')
     assert result.exit_code == 0
-    sent = [request.parts()["file"] for request in site.requests]
+    sent = [request.parts()["file"] for request in site.posts]
     assert sent == [("predictions.json", b'{"0": 1.5}')] * 2
 
 
@@ -102,7 +102,7 @@ def test_submit_takes_a_pipe(site: RecordedSite) -> None:
         cwd=REPOSITORY,
     )
     assert done.returncode == 0, done.stderr
-    assert [request.parts()["file"][1] for request in site.requests] == [b"{}\n"] * 2
+    assert [request.parts()["file"][1] for request in site.posts] == [b"{}\n"] * 2
 
 
 def test_file_whose_name_is_no_text_is_sent_under_another(
@@ -112,7 +112,7 @@ def test_file_whose_name_is_no_text_is_sent_under_another(
     odd = tmp_path / os.fsdecode(b"\xff.json")
     odd.write_bytes(b"{}")
     assert tsttc("submit", odd, "--split", "val", "--method", "Foo").exit_code == 0
-    assert site.requests[0].parts()["file"] == ("predictions.json", b"{}")
+    assert site.posts[0].parts()["file"] == ("predictions.json", b"{}")
 
 
 @pytest.mark.parametrize("option", ["--method", "--note", "--commit"])
@@ -128,7 +128,7 @@ def test_file_sent_before_is_said_to_be(tsttc: Tsttc, site: RecordedSite) -> Non
     result = submit(tsttc, "--wait")
     assert result.exit_code == 0
     assert "This file was sent before; this is its first submission." in result.stdout
-    assert len(site.requests) == 1
+    assert len(site.posts) == 1
 
 
 def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -180,15 +180,18 @@ def test_rejected_file_is_the_file_s_fault_with_numbered_problems(
 
 
 @pytest.mark.parametrize(
-    ("state", "words"),
-    [("SYSTEM_ERROR", "The fault is not the file's."), ("CANCELLED", "was cancelled, so it has no scores")],
+    ("state", "exit_code", "words"),
+    [
+        ("SYSTEM_ERROR", 7, "The fault is not the file's."),
+        ("CANCELLED", 8, "was cancelled, so it has no scores"),
+    ],
 )
-def test_submission_without_scores_that_is_no_fault_of_the_file_ends_with_3(
-    tsttc: Tsttc, site: RecordedSite, state: str, words: str
+def test_submission_without_scores_says_whose_turn_it_is(
+    tsttc: Tsttc, site: RecordedSite, state: str, exit_code: int, words: str
 ) -> None:
     site.put(GET, Reply(QUEUED | {"state": state, "queue": None}))
     result = tsttc("status", ID)
-    assert result.exit_code == 3
+    assert result.exit_code == exit_code
     assert words in result.stderr
 
 
@@ -196,7 +199,7 @@ def test_timeout_says_that_the_submission_goes_on(tsttc: Tsttc, site: RecordedSi
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(QUEUED))
     result = submit(tsttc, "--wait", "--timeout", "0.1")
-    assert result.exit_code == 3
+    assert result.exit_code == 9
     assert f"Submission {ID} is not final after 0.1 s. It was QUEUED last." in result.stderr
     assert f"tsttc status {ID} --watch" in result.stderr
     document = json.loads(submit(tsttc, "--wait", "--timeout", "0.1", "--json").stdout)
@@ -222,12 +225,12 @@ def test_token_on_an_unencrypted_way_is_warned_of(tsttc: Tsttc, site: RecordedSi
 
 @pytest.mark.parametrize("command", ["submit", "status"])
 @pytest.mark.parametrize("token", ["", "  ", "to ken", "tökén", "a\nb"])
-def test_missing_or_senseless_token_is_wrong_usage_and_nothing_is_sent(
+def test_empty_or_senseless_token_is_told_and_nothing_is_sent(
     tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch, command: str, token: str
 ) -> None:
     monkeypatch.setenv("TSTTC_TOKEN", token)
     result = submit(tsttc) if command == "submit" else tsttc("status", ID)
-    assert result.exit_code == 2
+    assert result.exit_code == 4
     assert "TSTTC_TOKEN" in result.stderr
     assert site.requests == []
 
@@ -240,17 +243,22 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
 @pytest.mark.parametrize(
     ("reply", "exit_code", "words"),
     [
-        (Reply(problem("Invalid token."), 401), 3, "The server does not accept the token: Invalid token."),
-        (Reply(problem("Not yours."), 403), 3, "This token may not do that: Not yours."),
-        (Reply(problem("There is nothing here."), 404), 3, "knows no such thing: There is nothing here."),
-        (Reply(problem("The split is closed.", where="split"), 409), 3, "The split is closed."),
-        (Reply(problem("It has 21 MB.", where="file"), 413), 1, "The file is too large: It has 21 MB."),
-        (Reply(problem("No such split 'x'.", where="split"), 422), 2, "No such split 'x'."),
-        (Reply(problem("The file is empty.", where="file"), 422), 1, "The file is empty."),
-        (Reply(b"<html>", 400), 1, "Bad Request"),
-        (Reply(problem("5 a day."), 429, {"Retry-After": "7200"}), 3, "Too much at once: 5 a day."),
-        (Reply(b"<html>gateway</html>", 500), 3, "The server failed (500: Internal Server Error)."),
-        (Reply(status=418), 3, "The server refused (418"),
+        (Reply(problem("Invalid token."), 401), 4, "Error: Invalid token.\nMake a new one at http://"),
+        (Reply(problem("Not yours."), 403), 4, "Error: Not yours."),
+        (Reply(problem("There is nothing here."), 404), 8, "Error: There is nothing here."),
+        (Reply(problem("The split is closed.", where="split"), 409), 8, "Error: The split is closed."),
+        (Reply(problem("It has 21 MB.", where="file"), 413), 1, "Error: It has 21 MB."),
+        (Reply(problem("No such split 'x'.", where="split"), 422), 2, "Error: No such split 'x'."),
+        (Reply(problem("The file is empty.", where="file"), 422), 1, "Error: The file is empty."),
+        (Reply(b"<html>", 400), 1, "The server refused (400: Bad Request)."),
+        (
+            Reply(problem("5 a day; the next slot opens at noon."), 429, {"Retry-After": "7200"}),
+            5,
+            "Error: 5 a day; the next slot opens at noon.\nTry again in 2 h.\n",
+        ),
+        (Reply(b"<html>gateway</html>", 500), 7, "The server failed (500: Internal Server Error)."),
+        (Reply(b"<html>", 401), 4, "The server does not accept the token (401: Unauthorized)."),
+        (Reply(status=418), 8, "The server refused (418"),
         (Reply(status=301, headers={"Location": "https://e.example/"}), 3, "points to https://e.example/"),
         (Reply(b"<html>hello</html>", 200), 3, "gave no leaderboard's answer: not JSON"),
         (Reply({"hello": "world"}, 200), 3, "Object missing required field"),
@@ -266,11 +274,6 @@ def test_refusal_is_told_in_plain_words_and_by_whose_fault_it_is(
     assert result.stderr.count(words) == 1
     assert "Traceback" not in result.output
     assert result.stdout == ""
-
-
-def test_quota_says_when_to_come_back(tsttc: Tsttc, site: RecordedSite) -> None:
-    site.put(POST, Reply(problem("5 a day."), 429, {"Retry-After": "7200"}))
-    assert "Try again in 2 h." in submit(tsttc).stderr
 
 
 def test_refusal_as_json_is_the_server_s_own_document(tsttc: Tsttc, site: RecordedSite) -> None:

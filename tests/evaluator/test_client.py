@@ -5,16 +5,17 @@ from __future__ import annotations
 import io
 import random
 import socket
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from pathlib import Path
 
 import pytest
 
-from evaluator.answers import BadAnswer, Redirected, Refused, TimedOut, Unreachable
-from evaluator.client import Client, Patience
+from evaluator.answers import BadAnswer, Redirected, Refused, Unreachable
+from evaluator.client import Client
+from evaluator.exchange import Patience
 from evaluator.problems import Problem
+from tests.evaluator.fake_time import FakeTime
 from tests.evaluator.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
 
 SUBMISSIONS = "POST /api/v1/submissions"
@@ -25,35 +26,6 @@ SCORED = QUEUED | {
     "scores": {"mid": 14.21, "mid_crucial": None},
     "counts": {"overall": 60},
 }
-
-
-class FakeTime:
-    """A clock that only sleeping moves forward."""
-
-    def __init__(self) -> None:
-        self.now_s = 0.0
-        self.slept_s: list[float] = []
-
-    def sleep(self, seconds: float) -> None:
-        self.slept_s.append(seconds)
-        self.now_s += seconds
-
-
-@pytest.fixture
-def clock() -> FakeTime:
-    return FakeTime()
-
-
-@pytest.fixture
-def client(site: RecordedSite, clock: FakeTime) -> Iterator[Client]:
-    with Client(
-        url=site.url + "/",
-        token="secret-token",
-        sleep=clock.sleep,
-        monotonic_s=lambda: clock.now_s,
-        rng=random.Random(0),
-    ) as connected:
-        yield connected
 
 
 def send(client: Client, data: bytes = b'{"0": 5.3}') -> object:
@@ -125,7 +97,7 @@ def test_server_that_keeps_cutting_is_reported_after_a_few_tries(
     with pytest.raises(Unreachable) as caught:
         client.submission("abc")
     assert caught.value.was_connected
-    assert len(site.requests) == 4
+    assert len(site.requests) == Patience().n_tries
     assert clock.slept_s == sorted(clock.slept_s)
 
 
@@ -273,70 +245,6 @@ def test_manifest_is_given_as_it_came(client: Client, site: RecordedSite) -> Non
     table = b"anno_id,bag_stamp,cam_id,ts,track_id\n0,a,1,5,9\n"
     site.put("GET /api/v1/splits/val/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
     assert client.manifest("val") == table
-
-
-def test_watch_gives_every_state_until_the_final_one(client: Client, site: RecordedSite) -> None:
-    queued = QUEUED | {"queue": {"ahead": 2, "estimate_s": 4.5}}
-    site.put(ONE, Reply(queued), Reply(QUEUED | {"state": "RUNNING"}), Reply(SCORED))
-    seen = list(client.watch("abc", timeout_s=60))
-    assert [submission.state for submission in seen] == ["QUEUED", "RUNNING", "SCORED"]
-    assert seen[0].queue is not None
-    assert (seen[0].queue.ahead, seen[0].queue.estimate_s) == (2, 4.5)
-
-
-def test_watch_asks_less_and_less_often(client: Client, site: RecordedSite, clock: FakeTime) -> None:
-    site.put(ONE, *[Reply(QUEUED)] * 12, Reply(SCORED))
-    list(client.watch("abc", timeout_s=600))
-    assert clock.slept_s[0] <= 0.25
-    assert clock.slept_s[8] > 10 * clock.slept_s[0]
-    assert max(clock.slept_s) <= 10
-
-
-def test_watch_outlives_an_absent_and_a_busy_server(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(
-        ONE,
-        Reply(fault=CUT),
-        Reply(status=502),
-        Reply(status=503, headers={"Retry-After": "9"}),
-        Reply(SCORED),
-    )
-    assert [submission.state for submission in client.watch("abc", timeout_s=60)] == ["SCORED"]
-    assert clock.slept_s[2] == 9.0
-
-
-def test_watch_heeds_the_pace_that_a_healthy_server_asks_for(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(ONE, Reply(QUEUED, headers={"Retry-After": "3"}), Reply(SCORED))
-    list(client.watch("abc", timeout_s=60))
-    assert clock.slept_s == [3.0]
-
-
-def test_watch_ends_in_time_with_what_it_saw_last(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(ONE, Reply(QUEUED))
-    with pytest.raises(TimedOut) as caught:
-        list(client.watch("abc", timeout_s=30))
-    assert clock.now_s <= 30
-    assert caught.value.submission is not None
-    assert caught.value.submission.state == "QUEUED"
-
-
-def test_watch_does_not_wait_for_what_never_comes(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(ONE, Reply(status=404))
-    with pytest.raises(Refused):
-        list(client.watch("abc", timeout_s=30))
-    assert clock.slept_s == []
-
-
-def test_state_of_a_newer_server_is_not_taken_for_a_final_one(client: Client, site: RecordedSite) -> None:
-    site.put(ONE, Reply(QUEUED | {"state": "PAUSED"}), Reply(SCORED))
-    assert [submission.state for submission in client.watch("abc", timeout_s=60)] == ["PAUSED", "SCORED"]
 
 
 def test_token_is_not_shown(client: Client) -> None:

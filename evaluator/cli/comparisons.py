@@ -1,0 +1,163 @@
+"""The subcommand compare: two methods of a board, or two files against ground truth that you have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
+
+import click
+
+from evaluator.cli.connection import connect
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.gates import SIGNIFICANT, named
+from evaluator.cli.layout import NO_VALUE, UNITS, Cell, aligned, printable, short_name
+from evaluator.cli.options import json_option, sendable, slug, url_option
+from evaluator.cli.reading import TABLE, bytes_of, naming
+from evaluator.cli.tokens import has_token
+from evaluator.protocol import SCORE_NAMES
+
+if TYPE_CHECKING:
+    from evaluator.answers import Compared
+
+Scores = Mapping[str, float | None]
+
+
+class Found(Protocol):
+    """A difference, computed here or by the server: first minus second, its 95 % interval, and p."""
+
+    @property
+    def difference(self) -> float: ...
+    @property
+    def low(self) -> float | None: ...
+    @property
+    def high(self) -> float | None: ...
+    @property
+    def p(self) -> float | None: ...
+
+
+@click.command(short_help="Say how far two methods, or two files, differ beyond chance.")
+@click.argument("first", callback=sendable)
+@click.argument("second", callback=sendable)
+@click.option("--split", default="test", show_default=True, callback=slug, help="The board of the methods.")
+@click.option(
+    "--truth",
+    "truth_path",
+    type=TABLE,
+    metavar="FILE",
+    help="Ground truth that you have: FIRST and SECOND are prediction files, and nothing is sent.",
+)
+@url_option
+@json_option
+def compare(*, first: str, second: str, split: str, truth_path: Path | None, url: str, as_json: bool) -> None:
+    """Compare FIRST with SECOND, methods of a board by name or id, or with --truth two prediction files.
+
+    Whole recordings are resampled, since what follows in one recording is alike: each column gets the
+    difference, its 95 % interval, and the p of a two-sided test. Below 0 the first is better.
+
+    \b
+    Examples:
+      tsttc compare "Foo++" "Bar" --split val
+      tsttc compare new.json old.json --truth val.csv
+    """
+    if truth_path is not None:
+        _compare_files(Path(first), Path(second), truth_path, as_json=as_json)
+        return
+    with connect(url, with_token=has_token(url)) as client:
+        board = client.board(split)
+        entries = [named(board, name) for name in (first, second)]
+        ids = [entry.method_id for entry in entries if entry.method_id]
+        if len(ids) < len(entries):
+            raise Failure(
+                "A row that was published in a paper cannot be compared: nothing is known of its recordings.",
+                exit_code=Exit.USAGE,
+                code="bad-comparison",
+            )
+        found = client.compare(split, ids)
+    if as_json:
+        echo_json(found.document)
+        return
+    for line in _server_s_words(
+        found, names=(entries[0].method, entries[1].method), scores=(entries[0].scores, entries[1].scores)
+    ):
+        click.echo(line)
+
+
+def _server_s_words(
+    found: Compared, *, names: tuple[str, str], scores: tuple[Scores, Scores]
+) -> Iterator[str]:
+    edition = f" · edition {found.edition}" if found.edition is not None else ""
+    yield printable(f"{found.split}{edition}")
+    yield UNITS
+    yield ""
+    yield from table(names, scores, found.differences())
+    said = found.pairs[0].sentence if found.pairs else ""
+    if said or found.reason:
+        yield ""
+        yield printable(said or found.reason)
+
+
+def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool) -> None:
+    from evaluator import compare_predictions, evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy
+
+    with naming(truth_path):
+        truth = read_truth(truth_path)
+    read, reports = [], []
+    for path in (first, second):
+        with naming(path):
+            predictions = read_predictions(bytes_of(path), manifest=truth.manifest)
+            read.append(predictions)
+            reports.append(evaluate(predictions, truth))
+    found = compare_predictions(read[0], read[1], truth)
+    if as_json:
+        differences = {
+            name: {"difference": d.difference, "low": d.low, "high": d.high, "p": d.p}
+            for name, d in found.items()
+        }
+        echo_json(
+            {
+                "first": reports[0].as_dict(),
+                "second": reports[1].as_dict(),
+                "differences": differences,
+            }
+        )
+        return
+    for line in table((str(first), str(second)), (reports[0].flat(), reports[1].flat()), found):
+        click.echo(line)
+    click.echo("")
+    click.echo(UNITS)
+    click.echo(verdict(str(first), str(second), found))
+
+
+def table(names: tuple[str, str], scores: tuple[Scores, Scores], found: Mapping[str, Found]) -> list[str]:
+    """Both results, and below them the difference of each column with its interval and p."""
+    from evaluator.report import format_published, published  # noqa: PLC0415 -- loads numpy
+
+    rows = [[Cell(""), *(Cell(short_name(name), is_bold=True) for name in SCORE_NAMES)]]
+    for name, values in zip(names, scores, strict=True):
+        texts = [format_published(values.get(score), missing=NO_VALUE) for score in SCORE_NAMES]
+        rows.append([Cell(printable(name)), *map(Cell, texts)])
+
+    def column(kind: str, decimals: int, sign: str = "+") -> list[Cell]:
+        values = [published(getattr(found.get(name), kind, None), decimals=decimals) for name in SCORE_NAMES]
+        return [Cell(NO_VALUE if value is None else f"{value:{sign}.{decimals}f}") for value in values]
+
+    rows += [
+        [Cell("difference", is_bold=True), *column("difference", 2)],
+        [Cell("95 % from"), *column("low", 2)],
+        [Cell("95 % to"), *column("high", 2)],
+        [Cell("p"), *column("p", 4, sign="")],
+    ]
+    return aligned(rows, align="<" + "." * len(SCORE_NAMES))
+
+
+def verdict(first: str, second: str, found: Mapping[str, Found]) -> str:
+    """What the difference in MiD means, in a sentence."""
+    mid = found.get("mid")
+    if mid is None or mid.p is None:
+        return "There are too few recordings to tell a difference from chance."
+    if mid.p >= SIGNIFICANT or not mid.difference:
+        return f"In MiD the two do not differ by more than chance alone may well make (p = {mid.p:.2g})."
+    better = first if mid.difference < 0 else second
+    return f"In MiD {printable(better)} is better by more than chance alone makes (p = {mid.p:.2g})."

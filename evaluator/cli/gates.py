@@ -1,0 +1,252 @@
+"""Gates: conditions on scores that set the exit code, so that a CI job can stop on them.
+
+The grammar is `NAME OPERATOR NUMBER`, joined by `or`: names are the ten scores, operators > >= < <= == !=.
+Nothing is evaluated but that. The numbers compared are the published ones, with two decimals.
+"""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Final, TypeVar
+
+import click
+
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.layout import printable, short_name
+from evaluator.protocol import SCORE_NAMES
+
+if TYPE_CHECKING:
+    from evaluator.answers import Board, BoardEntry, Difference
+    from evaluator.client import Client
+
+OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    "==": operator.eq,
+    "!=": operator.ne,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+_CONDITION: Final = re.compile(
+    r"\s*(?P<name>[a-z_]+)\s*(?P<operator>>=|<=|==|!=|>|<)\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)\s*",
+    re.ASCII,
+)
+_OR: Final = re.compile(r"\bor\b", re.ASCII)
+SIGNIFICANT: Final = 0.05
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+Scores = Mapping[str, float | None]
+
+
+@dataclass(frozen=True, slots=True)
+class Condition:
+    """One comparison of a score with a number."""
+
+    name: str
+    operator: str
+    number: float
+
+    def __str__(self) -> str:
+        return f"{self.name} {self.operator} {self.number:g}"
+
+    def holds(self, scores: Scores) -> bool | None:
+        """Whether it holds; None where there is no such value."""
+        value = scores.get(self.name)
+        return None if value is None else OPERATORS[self.operator](round(value, 2), self.number)
+
+
+def parse(text: str) -> list[Condition]:
+    """The conditions of which one is enough; raises `ValueError` that says what was expected where.
+
+    >>> [str(condition) for condition in parse("mid > 15.0 or rte_crucial>=7")]
+    ['mid > 15', 'rte_crucial >= 7']
+    >>> parse("mid")
+    Traceback (most recent call last):
+    ValueError: found 'mid', expected NAME OPERATOR NUMBER, such as mid > 15.0
+    """
+    return [_condition(part) for part in _OR.split(text)]
+
+
+def _condition(text: str) -> Condition:
+    found = _CONDITION.fullmatch(text)
+    if found is None:
+        shown = text.strip() or "nothing"
+        raise ValueError(f"found {shown!r}, expected NAME OPERATOR NUMBER, such as mid > 15.0")
+    if found["name"] not in SCORE_NAMES:
+        raise ValueError(f"found {found['name']!r}, expected one of {', '.join(SCORE_NAMES)}")
+    return Condition(found["name"], found["operator"], float(found["number"]))
+
+
+def fail_if_option(command: Command) -> Command:
+    """--fail-if: conditions on scores."""
+    return click.option(
+        "--fail-if",
+        "fail_if",
+        multiple=True,
+        metavar="CONDITION",
+        callback=_conditions,
+        help='End with exit code 6 if this holds, such as "mid > 15.0 or rte > 20"; may be repeated.',
+    )(command)
+
+
+def _conditions(
+    _context: click.Context, _parameter: click.Parameter, texts: Sequence[str]
+) -> list[Condition]:
+    try:
+        return [condition for text in texts for condition in parse(text)]
+    except ValueError as fault:
+        raise click.BadParameter(f"{fault}.") from None
+
+
+def judge(conditions: Sequence[Condition], scores: Scores | None) -> None:
+    """Raise Failure if one of the conditions holds, or cannot be told: no value is no pass."""
+    known: Scores = scores or {}
+    missing = [condition for condition in conditions if condition.holds(known) is None]
+    holding = [condition for condition in conditions if condition.holds(known)]
+    if holding:
+        said = "; ".join(f"{c.name} is {known[c.name]:.2f}, and {c} was to fail" for c in holding)
+        raise Failure(f"The gate fails: {said}.", exit_code=Exit.GATE, code="gate-failed")
+    if missing:
+        names = ", ".join(dict.fromkeys(condition.name for condition in missing))
+        raise undecided(f"there is no value for {names}")
+
+
+def told(
+    document: Mapping[str, Any], *, show: Callable[[], None], judge: Callable[[], None], as_json: bool
+) -> None:
+    """Show a result, and raise what `judge` raises; as JSON, `document`, the two are one."""
+    failure = None
+    try:
+        judge()
+    except Failure as found:
+        failure = found
+    if as_json and failure is None:
+        echo_json(document)
+    elif not as_json:
+        show()
+    if failure is not None:
+        failure.document = {**document, "gate": failure.document}
+        raise failure
+
+
+def undecided(why: str, *, hint: str = "") -> Failure:
+    """The failure of a gate for which something is missing."""
+    return Failure(
+        f"The gate cannot be judged: {why}.", exit_code=Exit.GATE, code="gate-undecided", hint=hint
+    )
+
+
+# --- worse than another method ---------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, slots=True)
+class Rival:
+    """The method that a file is not to be worse than, as the board had it before the file was sent."""
+
+    entry: BoardEntry
+    is_significant_only: bool
+
+
+def named(board: Board, name: str) -> BoardEntry:
+    """The board's row of a method, by name or id; raises Failure for none, or more than one."""
+    rows = [entry for entry in board.entries if name in {entry.method, entry.method_id}]
+    if len(rows) == 1:
+        return rows[0]
+    if not rows:
+        raise Failure(
+            f"The board of {board.split} has no method {printable(name)!r}; expected a name or an id that is "
+            "on it.",
+            exit_code=Exit.USAGE,
+            code="unknown-method",
+            hint=f"See them with: tsttc board {board.split}",
+        )
+    ids = ", ".join(f"{entry.method_id or 'published'} ({printable(entry.team or '')})" for entry in rows)
+    raise Failure(
+        f"The board of {board.split} has {len(rows)} methods called {printable(name)!r}: {ids}; "
+        "expected an id.",
+        exit_code=Exit.USAGE,
+        code="ambiguous-method",
+    )
+
+
+def rival(client: Client, *, split: str, method: str, own: str, is_significant_only: bool) -> Rival | None:
+    """Look the other method up; raises Failure where there can be no comparison, before anything is sent.
+
+    None where it is the file's `own` method, and nothing of it is on the board yet.
+    """
+    board = client.board(split)
+    if method == own and all(method not in {entry.method, entry.method_id} for entry in board.entries):
+        words = f"{printable(method)} is not on the board of {split} yet; there is nothing to be worse than."
+        click.echo(words, err=True)
+        return None
+    entry = named(board, method)
+    if entry.scores.get("mid") is None:
+        raise undecided(f"{printable(entry.method)} has no MiD on {split}")
+    if is_significant_only and entry.method_id is None:
+        raise undecided(
+            f"{printable(entry.method)} was published in a paper, and nothing is known of its recordings",
+            hint="Compare with it without --significant.",
+        )
+    return Rival(entry=entry, is_significant_only=is_significant_only)
+
+
+def judge_against(
+    client: Client, found: Rival, *, split: str, method_id: str | None, mid: float | None
+) -> None:
+    """Raise Failure if MiD is worse than the other method's; by more than chance, if only that counts."""
+    other, name = found.entry.scores["mid"], printable(found.entry.method)
+    if mid is None or other is None:
+        raise undecided("there is no value for mid")
+    if mid <= other:
+        return
+    words = f"MiD is {mid:.2f}, and {name} has {other:.2f}"
+    if not found.is_significant_only:
+        raise _worse(words)
+    if method_id is None or found.entry.method_id is None:
+        raise undecided("the server does not say which method this is")
+    row = named(client.board(split), method_id)
+    if method_id == found.entry.method_id or row.scores.get("mid") != mid:
+        raise undecided(
+            f"{words}, but the board compares methods, and has a better one of {printable(row.method)}",
+            hint="Send it under another method's name, or compare files: tsttc compare A B --truth TRUTH",
+        )
+    difference = client.compare(split, [method_id, found.entry.method_id]).differences().get("mid")
+    if difference is None or difference.p is None:
+        raise undecided("there are too few recordings to tell a difference from chance")
+    if difference.p < SIGNIFICANT:
+        raise _worse(f"{words}; {in_numbers(difference)}")
+
+
+def in_numbers(found: Difference) -> str:
+    """`+1.20 [0.40, 2.00], p = 0.003`: a difference, its 95 % interval, and p.
+
+    >>> from evaluator.answers import Difference
+    >>> in_numbers(Difference(difference=1.2, low=0.4, high=2.0, p=0.003))
+    '+1.20 [+0.40, +2.00], p = 0.003'
+    """
+    if found.low is None or found.high is None or found.p is None:
+        return f"{found.difference:+.2f}"
+    return f"{found.difference:+.2f} [{found.low:+.2f}, {found.high:+.2f}], p = {found.p:.2g}"
+
+
+def _worse(words: str) -> Failure:
+    return Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")
+
+
+def worse_than_options(command: Command) -> Command:
+    """--fail-if-worse-than METHOD, --significant."""
+    command = click.option(
+        "--significant",
+        is_flag=True,
+        help=f"With --fail-if-worse-than: only for what chance alone hardly makes (p < {SIGNIFICANT:g}).",
+    )(command)
+    return click.option(
+        "--fail-if-worse-than",
+        "worse_than",
+        metavar="METHOD",
+        help=f"End with exit code 6 if {short_name('mid')} is higher than this method's on the board.",
+    )(command)

@@ -1,0 +1,47 @@
+"""Where the command keeps what it may: settings that people can read, and copies that may be lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import click
+
+APPLICATION = "tsttc"
+
+
+def settings_file() -> Path:
+    """The file of settings: of the user's configuration, as each system has it."""
+    return Path(click.get_app_dir(APPLICATION)) / "settings.json"
+
+
+def cache_folder() -> Path:
+    """The folder of copies that can be fetched again."""
+    if sys.platform == "win32":
+        home = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
+        return Path(home) / APPLICATION / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / APPLICATION
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / APPLICATION
+
+
+def server_of_login() -> str | None:
+    """The address that `tsttc login` was last given; None where there was none, or it cannot be read."""
+    try:
+        found = json.loads(settings_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
+        return None
+    server = found.get("server") if isinstance(found, dict) else None
+    return server if isinstance(server, str) else None
+
+
+def keep_server_of_login(server: str | None) -> None:
+    """Keep the address, or forget it. Raises `OSError`."""
+    path = settings_file()
+    if server is None:
+        path.unlink(missing_ok=True)
+        return
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(json.dumps({"server": server}, indent=2) + "\n", encoding="utf-8")

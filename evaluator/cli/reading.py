@@ -1,0 +1,48 @@
+"""Reading the files that a command names, with every fault of them in the library's words."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+
+import click
+
+from evaluator.cli.failures import rejected
+from evaluator.problems import Rejected
+
+TABLE: Final = click.Path(exists=True, path_type=Path)
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Turns the library's rejection into a failure that names the file."""
+    try:
+        yield
+    except Rejected as fault:
+        raise rejected(name_of(path), fault) from None
+
+
+def name_of(path: Path) -> str:
+    """What a file is called in a sentence."""
+    return "standard input" if str(path) == "-" else str(path)
+
+
+def bytes_of(path: Path) -> bytes:
+    """The bytes of a file or of standard input."""
+    if str(path) == "-":
+        return sys.stdin.buffer.read()
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write what `-o` names."""
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise click.BadParameter(f"{path} cannot be written: {error.strerror}.", param_hint="-o") from None

@@ -1,0 +1,118 @@
+"""The subcommands about receipts: receipt fetches one, verify checks one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+from urllib.parse import urlsplit
+
+import click
+
+from evaluator.cli.connection import connect
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.layout import UNITS, printable, score_table
+from evaluator.cli.options import json_option, slug, url_option
+from evaluator.cli.reading import bytes_of, write_bytes
+
+if TYPE_CHECKING:
+    from evaluator.receipts import Verified
+
+
+@click.command(short_help="Get the signed receipt of a scored submission.")
+@click.argument("submission_id", metavar="ID", callback=slug)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write it here instead of to standard output.",
+)
+@url_option
+def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
+    """Get the signed receipt of submission ID: what it scored, in which edition, by which file, and when.
+
+    Put it beside the paper: who has it can check it without asking anybody.
+
+    \b
+    Example:
+      tsttc receipt 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 -o receipt.json
+    """
+    with connect(url, with_token=True) as client:
+        data = client.receipt(submission_id)
+    if output is None:
+        click.echo(data, nl=not data.endswith(b"\n"))
+        return
+    write_bytes(output, data)
+    click.echo(f"{output}: check it with tsttc verify {output}")
+
+
+@click.command(short_help="Check the receipt of a score.")
+@click.argument(
+    "receipt_path",
+    metavar="RECEIPT",
+    type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path),
+)
+@click.option(
+    "--keys",
+    "keys_path",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="The site's keys, kept from before; without them they are fetched from --server.",
+)
+@url_option
+@json_option
+def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: bool) -> None:
+    """Check that the leaderboard signed RECEIPT, a file or - for standard input, and print what it says.
+
+    The site's keys are at /.well-known/tsttc-receipt-keys.json; with --keys nothing is asked of the network.
+    Never take them from whoever gave you the receipt.
+
+    \b
+    Examples:
+      tsttc verify receipt.json --server https://leaderboard.example.org
+      tsttc verify receipt.json --keys tsttc-receipt-keys.json
+    """
+    from evaluator.receipts import NotVerified, read_keys  # noqa: PLC0415 -- needed here alone
+    from evaluator.receipts import verify as verified_by  # noqa: PLC0415 -- as above
+
+    data = bytes_of(receipt_path)
+    if keys_path is not None:
+        keys_data = bytes_of(keys_path)
+    else:
+        with connect(url, with_token=False) as client:
+            keys_data = client.receipt_keys()
+    try:
+        found = verified_by(data, read_keys(keys_data))
+    except NotVerified as fault:
+        raise Failure(str(fault), exit_code=Exit.REJECTED, code=fault.code) from None
+    is_elsewhere = keys_path is None and urlsplit(found.site).netloc != urlsplit(url).netloc
+    if as_json:
+        echo_json({name: getattr(found, name) for name in found.__dataclass_fields__})
+    else:
+        for line in _in_words(found):
+            click.echo(line)
+    if is_elsewhere:
+        click.echo(f"Note: the receipt names {printable(found.site)}; the keys are those of {url}.", err=True)
+
+
+def _in_words(found: Verified) -> Iterator[str]:
+    facts = {
+        "signed by": found.site,
+        "scored": found.scored_at,
+        "method": f"{found.method} ({found.method_id})",
+        "submission": found.submission,
+        "split": f"{found.split}, edition {found.edition}, {found.protocol}",
+        "truth": found.ground_truth,
+        "predictions": found.file,
+        "key": found.key_id,
+    }
+    yield "The receipt holds."
+    yield ""
+    for name, text in facts.items():
+        yield printable(f"{name:<12} {text}")
+    yield ""
+    yield from score_table(found.scores, counts=found.counts)
+    yield ""
+    yield UNITS

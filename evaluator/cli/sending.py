@@ -1,0 +1,158 @@
+"""Sending a file: checked here first, by the server's own code, then streamed with a bar on a terminal."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO
+
+import click
+
+from evaluator.cli.failures import rejected
+from evaluator.cli.places import cache_folder
+from evaluator.problems import Rejected
+
+if TYPE_CHECKING:
+    from evaluator.answers import Submission
+    from evaluator.client import Client
+    from evaluator.truth import Manifest
+
+# What is larger is no prediction file, and the server says so without its being read here.
+LARGEST_CHECKED_BYTES = 64_000_000
+
+
+@contextmanager
+def opened(path: Path) -> Iterator[BinaryIO]:
+    """The file to send. What can be read only once is kept first, so that sending can be repeated."""
+    try:
+        source = nullcontext(sys.stdin.buffer) if str(path) == "-" else path.open("rb")
+        with source as file, tempfile.TemporaryFile() as kept:
+            if not file.seekable():
+                shutil.copyfileobj(file, kept)
+            yield file if file.seekable() else kept
+    except OSError as error:
+        raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> None:
+    """Raise Failure, with every problem, for a file that the server would reject.
+
+    A split without a manifest is left to the server, which says what is the matter with it.
+    """
+    from evaluator.answers import Refused  # noqa: PLC0415 -- loads msgspec
+    from evaluator.predictions import read_predictions  # noqa: PLC0415 -- loads numpy
+
+    file.seek(0)
+    data = file.read(LARGEST_CHECKED_BYTES + 1)
+    if len(data) > LARGEST_CHECKED_BYTES:
+        return
+    try:
+        manifest = manifest_of(client, split)
+    except Refused as refused:
+        if refused.status != 404:
+            raise
+        return
+    if manifest is None:
+        return
+    try:
+        read_predictions(data, manifest=manifest)
+    except Rejected as fault:
+        name = "standard input" if name == "-" else name
+        raise rejected(name, fault, hint="Nothing was sent, so it costs nothing.") from None
+
+
+def manifest_of(client: Client, split: str) -> Manifest | None:
+    """The split's manifest: the kept copy if it is the present one, else fetched and kept.
+
+    A copy goes by its digest, and what does not have that digest is no copy.
+    """
+    from evaluator.truth import read_manifest  # noqa: PLC0415 -- loads numpy
+
+    digest = client.manifest_digest(split)
+    if digest is None:
+        return None
+    kept = cache_folder() / "manifests" / f"{digest.removeprefix('sha256:')[:64]}.csv"
+    try:
+        manifest = read_manifest(kept)
+        if manifest.digest == digest:
+            return manifest
+    except (Rejected, OSError):  # none yet, or damaged
+        pass
+    with tempfile.TemporaryDirectory() as folder:
+        table = Path(folder, "manifest.csv")
+        table.write_bytes(client.manifest(split))
+        try:
+            manifest = read_manifest(table)
+        except Rejected as fault:
+            raise rejected(f"the server's manifest of {split}", fault) from None
+        _keep(table, kept)
+    return manifest
+
+
+def _keep(table: Path, kept: Path) -> None:
+    """Put a copy where the next run finds it; a machine where that cannot be does without."""
+    part = kept.with_suffix(f".{os.getpid()}.part")
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(table, part)
+        part.replace(kept)
+    except OSError:
+        return
+
+
+def sent(
+    client: Client,
+    file: BinaryIO,
+    *,
+    filename: str,
+    split: str,
+    method: str,
+    details: Mapping[str, str],
+    idempotency_key: str | None,
+) -> Submission:
+    """Send the file; on a terminal standard error shows how far it is."""
+    with _bar(_size_of(file), filename) as on_progress:
+        return client.submit(
+            file,
+            filename=filename,
+            split=split,
+            method=method,
+            details=details,
+            idempotency_key=idempotency_key,
+            on_progress=on_progress,
+        )
+
+
+def _size_of(file: BinaryIO) -> int:
+    return file.seek(0, os.SEEK_END)
+
+
+@contextmanager
+def _bar(n_bytes: int, filename: str) -> Iterator[Callable[[int], None] | None]:
+    """What to tell how many bytes are sent; None where nobody looks."""
+    if not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console  # noqa: PLC0415 -- only a terminal needs it
+    from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn  # noqa: PLC0415 -- as above
+
+    from evaluator.cli.layout import printable  # noqa: PLC0415 -- as above
+
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        DownloadColumn(),
+        TransferSpeedColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(printable(filename), total=n_bytes)
+
+        def on_progress(n_sent: int) -> None:
+            bar.update(task, completed=n_sent)
+
+        yield on_progress

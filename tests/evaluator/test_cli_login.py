@@ -1,0 +1,162 @@
+"""login, logout and where the token comes from, with real keyrings of tests."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import keyring
+import pytest
+from click.testing import Result
+
+from tests.evaluator.keyrings import LockedKeyring, NoKeyring, RememberingKeyring
+from tests.evaluator.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.worlds import REPOSITORY
+
+Tsttc = Callable[..., Result]
+TOKEN = "tsttc_" + "a1" * 32
+ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
+SCORED = {"id": ID, "state": "SCORED", "split": "val", "method": "Foo++"}
+
+
+@pytest.fixture
+def ring() -> Iterator[RememberingKeyring]:
+    """A keyring that remembers."""
+    backend = RememberingKeyring()
+    keyring.set_keyring(backend)
+    yield backend
+    keyring.set_keyring(NoKeyring())
+
+
+@pytest.fixture(autouse=True)
+def signed_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("TSTTC_TOKEN", "TSTTC_URL"):
+        monkeypatch.delenv(name, raising=False)
+
+
+def test_login_tries_the_token_keeps_it_and_other_commands_find_it_and_the_server(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring
+) -> None:
+    site.put("GET /api/v1/quota", Reply([]))
+    site.put(f"GET /api/v1/submissions/{ID}", Reply(SCORED))
+    result = tsttc("login", "--server", f"{site.url}/", stdin=f" {TOKEN}\n".encode())
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout == f"The token is good, and kept for {site.url}/ (A keyring of the tests).\n"
+    assert ring.kept == {("tsttc", site.url): TOKEN}
+    assert tsttc("status", ID).exit_code == 0, "without naming token or server"
+    assert [request.headers["Authorization"] for request in site.requests] == [f"Bearer {TOKEN}"] * 2
+    assert TOKEN not in tsttc("login", "--server", site.url, "--json", stdin=TOKEN.encode()).output
+
+
+def test_token_that_the_server_refuses_is_not_kept(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring
+) -> None:
+    words = "The token expired on 2026-11-20."
+    site.put("GET /api/v1/quota", Reply(problem(words, code="token-expired"), 401))
+    result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
+    assert result.exit_code == 4
+    assert result.stderr.startswith(f"Error: {words}\nMake a new one at {site.url}/tokens/")
+    assert ring.kept == {}
+    assert TOKEN not in result.output
+
+
+@pytest.mark.parametrize("text", ["", "\n", "to ken", "tökén"])
+def test_what_is_no_token_is_not_sent(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, text: str
+) -> None:
+    result = tsttc("login", "--server", site.url, stdin=text.encode())
+    assert (result.exit_code, site.requests) == (4, [])
+
+
+def test_machine_without_a_keyring_is_told_what_to_do_before_anything_is_typed(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    result = tsttc("login", "--server", site.url, "--json", stdin=TOKEN.encode())
+    assert result.exit_code == 4
+    assert "This machine has no keyring" in result.stderr
+    assert "export TSTTC_TOKEN=…" in result.stderr
+    assert json.loads(result.stdout)["code"] == "no-keyring"
+    assert site.requests == []
+
+
+def test_keyring_that_stays_locked_is_told_and_means_no_token(tsttc: Tsttc, site: RecordedSite) -> None:
+    keyring.set_keyring(LockedKeyring())
+    site.put("GET /api/v1/quota", Reply([]))
+    result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
+    assert result.exit_code == 4
+    assert "The keyring did not take the token (the collection is locked)." in result.stderr
+    keyring.set_keyring(NoKeyring())
+
+
+def test_without_any_token_nothing_is_sent_and_both_ways_are_named(tsttc: Tsttc, site: RecordedSite) -> None:
+    result = tsttc("status", ID, "--server", site.url)
+    assert (result.exit_code, site.requests) == (4, [])
+    assert "TSTTC_TOKEN is not set, and tsttc login has kept none" in result.stderr
+    assert f"{site.url}/tokens/" in result.stderr
+
+
+def test_environment_comes_before_the_keyring(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ring.kept["tsttc", site.url] = TOKEN
+    monkeypatch.setenv("TSTTC_TOKEN", "tsttc_other")
+    site.put("GET /api/v1/quota", Reply([]))
+    assert tsttc("quota", "--server", site.url).exit_code == 0
+    assert site.requests[0].headers["Authorization"] == "Bearer tsttc_other"
+
+
+def test_token_of_one_server_is_not_sent_to_another(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring
+) -> None:
+    ring.kept["tsttc", "https://elsewhere.example"] = TOKEN
+    assert tsttc("status", ID, "--server", site.url).exit_code == 4
+    assert site.requests == []
+
+
+def test_logout_forgets_token_and_server(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, places: Path
+) -> None:
+    site.put("GET /api/v1/quota", Reply([]))
+    assert tsttc("login", "--server", site.url, stdin=TOKEN.encode()).exit_code == 0
+    assert list(places.rglob("settings.json")) != []
+    assert f"The token for {site.url} is removed" in tsttc("logout").stdout
+    assert ring.kept == {}
+    assert list(places.rglob("settings.json")) == []
+    again = tsttc("logout", "--server", site.url)
+    assert (again.exit_code, again.stdout) == (
+        0,
+        f"There was no token for {site.url} in a keyring of this machine.\n",
+    )
+
+
+def test_terminal_is_asked_and_does_not_show_the_token(site: RecordedSite, tmp_path: Path) -> None:
+    """A real terminal, and a real process with a keyring that is a class of the tests."""
+    site.put("GET /api/v1/quota", Reply([]))
+    terminal, end = pty.openpty()
+    running = subprocess.Popen(
+        [sys.executable, "-m", "evaluator", "login", "--server", site.url],
+        stdin=end,
+        stdout=end,
+        stderr=end,
+        cwd=REPOSITORY,
+        start_new_session=True,
+        env=os.environ
+        | {"PYTHON_KEYRING_BACKEND": "tests.evaluator.keyrings.RememberingKeyring", "HOME": str(tmp_path)},
+    )
+    os.close(end)
+    with open(terminal, "r+b", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
+        shown = b""
+        while b"Token:" not in shown:
+            shown += screen.read(1 << 16)
+        screen.write(TOKEN.encode() + b"\n")
+        while b"is good" not in shown:
+            shown += screen.read(1 << 16)
+        assert running.wait(30) == 0
+    assert b"it is not shown" in shown
+    assert TOKEN.encode() not in shown
+    assert site.requests[0].headers["Authorization"] == f"Bearer {TOKEN}"

@@ -1,0 +1,206 @@
+"""quota, compare, publish, receipt and verify, as a person and as a program call them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import Result
+
+from evaluator import compare_predictions, read_predictions, read_truth
+from evaluator.protocol import SCORE_NAMES
+from tests.evaluator.console import METHOD_ID, RECEIPT, RECEIPT_KEYS
+from tests.evaluator.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.worlds import REPOSITORY
+
+Tsttc = Callable[..., Result]
+pytestmark = pytest.mark.usefixtures("at_site")
+
+EXAMPLES = REPOSITORY / "examples"
+SENTENCE = "Your team has spent the 3 submissions to test; the next slot opens at 2026-12-04 09:13 UTC."
+QUOTAS: list[dict[str, Any]] = [
+    {"split": "val", "limit": None, "used": 4, "left": None, "is_open": True, "sentence": "Any number."},
+    {"split": "test", "limit": 3, "used": 3, "left": 0, "is_open": False, "sentence": SENTENCE}
+    | {"next_slot_at": "2026-12-04T09:13:00Z"},
+]
+
+
+def test_quota_says_what_is_left_and_when_the_next_slot_opens(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put("GET /api/v1/quota", Reply(QUOTAS))
+    lines = tsttc("quota").stdout.splitlines()
+    assert lines[1].split() == ["val", "–", "any", "number", "now"]
+    assert lines[2].split() == ["test", "0", "3", "2026-12-04T09:13:00Z"]
+    assert lines[-1] == f"test: {SENTENCE}"
+    assert json.loads(tsttc("quota", "--json").stdout) == QUOTAS
+    assert json.loads(tsttc("quota", "test", "--json").stdout) == QUOTAS[1]
+    unknown = tsttc("quota", "trial")
+    assert (unknown.exit_code, unknown.stdout) == (8, "")
+    assert "'trial'" in unknown.stderr
+
+
+# --- compare ----------------------------------------------------------------------------------------------
+
+
+def board(*names: tuple[str, str | None]) -> Reply:
+    scores = dict.fromkeys(SCORE_NAMES, 14.0)
+    entries = [{"method": name, "method_id": found, "team": "T", "scores": scores} for name, found in names]
+    return Reply({"split": "val", "edition": 2, "entries": entries})
+
+
+def test_compare_asks_until_it_is_computed_and_shows_interval_and_p(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put("GET /api/v1/splits/val/board", board(("A", "id-a"), ("B", "id-b")))
+    found: dict[str, Any] = dict.fromkeys(SCORE_NAMES)
+    found["mid"] = {"difference": -1.2, "low": -2.0, "high": -0.4, "p": 0.003, "is_significant": True}
+    waiting = {"split": "val", "edition": 2, "is_complete": False, "reason": "", "entries": []}
+    pair = {"first": "id-a", "second": "id-b", "differences": None, "sentence": ""}
+    ready = waiting | {
+        "is_complete": True,
+        "pairs": [pair | {"differences": found, "sentence": "A is better."}],
+    }
+    site.put("GET /api/v1/compare", Reply(waiting | {"pairs": [pair]}, status=202), Reply(ready))
+    result = tsttc("compare", "A", "id-b", "--split", "val")
+    assert (result.exit_code, result.stderr) == (0, "")
+    rows = {line.split("  ")[0]: line.split() for line in result.stdout.splitlines()}
+    assert rows["difference"][1:3] == ["-1.20", "–"]
+    assert (rows["95 % from"][3], rows["95 % to"][3], rows["p"][1]) == ("-2.00", "-0.40", "0.0030")
+    assert result.stdout.endswith("\n\nA is better.\n")
+    assert site.requests[-1].path == "/api/v1/compare?split=val&m=id-a&m=id-b"
+    assert json.loads(tsttc("compare", "A", "B", "--split", "val", "--json").stdout) == ready
+
+
+def test_compare_names_what_it_does_not_find_and_what_cannot_be_compared(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    site.put("GET /api/v1/splits/test/board", board(("A", "id-a"), ("Paper", None)))
+    unknown = tsttc("compare", "A", "C")
+    assert (unknown.exit_code, "has no method 'C'" in unknown.stderr) == (2, True)
+    printed = tsttc("compare", "A", "Paper")
+    assert (printed.exit_code, "published in a paper" in printed.stderr) == (2, True)
+    words = "A method was named twice; expected different ones to compare."
+    site.put("GET /api/v1/compare", Reply(problem(words, where="m"), 400))
+    twice = tsttc("compare", "A", "A")
+    assert (twice.exit_code, twice.stderr) == (2, f"Error: {words}\n")
+
+
+def test_files_are_compared_offline_as_the_library_does(
+    tsttc: Tsttc, site: RecordedSite, tmp_path: Path, truth_of_30_recordings: Path
+) -> None:
+    truth = read_truth(truth_of_30_recordings)
+    files = []
+    for name, factor in (("good", 1.05), ("bad", 1.3)):
+        values = dict(zip(truth.manifest.anno_id_keys, (truth.ttc_s * factor).tolist(), strict=True))
+        files.append(tmp_path / f"{name}.json")
+        files[-1].write_text(json.dumps(values))
+    arguments = ["compare", *files, "--truth", truth_of_30_recordings]
+    document = json.loads(tsttc(*arguments, "--json").stdout)
+    read = [read_predictions(path.read_bytes(), manifest=truth.manifest) for path in files]
+    expected = compare_predictions(read[0], read[1], truth)
+    assert document["differences"]["mid"]["p"] == expected["mid"].p
+    assert document["differences"]["mid"]["low"] == expected["mid"].low
+    assert document["first"]["scores"]["overall"]["mid"] < document["second"]["scores"]["overall"]["mid"]
+    assert f"In MiD {files[0]} is better by more than chance alone makes" in tsttc(*arguments).stdout
+    assert site.requests == []
+    bad = tsttc("compare", EXAMPLES / "broken.json", files[0], "--truth", truth_of_30_recordings)
+    assert bad.exit_code == 1
+    assert "broken.json is rejected" in bad.stderr
+
+
+@pytest.fixture
+def truth_of_30_recordings(tmp_path: Path) -> Path:
+    rows = [f"{i},bag{i % 30},1,{i},7,{(i % 37 - 18) / 2 + 0.3}" for i in range(300)]
+    path = tmp_path / "truth.csv"
+    path.write_text("\n".join(["anno_id,bag_stamp,cam_id,ts,track_id,ttc", *rows, ""]))
+    return path
+
+
+# --- publish ----------------------------------------------------------------------------------------------
+
+MINE = {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE"}
+SHOW = f"POST /api/v1/methods/{METHOD_ID}/visibility"
+
+
+@pytest.mark.parametrize("name", ["Foo++", METHOD_ID])
+def test_publish_shows_one_s_own_method_once_it_is_confirmed(
+    tsttc: Tsttc, site: RecordedSite, name: str
+) -> None:
+    site.put("GET /api/v1/methods", Reply([MINE]))
+    site.put(SHOW, Reply(MINE | {"visibility": "PUBLIC", "url": "https://e.example/methods/x/"}))
+    asked = tsttc("publish", name)
+    assert (asked.exit_code, site.posts) == (2, [])
+    assert "Say --yes if it is meant." in asked.stderr
+    result = tsttc("publish", name, "--yes")
+    assert (result.exit_code, result.stdout) == (0, "Foo++ is public now: https://e.example/methods/x/\n")
+    assert json.loads(site.posts[0].body) == {"visibility": "PUBLIC", "confirm": True, "reveal_at": None}
+
+
+def test_publish_under_a_pseudonym_until_a_day(tsttc: Tsttc, site: RecordedSite) -> None:
+    day = "2027-03-01T00:00:00Z"
+    site.put("GET /api/v1/methods", Reply([MINE]))
+    shown = MINE | {"visibility": "ANONYMOUS", "pseudonym": "Anonymous 3f9c2a", "reveal_at": day}
+    site.put(SHOW, Reply(shown))
+    result = tsttc("publish", "Foo++", "--as", "anonymous", "--reveal-at", day, "--yes")
+    assert result.stdout == f'Foo++ is anonymous now, and called "Anonymous 3f9c2a" until {day}\n'
+    assert json.loads(site.posts[0].body)["reveal_at"] == day
+    assert tsttc("publish", "Foo++", "--reveal-at", day, "--yes").exit_code == 2
+
+
+def test_publish_knows_one_s_own_methods_alone_and_tells_the_server_s_words(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    site.put("GET /api/v1/methods", Reply([MINE]))
+    site.put(SHOW, Reply(problem("The method 'Foo++' is public, for good.", where="visibility"), 422))
+    assert tsttc("publish", "Theirs", "--yes").exit_code == 2
+    refused = tsttc("publish", "Foo++", "--as", "anonymous", "--yes")
+    assert (refused.exit_code, refused.stderr) == (2, "Error: The method 'Foo++' is public, for good.\n")
+
+
+# --- receipts ---------------------------------------------------------------------------------------------
+
+KEYS = "GET /.well-known/tsttc-receipt-keys.json"
+
+
+@pytest.fixture
+def receipt(tmp_path: Path) -> Path:
+    path = tmp_path / "receipt.json"
+    path.write_text(json.dumps(RECEIPT))
+    return path
+
+
+def test_receipt_is_written_as_it_came(tsttc: Tsttc, site: RecordedSite, tmp_path: Path) -> None:
+    data = json.dumps(RECEIPT, indent=1).encode() + b"\n"
+    site.put(f"GET /api/v1/submissions/{RECEIPT['submission']}/receipt", Reply(data))
+    written = tmp_path / "written.json"
+    assert tsttc("receipt", RECEIPT["submission"], "-o", written).exit_code == 0
+    assert written.read_bytes() == data
+    assert tsttc("receipt", RECEIPT["submission"]).stdout_bytes == data
+
+
+def test_verify_asks_the_named_server_for_its_keys_and_no_other(
+    tsttc: Tsttc, site: RecordedSite, receipt: Path
+) -> None:
+    site.put(KEYS, Reply(RECEIPT_KEYS))
+    result = tsttc("verify", receipt)
+    assert result.exit_code == 0
+    assert result.stdout.startswith("The receipt holds.\n")
+    assert "13.92" in result.stdout
+    assert result.stderr == (
+        f"Note: the receipt names https://leaderboard.example.org; the keys are those of {site.url}.\n"
+    )
+    assert site.requests[0].headers["Authorization"] is None
+
+
+def test_verify_with_kept_keys_asks_nobody(
+    tsttc: Tsttc, site: RecordedSite, receipt: Path, tmp_path: Path
+) -> None:
+    keys = tmp_path / "keys.json"
+    keys.write_text(json.dumps(RECEIPT_KEYS))
+    said = json.loads(tsttc("verify", receipt, "--keys", keys, "--json").stdout)
+    assert (said["scores"]["mid"], said["edition"], said["split"]) == (13.92, 2, "val")
+    receipt.write_text(receipt.read_text().replace("13.92", "10.92"))
+    forged = tsttc("verify", receipt, "--keys", keys, "--json")
+    assert (forged.exit_code, json.loads(forged.stdout)["code"]) == (1, "receipt-altered")
+    assert tsttc("verify", "-", "--keys", keys, stdin=b"{}").exit_code == 1
+    assert site.requests == []

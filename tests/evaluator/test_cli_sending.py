@@ -1,0 +1,189 @@
+"""What happens before and while a file is sent: the check with the split's manifest, the key, the bar."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import Result
+
+from evaluator import read_manifest
+from tests.evaluator.recorded_site import CUT, RecordedSite, Reply, problem
+from tests.evaluator.worlds import REPOSITORY
+
+Tsttc = Callable[..., Result]
+pytestmark = pytest.mark.usefixtures("at_site")
+
+EXAMPLES = REPOSITORY / "examples"
+MANIFEST = EXAMPLES / "manifest.csv"
+ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
+QUEUED: dict[str, Any] = {"id": ID, "state": "QUEUED", "split": "val", "method": "Foo++"}
+POST = "POST /api/v1/submissions"
+EDITIONS = "GET /api/v1/splits/val/editions"
+TABLE = "GET /api/v1/splits/val/manifest"
+
+
+def submit(tsttc: Tsttc, name: str = "predictions.json", *more: object) -> Result:
+    return tsttc("submit", EXAMPLES / name, "--split", "val", "--method", "Foo++", *more)
+
+
+def put_manifest(
+    site: RecordedSite, data: bytes = MANIFEST.read_bytes(), *, digest: str | None = None
+) -> None:
+    found = digest or read_manifest(MANIFEST).digest
+    rows = [{"edition": 2, "is_board": False, "manifest": "sha256:old"}]
+    rows.append({"edition": 1, "is_board": True, "manifest": found})
+    site.put(EDITIONS, Reply(rows))
+    site.put(TABLE, Reply(data, headers={"Content-Type": "text/csv"}))
+    site.put(POST, Reply(QUEUED, status=201))
+
+
+def paths(site: RecordedSite) -> list[str]:
+    return [f"{request.method} {request.path}" for request in site.requests]
+
+
+def test_bad_file_is_told_in_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc, site: RecordedSite) -> None:
+    put_manifest(site)
+    checked = tsttc("check", EXAMPLES / "broken.json", "--manifest", MANIFEST)
+    result = submit(tsttc, "broken.json")
+    assert (result.exit_code, result.stdout) == (1, "")
+    assert result.stderr == checked.stderr + "Nothing was sent, so it costs nothing.\n"
+    assert site.posts == []
+    document = json.loads(submit(tsttc, "broken.json", "--json").stdout)
+    assert (document["code"], document["n_problems"]) == ("rejected", 7)
+    assert submit(tsttc, "broken.json", "--no-check").exit_code == 0
+    assert len(site.posts) == 1
+
+
+def test_manifest_is_fetched_once_as_anybody_and_kept_under_its_digest(
+    tsttc: Tsttc, site: RecordedSite, places: Path
+) -> None:
+    put_manifest(site)
+    assert [submit(tsttc).exit_code for _ in range(2)] == [0, 0]
+    assert paths(site) == [EDITIONS, TABLE, POST, EDITIONS, POST]
+    public = [request for request in site.requests if request.method == "GET"]
+    assert [request.headers["Authorization"] for request in public] == [None] * 3
+    (kept,) = places.rglob("*.csv")
+    assert kept.read_bytes() == MANIFEST.read_bytes()
+    assert kept.stem in read_manifest(MANIFEST).digest
+
+
+@pytest.mark.parametrize("damage", [b"", b"nonsense", MANIFEST.read_bytes()[:-60], b"\xff"])
+def test_copy_that_is_damaged_is_fetched_anew(
+    tsttc: Tsttc, site: RecordedSite, places: Path, damage: bytes
+) -> None:
+    put_manifest(site)
+    submit(tsttc)
+    (kept,) = places.rglob("*.csv")
+    kept.write_bytes(damage)
+    assert submit(tsttc).exit_code == 0
+    assert kept.read_bytes() == MANIFEST.read_bytes()
+
+
+def test_machine_where_nothing_can_be_kept_does_without(
+    tsttc: Tsttc, site: RecordedSite, places: Path
+) -> None:
+    put_manifest(site)
+    places.write_text("a file where the folder would be")
+    assert [submit(tsttc).exit_code for _ in range(2)] == [0, 0]
+    assert paths(site).count(TABLE) == 2
+
+
+def test_new_edition_of_a_split_is_checked_by_its_own_manifest(tsttc: Tsttc, site: RecordedSite) -> None:
+    put_manifest(site)
+    submit(tsttc)
+    shorter = b"".join(MANIFEST.read_bytes().splitlines(keepends=True)[:-1])
+    other = RecordedSite()
+    with other:
+        put_manifest(other, shorter, digest="sha256:" + "0" * 64)
+        result = submit(tsttc, "predictions.json", "--server", other.url)
+    assert result.exit_code == 1
+    assert '1 key names no sequence of the manifest: "59"' in result.stderr
+
+
+def test_split_without_a_manifest_is_left_to_the_server_s_words(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(EDITIONS, Reply([]))
+    site.put(POST, Reply(problem("The split val takes no submissions yet.", where="split"), 409))
+    result = submit(tsttc)
+    assert (result.exit_code, result.stderr) == (8, "Error: The split val takes no submissions yet.\n")
+
+
+def test_key_is_one_for_all_tries_of_a_call_and_another_for_the_next_call(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    site.put(POST, Reply(fault=CUT), Reply(status=503), Reply(QUEUED, status=201))
+    submit(tsttc)
+    submit(tsttc)
+    keys = [request.headers["Idempotency-Key"] for request in site.posts]
+    assert len(keys) == 4
+    assert keys[0] == keys[1] == keys[2] != keys[3]
+    assert all(len(json.loads(key)) == 64 for key in keys), "quoted, as the draft standard wants it"
+
+
+def test_key_of_one_s_own_is_sent_as_it_is(
+    tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    site.put(POST, Reply(QUEUED, status=201))
+    submit(tsttc, "predictions.json", "--idempotency-key", 'build "7"')
+    monkeypatch.setenv("TSTTC_IDEMPOTENCY_KEY", "8")
+    submit(tsttc)
+    monkeypatch.setenv("TSTTC_IDEMPOTENCY_KEY", "")
+    submit(tsttc)
+    keys = [json.loads(request.headers["Idempotency-Key"]) for request in site.posts]
+    assert keys[:2] == ['build "7"', "8"]
+    assert len(keys[2]) == 64
+    for bad in ("x" * 256, "a\nb", "τ"):
+        assert submit(tsttc, "predictions.json", "--idempotency-key", bad).exit_code == 2
+
+
+def test_answer_that_was_lost_is_no_file_sent_before(tsttc: Tsttc, site: RecordedSite) -> None:
+    replayed = Reply(QUEUED, status=200, headers={"Idempotent-Replayed": "true"})
+    site.put(POST, Reply(fault=CUT), replayed)
+    assert "sent before" not in submit(tsttc).stdout
+    assert "sent before" in submit(tsttc, "predictions.json", "--idempotency-key", "7").stdout
+
+
+def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, site: RecordedSite) -> None:
+    method = {"id": "m1", "name": "Foo\x1b[2J++", "visibility": "PRIVATE"}
+    site.put(POST, Reply(QUEUED | {"method_id": "m1"}, status=201))
+    site.put(
+        "GET /api/v1/methods/m1", Reply(method), Reply(method | {"visibility": "PUBLIC"}), Reply(status=403)
+    )
+    shown = submit(tsttc).stdout
+    assert shown.endswith(
+        'is private: its results are your team\'s alone. Show them with: tsttc publish "Foo\\x1b[2J++"\n'
+    )
+    for _ in range(2):
+        again = submit(tsttc)
+        assert (again.exit_code, "private" in again.output) == (0, False)
+
+
+def test_terminal_shows_a_bar_and_a_pipe_does_not(site: RecordedSite, tmp_path: Path) -> None:
+    site.put(POST, Reply(QUEUED, status=201))
+    large = tmp_path / "large.json"
+    large.write_bytes(b" " * 3_000_000)
+    terminal, end = os.openpty()
+    command = [sys.executable, "-m", "evaluator", "submit", str(large), "--split", "val", "--method", "Foo"]
+    done = subprocess.run(
+        command,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=end,
+        check=True,
+        cwd=REPOSITORY,
+        env=os.environ | {"TERM": "xterm"},
+    )
+    with open(terminal, "rb", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
+        shown = screen.read(1 << 16).decode()
+    os.close(end)
+    assert "large.json" in shown
+    assert "MB" in shown
+    assert done.stdout.startswith(b"Submission ")
+    piped = subprocess.run(command, capture_output=True, check=True, cwd=REPOSITORY)
+    assert piped.stderr == b""
