@@ -6,17 +6,19 @@ from typing import Any, ClassVar, cast
 from django.contrib import admin, messages
 from django.contrib.admin.models import LogEntry
 from django.contrib.auth.admin import UserAdmin as DjangoUserAdmin
-from django.db.models import Model, QuerySet
+from django.db import transaction
+from django.db.models import Model, QuerySet, URLField
 from django.http import HttpRequest, HttpResponse
 from django.utils import timezone
 
-from leaderboard import audit, lifecycle, quotas, tokens
+from leaderboard import audit, boards, lifecycle, quotas, tokens
 from leaderboard.models import (
     ApiToken,
     AuditEvent,
     Edition,
     Evaluation,
     GroundTruth,
+    Invitation,
     Membership,
     Method,
     PublishedResult,
@@ -31,6 +33,8 @@ from leaderboard.models import (
 
 class ReadOnlyAdmin(admin.ModelAdmin):
     """Looks, does not touch: what these rows say is written by verbs."""
+
+    formfield_overrides = {URLField: {"assume_scheme": "https"}}  # what Django 6 will do by itself
 
     def has_add_permission(self, request: HttpRequest) -> bool:
         """Nobody adds here."""
@@ -77,6 +81,10 @@ class AuditedAdmin(admin.ModelAdmin):
                 **{name: str(getattr(obj, name)) for name in self.audited_fields},
             },
         )
+        # What is changed here is rare, and may stand on any board. Most views are transactions; where one is
+        # not, the sweep finds what a reader has drawn between the two.
+        with transaction.atomic():
+            boards.changed_everywhere()
 
 
 @admin.register(Evaluation)
@@ -220,10 +228,12 @@ class AuditEventAdmin(ReadOnlyAdmin):
 
 @admin.register(Method)
 class MethodAdmin(ReadOnlyAdmin):
-    """Methods of every team."""
+    """Methods of every team. Who sees them is their teams' to decide."""
 
-    list_display = ["name", "team", "visibility", "created_at"]
-    search_fields = ["name", "team__name"]
+    list_display = ["name", "team", "visibility", "shown_at", "reveal_at", "created_at"]
+    list_filter = ["visibility"]
+    search_fields = ["id", "name", "team__name"]
+    list_select_related = ["team"]
 
 
 @admin.register(Team)
@@ -232,6 +242,24 @@ class TeamAdmin(ReadOnlyAdmin):
 
     list_display = ["name", "created_at"]
     search_fields = ["name"]
+
+
+@admin.register(Invitation)
+class InvitationAdmin(ReadOnlyAdmin):
+    """Invitations, without their secrets."""
+
+    list_display = [
+        "team",
+        "created_by",
+        "created_at",
+        "expires_at",
+        "accepted_by",
+        "accepted_at",
+        "revoked_at",
+    ]
+    exclude = ["secret_hash"]
+    search_fields = ["team__name", "created_by__email", "accepted_by__email"]
+    list_select_related = ["team", "created_by", "accepted_by"]
 
 
 @admin.register(ApiToken)
@@ -274,6 +302,12 @@ class UserAdmin(AuditedAdmin, DjangoUserAdmin):
     add_fieldsets = [
         (None, {"classes": ["wide"], "fields": ["email", "usable_password", "password1", "password2"]})
     ]
+
+    def has_delete_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
+        """Who is in a team leaves it first, which decides who owns it then."""
+        if isinstance(obj, User) and Membership.objects.filter(user=obj).exists():
+            return False
+        return super().has_delete_permission(request, obj)
 
 
 for model in (Edition, GroundTruth, Membership, PublishedResult):

@@ -76,12 +76,17 @@ def _chained(
     return events
 
 
-def _locked_tip() -> str:
-    """The hash of the last event, which stays the last until the transaction ends."""
+def hold() -> None:
+    """Let nobody else record until the transaction ends; to be called where it ends soon."""
     if connection.vendor == "postgresql":
         with connection.cursor() as cursor:
             cursor.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
     # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+
+
+def _locked_tip() -> str:
+    """The hash of the last event, which stays the last until the transaction ends."""
+    hold()
     return AuditEvent.objects.order_by("-pk").values_list("hash", flat=True).first() or GENESIS
 
 

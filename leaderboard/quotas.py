@@ -3,6 +3,9 @@
 Nothing is counted up or down. What is spent follows from the submissions and what came of them, so no counter
 can drift: a submission costs a slot while it waits or runs, and for good once it is scored. Rejected,
 cancelled or failed by our fault it costs none; rejected files have a limit of their own.
+
+Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
+have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people.
 """
 
 import math
@@ -12,10 +15,10 @@ from datetime import datetime, timedelta
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import Exists, OuterRef
+from django.db.models import Exists, OuterRef, Q
 
 from leaderboard import audit
-from leaderboard.models import Evaluation, QuotaOverride, Split, Status, Submission, Team, User
+from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
 from leaderboard.models.quotas import QuotaRules
 
 REJECTED_WINDOW = timedelta(hours=24)
@@ -96,27 +99,27 @@ class Quota:
         return max(1, math.ceil((self.next_slot_at - now).total_seconds()))
 
 
-def state(*, team: Team | None, split: Split, now: datetime) -> Quota:
-    """What the team has left on the split. Somebody without a team has not sent anything yet."""
-    return _state(team=team, split=split, rules=rules_of(team=team, split=split), now=now)
+def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quota:
+    """What the team has left on the split; of somebody without a team, what they themselves have."""
+    rules = rules_of(team=team, split=split)
+    return _state(team=team, user=user, split=split, rules=rules, now=now)
 
 
-def hold(*, team: Team, split: Split) -> None:
-    """Let the team's other submissions wait until this transaction ends, so that two cannot take one slot.
+def hold(*, team: Team) -> None:
+    """Let what else the team does wait until this transaction ends, so that two cannot take one slot.
 
     To be called before anything is looked up that `require` or an answer depends on.
     """
-    # SQLite has one writer at a time, and needs no lock.
-    if not rules_of(team=team, split=split).are_none:
-        Team.objects.select_for_update(no_key=True).get(pk=team.pk)
+    # SQLite has one writer at a time, and takes no notice.
+    Team.objects.select_for_update(no_key=True).filter(pk=team.pk).first()
 
 
-def require(*, team: Team | None, split: Split, now: datetime) -> None:
+def require(*, team: Team | None, user: User, split: Split, now: datetime) -> None:
     """Raise `QuotaExceeded` unless a slot is open. What it says is certain for whoever has called `hold`."""
     rules = rules_of(team=team, split=split)
     if rules.are_none:
         return
-    quota = _state(team=team, split=split, rules=rules, now=now)
+    quota = _state(team=team, user=user, split=split, rules=rules, now=now)
     if not quota.is_open:
         raise QuotaExceeded(quota)
 
@@ -135,23 +138,25 @@ def rules_of(*, team: Team | None, split: Split) -> Rules:
     )
 
 
-def _state(*, team: Team | None, split: Split, rules: Rules, now: datetime) -> Quota:
-    spent, rejected = _spent(team=team, split=split, rules=rules, now=now)
+def _state(*, team: Team | None, user: User, split: Split, rules: Rules, now: datetime) -> Quota:
+    spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
     return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
 
 
 def _spent(
-    *, team: Team | None, split: Split, rules: Rules, now: datetime
+    *, team: Team | None, user: User, split: Split, rules: Rules, now: datetime
 ) -> tuple[list[datetime], list[datetime]]:
-    """When the team sent what costs a slot, and what was rejected, oldest first."""
-    if team is None:
-        return [], []
+    """When the team and its people sent what costs a slot, and what was rejected, oldest first."""
+    theirs = Q(submitted_by=user)
+    if team is not None:
+        people = Membership.objects.filter(team=team).values("user")
+        theirs = Q(method__team=team) | Q(submitted_by__in=people)
     since = now - max(rules.window, rules.min_gap, REJECTED_WINDOW)
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
     # Scoring anew after a correction costs nothing and gives nothing back.
     live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
     rows = (
-        Submission.objects.filter(method__team=team, split=split, submitted_at__gt=since)
+        Submission.objects.filter(theirs, split=split, submitted_at__gt=since)
         .annotate(
             is_scored=Exists(evaluations.filter(status=Status.SCORED)),
             is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),

@@ -2,17 +2,30 @@
 
 from leaderboard.models.audit import AuditEvent
 from leaderboard.models.benchmark import Edition, GroundTruth, Publication, PublishedResult, Split
-from leaderboard.models.people import ApiToken, Membership, Scope, Team, User
+from leaderboard.models.boards import BoardVersion, Snapshot
+from leaderboard.models.inference import Analysis, Comparison
+from leaderboard.models.limits import Allowance, CachedValue
+from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
+from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
 from leaderboard.models.quotas import QuotaOverride
-from leaderboard.models.submissions import Evaluation, Method, Score, Status, Submission, Visibility
+from leaderboard.models.submissions import Evaluation, IdempotencyKey, Score, Status, Submission
 from leaderboard.models.sweep import SweepBeat
 
 __all__ = [
+    "Allowance",
+    "Analysis",
     "ApiToken",
     "AuditEvent",
+    "BoardVersion",
+    "BoxSource",
+    "CachedValue",
+    "Cameras",
+    "Comparison",
     "Edition",
     "Evaluation",
     "GroundTruth",
+    "IdempotencyKey",
+    "Invitation",
     "Membership",
     "Method",
     "Publication",
@@ -20,6 +33,7 @@ __all__ = [
     "QuotaOverride",
     "Scope",
     "Score",
+    "Snapshot",
     "Split",
     "Status",
     "Submission",

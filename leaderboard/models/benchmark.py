@@ -96,6 +96,9 @@ class Edition(models.Model):
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
     published_at = models.DateTimeField(null=True, blank=True, help_text="When it first was the board.")
     discarded_at = models.DateTimeField(null=True, blank=True, help_text="Given up before it was published.")
+    # The entries whose intervals and rank ranges stand beside their scores; another set makes them stale.
+    inferred_at = models.DateTimeField(null=True, blank=True)
+    inference_digest = models.CharField(max_length=80, blank=True)
 
     class Meta:
         ordering = ["split", "number"]

@@ -1,61 +1,18 @@
 """What was sent, and what it scored."""
 
 import uuid
+from collections.abc import Collection
 from typing import ClassVar, Self
 
 from django.contrib.auth.models import AnonymousUser
 from django.db import models
 from django.db.models import F, Q
+from django.db.models.functions import Now
 from django.utils import timezone
 
 from leaderboard.models.benchmark import Edition, Split
-from leaderboard.models.people import Team, User
-
-# Larger than any error can be; what lies beyond is NaN or an infinity, which PostgreSQL sorts above it.
-FINITE = 1e300
-
-
-class Visibility(models.TextChoices):
-    """Who may see a method: its team, everybody under a pseudonym, or everybody."""
-
-    PRIVATE = "PRIVATE", "private"
-    ANONYMOUS = "ANONYMOUS", "anonymous"
-    PUBLIC = "PUBLIC", "public"
-
-
-class MethodQuerySet(models.QuerySet["Method"]):
-    """Questions about methods."""
-
-    def visible_to(self, user: User | AnonymousUser) -> Self:
-        """Public methods, and those of the person's own team; maintainers see all."""
-        if not user.is_authenticated:
-            return self.filter(visibility=Visibility.PUBLIC)
-        if user.is_maintainer:
-            return self
-        return self.filter(Q(visibility=Visibility.PUBLIC) | Q(team__memberships__user=user))
-
-
-class Method(models.Model):
-    """A team's named approach."""
-
-    id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
-    team = models.ForeignKey(Team, on_delete=models.PROTECT, related_name="methods")
-    name = models.CharField(max_length=80)
-    description = models.TextField(blank=True, max_length=2000)
-    paper_url = models.URLField(blank=True, max_length=500)
-    code_url = models.URLField(blank=True, max_length=500)
-    visibility = models.CharField(max_length=12, choices=Visibility, default=Visibility.PUBLIC)
-    created_at = models.DateTimeField(default=timezone.now)
-
-    objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
-
-    class Meta:
-        constraints = [
-            models.UniqueConstraint(fields=["team", "name"], name="method_name_once_per_team"),
-        ]
-
-    def __str__(self) -> str:
-        return self.name
+from leaderboard.models.methods import FINITE, Method
+from leaderboard.models.people import User
 
 
 class SubmissionQuerySet(models.QuerySet["Submission"]):
@@ -113,6 +70,24 @@ class Submission(models.Model):
         return f"{self.method} on {self.split_id} ({self.id})"
 
 
+class IdempotencyKey(models.Model):
+    """A client's own name for one request, so that the same request sent twice is one submission."""
+
+    user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="+")
+    key = models.CharField(max_length=255)
+    request_digest = models.CharField(max_length=80)
+    submission = models.ForeignKey(Submission, on_delete=models.CASCADE, related_name="+")
+    created_at = models.DateTimeField(default=timezone.now, db_index=True)
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["user", "key"], name="idempotency_key_once_per_person"),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.key} of {self.user}"
+
+
 class Status(models.TextChoices):
     """The states of an evaluation; only `leaderboard.lifecycle` writes them."""
 
@@ -127,8 +102,24 @@ class Status(models.TextChoices):
 FINAL_STATUSES = (Status.SCORED, Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 
 
+class EvaluationQuerySet(models.QuerySet["Evaluation"]):
+    """Questions about evaluations."""
+
+    def due(self) -> Self:
+        """What waits and may be begun, the most urgent and oldest first."""
+        waiting = self.filter(status=Status.QUEUED, due_at__lte=Now())
+        return waiting.order_by("priority", "queued_at")
+
+    def scorable(self, held: Collection[str]) -> Self:
+        """What is scored against a ground truth of one of these digests."""
+        # Asked beside and not joined, so that no edition is locked with it.
+        return self.filter(edition__in=Edition.objects.filter(ground_truth__in=held))
+
+
 class Evaluation(models.Model):
     """One submission scored in one edition: the unit of work, and the only status of the system."""
+
+    objects: ClassVar[EvaluationQuerySet] = EvaluationQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     # Smaller goes first.
     PRIORITY_LIVE = 0
@@ -211,6 +202,10 @@ class Score(models.Model):
     value = models.FloatField()
     low = models.FloatField(null=True, blank=True)
     high = models.FloatField(null=True, blank=True)
+    # Where the entry may stand in its column at 95 %; whether it is not significantly worse than the best.
+    rank_low = models.PositiveIntegerField(null=True, blank=True)
+    rank_high = models.PositiveIntegerField(null=True, blank=True)
+    is_with_best = models.BooleanField(null=True, blank=True)
 
     class Meta:
         constraints = [

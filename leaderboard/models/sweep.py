@@ -11,6 +11,9 @@ class SweepBeat(models.Model):
 
     id = models.PositiveSmallIntegerField(primary_key=True, default=THE_ONE, editable=False)
     swept_at = models.DateTimeField()
+    n_out_of_reach = models.PositiveIntegerField(
+        default=0, help_text="What waited for a ground truth that the sweeping worker cannot read."
+    )
 
     class Meta:
         constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]

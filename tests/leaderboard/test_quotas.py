@@ -61,7 +61,7 @@ def bad(number: int) -> bytes:
 
 def state(user: User, *, at: datetime = NOW, split: str = "test") -> Quota:
     row = Split.objects.get(pk=split)
-    return quotas.state(team=teams.present_team_of(user=user), split=row, now=at)
+    return quotas.state(team=teams.present_team_of(user=user), user=user, split=row, now=at)
 
 
 # --- the rules of the benchmark --------------------------------------------------------------------------

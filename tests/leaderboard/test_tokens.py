@@ -124,6 +124,7 @@ def test_another_split_is_named(edition: Edition, owner: User) -> None:
     client = client_with(builders.token(owner, split_name="val"))
     said = "The token is good for the split 'val' alone; expected that, found 'test'."
     assert refusal(client, "/api/v1/splits/test/board") == (403, "token-split", said)
+    assert refusal(client, "/api/v1/compare?split=test&m=x&m=y") == (403, "token-split", said)
     response = post(client, builders.predictions(edition))
     assert (response.status_code, response.json()["detail"]) == (403, said)
 

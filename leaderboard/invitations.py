@@ -1,0 +1,246 @@
+"""Invitations: links that let one person into a team, once, for a while.
+
+The secret of a link is shown when it is made and kept as its hash alone; whoever has it may come in.
+"""
+
+import hashlib
+import re
+import secrets
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+
+from django.conf import settings
+from django.db import IntegrityError, transaction
+from django.db.models import QuerySet
+from django.urls import reverse
+
+from leaderboard import audit, boards, teams
+from leaderboard.models import Invitation, Membership, Method, Team, User, Visibility
+from leaderboard.names import MAX_NAME, like
+from leaderboard.texts import Refused
+
+LIFETIME = timedelta(days=7)
+MAX_STANDING = 20
+_SECRET = re.compile(r"[A-Za-z0-9_-]{43}")
+
+
+class Unusable(Refused):
+    """The link let somebody in once, or would have, and does not any more."""
+
+
+@dataclass(frozen=True)
+class Meaning:
+    """What accepting an invitation would do to whoever asks.
+
+    `left` is the team that they would leave. Where they are alone in it, its methods come along, `renamed`
+    being those whose names would look like one that is there; else what they sent stays where it is.
+    """
+
+    invitation: Invitation
+    left: Team | None
+    n_methods: int
+    n_private: int
+    renamed: tuple[tuple[str, str], ...]
+    comes_along: bool
+    refusal: str = ""
+
+
+def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
+    """A new invitation into one's team, and its secret, which is told this once. Raises `Refused`."""
+    secret = secrets.token_urlsafe(32)
+    with transaction.atomic():
+        row = teams.locked(team)[0]
+        teams.require_owner(row, actor, doing="invites")
+        n_standing = standing(team=row, now=now).count()
+        if n_standing >= MAX_STANDING:
+            raise Refused(
+                "too-many-invitations",
+                f"There are {n_standing} invitations that nobody used, the most there may be; revoke one.",
+            )
+        invitation = Invitation.objects.create(
+            team=row,
+            secret_hash=_hash(secret),
+            created_by=actor,
+            created_at=now,
+            expires_at=now + LIFETIME,
+        )
+        audit.record(verb="invited", noun="Team", noun_id=row.pk, actor=actor, details=_named(invitation))
+    return invitation, secret
+
+
+def link(secret: str) -> str:
+    """The address that lets its reader in."""
+    return settings.SITE_URL + reverse("join_team", args=[secret])
+
+
+def standing(*, team: Team, now: datetime) -> "QuerySet[Invitation]":
+    """The team's invitations that somebody may still use."""
+    return Invitation.objects.filter(team=team, accepted_at=None, revoked_at=None, expires_at__gt=now)
+
+
+def state_of(invitation: Invitation, *, now: datetime) -> str:
+    """In a word what has become of it."""
+    if invitation.accepted_at:
+        return "used"
+    if invitation.revoked_at:
+        return "revoked"
+    return "expired" if invitation.expires_at <= now else "open"
+
+
+def revoke(*, invitation: Invitation, actor: User, now: datetime) -> bool:
+    """End an invitation that nobody has used. Returns False if it had ended. Raises `Refused`."""
+    with transaction.atomic():
+        row = teams.locked(invitation.team)[0]
+        teams.require_owner(row, actor, doing="revokes invitations")
+        fresh = Invitation.objects.filter(pk=invitation.pk, accepted_at=None, revoked_at=None)
+        if not fresh.update(revoked_at=now):
+            return False
+        audit.record(
+            verb="revoked_invitation", noun="Team", noun_id=row.pk, actor=actor, details=_named(invitation)
+        )
+    return True
+
+
+def find(*, secret: str, now: datetime) -> Invitation | None:
+    """The invitation of this link; None if there is none. Raises `Unusable` if it opens nothing any more."""
+    if not _SECRET.fullmatch(secret):
+        return None
+    found = Invitation.objects.select_related("team").filter(secret_hash=_hash(secret)).first()
+    if found is not None:
+        _require_standing(found, now=now)
+    return found
+
+
+def meaning(*, invitation: Invitation, user: User) -> Meaning:
+    """What accepting would do, for the page that asks first."""
+    membership = Membership.objects.filter(user=user).select_related("team").first()
+    left = membership.team if membership else None
+    comes_along = left is not None and not left.memberships.exclude(user=user).exists()
+    methods = list(Method.objects.filter(team=left).order_by("name")) if left and comes_along else []
+    there = Method.objects.filter(team=invitation.team).values_list("name", flat=True)
+    names = _names_there([method.name for method in methods], there)
+    refusal = ""
+    if membership is not None:
+        refusal = _refusal(membership, invitation.team, is_alone=comes_along)
+    return Meaning(
+        invitation=invitation,
+        left=left,
+        n_methods=len(methods),
+        n_private=sum(method.visibility == Visibility.PRIVATE for method in methods),
+        renamed=tuple((old, new) for old, new in names.items() if old != new),
+        comes_along=comes_along,
+        refusal=refusal,
+    )
+
+
+def accept(*, secret: str, user: User, now: datetime) -> Team:
+    """Come into the team, which uses the link up. Of two who do it at once, one comes in.
+
+    Whoever was alone in a team brings its methods along. Raises `Refused`.
+    """
+    seen = find(secret=secret, now=now)
+    if seen is None:
+        raise _nothing()
+    with transaction.atomic():
+        membership = teams.present_membership(user, seen.team)
+        invitation = Invitation.objects.select_for_update().filter(pk=seen.pk).first()
+        if invitation is None:
+            raise _nothing()  # its team has ended meanwhile
+        _require_standing(invitation, now=now)
+        team, moved = seen.team, {}
+        former = membership.team if membership else None
+        if membership is None or former is None:
+            _enter(team, user, now=now)
+        else:
+            is_alone = not former.memberships.exclude(user=user).exists()
+            refusal = _refusal(membership, team, is_alone=is_alone)
+            if refusal:
+                raise Refused("cannot-join", refusal)
+            if is_alone:
+                moved = _bring_methods(former, team)
+            Membership.objects.filter(pk=membership.pk).update(team=team, is_owner=False, joined_at=now)
+            teams.end_invitations(former, of=user)
+            teams.end_if_empty(former)
+        Invitation.objects.filter(pk=invitation.pk).update(accepted_by=user, accepted_at=now)
+        audit.record(
+            verb="joined",
+            noun="Team",
+            noun_id=team.pk,
+            actor=user,
+            details={**_named(invitation), "left": str(former.pk) if former else None, "brought": moved},
+        )
+        boards.changed_by_methods(
+            Method.objects.shown().filter(pk__in=list(moved)).values_list("pk", flat=True)
+        )
+    return team
+
+
+# --- what several of these need --------------------------------------------------------------------------
+
+
+def _nothing() -> Unusable:
+    return Unusable("no-invitation", "There is no such invitation; ask for a new link.")
+
+
+def _hash(secret: str) -> str:
+    return hashlib.sha256(secret.encode()).hexdigest()
+
+
+def _named(invitation: Invitation) -> dict[str, str]:
+    return {"invitation": str(invitation.pk)}
+
+
+def _require_standing(invitation: Invitation, *, now: datetime) -> None:
+    state = state_of(invitation, now=now)
+    sentence = {
+        "used": "This invitation has let somebody in already; each is for one person.",
+        "revoked": "This invitation was revoked by the team.",
+        "expired": f"This invitation ended at {invitation.expires_at:%Y-%m-%d %H:%M} UTC.",
+    }.get(state)
+    if sentence:
+        raise Unusable(f"invitation-{state}", f"{sentence} Ask the team for a new link.")
+
+
+def _refusal(membership: Membership, team: Team, *, is_alone: bool) -> str:
+    if membership.team_id == team.pk:
+        return f"You are in the team {team.name!r} already."
+    if membership.is_owner and not is_alone:
+        return (
+            f"You own the team {membership.team.name!r}, and others are in it; "
+            "hand it over to one of them before you join another."
+        )
+    return ""
+
+
+def _enter(team: Team, user: User, *, now: datetime) -> None:
+    try:
+        with transaction.atomic():
+            Membership.objects.create(team=team, user=user, joined_at=now)
+    except IntegrityError:
+        raise Refused("changed-meanwhile", "Your team has just changed; look again, and try again.") from None
+
+
+def _bring_methods(former: Team, team: Team) -> dict[str, str]:
+    """Move every method of one team into the other. Returns their names there, by id."""
+    methods = list(Method.objects.select_for_update(no_key=True).filter(team=former).order_by("name"))
+    there = Method.objects.filter(team=team).values_list("name", flat=True)
+    names = _names_there([method.name for method in methods], there)
+    for method in methods:
+        Method.objects.filter(pk=method.pk).update(team=team, name=names[method.name])
+    return {str(method.pk): names[method.name] for method in methods}
+
+
+def _names_there(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
+    """What methods of these names are called among others: numbered where they would be taken for one."""
+    found: dict[str, str] = {}
+    others = list(taken)
+    for name in names:
+        new, number = name, 1
+        while like(new, others):
+            number += 1
+            ending = f" {number}"
+            new = f"{name[: MAX_NAME - len(ending)]}{ending}"
+        found[name] = new
+        others.append(new)
+    return found

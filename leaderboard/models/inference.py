@@ -1,0 +1,47 @@
+"""What the workers make of scores beyond the scores: comparisons of two entries, and analyses for owners."""
+
+from django.db import models
+from django.utils import timezone
+
+from leaderboard.models.benchmark import Edition
+from leaderboard.models.submissions import Evaluation
+
+
+class Comparison(models.Model):
+    """The difference between two entries of an edition, asked for by a reader and answered by a worker.
+
+    Recordings are compared, and their values are the worker's alone; interval aggregates stand here.
+    """
+
+    edition = models.ForeignKey(Edition, on_delete=models.CASCADE, related_name="comparisons")
+    first = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="+")
+    second = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="+")
+    asked_at = models.DateTimeField(default=timezone.now)
+    computed_at = models.DateTimeField(null=True, blank=True)
+    differences = models.JSONField(
+        null=True, blank=True, help_text="By score name: first minus second, its 95 % interval, and p."
+    )
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["edition", "first", "second"], name="one_comparison_per_pair"),
+        ]
+        indexes = [
+            models.Index(
+                fields=["asked_at"], condition=models.Q(computed_at=None), name="comparison_waiting"
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.first_id} against {self.second_id}"
+
+
+class Analysis(models.Model):
+    """What the owner of an entry on an open split may look at more closely. Never of a hidden split."""
+
+    evaluation = models.OneToOneField(Evaluation, on_delete=models.CASCADE, related_name="analysis")
+    content = models.JSONField(help_text="Error by time to contact, distribution, scatter, worst recordings.")
+    made_at = models.DateTimeField(default=timezone.now)
+
+    def __str__(self) -> str:
+        return f"analysis of {self.evaluation_id}"

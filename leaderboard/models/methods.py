@@ -1,0 +1,134 @@
+"""What competes: a team's named approaches, what is said of them, and who may see them."""
+
+import uuid
+from datetime import datetime
+from typing import ClassVar, Self
+
+from django.contrib.auth.models import AnonymousUser
+from django.core.validators import MaxValueValidator, MinValueValidator
+from django.db import models
+from django.db.models import Q
+from django.utils import timezone
+
+from leaderboard.models.people import Membership, Team, User
+
+# Larger than any error or latency; what lies beyond is NaN or an infinity, which PostgreSQL sorts above it.
+FINITE = 1e300
+
+
+class Visibility(models.TextChoices):
+    """Who may see a method: its team, everybody under a pseudonym, or everybody."""
+
+    PRIVATE = "PRIVATE", "private"
+    ANONYMOUS = "ANONYMOUS", "anonymous"
+    PUBLIC = "PUBLIC", "public"
+
+
+class Cameras(models.TextChoices):
+    """How many views of a scene a method takes."""
+
+    ONE = "ONE", "one camera"
+    SEVERAL = "SEVERAL", "several cameras"
+
+
+class BoxSource(models.TextChoices):
+    """Where a method has the object's box from."""
+
+    GIVEN = "GIVEN", "given boxes"
+    DETECTED = "DETECTED", "own detector"
+    NONE = "NONE", "no boxes"
+
+
+class MethodQuerySet(models.QuerySet["Method"]):
+    """Questions about methods."""
+
+    def shown(self, *, at: datetime | None = None) -> Self:
+        """Methods that everybody sees, under their name or a pseudonym; with `at` those shown by then."""
+        rows = self.exclude(visibility=Visibility.PRIVATE)
+        return rows if at is None else rows.filter(shown_at__lte=at)
+
+    def of(self, user: User | AnonymousUser) -> Self:
+        """Methods of the person's own team."""
+        if not user.is_authenticated:
+            return self.none()
+        return self.filter(team__in=Membership.objects.filter(user=user).values("team"))
+
+    def visible_to(self, user: User | AnonymousUser) -> Self:
+        """What everybody sees, and the person's own team's; maintainers see all.
+
+        That an anonymous one is among them says nothing of whose it is: `Method.is_named_for` does.
+        """
+        if not user.is_authenticated:
+            return self.shown()
+        if user.is_maintainer:
+            return self
+        own = Membership.objects.filter(user=user).values("team")
+        return self.filter(~Q(visibility=Visibility.PRIVATE) | Q(team__in=own))
+
+
+class Method(models.Model):
+    """A team's named approach."""
+
+    id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
+    team = models.ForeignKey(Team, on_delete=models.PROTECT, related_name="methods")
+    name = models.CharField(max_length=80)
+    description = models.TextField(blank=True, max_length=2000)
+    paper_url = models.URLField(blank=True, max_length=500)
+    code_url = models.URLField(blank=True, max_length=500)
+    # What it uses and costs, as its team says; empty where nothing was said.
+    n_frames = models.PositiveSmallIntegerField(
+        "frames used", null=True, blank=True, validators=[MinValueValidator(2), MaxValueValidator(6)]
+    )
+    cameras = models.CharField(max_length=12, choices=Cameras, blank=True)
+    box_source = models.CharField(max_length=12, choices=BoxSource, blank=True)
+    uses_nerf = models.BooleanField("NeRF data", null=True, blank=True)
+    uses_extra_data = models.BooleanField("extra data", null=True, blank=True)
+    pretraining = models.CharField(max_length=200, blank=True)
+    n_parameters = models.PositiveBigIntegerField("parameters", null=True, blank=True)
+    latency_ms = models.FloatField("latency in ms", null=True, blank=True)
+    hardware = models.CharField(max_length=120, blank=True)
+    visibility = models.CharField(max_length=12, choices=Visibility, default=Visibility.PRIVATE)
+    shown_at = models.DateTimeField(null=True, blank=True, help_text="When it first left private.")
+    reveal_at = models.DateTimeField(null=True, blank=True, help_text="When an anonymous one turns public.")
+    created_at = models.DateTimeField(default=timezone.now)
+
+    objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["team", "name"], name="method_name_once_per_team"),
+            models.CheckConstraint(
+                condition=Q(n_frames=None) | Q(n_frames__gte=2, n_frames__lte=6),
+                name="method_uses_2_to_6_frames",
+            ),
+            models.CheckConstraint(
+                condition=Q(latency_ms=None) | Q(latency_ms__gt=0, latency_ms__lt=FINITE),
+                name="method_latency_is_finite",
+            ),
+            models.CheckConstraint(
+                condition=Q(visibility=Visibility.PRIVATE) | Q(shown_at__isnull=False),
+                name="what_is_shown_has_been_shown_since",
+            ),
+        ]
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def pseudonym(self) -> str:
+        """What an anonymous one is called: the same for ever, and of its random id alone."""
+        return f"Anonymous {self.id.hex[:6]}"
+
+    def was_shown(self, *, at: datetime | None = None) -> bool:
+        """Whether everybody sees it, by then already if `at` is given."""
+        if self.visibility == Visibility.PRIVATE:
+            return False
+        return at is None or (self.shown_at is not None and self.shown_at <= at)
+
+    def is_named_for(self, user: User | AnonymousUser) -> bool:
+        """Whether this reader may know whose it is: it is public, or theirs, or they are a maintainer."""
+        if self.visibility == Visibility.PUBLIC:
+            return True
+        if not user.is_authenticated:
+            return False
+        return user.is_maintainer or self.team.memberships.filter(user=user).exists()

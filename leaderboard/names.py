@@ -1,0 +1,134 @@
+"""Names of people's making: which are taken, and what they look like, whatever characters they are made of.
+
+What looks alike is Unicode's list of confusable characters (UTS 39, through `confusable-homoglyphs`), each
+folded to what it is taken for. The list says nothing of case, and has a few gaps that this fills.
+"""
+
+import unicodedata
+from collections.abc import Iterable, Mapping
+from functools import cache
+from typing import Any
+
+from confusable_homoglyphs.confusables import confusables_data
+
+from leaderboard.texts import Refused, clean_text
+
+MAX_NAME = 80
+MAX_LOOK = 320
+RESERVED = "Anonymous"
+
+# Letters that differ by case or by name alone, and pairs that read as one letter.
+_ONE_LOOK = str.maketrans({"i": "l", "1": "l", "|": "l", "0": "o", "m": "rn", "w": "vv", "`": "'", '"': "''"})
+# Characters without ink that are no spaces or controls by their category.
+_WITHOUT_INK = frozenset(
+    [
+        *(0x034F, 0x115F, 0x1160, 0x17B4, 0x17B5, 0x2800, 0x3164, 0xFFA0),
+        *range(0x180B, 0x1810),
+        *range(0xFE00, 0xFE10),
+        *range(0xE0100, 0xE01F0),
+    ]
+)
+_MAX_MARKS = 2
+
+
+def look(name: str) -> str:
+    """What a name looks like, as a key: names with the same one are taken for each other.
+
+    >>> look("Foo  Lab") == look("ｆｏｏ lab") == look("Fоο Lаb")
+    True
+    >>> look("Foo Lab 2") == look("Foo Lab 3")
+    False
+    """
+    folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name))
+    return " ".join(folded.casefold().translate(_ONE_LOOK).split())
+
+
+def clean_name(field: str, text: str) -> str:
+    """A name as it is kept and shown. Raises `texts.Refused` for what is none, or hides what it says."""
+    text = clean_text(field, _with_plain_spaces(text), limit=MAX_NAME)
+    n_marks = 0
+    for character in text:
+        category = unicodedata.category(character)
+        n_marks = n_marks + 1 if category in {"Mn", "Me"} else 0
+        if category in {"Cc", "Cf", "Zl", "Zp"} or ord(character) in _WITHOUT_INK or n_marks > _MAX_MARKS:
+            raise Refused(
+                "bad-character",
+                f"The name in '{field}' has the character U+{ord(character):04X}, "
+                f"{unicodedata.name(character, 'without a name')}; expected characters that one can see.",
+                field=field,
+            )
+    if not any(unicodedata.category(character)[0] in "LN" for character in text):
+        raise Refused(
+            "bad-name", f"The name in '{field}' is {text!r}; expected a letter or a digit in it.", field=field
+        )
+    found = look(text)
+    if len(found) > MAX_LOOK:
+        raise Refused(
+            "text-too-long",
+            f"The name in '{field}' is shown with {len(found)} characters; expected at most {MAX_LOOK}.",
+            field=field,
+        )
+    if found.startswith(look(RESERVED)):
+        raise Refused(
+            "reserved-name",
+            f"The name in '{field}' reads as {RESERVED!r}, which is what methods without a name are called; "
+            "expected another one.",
+            field=field,
+        )
+    return text
+
+
+def like(name: str, others: Iterable[str]) -> str | None:
+    """The first of the other names that this one would be taken for."""
+    wanted = look(name)
+    return next((other for other in others if look(other) == wanted), None)
+
+
+def _with_plain_spaces(text: str) -> str:
+    """Every space as the one of the keyboard, and never two in a row."""
+    spaced = "".join(" " if unicodedata.category(character) == "Zs" else character for character in text)
+    return " ".join(part for part in spaced.split(" ") if part)
+
+
+def _folded(character: str) -> str:
+    """What one character is taken for. Marks above and below letters are too small to tell names apart."""
+    category = unicodedata.category(character)
+    if character.isascii():
+        return character
+    if category in {"Mn", "Me", "Cf"}:
+        return ""
+    if category == "Pd":
+        return "-"
+    # Where only the other case has a twin in ASCII, both have its look: a name in Cyrillic is one name.
+    for form in (character, character.swapcase(), character.casefold()):
+        found = _prototypes().get(form, form)
+        if found.isascii():
+            return found
+    small_capital = unicodedata.name(character, "").partition("LATIN LETTER SMALL CAPITAL ")[2]
+    if len(small_capital) == 1:
+        return small_capital
+    return _prototypes().get(character.casefold(), character.casefold())
+
+
+@cache
+def _prototypes() -> Mapping[str, str]:
+    """Each confusable character and what it is taken for, without what is too small to be seen.
+
+    The library lists pairs both ways round. The list that it was made from gives every character one target,
+    which itself has none: what stands alone with one partner is the character, what has many is the target.
+    """
+    data: Mapping[str, list[dict[str, Any]]] = confusables_data
+    found = {}
+    for character, partners in data.items():
+        if len(character) != 1 or character.isascii() or len(partners) != 1:
+            continue
+        target = partners[0]["c"]
+        is_pair = len(data.get(target, [])) == 1 and len(target) == 1
+        if not is_pair or target.isascii() or ord(target) < ord(character):
+            found[character] = _without_marks(target)
+    return found
+
+
+def _without_marks(text: str) -> str:
+    decomposed = unicodedata.normalize("NFKD", text)
+    return "".join(c for c in decomposed if unicodedata.category(c) not in {"Mn", "Me", "Cf"}) or decomposed

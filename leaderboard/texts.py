@@ -1,0 +1,54 @@
+"""What people write: taken as clean text, or refused with a reason, in the same words at every door."""
+
+import unicodedata
+
+from django.core.exceptions import ValidationError
+from django.core.validators import URLValidator
+
+_is_web_address = URLValidator(schemes=["http", "https"])
+MAX_URL = 500
+
+
+class Refused(Exception):
+    """What was asked for cannot be done. `field` names the input at fault, `code` is stable."""
+
+    def __init__(self, code: str, message: str, *, field: str = "") -> None:
+        super().__init__(message)
+        self.code = code
+        self.field = field
+
+
+def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:
+    """The text without surrounding space. Raises `Refused` for control characters, excess or absence."""
+    text = unicodedata.normalize("NFC", text).strip()
+    if required and not text:
+        raise Refused("missing-field", f"The field '{name}' is empty; expected a text.", field=name)
+    if len(text) > limit:
+        raise Refused(
+            "text-too-long",
+            f"The field '{name}' has {len(text)} characters; expected at most {limit}.",
+            field=name,
+        )
+    for character in text:
+        if unicodedata.category(character) in {"Cc", "Cs", "Co", "Cn"} and character not in "\r\n\t":
+            raise Refused(
+                "bad-character",
+                f"The field '{name}' has the character U+{ord(character):04X}; expected printable text.",
+                field=name,
+            )
+    return text
+
+
+def clean_url(name: str, text: str) -> str:
+    """An address of the web, or nothing. Raises `Refused`."""
+    text = clean_text(name, text, limit=MAX_URL, required=False)
+    if text:
+        try:
+            _is_web_address(text)
+        except ValidationError:
+            raise Refused(
+                "bad-address",
+                f"The field '{name}' is {text[:80]!r}; expected an address that begins with http:// or https://.",
+                field=name,
+            ) from None
+    return text

@@ -1,0 +1,240 @@
+"""Invitations: one link lets one person in, once, for a while."""
+
+import hashlib
+import logging
+from datetime import timedelta
+
+import pytest
+from django.db import connection
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import invitations, teams
+from leaderboard.models import AuditEvent, Edition, Invitation, Membership, Method, Team, User
+from leaderboard.texts import Refused
+from tests import builders, pages
+
+WEEK = timedelta(days=7)
+
+
+def refused(code: str) -> "pytest.RaisesExc[Refused]":
+    return pytest.raises(Refused, check=lambda refusal: refusal.code == code)
+
+
+@pytest.fixture
+def team(owner: User, teammate: User) -> Team:
+    """The owner's team, with a teammate in it."""
+    return teams.team_of(user=owner)
+
+
+def invite(team: Team, actor: User) -> str:
+    return invitations.make(team=team, actor=actor, now=timezone.now())[1]
+
+
+def accept(secret: str, user: User, *, after: timedelta = timedelta(0)) -> Team:
+    return invitations.accept(secret=secret, user=user, now=timezone.now() + after)
+
+
+# --- its life ----------------------------------------------------------------------------------------------
+
+
+def test_one_link_lets_one_person_in_once(owner: User, stranger: User, maintainer: User, team: Team) -> None:
+    secret = invite(team, owner)
+    assert accept(secret, stranger) == team
+    membership = Membership.objects.get(user=stranger)
+    assert (membership.team, membership.is_owner) == (team, False)
+    with refused("invitation-used"):
+        accept(secret, maintainer)
+    (event,) = AuditEvent.objects.filter(verb="joined")
+    assert event.actor == stranger
+
+
+def test_only_its_hash_is_kept(owner: User, team: Team) -> None:
+    secret = invite(team, owner)
+    row = Invitation.objects.get()
+    assert row.secret_hash == hashlib.sha256(secret.encode()).hexdigest()
+    events = repr(list(AuditEvent.objects.values()))
+    assert secret not in events
+    assert row.secret_hash not in events
+
+
+def test_it_ends_after_a_week_or_when_it_is_revoked(
+    owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    secret = invite(team, owner)
+    with refused("invitation-expired"):
+        accept(secret, stranger, after=WEEK)
+    row = Invitation.objects.get()
+    now = timezone.now()
+    with refused("not-the-owner"):
+        invitations.revoke(invitation=row, actor=teammate, now=now)
+    assert invitations.revoke(invitation=row, actor=owner, now=now)
+    assert not invitations.revoke(invitation=row, actor=owner, now=now)
+    with refused("invitation-revoked"):
+        accept(secret, stranger)
+    assert not Membership.objects.filter(user=stranger).exists()
+
+
+def test_links_of_who_is_not_in_the_team_any_more_open_nothing(
+    edition: Edition, owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    first, second = invite(team, owner), invite(team, owner)
+    teams.hand_over(team=team, to=teammate, actor=owner)
+    third = invite(team, teammate)
+    teams.remove(team=team, member=owner, actor=teammate)
+    for secret in (first, second):
+        with refused("invitation-revoked"):
+            accept(secret, owner)
+    # The last one out leaves private methods that nobody is to see again.
+    builders.submit(teammate, builders.predictions(edition), visibility="PRIVATE")
+    teams.leave(user=teammate)
+    with refused("invitation-revoked"):
+        accept(third, stranger)
+    assert not Membership.objects.filter(team=team).exists()
+
+
+def test_links_into_a_team_that_was_left_for_another_open_nothing(
+    owner: User, teammate: User, stranger: User, maintainer: User, team: Team
+) -> None:
+    old = invite(team, owner)
+    teams.hand_over(team=team, to=teammate, actor=owner)
+    accept(invite(teams.team_of(user=stranger), stranger), owner)
+    with refused("invitation-revoked"):
+        accept(old, maintainer)
+
+
+def test_a_team_that_ends_between_reading_and_accepting_is_a_refusal(owner: User, stranger: User) -> None:
+    team = teams.team_of(user=owner)
+    secret = invite(team, owner)
+    has_ended: list[bool] = []
+
+    def end_meanwhile(execute, sql, params, many, context):
+        if "leaderboard_user" in sql and not has_ended:
+            has_ended.append(True)
+            Team.objects.filter(pk=team.pk).delete()
+        return execute(sql, params, many, context)
+
+    with connection.execute_wrapper(end_meanwhile), refused("no-invitation"):
+        accept(secret, stranger)
+    assert has_ended
+
+
+def test_owner_alone_invites_and_not_without_end(
+    owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    for other in (teammate, stranger):
+        with refused("not-the-owner"):
+            invite(team, other)
+    for _ in range(invitations.MAX_STANDING):
+        invite(team, owner)
+    with refused("too-many-invitations"):
+        invite(team, owner)
+
+
+@pytest.mark.parametrize(
+    "secret", ["", "x", "é" * 43, "A" * 43, "A" * 10_000, "../../etc", "%00", "A" * 42 + "\x00"]
+)
+def test_what_is_no_secret_is_nothing(db: None, stranger: User, client: Client, secret: str) -> None:
+    assert invitations.find(secret=secret, now=timezone.now()) is None
+    with refused("no-invitation"):
+        accept(secret, stranger)
+    client.force_login(stranger)
+    if "/" not in secret and secret:
+        assert client.get(f"/team/join/{secret}/").status_code == 404
+
+
+# --- what becomes of the team that one was in ---------------------------------------------------------------
+
+
+def test_a_team_of_one_comes_along_with_its_methods(
+    edition: Edition, owner: User, stranger: User, team: Team
+) -> None:
+    builders.submit(owner, builders.predictions(edition, factor=1.2), method="Foo")
+    sent = builders.submit(stranger, builders.predictions(edition), method="fοo")
+    hidden = builders.submit(
+        stranger, builders.predictions(edition, factor=1.3), method="Bar", visibility="PRIVATE"
+    )
+    former = sent.method.team
+    secret = invite(team, owner)
+    found = invitations.find(secret=secret, now=timezone.now())
+    told = invitations.meaning(invitation=found, user=stranger)
+    assert (told.left, told.n_methods, told.n_private, told.comes_along) == (former, 2, 1, True)
+    assert told.renamed == (("fοo", "fοo 2"),)
+    accept(secret, stranger)
+    names = sorted(Method.objects.filter(team=team).values_list("name", flat=True))
+    assert names == ["Bar", "Foo", "fοo 2"]
+    assert not Team.objects.filter(pk=former.pk).exists()
+    hidden.method.refresh_from_db()
+    assert hidden.method.visibility == "PRIVATE"
+    (event,) = AuditEvent.objects.filter(verb="joined")
+    assert sorted(event.details["brought"].values()) == ["Bar", "fοo 2"]
+
+
+def test_who_is_not_alone_leaves_what_was_sent_behind(
+    edition: Edition, owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    sent = builders.submit(teammate, builders.predictions(edition))
+    secret = invite(teams.team_of(user=stranger), stranger)
+    accept(secret, teammate)
+    sent.method.refresh_from_db()
+    assert sent.method.team == team
+    assert list(team.members.all()) == [owner]
+
+
+def test_owner_of_a_team_with_others_and_a_member_already_are_held_back(
+    owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    other = invite(teams.team_of(user=stranger), stranger)
+    with refused("cannot-join"):
+        accept(other, owner)
+    own = invite(team, owner)
+    with refused("cannot-join"):
+        accept(own, teammate)
+    assert Invitation.objects.filter(accepted_at=None).count() == 2
+
+
+# --- the page ----------------------------------------------------------------------------------------------
+
+
+def test_page_makes_a_link_shows_it_once_and_lets_somebody_in(
+    client: Client, owner: User, stranger: User, team: Team, caplog: pytest.LogCaptureFixture
+) -> None:
+    client.force_login(owner)
+    made = pages.page(client.post("/team/invite/"))
+    link = made.one("code", id="link").text
+    address = link[link.index("/team/join/") :]
+    secret = address.split("/")[3]
+    assert secret not in client.get("/team/").content.decode()
+    assert "open" in pages.page(client.get("/team/")).one("main").text
+
+    client.logout()
+    assert client.get(address).status_code == 302
+    client.force_login(stranger)
+    teams.team_of(user=stranger)
+    with caplog.at_level(logging.INFO):
+        response = client.get(address)
+    assert secret not in caplog.text
+    assert "no-store" in response["Cache-Control"]
+    main = pages.page(response).one("main")
+    assert "Join Owls" in main.one("h1").text
+    assert "You are alone in Strangers" in main.text
+    assert not Membership.objects.filter(user=stranger, team=team).exists()
+    followed = client.post(address, follow=True)
+    assert "You are in the team Owls now." in pages.page(followed).one("main").text
+    assert client.get(address).status_code == 410
+    client.force_login(owner)
+    assert "used by stranger@example.org" in pages.page(client.get("/team/")).one("main").text
+
+
+def test_owner_revokes_on_the_page(
+    client: Client, owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    secret = invite(team, owner)
+    row = Invitation.objects.get()
+    for user, status in ((stranger, 404), (teammate, 422), (owner, 302)):
+        client.force_login(user)
+        assert client.post(f"/team/invitations/{row.pk}/revoke/").status_code == status
+    client.force_login(stranger)
+    response = client.get(f"/team/join/{secret}/")
+    assert response.status_code == 410
+    assert "revoked by the team" in pages.page(response).one("main").text

@@ -1,0 +1,264 @@
+"""What a team says of a method: typed, checked, shown, and what the board is filtered by."""
+
+import json
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import AnonymousUser
+from django.test import Client
+
+from leaderboard import filters, methods, standings
+from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User
+from leaderboard.texts import Refused
+from tests import builders, pages
+
+ANYBODY = AnonymousUser()
+WHOLE: dict[str, Any] = {
+    "description": "What it does.",
+    "paper_url": "https://example.org/paper",
+    "code_url": "https://example.org/code",
+    "n_frames": 6,
+    "cameras": "ONE",
+    "box_source": "GIVEN",
+    "uses_nerf": False,
+    "uses_extra_data": True,
+    "pretraining": "ImageNet-1k",
+    "n_parameters": 31_000_000,
+    "latency_ms": 41.5,
+    "hardware": "one GPU",
+}
+
+
+def of(name: str, *values: object) -> list[tuple[str, object]]:
+    return [(name, value) for value in values]
+
+
+BAD = [
+    *of("n_frames", 1, 7, "six", 2.5, True, [], "²", 10**30, float("inf")),
+    *of("cameras", "one", "THREE", 1, True, {}),
+    ("box_source", "MADE UP"),
+    *of("uses_nerf", "maybe", 1, [], "YES"),
+    *of("n_parameters", 0, -1, 10**16, "1e9", "9" * 5000, 1.5, True),
+    *of("latency_ms", 0, -1, "fast", float("nan"), float("inf"), 1e300, True, 10**400, []),
+    *of("paper_url", "javascript:alert(1)", "ftp://example.org", "example.org", 5),
+    ("description", "x" * 2001),
+    ("description", "a\x00b"),
+    ("description", "\ud800"),
+    ("hardware", "x" * 121),
+    ("pretraining", ["ImageNet"]),
+    *of("name", "", None, "Anonymous", "a\u202eb", 5, "x" * 81),
+]
+
+
+@pytest.fixture
+def sent(edition: Edition, owner: User) -> Submission:
+    """A scored submission of a public method."""
+    made = builders.submit(owner, builders.predictions(edition, factor=1.2), method="Foo")
+    builders.score_all()
+    return made
+
+
+@pytest.fixture
+def method(sent: Submission) -> Method:
+    """Its method."""
+    return sent.method
+
+
+def patch(client: Client, method: Method, user: User, body: Any) -> tuple[int, dict[str, Any]]:
+    response = client.patch(
+        f"/api/v1/methods/{method.pk}",
+        body if isinstance(body, str) else json.dumps(body),
+        content_type="application/json",
+        headers={"Authorization": f"Bearer {builders.token(user)}"},
+    )
+    return response.status_code, response.json()
+
+
+# --- the verb ----------------------------------------------------------------------------------------------
+
+
+def test_everything_said_is_kept_and_taken_back_with_nothing(method: Method, owner: User) -> None:
+    kept = methods.edit(method=method, changes=WHOLE, actor=owner)
+    kept.refresh_from_db()
+    assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
+    for nothing in (None, ""):
+        methods.edit(method=method, changes=WHOLE, actor=owner)
+        kept = methods.edit(method=method, changes=dict.fromkeys(WHOLE, nothing), actor=owner)
+        kept.refresh_from_db()
+        assert {getattr(kept, name) for name in WHOLE} == {None, ""}
+
+
+def test_words_mean_what_values_do(method: Method, owner: User) -> None:
+    words = {"n_frames": "6", "uses_nerf": "no", "uses_extra_data": "yes", "n_parameters": " 31000000 "}
+    kept = methods.edit(method=method, changes={**WHOLE, **words, "latency_ms": "41.5"}, actor=owner)
+    assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
+
+
+@pytest.mark.parametrize(("name", "value"), BAD)
+def test_what_it_cannot_be_is_named_with_what_was_expected(
+    method: Method, owner: User, name: str, value: object
+) -> None:
+    with pytest.raises(Refused, match="expected") as refusal:
+        methods.edit(method=method, changes={name: value}, actor=owner)
+    assert refusal.value.field == name
+    str(refusal.value).encode()
+    assert AuditEvent.objects.filter(verb="edited").count() == 0
+
+
+def test_a_latency_needs_its_hardware(method: Method, owner: User) -> None:
+    with pytest.raises(Refused, match="what the latency was measured on"):
+        methods.edit(method=method, changes={"latency_ms": 3.5}, actor=owner)
+    methods.edit(method=method, changes={"latency_ms": 3.5, "hardware": "one GPU"}, actor=owner)
+    with pytest.raises(Refused, match="what the latency was measured on"):
+        methods.edit(method=method, changes={"hardware": ""}, actor=owner)
+
+
+def test_only_the_team_says_something_and_the_trail_knows_what_changed(
+    method: Method, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    for other in (stranger, maintainer):
+        with pytest.raises(Refused, match="Only the team"):
+            methods.edit(method=method, changes={"n_frames": 2}, actor=other)
+    number = BoardVersion.objects.get(split="test").number
+    methods.edit(method=method, changes={"n_frames": 2, "cameras": ""}, actor=teammate)
+    methods.edit(method=method, changes={"n_frames": 2}, actor=owner)
+    assert BoardVersion.objects.get(split="test").number == number + 1
+    (event,) = AuditEvent.objects.filter(verb="edited")
+    assert (event.actor, event.details) == (teammate, {"fields": ["n_frames"]})
+
+
+def test_a_name_changes_until_it_is_public_and_is_no_other_ones_of_the_team(
+    edition: Edition, method: Method, owner: User, stranger: User
+) -> None:
+    with pytest.raises(Refused, match="keeps its name"):
+        methods.edit(method=method, changes={"name": "Bar"}, actor=owner)
+    data = builders.predictions(edition, factor=1.4)
+    hidden = builders.submit(owner, data, method="Hidden", visibility="PRIVATE").method
+    with pytest.raises(Refused, match="Your team has a method 'Foo'"):
+        methods.edit(method=hidden, changes={"name": "F0o"}, actor=owner)
+    assert methods.edit(method=hidden, changes={"name": "Seen"}, actor=owner).name == "Seen"
+    assert builders.submit(stranger, data, method="F0o").method.team != method.team
+    with pytest.raises(Refused, match="looks like"):
+        builders.submit(owner, data, method="FOO")
+
+
+# --- the page ----------------------------------------------------------------------------------------------
+
+
+def test_page_takes_the_details_and_shows_them(client: Client, method: Method, owner: User) -> None:
+    client.force_login(owner)
+    address = f"/methods/{method.pk}/edit/"
+    form = pages.page(client.get(address)).one("main")
+    assert "id_name" not in [element.attributes.get("id") for element in form.all("input")]
+    sent = {name: {True: "yes", False: "no"}.get(value, value) for name, value in WHOLE.items()}
+    assert client.post(address, sent).status_code == 302
+    client.logout()
+    shown = pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
+    for words in ("41.5 ms on one GPU", "31,000,000", "one camera", "given boxes", "ImageNet-1k"):
+        assert words in shown
+    client.force_login(owner)
+    response = client.post(address, {**sent, "n_frames": "9"})
+    assert response.status_code == 422
+    assert "expected a whole number from 2 to 6" in pages.page(response).one("main").text
+
+
+# --- the API -----------------------------------------------------------------------------------------------
+
+
+def test_program_says_and_reads_the_same(client: Client, method: Method, owner: User, stranger: User) -> None:
+    status, told = patch(client, method, owner, WHOLE)
+    assert status == 200
+    details = {name: told["details"][name] for name in told["details"]}
+    assert details == {name: WHOLE[name] for name in details}
+    assert patch(client, method, stranger, {"n_frames": 2})[0] == 404
+    status, told = patch(client, method, owner, {"n_frames": None})
+    assert (status, told["details"]["n_frames"], told["description"]) == (200, None, "What it does.")
+    assert client.get("/api/v1/methods").status_code == 401
+    headers = {"Authorization": f"Bearer {builders.token(owner)}"}
+    assert [row["name"] for row in client.get("/api/v1/methods", headers=headers).json()] == ["Foo"]
+    assert client.get("/api/v1/methods?limit=0", headers=headers).json()["code"] == "bad-limit"
+
+
+@pytest.mark.parametrize(
+    ("body", "code"),
+    [
+        ({"visibility": "PUBLIC"}, "unknown-field"),
+        ({"\ud800": 1}, "unknown-field"),
+        ({"team": "x"}, "unknown-field"),
+        ([1], "bad-value"),
+        ("null", "bad-value"),
+        ('{"n_frames": 1e999}', "bad-value"),
+        ('{"n_parameters": ' + "9" * 4000 + "}", "bad-value"),
+        ('{"description": "\\ud800"}', "bad-character"),
+        ('{"description": "\\u0000"}', "bad-character"),
+        ("{", "parse-error"),
+        ('{"n_frames": ' + "9" * 6000 + "}", "parse-error"),
+    ],
+)
+def test_nonsense_is_refused_in_words(
+    client: Client, method: Method, owner: User, body: Any, code: str
+) -> None:
+    status, told = patch(client, method, owner, body)
+    assert (status, told["code"]) == (400 if code == "parse-error" else 422, code)
+
+
+# --- filters -----------------------------------------------------------------------------------------------
+
+
+def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
+    edition: Edition, method: Method, owner: User
+) -> None:
+    methods.edit(method=method, changes=WHOLE, actor=owner)
+    data = builders.predictions(edition, factor=1.3)
+    veiled = builders.submit(owner, data, method="Veiled", visibility="ANONYMOUS").method
+    methods.edit(method=veiled, changes={"n_frames": 6, "code_url": "https://example.org"}, actor=owner)
+    builders.score_all()
+    split = Split.objects.select_related("published_edition").get(pk="test")
+
+    def names(**query: str) -> list[str]:
+        board = standings.board(split=split, viewer=ANYBODY, filters=filters.parse(query))
+        assert all(ranks[entry.method] == entry.rank for entry in board.entries)
+        assert board.n_in_all == 7
+        return [entry.method for entry in board.entries if entry.kind == "submission"]
+
+    ranks = {entry.method: entry.rank for entry in standings.board(split=split, viewer=ANYBODY).entries}
+    both = ["Foo", veiled.pseudonym]
+    for query, expected in (
+        ({}, both),
+        ({"frames": "6"}, both),
+        ({"frames": "2"}, []),
+        ({"cameras": "one"}, ["Foo"]),
+        ({"boxes": "given"}, ["Foo"]),
+        ({"nerf": "no"}, ["Foo"]),
+        ({"nerf": "yes"}, []),
+        ({"extra": "yes", "frames": "6"}, ["Foo"]),
+        ({"code": "yes"}, ["Foo"]),
+        ({"code": "no"}, [veiled.pseudonym]),
+        ({"paper": "yes"}, ["Foo"]),
+        ({"latency": "41.5"}, ["Foo"]),
+        ({"latency": "41"}, []),
+        ({"q": "OWL"}, ["Foo"]),
+        ({"q": "veiled"}, []),
+        ({"q": "anonymous"}, [veiled.pseudonym]),
+        ({"frames": "", "q": " "}, both),
+    ):
+        assert sorted(names(**query)) == sorted(expected), query
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        *(("frames", value) for value in ("1", "7", "x", "²")),
+        *(("cameras", "three"), ("boxes", "x"), ("nerf", "maybe"), ("code", "1"), ("paper", "\x00")),
+        *(("latency", value) for value in ("fast", "nan", "inf", "0", "-1", "1e999")),
+        ("q", "x" * 81),
+    ],
+)
+def test_a_filter_that_is_none_is_named(client: Client, benchmark: None, name: str, value: str) -> None:
+    with pytest.raises(filters.BadFilter, match="expected") as fault:
+        filters.parse({name: value})
+    assert fault.value.field == name
+    for address in ("/board/test/", "/api/v1/splits/test/board"):
+        response = client.get(address, {name: value})
+        assert response.status_code == 400
+        assert f"The filter '{name}' is" in response.content.decode().replace("&#x27;", "'")

@@ -1,0 +1,133 @@
+"""Names: which are told apart, which are taken for one another, and which are none."""
+
+import pytest
+
+from leaderboard import teams
+from leaderboard.models import Team, User
+from leaderboard.names import MAX_LOOK, MAX_NAME, clean_name, like, look
+from leaderboard.texts import Refused
+
+ALIKE = [
+    ("PayPal", "PayPaI"),
+    ("Owls", "OWLS"),
+    ("Owls", "0wls"),
+    ("Owls", "Оwls"),
+    ("Owls", "ΟWLS"),
+    ("Owls", "ꓳwls"),
+    ("Owls", "𝖮𝗐𝗅𝗌"),
+    ("Owls", "Ｏｗｌｓ"),
+    ("Owls", "O\u200bwls"),
+    ("Owls", "Owl\u0323s"),
+    ("Foo", "Fοο"),
+    ("Foo Lab", "Foo  Lab"),
+    ("Foo Lab", "Foo\u00a0Lab"),
+    ("Foo Lab", "Foo\u2003Lab"),
+    ("modern", "modem"),
+    ("vvave", "wave"),
+    ("alpha", "ɑlpha"),
+    ("alpha", "аlphа"),
+    ("scope", "ѕсоре"),
+    ("cope", "соре"),
+    ("Bor", "Воr"),
+    ("вор", "Вор"),
+    ("BAD", "ᏴᎪᎠ"),
+    ("lab", "ⅼab"),
+    ("lab", "ʟab"),
+    ("yes", "ʏes"),
+    ("T-Net", "τ-Net"),
+    ("Yes", "Υes"),
+    ("one", "oηe"),
+    ("fine", "ﬁne"),
+    ("Strasse", "Straße"),
+    ("Muller", "Müller"),
+    ("Bjorn", "Bjørn"),
+    ("x2", "x²"),
+    ("a-b", "a–b"),
+    ("a-b", "a—b"),
+    ("a-b", "a\u2010b"),
+    ("it's", "it’s"),
+    ('"x"', "“x”"),
+    ("Net 1l", "Net lI"),
+    ("ℍello", "Hello"),
+    ("İstanbul", "Istanbul"),
+]
+DIFFERENT = [
+    ("Team 1", "Team 7"),
+    ("Team 10", "Team 11"),
+    ("v10", "v12"),
+    ("RTX", "UTX"),
+    ("Yen", "Zen"),
+    ("Foo", "Fob"),
+    ("Net-A", "Net A"),
+    ("naive", "native"),
+    ("深度", "深广"),
+    ("한국", "한글"),
+    ("Ада", "Ева"),
+    ("Owls", "Owl"),
+]
+NO_NAMES = [
+    ("", "missing-field"),
+    ("   ", "missing-field"),
+    ("\u00a0\u2003", "missing-field"),
+    ("x" * (MAX_NAME + 1), "text-too-long"),
+    ("\ufdfa" * 30, "text-too-long"),
+    ("Foo\x00", "bad-character"),
+    ("Foo\nBar", "bad-character"),
+    ("Foo\u202eBar", "bad-character"),
+    ("Foo\u2066Bar", "bad-character"),
+    ("Foo\u200bBar", "bad-character"),
+    ("Foo\u200dBar", "bad-character"),
+    ("Foo\ufeff", "bad-character"),
+    ("Foo\u2028Bar", "bad-character"),
+    ("Foo\u3164", "bad-character"),
+    ("Foo\u2800", "bad-character"),
+    ("Foo\ufe0f", "bad-character"),
+    ("Foo\ud800", "bad-character"),
+    ("Foo\ue000", "bad-character"),
+    ("F\u0301\u0302\u0303\u0304oo", "bad-character"),
+    ("…", "bad-name"),
+    ("=+-", "bad-name"),
+    ("Anonymous", "reserved-name"),
+    ("anonymous 3f9c2a", "reserved-name"),
+    ("Αnоnymous", "reserved-name"),
+]
+GOOD = ["Foo++", "=1+1", "<b>x</b>", "深度", "Müller & Søn", "τ-Net", "{{7*7}}", "O'Reilly", "x" * MAX_NAME]
+
+
+@pytest.mark.parametrize(("name", "other"), ALIKE)
+def test_names_that_look_alike_have_one_look(name: str, other: str) -> None:
+    assert look(name) == look(other)
+    assert like(other, ["Something else", name]) == name
+
+
+@pytest.mark.parametrize(("name", "other"), DIFFERENT)
+def test_names_that_differ_to_the_eye_have_two(name: str, other: str) -> None:
+    assert look(name) != look(other)
+    assert like(other, [name]) is None
+
+
+@pytest.mark.parametrize(("text", "code"), NO_NAMES)
+def test_what_is_no_name_is_refused_with_its_reason(text: str, code: str) -> None:
+    with pytest.raises(Refused) as refusal:
+        clean_name("name", text)
+    assert (refusal.value.code, refusal.value.field) == (code, "name")
+    assert "expected" in str(refusal.value)
+    str(refusal.value).encode()
+
+
+@pytest.mark.parametrize("text", GOOD)
+def test_names_keep_what_one_can_see(text: str) -> None:
+    assert clean_name("name", f"  {text}\u00a0") == text
+    assert len(look(text)) <= MAX_LOOK
+
+
+def test_spaces_are_those_of_the_keyboard() -> None:
+    assert clean_name("name", "Foo\u2003 Lab") == "Foo Lab"
+
+
+def test_no_two_teams_look_the_same_and_a_person_without_a_usable_name_gets_a_plain_one(db: None) -> None:
+    names = ["Owls", "Оwls", "0WLS", "Foo\u202e", "", "Anonymous"]
+    people = [User.objects.create_user(f"{i}@example.org", name=name) for i, name in enumerate(names)]
+    made = [teams.team_of(user=person).name for person in people]
+    assert made == ["Owls", "Оwls 2", "0WLS 3", *(f"Team {person.pk}" for person in people[3:])]
+    assert Team.objects.values("look").distinct().count() == len(names)

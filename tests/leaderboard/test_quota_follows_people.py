@@ -1,0 +1,109 @@
+"""Quota follows people: nobody gets another turn by changing teams, and no team by changing people."""
+
+from datetime import timedelta
+
+import pytest
+from django.core.files.base import ContentFile
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import invitations, quotas, teams
+from leaderboard.models import Edition, Split, User
+from leaderboard.quotas import Quota, QuotaExceeded
+from tests import builders
+
+DAY = timedelta(days=1)
+
+
+@pytest.fixture
+def limited(edition: Edition) -> Edition:
+    """The test split, with three submissions in 30 days."""
+    Split.objects.filter(pk="test").update(quota_limit=3, quota_window=30 * DAY)
+    return edition
+
+
+def state(user: User) -> Quota:
+    split = Split.objects.get(pk="test")
+    return quotas.state(team=teams.present_team_of(user=user), user=user, split=split, now=timezone.now())
+
+
+def send(edition: Edition, user: User, *factors: float) -> None:
+    for factor in factors:
+        builders.submit(user, builders.predictions(edition, factor=factor), method=f"M{factor}")
+    builders.score_all()
+
+
+def join(user: User, owner: User) -> None:
+    now = timezone.now()
+    team = teams.team_of(user=owner)
+    secret = invitations.make(team=team, actor=owner, now=now)[1]
+    invitations.accept(secret=secret, user=user, now=now)
+
+
+def test_a_team_has_one_quota(limited: Edition, owner: User, teammate: User, stranger: User) -> None:
+    send(limited, owner, 1.1, 1.2)
+    send(limited, teammate, 1.3)
+    assert [state(user).left for user in (owner, teammate, stranger)] == [0, 0, 3]
+    with pytest.raises(QuotaExceeded):
+        send(limited, teammate, 1.4)
+
+
+def test_who_leaves_takes_what_they_sent_along_and_the_team_keeps_what_it_got(
+    limited: Edition, owner: User, teammate: User
+) -> None:
+    send(limited, teammate, 1.1, 1.2, 1.3)
+    teams.leave(user=teammate)
+    assert teams.present_team_of(user=teammate) is None
+    assert (state(teammate).left, state(owner).left) == (0, 0)
+    with pytest.raises(QuotaExceeded):
+        send(limited, teammate, 1.4)
+    assert state(teammate).left == 0
+
+
+def test_who_joins_brings_along_what_they_sent(limited: Edition, owner: User, stranger: User) -> None:
+    send(limited, stranger, 1.1, 1.2)
+    send(limited, owner, 1.3)
+    join(stranger, owner)
+    assert (state(owner).used, state(stranger).used) == (3, 3)
+    with pytest.raises(QuotaExceeded):
+        send(limited, owner, 1.4)
+
+
+def test_people_who_come_and_go_do_not_make_a_team_sent_twice(
+    limited: Edition, owner: User, stranger: User, maintainer: User
+) -> None:
+    teams.team_of(user=owner)
+    send(limited, stranger, 1.1)
+    join(stranger, owner)
+    send(limited, stranger, 1.2)
+    assert state(owner).used == 2
+    teams.leave(user=stranger)
+    # What came along as methods of a team of one stays with the team.
+    assert (state(owner).used, state(stranger).used) == (2, 2)
+    join(maintainer, stranger)
+    assert state(maintainer).used == 2
+
+
+@pytest.mark.parametrize("part", ["page", "API"])
+def test_closed_and_future_splits_say_when_with_a_zone(
+    client: Client, limited: Edition, owner: User, part: str
+) -> None:
+    moment = timezone.now().replace(microsecond=0)
+    words = {
+        "opens_at": f"Submissions to test open at {moment + DAY:%Y-%m-%d %H:%M} UTC.",
+        "closes_at": f"Submissions to test closed at {moment - DAY:%Y-%m-%d %H:%M} UTC.",
+    }
+    for field, sentence in words.items():
+        at = moment + DAY if field == "opens_at" else moment - DAY
+        Split.objects.filter(pk="test").update(**{"opens_at": None, "closes_at": None, field: at})
+        data = builders.predictions(limited)
+        fields = {"split": "test", "method": "Foo", "file": ContentFile(data, name="p.json")}
+        if part == "page":
+            client.force_login(owner)
+            assert sentence in client.get("/submit/").content.decode()
+            response = client.post("/submit/", fields)
+            assert (response.status_code, sentence in response.content.decode()) == (422, True)
+        else:
+            headers = {"Authorization": f"Bearer {builders.token(owner)}"}
+            response = client.post("/api/v1/submissions", fields, headers=headers)
+            assert (response.status_code, response.json()["detail"]) == (409, sentence)

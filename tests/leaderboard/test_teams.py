@@ -1,0 +1,225 @@
+"""Teams: founding, renaming, handing over, removing, leaving; and the page for it."""
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import invitations, quotas, teams
+from leaderboard.models import AuditEvent, BoardVersion, Edition, Membership, Method, Team, User
+from leaderboard.texts import Refused
+from tests import builders, pages
+
+
+def owners(team: Team) -> list[User]:
+    return [member.user for member in Membership.objects.filter(team=team, is_owner=True)]
+
+
+def refused(code: str) -> "pytest.RaisesExc[Refused]":
+    return pytest.raises(Refused, check=lambda refusal: refusal.code == code)
+
+
+@pytest.fixture
+def team(owner: User, teammate: User) -> Team:
+    """The owner's team, with a teammate in it."""
+    return teams.team_of(user=owner)
+
+
+# --- the verbs ---------------------------------------------------------------------------------------------
+
+
+def test_somebody_founds_one_team_and_owns_it(owner: User) -> None:
+    made = teams.create(user=owner, name=" Night  Owls ", now=timezone.now())
+    assert (made.name, owners(made)) == ("Night Owls", [owner])
+    with refused("in-a-team"):
+        teams.create(user=owner, name="More owls", now=timezone.now())
+    assert Team.objects.count() == 1
+
+
+def test_a_name_that_looks_like_another_teams_is_refused(owner: User, stranger: User, team: Team) -> None:
+    with refused("name-taken"):
+        teams.create(user=stranger, name="ОWLS", now=timezone.now())
+    other = teams.team_of(user=stranger)
+    with refused("name-taken"):
+        teams.rename(team=other, name="0wls", actor=stranger)
+    assert Team.objects.get(pk=other.pk).name == "Strangers"
+    assert teams.rename(team=team, name="OWLS", actor=owner).name == "OWLS"
+
+
+def test_renaming_changes_every_board_and_is_told_to_the_trail(
+    edition: Edition, owner: User, teammate: User, team: Team
+) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    number = BoardVersion.objects.get(split="test").number
+    with refused("not-the-owner"):
+        teams.rename(team=team, name="Mates", actor=teammate)
+    teams.rename(team=team, name="Barn Owls", actor=owner)
+    teams.rename(team=team, name="Barn Owls", actor=owner)
+    assert BoardVersion.objects.get(split="test").number == number + 1
+    (event,) = AuditEvent.objects.filter(verb="renamed")
+    assert (event.actor, event.details) == (owner, {"from": "Owls", "to": "Barn Owls"})
+
+
+def test_owner_hands_over_before_leaving(owner: User, teammate: User, stranger: User, team: Team) -> None:
+    with refused("hand-over-first"):
+        teams.leave(user=owner)
+    with refused("not-a-member"):
+        teams.hand_over(team=team, to=stranger, actor=owner)
+    with refused("not-the-owner"):
+        teams.hand_over(team=team, to=teammate, actor=teammate)
+    with refused("not-yourself"):
+        teams.hand_over(team=team, to=owner, actor=owner)
+    teams.hand_over(team=team, to=teammate, actor=owner)
+    assert owners(team) == [teammate]
+    teams.leave(user=owner)
+    assert teams.present_team_of(user=owner) is None
+    with refused("in-no-team"):
+        teams.leave(user=owner)
+    assert [e.verb for e in AuditEvent.objects.filter(noun="Team").order_by("pk")] == [
+        "created",
+        "handed_over",
+        "left",
+    ]
+
+
+def test_owner_removes_others_and_never_themselves(
+    owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    for actor, member, code in (
+        (teammate, owner, "not-the-owner"),
+        (stranger, owner, "not-the-owner"),
+        (owner, owner, "not-yourself"),
+        (owner, stranger, "not-a-member"),
+    ):
+        with refused(code):
+            teams.remove(team=team, member=member, actor=actor)
+    teams.remove(team=team, member=teammate, actor=owner)
+    assert list(team.members.all()) == [owner]
+
+
+def test_a_team_without_people_and_methods_is_forgotten_and_one_with_methods_stays(
+    edition: Edition, owner: User, stranger: User, maintainer: User
+) -> None:
+    teams.team_of(user=owner)
+    teams.leave(user=owner)
+    assert not Team.objects.exists()
+    builders.submit(stranger, builders.predictions(edition))
+    teams.leave(user=stranger)
+    assert [method.team.name for method in Method.objects.all()] == ["Strangers"]
+    kept = teams.team_of(user=maintainer)
+    quotas.override(
+        team=kept,
+        split=edition.split,
+        limit=0,
+        window=edition.split.quota_window,
+        min_gap=edition.split.quota_min_gap,
+        rejected_limit=None,
+        reason="a sanction is not shaken off by leaving",
+        actor=maintainer,
+        now=timezone.now(),
+    )
+    teams.leave(user=maintainer)
+    assert Team.objects.filter(pk=kept.pk).exists()
+
+
+def test_who_left_sees_nothing_private_of_the_team_any_more(
+    client: Client, edition: Edition, owner: User, teammate: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
+    client.force_login(teammate)
+    addresses = [
+        f"/submissions/{sent.pk}/",
+        f"/methods/{sent.method_id}/",
+        f"/api/v1/methods/{sent.method_id}",
+    ]
+    assert [client.get(address).status_code for address in addresses] == [200] * 3
+    teams.leave(user=teammate)
+    assert [client.get(address).status_code for address in addresses] == [404] * 3
+
+
+# --- the page ----------------------------------------------------------------------------------------------
+
+
+def test_page_founds_renames_hands_over_removes_and_leaves(
+    client: Client, owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    client.force_login(stranger)
+    assert "No team yet" in pages.page(client.get("/team/")).one("main").text
+    response = client.post("/team/", {"name": "owls"})
+    assert response.status_code == 422
+    assert "looks like" in pages.page(response).one("main").text
+    assert client.post("/team/", {"name": "Ravens"}).status_code == 302
+    assert "You are a team of one." in pages.page(client.get("/team/")).one("main").text
+
+    client.force_login(teammate)
+    main = pages.page(client.get("/team/")).one("main")
+    assert "owner@example.org" in main.text
+    assert [button.text for button in main.all("button")] == ["Leave Owls"]
+    assert client.post(f"/team/members/{owner.pk}/remove/").status_code == 422
+
+    client.force_login(owner)
+    assert client.post("/team/leave/").status_code == 422
+    assert client.post("/team/", {"name": "Barn Owls"}).status_code == 302
+    assert client.post(f"/team/members/{stranger.pk}/remove/").status_code == 404
+    assert client.post(f"/team/members/{teammate.pk}/hand-over/").status_code == 302
+    assert owners(team) == [teammate]
+    assert client.post("/team/leave/").status_code == 302
+    assert "No team yet" in pages.page(client.get("/team/")).one("main").text
+    assert client.post("/team/leave/").status_code == 404
+
+
+def test_who_would_leave_methods_to_nobody_says_that_they_know(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    client.force_login(owner)
+    response = client.post("/team/leave/")
+    assert response.status_code == 422
+    assert "nobody will see the private methods again" in pages.page(response).one("main").text
+    assert client.post("/team/leave/", {"confirm": "on"}).status_code == 302
+    assert teams.present_team_of(user=owner) is None
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "leave/",
+        "invite/",
+        "members/1/remove/",
+        "members/1/hand-over/",
+        "members/999999999999999999999/remove/",
+    ],
+)
+def test_deeds_are_posts_of_those_who_are_signed_in(client: Client, owner: User, path: str) -> None:
+    assert client.post(f"/team/{path}").status_code in {302, 404}
+    client.force_login(owner)
+    assert client.get(f"/team/{path}").status_code == 405
+    assert client.post(f"/team/{path}").status_code == 404
+
+
+# --- the administration ------------------------------------------------------------------------------------
+
+
+def test_administration_changes_nothing_of_teams_methods_and_invitations(
+    keeper: Client, edition: Edition, owner: User, stranger: User, team: Team
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
+    invitation, secret = invitations.make(team=team, actor=owner, now=timezone.now())
+    member = Membership.objects.get(user=owner)
+    for kind, row in (
+        ("method", sent.method),
+        ("team", team),
+        ("membership", member),
+        ("invitation", invitation),
+    ):
+        address = f"/admin/leaderboard/{kind}/{row.pk}/"
+        shown = keeper.get(f"{address}change/").content.decode()
+        assert "_save" not in shown
+        assert secret not in shown
+        assert invitation.secret_hash not in shown
+        assert keeper.post(f"{address}change/", {"visibility": "PUBLIC", "name": "x"}).status_code == 403
+        assert keeper.post(f"{address}delete/", {"post": "yes"}).status_code == 403
+    sent.method.refresh_from_db()
+    assert sent.method.visibility == "PRIVATE"
+    assert keeper.post(f"/admin/leaderboard/user/{owner.pk}/delete/", {"post": "yes"}).status_code == 403
+    assert keeper.get(f"/admin/leaderboard/user/{stranger.pk}/delete/").status_code == 200

@@ -1,0 +1,376 @@
+"""Who sees a method: private, anonymous, public, and the way from one to the next."""
+
+import json
+import random
+import re
+from datetime import timedelta
+from typing import Any
+
+import pytest
+from django.contrib.auth.models import AnonymousUser
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import queue, standings, submissions, visibility
+from leaderboard.entries import Details
+from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User, Visibility
+from leaderboard.texts import Refused
+from tests import builders, pages
+
+ANYBODY = AnonymousUser()
+SECRETS = (
+    *("Owls", "owner@example.org", "Secret sauce", "Words of its own"),
+    *("secret-paper", "secret-code", "Laptop of Ada", "WebText of Ada"),
+)
+
+
+def split() -> Split:
+    return Split.objects.select_related("published_edition__ground_truth").get(pk="test")
+
+
+def rows(viewer: Any = ANYBODY) -> dict[str, standings.Entry]:
+    return {entry.method: entry for entry in standings.board(split=split(), viewer=viewer).entries}
+
+
+def change(method: Method, to: str, actor: User, **options: Any) -> Method:
+    return visibility.change(method=method, visibility=to, actor=actor, now=timezone.now(), **options)
+
+
+@pytest.fixture
+def sent(edition: Edition, owner: User) -> Submission:
+    """A scored submission of a private method that is better than everything printed."""
+    made = builders.submit(
+        owner,
+        builders.predictions(edition, factor=1.0000001),
+        method="Secret sauce",
+        visibility="PRIVATE",
+        description="Words of its own",
+        paper_url="https://example.org/secret-paper",
+        code_url="https://example.org/secret-code",
+    )
+    Method.objects.update(
+        n_frames=6, latency_ms=12.5, hardware="Laptop of Ada", pretraining="WebText of Ada", cameras="ONE"
+    )
+    builders.score_all()
+    return made
+
+
+@pytest.fixture
+def method(sent: Submission) -> Method:
+    """Its method."""
+    return Method.objects.get(pk=sent.method_id)
+
+
+def everything_a_reader_can_ask(client: Client, method: Method, submission: Submission) -> list[bytes]:
+    """Bodies and headers of the pages and routes on which a method could show."""
+    addresses = [
+        *("/", "/board/test/", "/board/test/?sort=-date", "/board/test/?q=secret", "/board/test/editions/1/"),
+        *("/api/v1/splits/test/board", "/api/v1/splits/test/editions/1/board", "/api/v1/methods"),
+        *(f"/methods/{method.pk}/", f"/api/v1/methods/{method.pk}", f"/submissions/{submission.pk}/"),
+    ]
+    answers = [client.get(address) for address in addresses]
+    return [answer.content + repr(sorted(answer.items())).encode() for answer in answers]
+
+
+# --- private -----------------------------------------------------------------------------------------------
+
+
+def test_a_new_method_is_private_and_seen_by_its_team_alone(
+    client: Client, sent: Submission, method: Method, owner: User, teammate: User, stranger: User
+) -> None:
+    assert (method.visibility, method.shown_at) == (Visibility.PRIVATE, None)
+    for reader in (None, stranger):
+        if reader:
+            client.force_login(reader)
+        assert "Secret sauce" not in rows(reader or ANYBODY)
+        found = b"".join(everything_a_reader_can_ask(client, method, sent))
+        assert [secret for secret in (*SECRETS, method.pseudonym) if secret.encode() in found] == []
+        for address in (f"/methods/{method.pk}/", f"/api/v1/methods/{method.pk}"):
+            assert client.get(address).status_code == 404
+    for member in (owner, teammate):
+        entry = rows(member)["Secret sauce"]
+        assert (entry.rank, entry.is_mine, entry.is_visible_to_all) == (1, True, False)
+        client.force_login(member)
+        assert "only your team" in pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
+
+
+def test_a_private_method_moves_no_number_that_counts_changes(sent: Submission) -> None:
+    number = BoardVersion.objects.filter(split="test").values_list("number", flat=True).first()
+    builders.submit(sent.submitted_by, b"{}", method="Another", visibility="PRIVATE")
+    builders.score_all()
+    submissions.withdraw(submission=sent, actor=sent.submitted_by, now=timezone.now())
+    assert BoardVersion.objects.filter(split="test").values_list("number", flat=True).first() == number
+
+
+# --- anonymous ---------------------------------------------------------------------------------------------
+
+
+def test_an_anonymous_method_shows_numbers_and_nothing_of_whose_it_is(
+    client: Client, sent: Submission, method: Method, owner: User, stranger: User
+) -> None:
+    change(method, "ANONYMOUS", owner)
+    assert re.fullmatch(r"Anonymous [0-9a-f]{6}", method.pseudonym)
+    entry = rows()[method.pseudonym]
+    assert (entry.rank, entry.team, entry.n_attempts) == (1, "Anonymous", 1)
+    assert (entry.description, entry.paper_url, entry.code_url) == ("", "", "")
+    assert entry.details == Details(n_frames=6, latency_ms=12.5, cameras="ONE")
+    for reader in (None, stranger):
+        if reader:
+            client.force_login(reader)
+        answers = everything_a_reader_can_ask(client, method, sent)
+        found = b"".join(answers)
+        assert [secret for secret in SECRETS if secret.encode() in found] == []
+        assert method.pseudonym.encode() in answers[0]
+        page = client.get(f"/methods/{method.pk}/")
+        assert pages.page(page).one("h1").text == method.pseudonym
+        told = client.get(f"/api/v1/methods/{method.pk}").json()
+        assert (told["name"], told["team"], told["shown_at"]) == (method.pseudonym, "Anonymous", None)
+
+
+def test_its_own_team_reads_its_name_and_what_others_call_it(
+    client: Client, method: Method, owner: User, teammate: User
+) -> None:
+    change(method, "ANONYMOUS", owner)
+    for member in (owner, teammate):
+        entry = rows(member)["Secret sauce"]
+        assert (entry.pseudonym, entry.team, entry.is_visible_to_all) == (method.pseudonym, "Owls", True)
+        assert len(rows(member)) == len(rows())
+        client.force_login(member)
+        told = client.get(f"/api/v1/methods/{method.pk}").json()
+        assert (told["name"], told["pseudonym"]) == ("Secret sauce", method.pseudonym)
+
+
+# --- a board as of a time ----------------------------------------------------------------------------------
+
+
+def test_a_board_as_of_a_time_shows_what_was_shown_then(method: Method, owner: User, stranger: User) -> None:
+    before = timezone.now()
+    change(method, "PUBLIC", owner)
+    after = timezone.now()
+
+    def names(viewer: Any, at: Any) -> list[str]:
+        return [entry.method for entry in standings.board(split=split(), viewer=viewer, at=at).entries]
+
+    for reader in (ANYBODY, stranger):
+        assert "Secret sauce" not in names(reader, before)
+        assert "Secret sauce" in names(reader, after)
+    own = standings.board(split=split(), viewer=owner, at=before).entries
+    assert [entry.visibility for entry in own if entry.method == "Secret sauce"] == [Visibility.PRIVATE]
+
+
+def test_what_was_withdrawn_before_it_was_shown_leaves_no_stone(
+    sent: Submission, method: Method, owner: User
+) -> None:
+    sent.withdrawn_at = timezone.now()
+    sent.save()
+    change(method, "PUBLIC", owner)
+    assert "Secret sauce" not in rows()
+
+
+# --- leaving private ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("to", ["ANONYMOUS", "PUBLIC"])
+def test_the_preview_is_what_everybody_then_sees(method: Method, owner: User, to: str) -> None:
+    for name in ("Hidden too", "Shown"):
+        shown = "PUBLIC" if name == "Shown" else "PRIVATE"
+        data = builders.predictions(split().published_edition, factor=1.5)
+        builders.submit(owner, data, method=name, visibility=shown)
+    builders.score_all()
+    foreseen = visibility.preview(method=method, visibility=to, now=timezone.now())
+    assert method.visibility == Visibility.PRIVATE
+    change(method, to, owner)
+    (sight,) = foreseen.sights
+    entry = rows()[foreseen.profile.name]
+    assert sight.entry == entry
+    assert sight.n_ranked == 7
+    assert sight.n_attempts_now == 1
+    assert entry.n_attempts == (2 if to == "PUBLIC" else 1)
+
+
+def test_only_the_team_shows_a_method_and_it_is_told_to_the_trail(
+    method: Method, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    for other in (stranger, maintainer):
+        with pytest.raises(Refused, match="Only the team"):
+            change(method, "PUBLIC", other)
+    number = BoardVersion.objects.get(split="test").number
+    change(method, "ANONYMOUS", teammate)
+    change(method, "ANONYMOUS", teammate)
+    change(method, "PUBLIC", owner)
+    assert BoardVersion.objects.get(split="test").number == number + 2
+    events = AuditEvent.objects.filter(verb="shown").order_by("pk")
+    told = [(e.actor, e.details["from"], e.details["to"]) for e in events]
+    assert told == [(teammate, "PRIVATE", "ANONYMOUS"), (owner, "ANONYMOUS", "PUBLIC")]
+
+
+@pytest.mark.parametrize(
+    ("now_is", "to", "code"),
+    [
+        ("PUBLIC", "PRIVATE", "bad-value"),
+        ("PUBLIC", "ANONYMOUS", "shown-for-good"),
+        ("ANONYMOUS", "PRIVATE", "bad-value"),
+        ("PRIVATE", "PRIVATE", "bad-value"),
+        ("PRIVATE", "SECRET", "bad-value"),
+    ],
+)
+def test_there_is_no_way_back(method: Method, owner: User, now_is: str, to: str, code: str) -> None:
+    if now_is != "PRIVATE":
+        change(method, now_is, owner)
+    with pytest.raises(Refused) as refusal:
+        change(method, to, owner)
+    assert refusal.value.code == code
+    assert Method.objects.get().visibility == now_is
+
+
+@pytest.mark.parametrize("days", [-1, 0, 731])
+def test_a_date_of_reveal_is_to_come_and_not_too_far(method: Method, owner: User, days: int) -> None:
+    with pytest.raises(Refused, match="at most 730 days from now"):
+        change(method, "ANONYMOUS", owner, reveal_at=timezone.now() + timedelta(days=days))
+    with pytest.raises(Refused, match="has no date of reveal"):
+        change(method, "PUBLIC", owner, reveal_at=timezone.now() + timedelta(days=1))
+
+
+def test_the_sweep_reveals_what_is_due_once_and_nothing_else(method: Method, owner: User) -> None:
+    now = timezone.now()
+    change(method, "ANONYMOUS", owner, reveal_at=now + timedelta(days=3))
+    assert visibility.reveal_due(now=now + timedelta(days=2)) == 0
+    Method.objects.update(reveal_at=now - timedelta(seconds=1))
+    queue.sweep(rng=random.Random(0))
+    queue.sweep(rng=random.Random(0))
+    method.refresh_from_db()
+    assert (method.visibility, method.reveal_at) == (Visibility.PUBLIC, None)
+    (event,) = AuditEvent.objects.filter(verb="revealed")
+    assert (event.noun_id, event.actor) == (str(method.pk), None)
+    assert "Secret sauce" in rows()
+
+
+def test_a_withdrawn_entry_of_a_shown_method_leaves_a_stone(
+    sent: Submission, method: Method, owner: User
+) -> None:
+    change(method, "PUBLIC", owner)
+    submissions.withdraw(submission=sent, actor=owner, now=timezone.now())
+    entry = rows()["Secret sauce"]
+    assert (entry.rank, entry.scores["mid"], entry.n_attempts) == (None, None, 1)
+    assert entry.withdrawn_at
+
+
+# --- the page ----------------------------------------------------------------------------------------------
+
+
+def test_page_shows_what_others_will_see_asks_and_shows_it(
+    client: Client, sent: Submission, method: Method, owner: User
+) -> None:
+    client.force_login(owner)
+    outcome = pages.page(client.get(f"/submissions/{sent.pk}/")).one("div", id="outcome")
+    (link,) = [a for a in outcome.all("a") if a.text == "Make it public…"]
+    address = link.attributes["href"]
+    assert "What everybody will see" not in pages.page(client.get(address)).one("main").text
+    main = pages.page(client.get(address, {"visibility": "PUBLIC"})).one("main").text
+    for words in ("Secret sauce", "Owls", "rank 1 of 6", "1 attempt:", "cannot be taken back", "12.5 ms on"):
+        assert words in main
+    masked = pages.page(client.get(address, {"visibility": "ANONYMOUS"})).one("section").text
+    assert method.pseudonym in masked
+    assert not [secret for secret in SECRETS if secret in masked]
+    response = client.post(address, {"visibility": "PUBLIC"})
+    assert response.status_code == 422
+    assert "You have not confirmed" in pages.page(response).one("main").text
+    assert Method.objects.get().visibility == Visibility.PRIVATE
+    response = client.post(address, {"visibility": "PUBLIC", "confirm": "on"}, follow=True)
+    assert "Secret sauce is public now." in pages.page(response).one("main").text
+    assert Method.objects.get().visibility == Visibility.PUBLIC
+    left = pages.page(client.get(address)).one("main")
+    assert "Everybody does, for good." in left.text
+    assert left.all("form") == []
+
+
+def test_page_takes_a_day_of_reveal(client: Client, method: Method, owner: User) -> None:
+    client.force_login(owner)
+    address = f"/methods/{method.pk}/visibility/"
+    day = f"{timezone.now() + timedelta(days=30):%Y-%m-%d}"
+    asked = {"visibility": "ANONYMOUS", "reveal_on": day}
+    assert f"on {day} it becomes so by itself" in pages.page(client.get(address, asked)).one("main").text
+    assert client.post(address, {**asked, "confirm": "on"}).status_code == 302
+    assert f"{Method.objects.get().reveal_at:%Y-%m-%d %H:%M}" == f"{day} 00:00"
+    for bad in ("soon", "1999-01-01", "9999-12-31", "2026-13-01", "\x00"):
+        assert client.get(address, {"visibility": "ANONYMOUS", "reveal_on": bad}).status_code == 422, bad
+
+
+def test_page_is_the_teams_alone(
+    client: Client, method: Method, teammate: User, stranger: User, maintainer: User
+) -> None:
+    for path in ("visibility", "edit"):
+        address = f"/methods/{method.pk}/{path}/"
+        assert client.get(address).status_code == 302
+        for user, status in ((stranger, 404), (maintainer, 404), (teammate, 200)):
+            client.force_login(user)
+            response = client.get(address)
+            assert response.status_code == status
+            assert "no-store" in response["Cache-Control"]
+        client.logout()
+    assert client.post(f"/methods/{method.pk}/visibility/", {}).status_code == 302
+
+
+# --- the API -----------------------------------------------------------------------------------------------
+
+
+def ask(client: Client, method: Method, token: str, body: Any) -> tuple[int, dict[str, Any]]:
+    data = body if isinstance(body, str) else json.dumps(body)
+    response = client.post(
+        f"/api/v1/methods/{method.pk}/visibility",
+        data,
+        content_type="application/json",
+        headers={"Authorization": f"Bearer {token}"},
+    )
+    return response.status_code, response.json()
+
+
+def test_program_shows_a_method_when_it_says_that_it_means_it(
+    client: Client, method: Method, owner: User, stranger: User
+) -> None:
+    token = builders.token(owner)
+    status, told = ask(client, method, token, {"visibility": "PUBLIC"})
+    assert (status, told["code"], told["problems"][0]["where"]) == (422, "not-confirmed", "confirm")
+    assert ask(client, method, builders.token(stranger), {"visibility": "PUBLIC", "confirm": True})[0] == 404
+    reading = builders.token(owner, scopes=["read"])
+    assert ask(client, method, reading, {"visibility": "PUBLIC", "confirm": True})[0] == 403
+    of_one_split = builders.token(owner, split_name="test")
+    assert ask(client, method, of_one_split, {"visibility": "PUBLIC", "confirm": True})[0] == 403
+    later = (timezone.now() + timedelta(days=9)).isoformat()
+    status, told = ask(
+        client, method, token, {"visibility": "ANONYMOUS", "reveal_at": later, "confirm": True}
+    )
+    assert (status, told["visibility"], told["name"]) == (200, "ANONYMOUS", "Secret sauce")
+    assert told["reveal_at"][:10] == later[:10]
+    status, told = ask(client, method, token, {"visibility": "PUBLIC", "confirm": True})
+    assert (status, told["visibility"], told["reveal_at"]) == (200, "PUBLIC", None)
+    status, told = ask(client, method, token, {"visibility": "PRIVATE", "confirm": True})
+    assert (status, told["code"]) == (422, "bad-value")
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        *(
+            "[]",
+            "null",
+            "5",
+            '"x"',
+            "{",
+            '{"visibility": 5, "confirm": true}',
+            "[" * 2000,
+            '{"confirm": "yes"}',
+        ),
+        '{"visibility": "ANONYMOUS", "reveal_at": "soon", "confirm": true}',
+        '{"visibility": "ANONYMOUS", "reveal_at": 1e999, "confirm": true}',
+        '{"visibility": "ANONYMOUS", "reveal_at": "0001-01-01T00:00:00+14:00", "confirm": true}',
+        '{"visibility": "\\ud800", "confirm": true}',
+        '{"visibility": "PUBLIC", "confirm": "\\u0000"}',
+    ],
+)
+def test_nonsense_is_refused_and_changes_nothing(
+    client: Client, method: Method, owner: User, body: str
+) -> None:
+    status, told = ask(client, method, builders.token(owner), body)
+    assert status in {400, 422}, told
+    assert Method.objects.get().visibility == Visibility.PRIVATE
