@@ -1,6 +1,7 @@
 """The one Django app."""
 
 from django.apps import AppConfig
+from django.core import checks
 
 
 class LeaderboardConfig(AppConfig):
@@ -8,3 +9,9 @@ class LeaderboardConfig(AppConfig):
 
     name = "leaderboard"
     verbose_name = "TSTTC leaderboard"
+
+    def ready(self) -> None:
+        """Register the system checks; only now can what they look at be imported."""
+        from leaderboard import receipts  # noqa: PLC0415 - needs the models
+
+        checks.register(receipts.check_keys)

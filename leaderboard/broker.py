@@ -48,19 +48,39 @@ def nudge(evaluation_id: uuid.UUID) -> bool:
     A lost nudge costs seconds: workers also look by themselves. It takes about two seconds at most, and none
     right after one was lost.
     """
+    return _sent("nudge", str(evaluation_id), lost="nudge_not_sent", evaluation_id=str(evaluation_id))
+
+
+def redraw(split_id: str) -> bool:
+    """Tell the workers that a split's board has changed; False if the broker did not take it.
+
+    Lost, it costs the next reader the drawing.
+    """
+    return _sent("redraw", split_id, lost="redraw_not_sent", split=split_id)
+
+
+def infer(about: int | str) -> bool:
+    """Tell the workers that an edition or split has something to infer; False if it was not taken.
+
+    A lost message costs seconds: workers also look by themselves.
+    """
+    return _sent("infer", str(about), lost="infer_not_sent", about=str(about))
+
+
+def _sent(task: str, argument: str, *, lost: str, **facts: str) -> bool:
     if _rest:
         return False
     try:
         with _connections().acquire(block=True, timeout=IMPATIENT["socket_timeout"]) as connection:
             current_app.send_task(
-                "leaderboard.tasks.nudge",
-                args=[str(evaluation_id)],
+                f"leaderboard.tasks.{task}",
+                args=[argument],
                 ignore_result=True,
                 connection=connection,
             )
     except (KombuError, OSError) as fault:
         _rest.begin()
-        log.warning("nudge_not_sent", evaluation_id=str(evaluation_id), reason=str(fault)[:200])
+        log.warning(lost, reason=str(fault)[:200], **facts)
         return False
     return True
 

@@ -18,7 +18,7 @@ from django.db.models import Max
 import evaluator
 from evaluator.protocol import get_protocol
 from evaluator.revisions import compare
-from leaderboard import audit, files
+from leaderboard import audit, boards, files
 from leaderboard.models import Edition, GroundTruth, Publication, Split, User
 
 
@@ -149,6 +149,7 @@ def make_board(
         edition.save(update_fields=["published_at"])
     split.published_edition = edition
     split.save(update_fields=["published_edition"])
+    boards.changed(split.pk)
     audit.record(
         verb=kind.lower(),
         noun="Edition",
@@ -191,6 +192,16 @@ def _keep_values(truth: evaluator.GroundTruth) -> None:
         with Path(temporary).open("rb") as written:
             os.fsync(written.fileno())
         Path(temporary).replace(target)
+
+
+def held() -> frozenset[str]:
+    """The digests whose values this process can read: what it may take on. Empty without any access."""
+    try:
+        found = list(Path(settings.GROUND_TRUTH_DIR).iterdir())
+    except OSError:
+        return frozenset()
+    values = (path for path in found if path.suffix == ".npz" and not path.stem.endswith(".manifest"))
+    return frozenset(f"sha256:{path.stem}" for path in values if os.access(path, os.R_OK))
 
 
 @lru_cache(maxsize=2)

@@ -43,13 +43,13 @@ class Check:
     detail: str
 
 
-def record_sweep() -> None:
-    """Write down that a sweep was finished just now, by the database's clock."""
+def record_sweep(*, n_out_of_reach: int = 0) -> None:
+    """Write down that a sweep was finished just now, and what its worker cannot do."""
     SweepBeat.objects.bulk_create(
-        [SweepBeat(id=SweepBeat.THE_ONE, swept_at=Now())],
+        [SweepBeat(id=SweepBeat.THE_ONE, swept_at=Now(), n_out_of_reach=n_out_of_reach)],
         update_conflicts=True,
         unique_fields=["id"],
-        update_fields=["swept_at"],
+        update_fields=["swept_at", "n_out_of_reach"],
     )
 
 
@@ -69,19 +69,36 @@ def checks() -> tuple[Check, ...]:
     return (*_database(), _broker())
 
 
-def _database() -> tuple[Check, Check]:
-    """A new connection and one question over it, which also tells how old the last sweep is."""
+def n_out_of_reach(*, using: str = "default") -> int:
+    """What waited, at the last sweep, for a ground truth that the sweeping worker cannot read."""
+    return SweepBeat.objects.using(using).values_list("n_out_of_reach", flat=True).first() or 0
+
+
+def _database() -> tuple[Check, ...]:
+    """A new connection and what the last sweep wrote down: how old it is, and what it found out of reach."""
     started_s = time.monotonic()
     try:
         with _own_connection() as alias:
             age_s = sweep_age_s(using=alias)
+            n_without = n_out_of_reach(using=alias)
     except DatabaseProblem as fault:
         log.warning("database_not_ready", reason=str(fault)[:200])
         return (
             Check("database", is_ok=False, detail="does not answer"),
             Check("sweep", is_ok=False, detail="unknown: the database does not answer"),
+            Check("ground truth", is_ok=False, detail="unknown: the database does not answer"),
         )
-    return Check("database", is_ok=True, detail=_answered(started_s)), _sweep(age_s)
+    return (
+        Check("database", is_ok=True, detail=_answered(started_s)),
+        _sweep(age_s),
+        _ground_truth(n_without),
+    )
+
+
+def _ground_truth(n_without: int) -> Check:
+    """Whether the workers can read what they score against; how much waits is nobody's business."""
+    detail = "a worker cannot read that of what waits" if n_without else "the workers read that of what waits"
+    return Check("ground truth", is_ok=not n_without, detail=detail)
 
 
 def _sweep(age_s: float | None) -> Check:

@@ -16,7 +16,7 @@ dead (a zombie) changes nothing. All times are the database's: `Now()` is evalua
 import logging
 import random
 import uuid
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
@@ -29,7 +29,7 @@ from django.db import transaction
 from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
-from leaderboard import audit, broker, bulk
+from leaderboard import audit, boards, broker, bulk
 from leaderboard.clock import after, database_now, just_before
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 
@@ -134,21 +134,26 @@ def _announce_many(n: int) -> None:
 
 
 def claim(
-    *, lease_s: float, wall_s: float, limit: int = 1, batch: int = 1, token: uuid.UUID | None = None
+    *,
+    lease_s: float,
+    wall_s: float,
+    limit: int = 1,
+    batch: int = 1,
+    token: uuid.UUID | None = None,
+    held: Collection[str] | None = None,
 ) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
+    With `held`, only those whose ground truth is among these digests: what this worker can score at all.
     If the first is one of an edition's re-scoring, up to `batch` of that edition's. Two workers never get the
     same one. Whoever brings a new `token` can find what it got if the answer is lost.
     """
     token = token or uuid.uuid4()
     with transaction.atomic():
-        waiting = (
-            Evaluation.objects.select_for_update(skip_locked=True)  # SQLite has one writer, and skips nothing
-            .filter(status=Status.QUEUED, due_at__lte=Now())
-            .order_by("priority", "queued_at")
-            .values_list("pk", "attempt", "priority", "edition")
-        )
+        # SQLite has one writer, and skips nothing.
+        due = Evaluation.objects.due().select_for_update(skip_locked=True)
+        due = due if held is None else due.scorable(held)
+        waiting = due.values_list("pk", "attempt", "priority", "edition")
         rows = list(waiting[:limit])
         if not rows:
             return []
@@ -235,11 +240,10 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
                 for (metric, interval), value in outcome.scores.items()
             ],
         )
+        boards.changed_by_evaluations(lease.evaluation_id for lease, _ in decided)
         audit.record_many(
             (
-                outcome.status.lower(),
-                "Evaluation",
-                lease.evaluation_id,
+                *(outcome.status.lower(), "Evaluation", lease.evaluation_id),
                 {"attempt": lease.attempt, "report_digest": outcome.report_digest},
             )
             for lease, outcome in decided
@@ -316,11 +320,7 @@ def release_expired(*, rng: random.Random) -> int:
 
 def waiting_ids(*, limit: int) -> list[uuid.UUID]:
     """Evaluations that are queued and due, most urgent first: what a sweep nudges again."""
-    return list(
-        Evaluation.objects.filter(status=Status.QUEUED, due_at__lte=Now())
-        .order_by("priority", "queued_at")
-        .values_list("pk", flat=True)[:limit]
-    )
+    return list(Evaluation.objects.due().values_list("pk", flat=True)[:limit])
 
 
 def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.Random) -> Status:

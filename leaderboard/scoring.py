@@ -6,17 +6,18 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TypeVar
 
 import structlog
 from django.conf import settings
-from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection
+from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection, transaction
 
 import evaluator
 from evaluator import GroundTruth, Rejected, Report, published
 from evaluator.protocol import get_protocol
 from evaluator.scoring import Scorer
-from leaderboard import files, ground_truth, lifecycle, quarantine
+from leaderboard import bags, broker, files, ground_truth, lifecycle, quarantine
 from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
 from leaderboard.models import Edition, Evaluation, Status
 
@@ -76,7 +77,11 @@ def _claimed() -> list[Lease]:
     token = uuid.uuid4()
     try:
         return lifecycle.claim(
-            lease_s=settings.LEASE_S, wall_s=settings.WALL_S, batch=lifecycle.RESCORE_BATCH, token=token
+            lease_s=settings.LEASE_S,
+            wall_s=settings.WALL_S,
+            batch=lifecycle.RESCORE_BATCH,
+            token=token,
+            held=ground_truth.held(),
         )
     except (OperationalError, InterfaceError) as fault:
         # It may have been committed and only the answer lost; nobody else would look at it for a whole lease.
@@ -126,7 +131,9 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         predictions = files.load_aligned(manifest=truth.manifest, digest=digests[lease.evaluation_id])
         try:
             if predictions is not None:
-                outcomes.append((lease, scored(scorer.report(predictions))))
+                report = scorer.report(predictions, keep_bags=True)
+                bags.keep(edition, digest=predictions.digest, bags=report.bags)
+                outcomes.append((lease, scored(report)))
                 continue
         except (Rejected, *FAULTS_OF_THE_FILE) as fault:
             # Worded, or struck, when it is read again from the file, alone.
@@ -134,6 +141,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         rest.append(lease)
     if outcomes:
         _insist(lambda: lifecycle.finalise_many(outcomes))
+        _announce(edition)
     log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
     return rest
 
@@ -163,6 +171,7 @@ def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: ra
             heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
         )
         _insist(lambda: lifecycle.finalise(lease, outcome))
+        _announce(evaluation.edition)
     except LostRace as race:
         log.warning("evaluation_lost", reason=str(race))
     except OUR_FAULTS as fault:
@@ -217,15 +226,21 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
                 heartbeat=heartbeat,
                 heartbeat_s=settings.HEARTBEAT_S,
             )
-        report = evaluator.evaluate(predictions, truth, protocol=edition.protocol)
+        report = evaluator.evaluate(predictions, truth, protocol=edition.protocol, keep_bags=True)
     except Rejected as rejected:
         return rejection(rejected)
+    bags.keep(edition, digest=predictions.digest, bags=report.bags)
     try:
         files.keep_aligned(predictions)
     except OSError as fault:
         # They only make re-scoring quicker; without them it reads the file again.
         log.warning("values_not_kept", submission_id=str(evaluation.submission_id), reason=_in_words(fault))
     return scored(report)
+
+
+def _announce(edition: Edition) -> None:
+    """Tell the workers that the entries of an edition have changed: its intervals and ranges have not."""
+    transaction.on_commit(partial(broker.infer, edition.pk), robust=True)
 
 
 def _truth(edition: Edition) -> GroundTruth:

@@ -7,9 +7,11 @@ Every variable is described in `docs/operations.md`.
 
 import logging
 import sys
+from collections.abc import Callable
 from datetime import timedelta
 from ipaddress import ip_network
 from pathlib import Path
+from secrets import token_urlsafe
 from typing import Any
 
 import environ
@@ -18,7 +20,7 @@ from csp.constants import NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
 from django.core.management.utils import get_random_secret_key
 
-from leaderboard import logs
+from leaderboard import logs, openapi
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environ.Env()
@@ -44,24 +46,29 @@ def required(name: str, *, embedded: Any) -> Any:
 DATA_DIR = Path(env.str("TSTTC_DATA_DIR", default=str(BASE_DIR / "var")))
 # The hidden values. Only workers and the maintainers' commands read it; the web process needs no access.
 GROUND_TRUTH_DIR = Path(env.str("TSTTC_GROUND_TRUTH_DIR", default=str(DATA_DIR / "ground-truth")))
+# Where workers keep sums per recording, as private as the values; "": in the directory above.
+BAGS_DIR = env.str("TSTTC_BAGS_DIR", default="")
 FILES_DIR = Path(env.str("TSTTC_FILES_DIR", default=str(DATA_DIR / "files")))
 STATIC_ROOT = Path(env.str("TSTTC_STATIC_ROOT", default=str(BASE_DIR / "staticfiles")))
 if not PRODUCTION:
     DATA_DIR.mkdir(parents=True, exist_ok=True)
 
 
-def embedded_secret_key() -> str:
-    """A key of this checkout's own, made once, so that sessions survive a restart of the demo."""
-    path = DATA_DIR / "secret-key"
+def embedded_key(name: str, make: Callable[[], str]) -> str:
+    """A key of this checkout's own, made once, so that what it signed survives a restart of the demo."""
+    path = DATA_DIR / name
     if not path.exists():
         path.touch(mode=0o600)
-        path.write_text(get_random_secret_key())
+        path.write_text(make())
     return path.read_text()
 
 
 # --- the frame -------------------------------------------------------------------------------------------
 
-SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="") or embedded_secret_key()
+SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="") or embedded_key("secret-key", get_random_secret_key)
+# Signs score receipts (see leaderboard/receipts.py); what former keys signed still verifies.
+RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="") or embedded_key("receipt-key", token_urlsafe)
+RECEIPT_OLD_KEYS = env.list("TSTTC_RECEIPT_OLD_KEYS", default=[])
 DEBUG = env.bool("TSTTC_DEBUG", default=False)
 ALLOWED_HOSTS = required("TSTTC_ALLOWED_HOSTS", embedded="*").split(",")
 CSRF_TRUSTED_ORIGINS = env.list("TSTTC_CSRF_TRUSTED_ORIGINS", default=[])
@@ -92,19 +99,24 @@ INSTALLED_APPS = [
 MIDDLEWARE = [
     # First, so that every line that a request causes carries its id.
     "leaderboard.web.request_log.RequestLogMiddleware",
+    # What anything below answers, from memory or from a view, gets the same headers.
+    "leaderboard.web.caching.HeadersMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "csp.middleware.CSPMiddleware",
+    "django.middleware.clickjacking.XFrameOptionsMiddleware",
+    # Before sessions and accounts, which somebody without either should not pay for.
+    "leaderboard.web.kept.KeptMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
     "django.contrib.auth.middleware.AuthenticationMiddleware",
     "django.contrib.messages.middleware.MessageMiddleware",
-    "django.middleware.clickjacking.XFrameOptionsMiddleware",
     "allauth.account.middleware.AccountMiddleware",
     "django_htmx.middleware.HtmxMiddleware",
     # Last on the way in: its page needs the rest, and nothing before it reads the body.
     "leaderboard.web.limits.UploadLimitMiddleware",
+    "leaderboard.api.headers.ApiHeadersMiddleware",
 ]
 ROOT_URLCONF = "leaderboard.urls"
 WSGI_APPLICATION = "leaderboard.wsgi.application"
@@ -154,6 +166,16 @@ FILES_URL = env.str("TSTTC_FILES_URL", default="")
 if FILES_URL and not FILES_URL.startswith("s3://"):
     raise ImproperlyConfigured("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
 
+# Signing in is limited by what is counted here (allauth), so that all web processes count together.
+if PRODUCTION:
+    CACHES = {
+        "default": {
+            "BACKEND": "django.core.cache.backends.db.DatabaseCache",
+            "LOCATION": "leaderboard_cache",
+            "OPTIONS": {"MAX_ENTRIES": 100_000},
+        }
+    }
+
 STORAGES: dict[str, dict[str, Any]] = {
     "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": FILES_URL}}
     if FILES_URL
@@ -183,8 +205,8 @@ DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is strea
 DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
 FILE_UPLOAD_HANDLERS = ["leaderboard.web.uploads.UnnamedFileUploadHandler"]
 
-# Whether teams have quotas (see leaderboard/quotas.py): to be turned on before strangers may submit.
-QUOTAS = env.bool("TSTTC_QUOTAS", default=False)
+# Whether teams have quotas (see leaderboard/quotas.py).
+QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 
 # --- the life of an evaluation (seconds; see leaderboard/lifecycle.py) ----------------------------------
 
@@ -269,10 +291,8 @@ AUTHENTICATION_BACKENDS = [
     "allauth.account.auth_backends.AuthenticationBackend",
 ]
 AUTH_PASSWORD_VALIDATORS = [
-    {"NAME": "django.contrib.auth.password_validation.UserAttributeSimilarityValidator"},
-    {"NAME": "django.contrib.auth.password_validation.MinimumLengthValidator"},
-    {"NAME": "django.contrib.auth.password_validation.CommonPasswordValidator"},
-    {"NAME": "django.contrib.auth.password_validation.NumericPasswordValidator"},
+    {"NAME": f"django.contrib.auth.password_validation.{name}Validator"}
+    for name in ("UserAttributeSimilarity", "MinimumLength", "CommonPassword", "NumericPassword")
 ]
 LOGIN_URL = "account_login"
 LOGIN_REDIRECT_URL = "/submit/"
@@ -304,41 +324,20 @@ REST_KNOX = {
     "TOKEN_TTL": timedelta(days=90),
     "TOKEN_MODEL": KNOX_TOKEN_MODEL,
 }
-REST_FRAMEWORK = {
-    "DEFAULT_AUTHENTICATION_CLASSES": [
-        "leaderboard.api.authentication.BearerAuthentication",
-        "rest_framework.authentication.SessionAuthentication",
-    ],
-    "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
-    "DEFAULT_RENDERER_CLASSES": ["rest_framework.renderers.JSONRenderer"],
-    "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.MultiPartParser", "rest_framework.parsers.JSONParser"],
-    "DEFAULT_SCHEMA_CLASS": "drf_spectacular.openapi.AutoSchema",
-    "EXCEPTION_HANDLER": "leaderboard.api.problems.exception_handler",
-    "DEFAULT_THROTTLE_CLASSES": [
-        "leaderboard.api.throttles.SignedInThrottle",
-        "leaderboard.api.throttles.VisitorThrottle",
-    ],
-    "NUM_PROXIES": TRUSTED_PROXIES,
-}
-# How often one account or one address may ask; counted by each web process on its own.
+REST_FRAMEWORK = {**openapi.REST_FRAMEWORK, "NUM_PROXIES": TRUSTED_PROXIES}
+# How often one account or one address may ask; counted by all web processes together.
 API_RATES: dict[str, str | None] = {
     "signed_in": "600/min",
     "visitor": "240/min",
     "submit": "60/min",
     "revoke": "10/min",
+    "refused": "60/min",
 }
-if TESTING or not env.bool("TSTTC_THROTTLES", default=False):
+if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
     API_RATES = dict.fromkeys(API_RATES)
-SPECTACULAR_SETTINGS = {
-    "TITLE": "TSTTC leaderboard API",
-    "DESCRIPTION": "Submit prediction files, follow their evaluation, read the boards.",
-    "VERSION": "1",
-    "OAS_VERSION": "3.1.0",
-    "SERVE_INCLUDE_SCHEMA": False,
-    # What a request may hold differs from what an answer holds; a file is bytes in the one alone.
-    "COMPONENT_SPLIT_REQUEST": True,
-    "SCHEMA_PATH_PREFIX": "/api/v1",
-}
+SPECTACULAR_SETTINGS = openapi.SPECTACULAR_SETTINGS
+# Waiters that a web process holds at once; gunicorn has as many threads for them (deploy/gunicorn.conf.py).
+WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)
 
 # --- what is written down, and who may look --------------------------------------------------------------
 
@@ -355,9 +354,7 @@ DJANGO_STRUCTLOG_CELERY_TASK_START_LOG_LEVEL = logging.DEBUG
 DJANGO_STRUCTLOG_CELERY_TASK_SUCCESS_LOG_LEVEL = logging.DEBUG
 # Who may read /metrics; see leaderboard/web/health.py.
 METRICS_TOKEN = env.str("TSTTC_METRICS_TOKEN", default="")
-METRICS_NETWORKS = [
-    ip_network(text) for text in env.list("TSTTC_METRICS_NETWORKS", default=["127.0.0.0/8", "::1/128"])
-]
+METRICS_NETWORKS = [*map(ip_network, env.list("TSTTC_METRICS_NETWORKS", default=["127.0.0.0/8", "::1/128"]))]
 
 # --- security --------------------------------------------------------------------------------------------
 

@@ -1,33 +1,22 @@
 """Submissions: one file for one split, acknowledged only once it can no longer be lost."""
 
-import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 
 import structlog
 from django.conf import settings
-from django.core.exceptions import ValidationError
 from django.core.files.base import File
-from django.core.validators import URLValidator
 from django.db import IntegrityError, transaction
 from django.db.models import Q
 
-from leaderboard import audit, estimates, files, lifecycle, quotas, standings, teams
+from leaderboard import audit, boards, estimates, files, lifecycle, methods, quotas, teams
+from leaderboard.entries import Interval, scored_of
 from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
+from leaderboard.names import clean_name
+from leaderboard.texts import Refused, clean_text, clean_url
 
 log = structlog.get_logger(__name__)
-
-is_web_address = URLValidator(schemes=["http", "https"])
-
-
-class Refused(Exception):
-    """The submission cannot be taken. `field` names the input at fault, `code` is stable."""
-
-    def __init__(self, code: str, message: str, *, field: str = "") -> None:
-        super().__init__(message)
-        self.code = code
-        self.field = field
 
 
 class TooLarge(Refused):
@@ -72,14 +61,14 @@ def submit(
     nothing. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
-    name = _clean_text("method", method_name, limit=80)
+    name = clean_name("method", method_name)
     details = MethodDetails(
-        description=_clean_text("description", description, limit=2000, required=False),
-        paper_url=_clean_url("paper_url", paper_url),
-        code_url=_clean_url("code_url", code_url),
+        description=clean_text("description", description, limit=2000, required=False),
+        paper_url=clean_url("paper_url", paper_url),
+        code_url=clean_url("code_url", code_url),
     )
-    note = _clean_text("note", note, limit=500, required=False)
-    commit = _clean_text("commit", commit, limit=64, required=False)
+    note = clean_text("note", note, limit=500, required=False)
+    commit = clean_text("commit", commit, limit=64, required=False)
     upload = _checked(upload)
     first = _before_the_quota(user=user, split=split, method_name=name, upload=upload, now=now)
     if first is not None:
@@ -87,13 +76,15 @@ def submit(
     kept = files.keep_predictions(upload, now=now)
     team = teams.team_of(user=user)
     with transaction.atomic():
-        quotas.hold(team=team, split=split)
-        method = _method(team=team, name=name, details=details, now=now)
+        quotas.hold(team=team)
+        teams.require_member(team, user)
+        method, is_told_anew = _method(team=team, name=name, details=details, now=now)
         standing = Submission.objects.standing().filter(split=split, method=method, digest=kept.digest)
         first = standing.first()
         if first is not None:
+            boards.changed_by_methods([method.pk] * is_told_anew)
             return Submitted(submission=first, is_new=False)
-        quotas.require(team=team, split=split, now=now)
+        quotas.require(team=team, user=user, split=split, now=now)
         try:
             with transaction.atomic():
                 submission = Submission.objects.create(
@@ -112,6 +103,7 @@ def submit(
             # The same bytes came twice at once, and the other request was first.
             return Submitted(submission=standing.get(), is_new=False)
         _queue(submission)
+        boards.changed_by_methods([method.pk] * is_told_anew)
         audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
     log.info(
         "submission_received",
@@ -133,9 +125,11 @@ def _queue(submission: Submission) -> None:
 
 
 def _open_split(name: str, *, now: datetime) -> Split:
-    split = Split.objects.select_related("published_edition").filter(name=name).first()
+    # Looked up here and not there: not every text is one that a database can be asked for.
+    splits = {split.name: split for split in Split.objects.select_related("published_edition")}
+    split = splits.get(name)
     if split is None:
-        known = ", ".join(Split.objects.values_list("name", flat=True))
+        known = ", ".join(splits)
         raise Refused(
             "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
         )
@@ -166,10 +160,10 @@ def _before_the_quota(
     """
     team = teams.present_team_of(user=user)
     try:
-        quotas.require(team=team, split=split, now=now)
+        quotas.require(team=team, user=user, split=split, now=now)
     except quotas.QuotaExceeded:
-        methods = Method.objects.filter(team=team, name=method_name)
-        same = {"split": split, "method__in": methods, "digest": files.measure(upload).digest}
+        named = Method.objects.filter(team=team, name=method_name)
+        same = {"split": split, "method__in": named, "digest": files.measure(upload).digest}
         first = Submission.objects.standing().filter(**same).first()
         if first is None:
             raise
@@ -195,48 +189,25 @@ def too_large(*, found_bytes: int) -> str:
     )
 
 
-def _method(*, team: Team, name: str, details: MethodDetails, now: datetime) -> Method:
-    """The team's method of that name, made if new; what is said of it replaces what was said."""
+def _method(*, team: Team, name: str, details: MethodDetails, now: datetime) -> tuple[Method, bool]:
+    """The team's method of that name, made if new; what is said of it replaces what was said.
+
+    Returns as well whether everybody reads something new of it. A new one is private. Raises `Refused` for a
+    name that looks like another one of the team's.
+    """
     said = {key: value for key, value in vars(details).items() if value}
-    method, is_new = Method.objects.get_or_create(team=team, name=name, defaults={**said, "created_at": now})
-    if not is_new and any(getattr(method, key) != value for key, value in said.items()):
-        Method.objects.filter(pk=method.pk).update(**said)
-    return method
-
-
-def _clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:
-    """The text without surrounding space. Raises `Refused` for control characters, excess or absence."""
-    text = unicodedata.normalize("NFC", text).strip()
-    if required and not text:
-        raise Refused("missing-field", f"The field '{name}' is empty; expected a text.", field=name)
-    if len(text) > limit:
-        raise Refused(
-            "text-too-long",
-            f"The field '{name}' has {len(text)} characters; expected at most {limit}.",
-            field=name,
-        )
-    for character in text:
-        if unicodedata.category(character) in {"Cc", "Cs", "Co", "Cn"} and character not in "\r\n\t":
-            raise Refused(
-                "bad-character",
-                f"The field '{name}' has the character U+{ord(character):04X}; expected printable text.",
-                field=name,
-            )
-    return text
-
-
-def _clean_url(name: str, text: str) -> str:
-    text = _clean_text(name, text, limit=500, required=False)
-    if text:
-        try:
-            is_web_address(text)
-        except ValidationError:
-            raise Refused(
-                "bad-address",
-                f"The field '{name}' is {text[:80]!r}; expected an address that begins with http:// or https://.",
-                field=name,
-            ) from None
-    return text
+    method = Method.objects.filter(team=team, name=name).first()
+    if method is None:
+        teams.locked(team)
+        method = Method.objects.filter(team=team, name=name).first()
+    if method is None:
+        methods.require_own_look(name, team=team, field="method")
+        return Method.objects.create(team=team, name=name, created_at=now, **said), False
+    if all(getattr(method, key) == value for key, value in said.items()):
+        return method, False
+    Method.objects.filter(pk=method.pk).update(**said)
+    # Asked anew, now that its row is held: it may have been shown since it was read.
+    return method, Method.objects.shown().filter(pk=method.pk).exists()
 
 
 def _clean_filename(name: str) -> str:
@@ -257,6 +228,10 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
         if not changed:
             return False
         lifecycle.cancel(submission=submission, actor=actor)
+        # Before looking who is private: whoever shows a method holds this until it is shown.
+        audit.hold()
+        if Method.objects.shown().filter(pk=submission.method_id).exists():
+            boards.changed(submission.split_id)
         audit.record(verb="withdrawn", noun="Submission", noun_id=submission.pk, actor=actor)
     submission.withdrawn_at = now
     return True
@@ -278,6 +253,7 @@ class Progress:
     n_ahead: int | None = None
     estimate_s: float | None = None
     scores: Mapping[str, float | None] | None = None
+    intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
     counts: Mapping[str, int] = field(default_factory=dict)
     truncated: Mapping[str, int] = field(default_factory=dict)
     n_out_of_range: int | None = None
@@ -291,11 +267,18 @@ class Progress:
 
 
 def evaluation_of(submission: Submission) -> Evaluation:
-    """The evaluation that speaks for a submission: in the published edition, else in the latest."""
+    """The evaluation that speaks for a submission: in the published edition, else in the latest.
+
+    Of an edition in preparation only where there is no other.
+    """
     published = submission.split.published_edition_id
     # Sorted here and not by the database, so that a list of submissions can fetch its evaluations at once.
-    evaluations = sorted(submission.evaluations.all(), key=lambda e: e.edition.number)
+    evaluations = sorted(submission.evaluations.all(), key=_place_of_edition)
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
+
+
+def _place_of_edition(evaluation: Evaluation) -> tuple[bool, int]:
+    return evaluation.edition.published_at is not None, evaluation.edition.number
 
 
 def progress(submission: Submission) -> Progress:
@@ -303,6 +286,7 @@ def progress(submission: Submission) -> Progress:
     evaluation = evaluation_of(submission)
     report = evaluation.report or {}
     place = estimates.place_of(evaluation)
+    scored = scored_of(evaluation.scores.all()) if evaluation.status == Status.SCORED else None
     return Progress(
         state=evaluation.status,
         state_label=Status(evaluation.status).label,
@@ -312,7 +296,8 @@ def progress(submission: Submission) -> Progress:
         finished_at=evaluation.finished_at,
         n_ahead=place.n_ahead if place else None,
         estimate_s=place.estimate_s if place else None,
-        scores=standings.flat_scores(evaluation.scores.all()) if evaluation.status == Status.SCORED else None,
+        scores=scored.values if scored else None,
+        intervals=scored.intervals if scored else {},
         counts=report.get("counts", {}),
         truncated=report.get("truncated", {}),
         n_out_of_range=report.get("n_out_of_range"),

@@ -3,8 +3,9 @@
 import random
 
 from celery import shared_task
+from django.utils import timezone
 
-from leaderboard import queue, scoring
+from leaderboard import backlog, queue, scoring, snapshots
 
 
 @shared_task(name="leaderboard.tasks.nudge")
@@ -17,3 +18,15 @@ def nudge(evaluation_id: str) -> None:
 def sweep() -> None:
     """Take back what dead workers hold and nudge again what waits."""
     queue.sweep(rng=random.Random())  # noqa: S311 - jitter, not a secret
+
+
+@shared_task(name="leaderboard.tasks.infer")
+def infer(about: str) -> None:
+    """Do what waits behind submissions, whatever the message is about."""
+    backlog.work_off(now=timezone.now(), rng=random.Random())  # noqa: S311 - jitter, not a secret
+
+
+@shared_task(name="leaderboard.tasks.redraw")
+def redraw(split_id: str) -> None:
+    """Draw a split's board for its readers, if nobody has since it changed."""
+    snapshots.redraw(split_id=split_id, now=timezone.now())

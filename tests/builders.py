@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 from django.core.files.base import ContentFile
+from django.db import transaction
 from django.utils import timezone
 
 import evaluator
-from leaderboard import ground_truth, scoring, submissions, tokens
+from leaderboard import backlog, boards, ground_truth, scoring, submissions, tokens
+from leaderboard import visibility as visibility_verbs
 from leaderboard.models import Edition, Split, Submission, User
 
 N_SEQUENCES = 120
@@ -41,9 +43,17 @@ def predictions(edition: Edition, *, factor: float = 1.1) -> bytes:
     return evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * factor)
 
 
-def submit(user: User, data: bytes, *, split: str = "test", method: str = "Foo", **fields: str) -> Submission:
-    """A submission through the verb, as the web form makes it."""
-    return submissions.submit(
+def submit(
+    user: User,
+    data: bytes,
+    *,
+    split: str = "test",
+    method: str = "Foo",
+    visibility: str = "PUBLIC",
+    **fields: str,
+) -> Submission:
+    """A submission through the verb, as the web form makes it, of a method that is then shown."""
+    submission = submissions.submit(
         user=user,
         split_name=split,
         method_name=method,
@@ -53,11 +63,28 @@ def submit(user: User, data: bytes, *, split: str = "test", method: str = "Foo",
         filename="predictions.json",
         **fields,
     ).submission
+    if visibility != "PRIVATE" and submission.method.visibility == "PRIVATE":
+        visibility_verbs.change(
+            method=submission.method, visibility=visibility, actor=user, now=submission.submitted_at
+        )
+        submission.method.refresh_from_db()
+    return submission
 
 
 def token(user: User, **options: Any) -> str:
     """A new token of that person, which may do everything."""
     return tokens.create(user=user, name="CI", now=timezone.now(), **options)
+
+
+def board_changed(split: str) -> None:
+    """Say that a board is not what it was: for tests that write behind the verbs' backs."""
+    with transaction.atomic():
+        boards.changed(split)
+
+
+def infer_all() -> int:
+    """Do in this process what workers do when no submission waits. Returns how much that was."""
+    return backlog.work_off(now=timezone.now(), rng=random.Random(0))
 
 
 def score_all() -> int:

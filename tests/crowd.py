@@ -51,18 +51,22 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
     from django.utils import timezone  # noqa: PLC0415
 
     from leaderboard import files, lifecycle  # noqa: PLC0415
-    from leaderboard.models import Method, Split, Submission, Team, User  # noqa: PLC0415
+    from leaderboard.models import Method, Split, Submission, Team, User, Visibility  # noqa: PLC0415
+    from leaderboard.names import look  # noqa: PLC0415
 
     split = Split.objects.select_related("published_edition").get(pk=split_name)
     assert split.published_edition is not None
     teams = Team.objects.bulk_create(
-        Team(name=f"Team {split_name} {number}") for number in range(-(-n // METHODS_OF_A_TEAM))
+        Team(name=f"Team {split_name} {number}", look=look(f"Team {split_name} {number}"))
+        for number in range(-(-n // METHODS_OF_A_TEAM))
     )
+    now = timezone.now()
+    shown = {"visibility": Visibility.PUBLIC, "shown_at": now}
     methods = Method.objects.bulk_create(
-        Method(team=teams[number // METHODS_OF_A_TEAM], name=method_name(number)) for number in range(n)
+        Method(team=teams[number // METHODS_OF_A_TEAM], name=method_name(number), **shown)
+        for number in range(n)
     )
     user, _ = User.objects.get_or_create(email="crowd@example.org")
-    now = timezone.now()
     submissions = []
     for number, method in enumerate(methods):
         values = predictions(truth, number)

@@ -6,7 +6,8 @@ real thing: the files are checked and scored by whatever worker finds them in th
 
 import secrets
 import tempfile
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
@@ -17,10 +18,10 @@ from django.db import transaction
 
 import evaluator
 from evaluator.scale import ttc_to_scale_ratio
-from leaderboard import ground_truth, submissions
+from leaderboard import ground_truth, methods, submissions, visibility
 from leaderboard.demo.estimators import Estimator
 from leaderboard.demo.truth import simulate
-from leaderboard.models import Split, Submission, User
+from leaderboard.models import Split, Submission, User, Visibility
 
 SEED = 20230904
 SPLIT = "demo"
@@ -49,6 +50,8 @@ class Entry:
     description: str
     estimator: Estimator | None
     unit: str = "ttc"
+    visibility: str = Visibility.PUBLIC
+    details: Mapping[str, object] = field(default_factory=dict)
 
 
 ENTRIES = (
@@ -59,6 +62,19 @@ ENTRIES = (
         description="Simulated: little noise on the scale ratio, a tenth of the sequences worse.",
         estimator=Estimator(noise=9.0, recording_noise=3.0, outlier_share=0.1, outlier_factor=3.0),
         unit="scale_ratio",
+        details={
+            "n_frames": 6,
+            "cameras": "ONE",
+            "box_source": "GIVEN",
+            "uses_nerf": False,
+            "uses_extra_data": True,
+            "pretraining": "ImageNet-1k",
+            "n_parameters": 31_000_000,
+            "latency_ms": 41.5,
+            "hardware": "one RTX 4090",
+            "paper_url": "https://example.org/dense-scale-matching",
+            "code_url": "https://example.org/dense-scale-matching/code",
+        },
     ),
     Entry(
         email="south@example.org",
@@ -66,6 +82,17 @@ ENTRIES = (
         method="Feature pyramid, two frames",
         description="Simulated: a little more noise than the best, and none of its outliers.",
         estimator=Estimator(noise=12.0, recording_noise=5.0),
+        details={
+            "n_frames": 2,
+            "cameras": "ONE",
+            "box_source": "GIVEN",
+            "uses_nerf": False,
+            "uses_extra_data": False,
+            "n_parameters": 4_200_000,
+            "latency_ms": 6.8,
+            "hardware": "one Jetson Orin",
+            "code_url": "https://example.org/feature-pyramid",
+        },
     ),
     Entry(
         email=DEMO_EMAIL,
@@ -73,6 +100,7 @@ ENTRIES = (
         method="Box height, smoothed",
         description="Simulated: what the ratio of two smoothed box heights would give.",
         estimator=Estimator(noise=28.0, recording_noise=8.0, outlier_share=0.02),
+        details={"n_frames": 6, "cameras": "ONE", "box_source": "DETECTED", "uses_nerf": False},
     ),
     Entry(
         email="south@example.org",
@@ -81,6 +109,8 @@ ENTRIES = (
         description="Simulated: moderate noise, and now and then a match on the wrong object.",
         estimator=Estimator(noise=36.0, recording_noise=12.0, outlier_share=0.05),
         unit="scale_ratio",
+        visibility=Visibility.ANONYMOUS,
+        details={"n_frames": 3, "cameras": "SEVERAL", "box_source": "NONE", "uses_nerf": True},
     ),
     Entry(
         email="north@example.org",
@@ -95,6 +125,7 @@ ENTRIES = (
         method="First try",
         description="Simulated: a file with the faults that first files have; see its page for the list.",
         estimator=None,
+        visibility=Visibility.PRIVATE,
     ),
 )
 
@@ -164,17 +195,22 @@ def _open_split(truth: evaluator.GroundTruth, *, now: datetime) -> None:
 
 
 def _submit(entry: Entry, *, user: User, truth: evaluator.GroundTruth, now: datetime) -> None:
+    """Send the entry's file, and say and show of its method what the demo does: all of it, or nothing."""
     data = predictions_file(entry, truth=truth)
-    submissions.submit(
-        user=user,
-        split_name=SPLIT,
-        method_name=entry.method,
-        description=entry.description,
-        upload=ContentFile(data),
-        filename=f"{entry.method.lower().replace(',', '').replace(' ', '-')}.json",
-        via=Submission.Via.WEB,
-        now=now,
-    )
+    with transaction.atomic():
+        method = submissions.submit(
+            user=user,
+            split_name=SPLIT,
+            method_name=entry.method,
+            description=entry.description,
+            upload=ContentFile(data),
+            filename=f"{entry.method.lower().replace(',', '').replace(' ', '-')}.json",
+            via=Submission.Via.WEB,
+            now=now,
+        ).submission.method
+        methods.edit(method=method, changes=entry.details, actor=user)
+        if entry.visibility != Visibility.PRIVATE:
+            visibility.change(method=method, visibility=entry.visibility, actor=user, now=now)
 
 
 def predictions_file(entry: Entry, *, truth: evaluator.GroundTruth) -> bytes:

@@ -61,6 +61,7 @@ def test_ready_when_database_broker_and_sweep_are_well() -> None:
     assert {name: check["ok"] for name, check in response.json()["checks"].items()} == {
         "database": True,
         "sweep": True,
+        "ground truth": True,
         "broker": True,
     }
 

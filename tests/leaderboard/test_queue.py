@@ -137,6 +137,7 @@ def test_poller_looks_again_after_a_look_that_broke(poller: Poller, monkeypatch:
     monkeypatch.setattr(threading, "excepthook", lambda hook: broken.append(repr(hook.exc_value)))
     monkeypatch.setattr(lifecycle, "release_expired", release_expired)
     monkeypatch.setattr(scoring, "run_next", lambda *, rng: False)
+    monkeypatch.setattr(queue, "work_behind", lambda *, rng, stopping: 0)
     poller.start()
     assert looked_again.wait(10)
     assert broken == ["KeyError('a fault that nobody foresaw')"]

@@ -10,8 +10,19 @@ import pytest
 from django.core.files.base import ContentFile
 from django.db import connection
 
-from leaderboard import audit, quotas, submissions, teams
-from leaderboard.models import Edition, Evaluation, Split, Submission, User
+from leaderboard import audit, invitations, quotas, submissions, teams
+from leaderboard.models import (
+    Edition,
+    Evaluation,
+    Invitation,
+    Membership,
+    Method,
+    Split,
+    Submission,
+    Team,
+    User,
+)
+from leaderboard.texts import Refused
 from tests import builders
 
 T = TypeVar("T")
@@ -108,3 +119,93 @@ def test_the_same_bytes_at_once_are_one_submission_and_one_slot(edition: Edition
     data = builders.predictions(edition)
     assert len({submission.pk for submission in at_once(20, lambda _: builders.submit(owner, data))}) == 1
     assert Submission.objects.count() == 1
+
+
+def test_of_ten_who_follow_one_link_at_once_one_comes_in(owner: User) -> None:
+    team = teams.team_of(user=owner)
+    for number in range(5):
+        people = [
+            User.objects.create_user(f"{number}-{i}@example.org", name=f"P{number} {i}") for i in range(10)
+        ]
+        for person in people[::2]:
+            teams.team_of(user=person)
+        secret = invitations.make(team=team, actor=owner, now=FIRST_DAY)[1]
+
+        def accept(number: int, people: list[User] = people, secret: str = secret) -> bool:
+            try:
+                invitations.accept(secret=secret, user=people[number], now=FIRST_DAY)
+            except Refused:
+                return False
+            return True
+
+        assert sum(at_once(10, accept)) == 1
+        assert Membership.objects.filter(team=team, user__in=people).count() == 1
+    assert audit.verify().breaks == ()
+
+
+def test_one_person_who_follows_ten_links_at_once_is_in_one_team(owner: User) -> None:
+    secrets = []
+    for number in range(10):
+        host = User.objects.create_user(f"host-{number}@example.org", name=f"Host {number}")
+        secrets.append(invitations.make(team=teams.team_of(user=host), actor=host, now=FIRST_DAY)[1])
+
+    def accept(number: int) -> bool:
+        try:
+            invitations.accept(secret=secrets[number], user=owner, now=FIRST_DAY)
+        except Refused:
+            return False
+        return True
+
+    assert sum(at_once(10, accept)) >= 1
+    assert Membership.objects.filter(user=owner).count() == 1
+    used = Invitation.objects.exclude(accepted_at=None)
+    assert {row.accepted_by_id for row in used} == {owner.pk}
+
+
+def test_teams_that_look_alike_at_once_are_one(db: None) -> None:
+    people = [User.objects.create_user(f"{i}@example.org") for i in range(12)]
+
+    def create(number: int) -> bool:
+        try:
+            teams.create(
+                user=people[number], name=["Owls", "0wls", "ΟWLS", "owls"][number % 4], now=FIRST_DAY
+            )
+        except Refused:
+            return False
+        return True
+
+    assert sum(at_once(12, create)) == 1
+    assert Team.objects.count() == 1
+
+
+def test_methods_that_look_alike_at_once_are_one(edition: Edition, owner: User) -> None:
+    teams.team_of(user=owner)
+    data = [builders.predictions(edition, factor=1 + number / 100) for number in range(12)]
+
+    def submit(number: int) -> bool:
+        try:
+            builders.submit(owner, data[number], method=["Foo", "F0o", "FOO", "Fοo"][number % 4])
+        except Refused:
+            return False
+        return True
+
+    assert sum(at_once(12, submit)) == 3
+    assert Method.objects.count() == 1
+
+
+def test_leaving_while_sending_gives_nobody_another_slot(edition: Edition, owner: User) -> None:
+    Split.objects.filter(pk="test").update(quota_limit=3, quota_window=timedelta(days=1))
+    data = [builders.predictions(edition, factor=1 + number / 1000) for number in range(40)]
+
+    def go_on(number: int) -> None:
+        try:
+            if number % 4 == 3:
+                teams.leave(user=owner)
+            else:
+                builders.submit(owner, data[number], method=f"M{number}")
+        except (Refused, quotas.QuotaExceeded):
+            return
+
+    at_once(40, go_on)
+    assert Submission.objects.count() <= 3
+    assert audit.verify().breaks == ()

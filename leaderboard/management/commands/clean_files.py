@@ -6,11 +6,11 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
-from leaderboard import cleaning
+from leaderboard import cleaning, idempotency
 
 
 class Command(BaseCommand):
-    """Lists or removes files that no submission names."""
+    """Lists or removes files that no submission names; with them go old idempotency keys."""
 
     help = "List stored files that no submission has named for a day; with --remove, remove them."
 
@@ -30,6 +30,10 @@ class Command(BaseCommand):
             self.stdout.write(f"half-written: {path.name}")
             if options["remove"]:
                 path.unlink(missing_ok=True)
+        n_keys = idempotency.forget(now=timezone.now()) if options["remove"] else 0
+        if n_keys:
+            keys = "1 idempotency key" if n_keys == 1 else f"{n_keys} idempotency keys"
+            self.stdout.write(f"{keys} of more than {idempotency.KEPT.days} days ago removed.")
 
     def _files(self, *, remove: bool) -> None:
         now = timezone.now()

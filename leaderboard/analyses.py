@@ -1,0 +1,177 @@
+"""Analyses: what the owner of an entry on an open split may look at more closely. Never of a hidden one."""
+
+import itertools
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from django.contrib.auth.models import AnonymousUser
+from django.db import transaction
+from django.db.models import QuerySet
+from numpy.typing import NDArray
+
+import evaluator
+from evaluator.protocol import get_protocol
+from leaderboard import bags, ground_truth
+from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
+
+Floats = NDArray[np.float64]
+
+# Edges of the true time to contact in seconds: finer where it matters, the intervals' own ends among them.
+CURVE_EDGES_S = (-20, -15, -10, -8, -6, -4, -3, -2, -1, 0, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 15, 20)
+QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
+N_BINS = 24
+MAX_POINTS = 500
+MAX_RECORDINGS = 20
+
+
+@dataclass(frozen=True)
+class Closer:
+    """A closer look at one submission, in the edition that is its split's board. `content` has
+
+    - `curve`: the mean error by true time to contact, a list of `{"low_s", "high_s", "n", "mid", "rte"}` in
+      ascending order, one for each bin [low_s, high_s) that has sequences;
+    - `distribution`: `{"mid": […], "rte": […]}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
+    - `histogram`: a list of `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the
+      last has `"high": None` and holds all that is larger;
+    - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 sequences drawn at random, the
+      predictions as the protocol truncates them;
+    - `worst`: at most 20 recordings by their mean MiD, the worst first: `{"recording", "n", "mid", "rte"}`;
+    - `n_sequences` and `n_recordings`.
+
+    Errors are rounded as published values are, times to a thousandth of a second.
+    """
+
+    content: Mapping[str, Any]
+    made_at: datetime
+
+
+def of(*, submission: Submission, viewer: User | AnonymousUser) -> Closer | None:
+    """The analysis of a submission for its own team (and maintainers).
+
+    None for everybody else, on a hidden split, and until a worker has made it.
+    """
+    split = submission.split
+    if split.is_hidden or not Submission.objects.visible_to(viewer).filter(pk=submission.pk).exists():
+        return None
+    found = Analysis.objects.filter(
+        evaluation__submission=submission, evaluation__edition=split.published_edition_id
+    ).first()
+    return Closer(found.content, found.made_at) if found else None
+
+
+# --- a worker's work -------------------------------------------------------------------------------------
+
+
+def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
+    """What stands on the board of an open split and has no analysis, the newest first."""
+    boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=held)
+    return (
+        Evaluation.objects.filter(
+            status=Status.SCORED,
+            analysis=None,
+            edition__in=boards.values("published_edition"),
+            submission__withdrawn_at=None,
+        )
+        .select_related("edition__ground_truth", "edition__split", "submission")
+        .order_by("-finished_at")
+    )
+
+
+def make(evaluation: Evaluation, *, now: datetime) -> None:
+    """Look closely at one evaluation, and keep what is seen; not if its split was hidden meanwhile.
+
+    Raises `OSError` if the store or the private directory does not answer.
+    """
+    truth = ground_truth.load(evaluation.edition.ground_truth_id)
+    predictions = bags.predictions_of(evaluation.edition, digest=evaluation.submission.digest)
+    content = content_of(predictions, truth, protocol=evaluation.edition.protocol)
+    with transaction.atomic():
+        if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:
+            return
+        Analysis.objects.get_or_create(evaluation=evaluation, defaults={"content": content, "made_at": now})
+
+
+def forget_hidden() -> None:
+    """Remove the analyses of splits that were open once and are hidden now."""
+    Analysis.objects.filter(evaluation__edition__split__is_hidden=True).delete()
+
+
+def content_of(
+    predictions: evaluator.Predictions, truth: evaluator.GroundTruth, *, protocol: str
+) -> dict[str, Any]:
+    """The closer look itself, as `Closer` describes it. The points drawn are the same for all submissions."""
+    rules = get_protocol(protocol)
+    report = evaluator.evaluate(predictions, truth, protocol=rules, keep_sequences=True)
+    assert report.sequences is not None  # noqa: S101 - they were asked for
+    mid, rte = report.sequences.mid, report.sequences.rte
+    rng = np.random.default_rng(0)
+    drawn = np.sort(rng.permutation(truth.n_sequences)[:MAX_POINTS])
+    predicted_s = np.clip(predictions.ttc_s[drawn], -rules.limit_s, rules.limit_s)
+    if rules.near_zero_s is not None:
+        low_s, high_s = rules.near_zero_s
+        predicted_s = np.where(
+            predicted_s < 0, np.minimum(predicted_s, low_s), np.maximum(predicted_s, high_s)
+        )
+    return {
+        "n_sequences": truth.n_sequences,
+        "n_recordings": truth.manifest.n_recordings,
+        "curve": _curve(truth.ttc_s, mid, rte, rules.decimals),
+        "distribution": {
+            name: [
+                {"quantile": share, "value": round(float(value), rules.decimals)}
+                for share, value in zip(QUANTILES, np.quantile(errors, QUANTILES), strict=True)
+            ]
+            for name, errors in (("mid", mid), ("rte", rte))
+        },
+        "histogram": _histogram(mid, rules.decimals),
+        "scatter": {
+            "true_s": np.round(truth.ttc_s[drawn], 3).tolist(),
+            "predicted_s": np.round(predicted_s, 3).tolist(),
+        },
+        "worst": _worst(truth, mid, rte, rules.decimals),
+    }
+
+
+def _curve(ttc_s: Floats, mid: Floats, rte: Floats, decimals: int) -> list[dict[str, float | int]]:
+    bins = np.digitize(ttc_s, CURVE_EDGES_S)
+    rows = []
+    for i, (low_s, high_s) in enumerate(itertools.pairwise(CURVE_EDGES_S), 1):
+        inside = bins == i
+        if inside.any():
+            means = {"mid": float(mid[inside].mean()), "rte": float(rte[inside].mean())}
+            rounded = {name: round(mean, decimals) for name, mean in means.items()}
+            rows.append({"low_s": low_s, "high_s": high_s, "n": int(inside.sum()), **rounded})
+    return rows
+
+
+def _histogram(mid: Floats, decimals: int) -> list[dict[str, float | int | None]]:
+    end = float(np.quantile(mid, 0.95)) or 1.0
+    edges = np.linspace(0, end, N_BINS + 1)
+    inside, _ = np.histogram(mid[mid < end], edges)
+    rows: list[dict[str, float | int | None]] = [
+        {"low": round(low, decimals), "high": round(high, decimals), "n": n}
+        for low, high, n in zip(edges[:-1].tolist(), edges[1:].tolist(), inside.tolist(), strict=True)
+    ]
+    return [*rows, {"low": round(end, decimals), "high": None, "n": int((mid >= end).sum())}]
+
+
+def _worst(
+    truth: evaluator.GroundTruth, mid: Floats, rte: Floats, decimals: int
+) -> list[dict[str, float | int | str]]:
+    index, n_bags = truth.manifest.recording_index, truth.manifest.n_recordings
+    counts = np.bincount(index, minlength=n_bags)
+    means = {
+        name: np.bincount(index, weights=errors, minlength=n_bags) / counts
+        for name, errors in (("mid", mid), ("rte", rte))
+    }
+    return [
+        {
+            "recording": truth.manifest.recordings[row],
+            "n": int(counts[row]),
+            **{name: round(float(values[row]), decimals) for name, values in means.items()},
+        }
+        for row in np.argsort(-means["mid"], kind="stable")[:MAX_RECORDINGS].tolist()
+    ]

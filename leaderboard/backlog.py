@@ -1,0 +1,75 @@
+"""What workers do when no submission waits: comparisons, then intervals and ranges, then analyses.
+
+Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
+for longer than a fraction of a second.
+"""
+
+import random
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from functools import partial
+
+import structlog
+
+from evaluator import Rejected
+from leaderboard import analyses, comparisons, ground_truth, inference, lifecycle, quarantine, scoring
+
+log = structlog.get_logger(__name__)
+
+# Of each kind at most so much in one go, so that every kind has its turn.
+MAX_AT_ONCE = 50
+FAULTS = (OSError, Rejected, quarantine.ChildDied, quarantine.ChildNotReady, quarantine.LeaseLost)
+
+
+class Stopping(Exception):
+    """The worker is to end; what was begun is begun anew by another."""
+
+
+def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], bool] = lambda: False) -> int:
+    """Do what waits and this worker has the values for. Returns how much was done.
+
+    What fails is logged and left for the next time, and keeps nothing else from being done.
+    """
+    between = partial(_let_live_work_by, rng=rng, is_stopping=is_stopping)
+    try:
+        return sum(_done(task, between) for task in _tasks(now=now, between=between))
+    except Stopping:
+        return 0
+
+
+def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
+    between()
+    try:
+        task()
+    except FAULTS as fault:
+        log.warning("backlog_failed", reason=f"{type(fault).__name__}: {fault}"[:200])
+        return False
+    return True
+
+
+def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[], object]]:
+    held = ground_truth.held()
+    asked = comparisons.waiting(held=held).select_related(
+        "edition__ground_truth", "first__submission", "second__submission"
+    )
+    for row in asked[:MAX_AT_ONCE]:
+        yield partial(comparisons.compute, row, now=now)
+    for edition in inference.stale(now=now, held=held):
+        yield partial(inference.infer, edition=edition, now=now, between=between)
+    for evaluation in analyses.missing(held=held)[:MAX_AT_ONCE]:
+        yield partial(analyses.make, evaluation, now=now)
+
+
+def _let_live_work_by(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
+    """Decide what waits before going on: somebody watches a page for it."""
+    while not is_stopping() and lifecycle.waiting_ids(limit=1) and scoring.run_next(rng=rng):
+        pass
+    if is_stopping():
+        raise Stopping
+
+
+def editions_waiting(*, now: datetime) -> list[int]:
+    """Editions of which something waits, for whoever tells the workers. Also forgets what must not stay."""
+    analyses.forget_hidden()
+    asked = comparisons.waiting().values_list("edition", flat=True)[:MAX_AT_ONCE]
+    return sorted({edition.pk for edition in inference.stale(now=now, held=None)} | set(asked))

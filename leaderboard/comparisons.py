@@ -1,0 +1,286 @@
+"""Comparisons: two to five entries of an edition side by side, each pair with its difference, interval and p.
+
+A reader asks, and is answered at once with what is known. What is not known yet is noted as a row, and a
+worker computes it: recordings are compared, and only workers have their values. Asked again a moment later,
+the answer is complete.
+"""
+
+import itertools
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from functools import partial
+from uuid import UUID
+
+from django.contrib.auth.models import AnonymousUser
+from django.db import transaction
+from django.db.models import QuerySet
+
+from evaluator import published, uncertainty
+from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES, get_protocol
+from leaderboard import bags, broker, entries, inference, snapshots, standings
+from leaderboard.models import Comparison, Edition, Method, Split, User
+from leaderboard.standings import Entry
+
+MIN_METHODS, MAX_METHODS = 2, 5
+# A worker takes a fraction of a second for each; nobody's questions may keep all the others' waiting.
+MAX_WAITING = 500
+SIGNIFICANT = 0.05
+_INTERVAL_WORDS = {"overall": "", **{name: f" on {name}" for name in INTERVAL_NAMES[1:]}}
+_METRIC_WORDS = {"mid": ("MiD", ""), "rte": ("RTE", " percentage points")}
+
+
+class BadComparison(Exception):
+    """The comparison that was asked for makes no sense; the text says what was found and what is expected.
+
+    `code` is stable: bad-comparison, unknown-method, not-on-the-board.
+    """
+
+    code = "bad-comparison"
+
+
+class UnknownMethod(BadComparison):
+    """A method that there is not, or that this reader may not see: the two are not told apart."""
+
+    code = "unknown-method"
+
+
+class NotOnTheBoard(BadComparison):
+    """The split has no board, or the method no scored submission on it."""
+
+    code = "not-on-the-board"
+
+
+@dataclass(frozen=True)
+class Difference:
+    """First minus second in one column: below 0 the first is better. All in published decimals.
+
+    `low` and `high` are the 95 % interval of the difference, `p` is the two-sided cluster sign-flip test's;
+    all three are None where there are too few recordings.
+    """
+
+    difference: float
+    low: float | None
+    high: float | None
+    p: float | None
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether p is below 5 %."""
+        return self.p is not None and self.p < SIGNIFICANT
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two entries and their differences by score name: None until a worker has computed them.
+
+    A column without sequences is not in `differences`.
+    """
+
+    first: Entry
+    second: Entry
+    differences: Mapping[str, Difference] | None
+
+    def sentence(self, name: str = "mid") -> str:
+        """What the difference in one column means, in words; empty while it is not known."""
+        if self.differences is None or name not in self.differences:
+            return ""
+        return sentence(self.first.method, self.second.method, name=name, found=self.differences[name])
+
+
+@dataclass(frozen=True)
+class Compared:
+    """The answer: entries in the order that was asked for, all pairs of them, and whether all is computed.
+
+    An entry is the method's row of the board as this reader sees it, pseudonym, values and intervals
+    included. `reason` says why there are no intervals where there are none, and is empty otherwise.
+    """
+
+    split: Split
+    edition: Edition
+    entries: tuple[Entry, ...]
+    pairs: tuple[Pair, ...]
+    is_complete: bool
+    reason: str
+
+
+def of(
+    *,
+    methods: Sequence[UUID],
+    split: Split,
+    viewer: User | AnonymousUser,
+    now: datetime,
+    edition: Edition | None = None,
+) -> Compared:
+    """Compare two to five methods of one board: the published edition's unless another is named.
+
+    Pairs that no worker has compared yet have `differences` None; they are asked for, and the workers told.
+    Raises `BadComparison` for another number of methods or the same one twice, `UnknownMethod` for one that
+    the viewer may not see, `NotOnTheBoard` for one without a value there.
+    """
+    board = snapshots.board(split=split, edition=edition, viewer=viewer)
+    if board.edition is None:
+        raise NotOnTheBoard(f"The split {split.pk} has no board yet; expected one with ground truth.")
+    chosen = _chosen(board, methods, viewer)
+    asked = list(itertools.combinations(chosen, 2))
+    known = _known(board.edition, chosen)
+    _ask(board.edition, [pair for pair in asked if _key(pair) not in known], now=now)
+    pairs = tuple(_pair(first, second, known.get(_key((first, second)))) for first, second in asked)
+    return Compared(
+        split=split,
+        edition=board.edition,
+        entries=tuple(chosen),
+        pairs=pairs,
+        is_complete=all(pair.differences is not None for pair in pairs),
+        reason=inference.why_no_interval(board.edition),
+    )
+
+
+def _chosen(board: standings.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
+    """The methods' rows, in the order that was asked for."""
+    if not MIN_METHODS <= len(methods) <= MAX_METHODS:
+        raise BadComparison(
+            f"{len(methods)} methods were named; expected {MIN_METHODS} to {MAX_METHODS} to compare."
+        )
+    if len(set(methods)) < len(methods):
+        raise BadComparison("A method was named twice; expected different ones to compare.")
+    rows = {entry.method_id: entry for entry in board.entries if entry.scores["mid"] is not None}
+    for pk in methods:
+        if pk not in rows:
+            if Method.objects.visible_to(viewer).filter(pk=pk).exists():
+                raise NotOnTheBoard(f"The method {pk} has no scored submission on {board.split.pk}.")
+            raise UnknownMethod(f"There is no method {pk} that you may see; expected one of the board.")
+    return [rows[pk] for pk in methods]
+
+
+def _key(pair: tuple[Entry, Entry]) -> tuple[UUID, UUID]:
+    """A pair is kept once, under its evaluations in ascending order."""
+    first, second = sorted([_evaluation_id(pair[0]), _evaluation_id(pair[1])])
+    return first, second
+
+
+def _evaluation_id(entry: Entry) -> UUID:
+    assert entry.evaluation_id is not None  # noqa: S101 - for the type checker: rows of submissions have one
+    return entry.evaluation_id
+
+
+def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[tuple[UUID, UUID], Comparison]:
+    """What was asked for before, computed or not."""
+    ids = [_evaluation_id(entry) for entry in chosen]
+    rows = Comparison.objects.filter(edition=edition, first__in=ids, second__in=ids)
+    return {(row.first_id, row.second_id): row for row in rows}
+
+
+def _ask(edition: Edition, pairs: Sequence[tuple[Entry, Entry]], *, now: datetime) -> None:
+    """Note what nobody has asked for yet, and tell the workers; beyond a limit, whoever asks asks again."""
+    # Of this edition: where no worker has the values of another one, only what is asked of that waits on.
+    if not pairs or Comparison.objects.filter(edition=edition, computed_at=None).count() >= MAX_WAITING:
+        return
+    rows = [
+        Comparison(edition=edition, first_id=first, second_id=second, asked_at=now)
+        for first, second in map(_key, pairs)
+    ]
+    with transaction.atomic():
+        Comparison.objects.bulk_create(rows, ignore_conflicts=True)
+        transaction.on_commit(partial(broker.infer, edition.pk), robust=True)
+
+
+def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
+    if row is None or row.differences is None:
+        return Pair(first, second, None)
+    is_turned = row.first_id != first.evaluation_id
+    differences = {
+        name: _turned(found) if is_turned else found
+        for name in SCORE_NAMES
+        if name in row.differences
+        for found in [Difference(**row.differences[name])]
+    }
+    return Pair(first, second, differences)
+
+
+def _turned(found: Difference) -> Difference:
+    """The same seen from the other side."""
+    low = None if found.high is None else 0.0 - found.high
+    high = None if found.low is None else 0.0 - found.low
+    return Difference(0.0 - found.difference, low, high, found.p)
+
+
+# --- a worker's work -------------------------------------------------------------------------------------
+
+
+def waiting(*, held: Collection[str] | None = None) -> QuerySet[Comparison]:
+    """What was asked for and is not computed, the oldest first; with `held` what this worker can compute."""
+    rows = Comparison.objects.filter(computed_at=None).order_by("asked_at", "pk")
+    return rows if held is None else rows.filter(edition__ground_truth__in=held)
+
+
+def compute(row: Comparison, *, now: datetime) -> None:
+    """Compare the two entries of a row, recording by recording, and write what came of it, once.
+
+    Raises what `bags.sums_of` raises; the row waits on then.
+    """
+    # First to the end of the line: what cannot be computed, again and again, keeps nothing else waiting.
+    Comparison.objects.filter(pk=row.pk, computed_at=None).update(asked_at=now)
+    edition = row.edition
+    digests = (row.first.submission.digest, row.second.submission.digest)
+    first, second = (bags.sums_of(edition, digest=digest) for digest in digests)
+    found = uncertainty.difference(
+        first,
+        second,
+        bootstrap=inference.bootstrap_of(edition),
+        signs=uncertainty.generator_of(edition.ground_truth_id, purpose="signs"),
+    )
+    values = [entries.flat_scores(each.scores.all()) for each in (row.first, row.second)]
+    decimals = get_protocol(edition.protocol).decimals
+    differences = {
+        name: _rounded(gap, values[0][name], values[1][name], decimals) for name, gap in found.items()
+    }
+    Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=differences, computed_at=now)
+
+
+def _rounded(
+    gap: uncertainty.Difference, first: float | None, second: float | None, decimals: int
+) -> dict[str, float | None]:
+    """As it is shown: the difference of the two published values, whatever lies behind their last digits."""
+    value = gap.difference if first is None or second is None else first - second
+    return {
+        "difference": published(value, decimals=decimals),
+        "low": published(gap.low, decimals=decimals),
+        "high": published(gap.high, decimals=decimals),
+        "p": None if gap.p is None else float(f"{gap.p:.2g}"),
+    }
+
+
+# --- in words --------------------------------------------------------------------------------------------
+
+
+def sentence(first: str, second: str, *, name: str, found: Difference) -> str:
+    """What a difference means, in words.
+
+    >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
+    "A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003."
+    >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))
+    "A's RTE is 0.70 ± 0.50 percentage points higher than B's; p = 0.02."
+    """
+    metric, _, interval = name.partition("_")
+    label, unit = _METRIC_WORDS[metric]
+    column = f"{label}{_INTERVAL_WORDS[interval or 'overall']}"
+    if found.difference == 0 and not found.is_significant:
+        return f"{first} and {second} have the same {column}."
+    direction = "lower" if found.difference < 0 else "higher"
+    if found.low is None or found.high is None or found.p is None:
+        amount = f"{abs(found.difference):.2f}".rstrip("0").rstrip(".")
+        return (
+            f"{first}'s {column} is {amount}{unit} {direction} than {second}'s; "
+            "there are too few recordings to say whether that means anything."
+        )
+    half = (found.high - found.low) / 2
+    decimals = _decimals(half)
+    amount = f"{abs(found.difference):.{decimals}f} ± {half:.{decimals}f}"
+    caveat = "" if found.is_significant else ", which chance alone may well have made"
+    return f"{first}'s {column} is {amount}{unit} {direction} than {second}'s; p = {found.p:.2g}{caveat}."
+
+
+def _decimals(half: float) -> int:
+    """As many as give the half width two digits, and never more than are published."""
+    return 0 if half >= 10 else 1 if half >= 0.995 else 2

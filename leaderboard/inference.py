@@ -1,0 +1,317 @@
+"""How sure the numbers of an edition are: an interval for every value, a range for every rank.
+
+Workers make them from sums per recording, which never leave the workers' private directory, and write them
+beside the scores. An interval belongs to one evaluation and stays; ranges belong to all entries of a board
+and are made anew when those change. Which entries an edition's ranges were made of is kept as a digest, so
+that anybody can see whether they still hold: the database is the truth, and messages only make it quick.
+`docs/uncertainty.md` says how and why.
+"""
+
+import hashlib
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from functools import lru_cache
+from uuid import UUID
+
+import numpy as np
+import structlog
+from django.db import connection, transaction
+from django.db.models import Exists, OuterRef
+from numpy.typing import NDArray
+
+from evaluator import published, uncertainty
+from evaluator.protocol import SCORE_NAMES, get_protocol
+from leaderboard import bags, boards, bulk
+from leaderboard.models import Edition, Evaluation, PublishedResult, Score, Status, Visibility
+
+log = structlog.get_logger(__name__)
+
+Floats = NDArray[np.float64]
+# Part of every digest: raised when the way changes in which intervals or ranges are made.
+METHOD = "1"
+# While an edition is being scored its entries change all the time; its ranges follow once a minute.
+PATIENCE = timedelta(minutes=1)
+# All pairs are compared, so the work grows with their number: two seconds of rest for 200 entries.
+REST_PER_PAIR = timedelta(microseconds=60)
+LOCKS = 0x7753
+COLUMNS = ("low", "high", "rank_low", "rank_high", "is_with_best")
+Values = tuple[float | None, float | None, int | None, int | None, bool | None]
+NOTHING: Values = (None, None, None, None, None)
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A scored submission in an edition that its team has not withdrawn."""
+
+    evaluation_id: UUID
+    digest: str
+    method_id: UUID
+    is_shown: bool
+    value: float  # its MiD, as published
+    submitted_at: datetime
+
+
+def why_no_interval(edition: Edition) -> str:
+    """Why nothing in this edition has an interval, a rank range or a p-value; "" where they have."""
+    n = edition.ground_truth.n_recordings
+    if n >= uncertainty.MIN_BAGS:
+        return ""
+    return (
+        f"There are no intervals: they are made by drawing recordings anew, and this ground truth has {n}; "
+        f"expected at least {uncertainty.MIN_BAGS}."
+    )
+
+
+# --- which entries ---------------------------------------------------------------------------------------
+
+
+def standing(edition: Edition) -> list[Standing]:
+    """Everything that stands in an edition, private methods included: one query."""
+    rows = Score.objects.filter(
+        evaluation__edition=edition,
+        evaluation__status=Status.SCORED,
+        evaluation__submission__withdrawn_at=None,
+        metric="mid",
+        interval="overall",
+    ).values_list(
+        "evaluation_id",
+        "evaluation__submission__digest",
+        "evaluation__submission__method_id",
+        "evaluation__submission__method__visibility",
+        "value",
+        "evaluation__submission__submitted_at",
+    )
+    return [
+        Standing(pk, digest, method, visibility != Visibility.PRIVATE, value, at)
+        for pk, digest, method, visibility, value, at in rows
+    ]
+
+
+def ranked(rows: Sequence[Standing]) -> list[Standing]:
+    """What everybody sees ranked: of each shown method its best, the earlier one of two that are as good."""
+    best: dict[UUID, Standing] = {}
+    for row in sorted(rows, key=lambda row: (row.value, row.submitted_at)):
+        if row.is_shown:
+            best.setdefault(row.method_id, row)
+    return list(best.values())
+
+
+def digest_of(edition: Edition, rows: Sequence[Standing]) -> str:
+    """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
+    rivals = {row.evaluation_id for row in ranked(rows)}
+    lines = sorted(f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in rows)
+    printed = sorted(map(repr, _printed(edition)))
+    text = "\n".join([METHOD, edition.ground_truth_id, edition.protocol, *printed, *lines])
+    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+
+def _printed(edition: Edition) -> list[tuple[float, ...]]:
+    """The ten numbers of each row that was printed in a paper; NaN where it has none."""
+    rows = PublishedResult.objects.filter(split=edition.split_id).values_list("scores", flat=True)
+    return [tuple(float(scores.get(name) or "nan") for name in SCORE_NAMES) for scores in rows]
+
+
+def stale(*, now: datetime, held: Collection[str] | None) -> list[Edition]:
+    """Editions whose entries are not those that their ranges were made of.
+
+    With `held` only those whose ground truth is among these digests: what this worker can do. An edition in
+    which something is still to be scored has patience, and so has a large one whose ranges are quite new.
+    """
+    undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
+    found = (
+        Edition.objects.filter(discarded_at=None)
+        .select_related("ground_truth")
+        .annotate(is_busy=Exists(undecided))
+        .order_by("pk")
+    )
+    if held is not None:
+        found = found.filter(ground_truth__in=held)
+    return [edition for edition in found if _is_stale(edition, now=now)]
+
+
+def _is_stale(edition: Edition, *, now: datetime) -> bool:
+    if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:  # type: ignore[attr-defined]  # annotated above
+        return False
+    rows = standing(edition)
+    rest = min(PATIENCE, len(rows) ** 2 * REST_PER_PAIR)
+    is_new = edition.inferred_at is not None and now - edition.inferred_at < rest
+    return not is_new and edition.inference_digest != digest_of(edition, rows)
+
+
+# --- a worker's work -------------------------------------------------------------------------------------
+
+
+def infer(*, edition: Edition, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
+    """Make what is missing of an edition's intervals, and its rank ranges anew. Whether it wrote them.
+
+    False: they hold already, another worker is at it, or the entries changed meanwhile, and whoever looks
+    next does it. `between` is called every fraction of a second. Raises what `bags.sums_of` raises.
+    """
+    with _alone(edition) as is_alone:
+        rows = standing(edition)
+        digest = digest_of(edition, rows)
+        if not is_alone or digest == edition.inference_digest:
+            return False
+        inferred = _inferred(edition, rows, between=between)
+        is_written = _write(edition, digest=digest, inferred=inferred, rows=rows, now=now)
+    log.info("inferred", edition=str(edition), n_entries=len(rows), is_written=is_written)
+    return is_written
+
+
+@contextmanager
+def _alone(edition: Edition) -> Iterator[bool]:
+    """Whether this worker is the only one at it: what several compute, all but one throw away."""
+    if connection.vendor != "postgresql":
+        yield True
+        return
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT pg_try_advisory_lock(%s, %s)", [LOCKS, edition.pk])
+        (is_alone,) = cursor.fetchone() or (False,)
+        try:
+            yield is_alone
+        finally:
+            if is_alone:
+                cursor.execute("SELECT pg_advisory_unlock(%s, %s)", [LOCKS, edition.pk])
+
+
+def _inferred(
+    edition: Edition, rows: Sequence[Standing], *, between: Callable[[], None]
+) -> Mapping[int, Values]:
+    """What is to stand beside each score of the edition, by the score's id."""
+    table = _Table(edition)
+    if why_no_interval(edition):
+        return dict.fromkeys(table.before, NOTHING)
+    usable = uncertainty.usable_columns(bags.counts_of(edition))
+    low, high = table.low, table.high
+    missing = [
+        row
+        for row in rows
+        for i in [table.row_of[row.evaluation_id]]
+        if np.isnan(low[i][usable & ~np.isnan(table.value[i])]).any()
+    ]
+    for start in range(0, len(missing), uncertainty.BATCH):
+        between()
+        some = missing[start : start + uncertainty.BATCH]
+        sums = np.stack([bags.sums_of(edition, digest=row.digest) for row in some])
+        places = [table.row_of[row.evaluation_id] for row in some]
+        low[places], high[places] = bootstrap_of(edition).intervals(sums)
+    rivals = ranked(rows)
+    places = [table.row_of[row.evaluation_id] for row in rivals]
+    rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)
+    is_with_best = np.zeros(table.value.shape, bool)
+    if rivals:
+        ranges = uncertainty.rank_ranges(
+            np.stack([bags.sums_of(edition, digest=row.digest) for row in rivals]),
+            published=table.value[places],
+            usable=usable,
+            rng=uncertainty.generator_of(edition.ground_truth_id, purpose="signs"),
+            between=between,
+        )
+        above, beside = _among_printed(
+            _printed(edition), table.value[places], low=low[places], high=high[places]
+        )
+        has_range = ranges.low > 0
+        rank_low[places] = np.where(has_range, ranges.low + above, 0)
+        rank_high[places] = np.where(has_range, ranges.high + above + beside, 0)
+        is_with_best[places] = ranges.is_with_best
+    decimals = get_protocol(edition.protocol).decimals
+    return {
+        pk: (
+            _published(low[i, j], decimals),
+            _published(high[i, j], decimals),
+            int(rank_low[i, j]) or None,
+            int(rank_high[i, j]) or None,
+            bool(is_with_best[i, j]) if rank_low[i, j] else None,
+        )
+        for pk, (i, j) in table.cells.items()
+    }
+
+
+class _Table:
+    """The scores of an edition as arrays (evaluations, columns), NaN where there is none."""
+
+    def __init__(self, edition: Edition) -> None:
+        scores = list(
+            Score.objects.filter(evaluation__edition=edition).values_list(
+                "pk", "evaluation_id", "metric", "interval", "value", *COLUMNS
+            )
+        )
+        ids = sorted({score[1] for score in scores})
+        self.row_of = {pk: i for i, pk in enumerate(ids)}
+        column_of = {name: j for j, name in enumerate(SCORE_NAMES)}
+        self.value, self.low, self.high = (np.full((len(ids), len(SCORE_NAMES)), np.nan) for _ in range(3))
+        self.cells: dict[int, tuple[int, int]] = {}
+        self.before: dict[int, Values] = {}
+        for pk, evaluation_id, metric, interval, value, *inferred in scores:
+            name = metric if interval == "overall" else f"{metric}_{interval}"
+            cell = self.row_of[evaluation_id], column_of[name]
+            self.cells[pk] = cell
+            self.before[pk] = (inferred[0], inferred[1], inferred[2], inferred[3], inferred[4])
+            self.value[cell] = value
+            self.low[cell], self.high[cell] = (
+                np.nan if end is None else end for end in (inferred[0], inferred[1])
+            )
+
+
+def _among_printed(
+    printed: Sequence[tuple[float, ...]], value: Floats, *, low: Floats, high: Floats
+) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Of rows printed in papers, how many are surely above each value, and how many may be either.
+
+    A paper has no recordings to compare by. Its number is taken as exact: it is above an entry whose whole
+    interval is larger, below one whose whole interval is smaller, and may be either within. So a board's
+    rank, which counts these rows, lies within the range that stands beside it.
+    """
+    # Ranked are published values, and a narrow interval may end between one and what it was rounded from.
+    low, high = np.fmin(low, value), np.fmax(high, value)
+    others = np.array(printed).reshape(-1, 1, len(SCORE_NAMES))
+    above = (others < low).sum(axis=0)
+    beside = ((others >= low) & (others <= high)).sum(axis=0)
+    return above, beside
+
+
+def _published(value: float, decimals: int) -> float | None:
+    return None if np.isnan(value) else published(float(value), decimals=decimals)
+
+
+def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
+    """The weights of the edition's ground truth. Raises `OSError` without access to its values."""
+    return _bootstrap(edition.ground_truth_id, edition.protocol, bags.counts_of(edition).tobytes())
+
+
+@lru_cache(maxsize=1)
+def _bootstrap(truth_digest: str, protocol: str, counts: bytes) -> uncertainty.Bootstrap:
+    table = np.frombuffer(counts).reshape(-1, len(SCORE_NAMES))
+    return uncertainty.bootstrap_of(truth_digest, table)
+
+
+def _write(
+    edition: Edition,
+    *,
+    digest: str,
+    inferred: Mapping[int, Values],
+    rows: Sequence[Standing],
+    now: datetime,
+) -> bool:
+    """Write what was made, all or nothing, if the entries are still the same."""
+    shown = {row.evaluation_id for row in rows if row.is_shown}
+    with transaction.atomic():
+        present = (
+            Edition.objects.select_for_update(of=("self",)).select_related("ground_truth").get(pk=edition.pk)
+        )
+        if present.inference_digest != edition.inference_digest or digest != digest_of(
+            present, standing(present)
+        ):
+            return False
+        table = _Table(present)
+        changed = [(*values, pk) for pk, values in inferred.items() if table.before.get(pk, values) != values]
+        bulk.update(Score, COLUMNS, changed)
+        Edition.objects.filter(pk=edition.pk).update(inferred_at=now, inference_digest=digest)
+        ids = {i: pk for pk, i in table.row_of.items()}
+        # Whose rows only their own team sees, changes nothing that anybody else is shown.
+        is_seen = any(ids[table.cells[row[-1]][0]] in shown for row in changed)
+        if is_seen and present.published_at is not None:
+            boards.changed(present.split_id)
+    return True

@@ -1,0 +1,122 @@
+"""The closer look at a submission: for its owner, on open splits, and never of a hidden one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from django.utils import timezone
+
+import evaluator
+from leaderboard import analyses, files, ground_truth, submissions
+from leaderboard.models import Analysis, Edition, Split, Submission, User
+from tests import builders
+from tests.editions import ANYBODY
+
+
+@pytest.fixture
+def val(benchmark: None, tmp_path: Path) -> Edition:
+    """An open split."""
+    Split.objects.filter(pk="val").update(is_hidden=False)
+    return builders.import_truth(tmp_path, split="val")
+
+
+@pytest.fixture
+def sent(val: Edition, owner: User) -> Submission:
+    """A scored submission to it, and what workers make of it afterwards."""
+    made = builders.submit(owner, builders.predictions(val), split="val")
+    builders.score_all()
+    builders.infer_all()
+    return made
+
+
+def plain(submission: Submission, edition: Edition) -> evaluator.Report:
+    truth = ground_truth.load(edition.ground_truth_id)
+    with files.opened_predictions(submission.digest) as kept:
+        predictions = evaluator.read_predictions(kept.read(), manifest=truth.manifest)
+    return evaluator.evaluate(predictions, truth, keep_sequences=True)
+
+
+def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, owner: User) -> None:
+    closer = analyses.of(submission=sent, viewer=owner)
+    assert closer is not None
+    content, truth = closer.content, ground_truth.load(val.ground_truth_id)
+    sequences = plain(sent, val).sequences
+    assert sequences is not None
+    assert (content["n_sequences"], content["n_recordings"]) == (120, 24)
+    for part in content["curve"]:
+        rows = [i for i, tau in enumerate(truth.ttc_s) if part["low_s"] <= tau < part["high_s"]]
+        assert part["n"] == len(rows) > 0
+        assert part["mid"] == pytest.approx(float(np.mean(sequences.mid[rows])), abs=0.0051)
+        assert part["rte"] == pytest.approx(float(np.mean(sequences.rte[rows])), abs=0.0051)
+    assert sum(part["n"] for part in content["curve"]) == int((np.abs(truth.ttc_s) < 20).sum())
+    assert sum(part["n"] for part in content["histogram"]) == 120
+    assert content["histogram"][-1]["high"] is None
+    median = next(row["value"] for row in content["distribution"]["mid"] if row["quantile"] == 0.5)
+    assert median == pytest.approx(float(np.median(sequences.mid)), abs=0.0051)
+    points = content["scatter"]
+    assert len(points["true_s"]) == len(points["predicted_s"]) == 120
+    assert max(map(abs, points["predicted_s"])) <= 20
+    worst = content["worst"]
+    assert len(worst) == analyses.MAX_RECORDINGS
+    bags = np.array(truth.manifest.bag_stamp)
+    assert [row["mid"] for row in worst] == sorted((row["mid"] for row in worst), reverse=True)
+    for row in worst:
+        own = sequences.mid[bags == row["recording"]]
+        assert (row["n"], row["mid"]) == (len(own), pytest.approx(float(own.mean()), abs=0.0051))
+
+
+def test_a_closer_look_is_for_the_team_alone(
+    sent: Submission, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    assert analyses.of(submission=sent, viewer=teammate) == analyses.of(submission=sent, viewer=maintainer)
+    assert analyses.of(submission=sent, viewer=teammate) is not None
+    assert analyses.of(submission=sent, viewer=stranger) is None
+    assert analyses.of(submission=sent, viewer=ANYBODY) is None
+
+
+def test_nothing_of_a_hidden_split_is_looked_at(entries: list[Submission], owner: User) -> None:
+    builders.infer_all()
+    assert Split.objects.get(pk="test").is_hidden
+    assert not Analysis.objects.exists()
+    assert analyses.of(submission=entries[0], viewer=owner) is None
+
+
+def test_a_split_that_is_hidden_later_shows_and_keeps_nothing(
+    sent: Submission, val: Edition, owner: User
+) -> None:
+    Split.objects.filter(pk="val").update(is_hidden=True)
+    sent.refresh_from_db()
+    assert analyses.of(submission=Submission.objects.get(pk=sent.pk), viewer=owner) is None
+    analyses.forget_hidden()
+    assert not Analysis.objects.exists()
+    analyses.make(val.evaluations.get(), now=timezone.now())
+    assert not Analysis.objects.exists()
+
+
+def test_what_was_withdrawn_before_is_not_looked_at(val: Edition, owner: User) -> None:
+    made = builders.submit(owner, builders.predictions(val), split="val")
+    builders.score_all()
+    submissions.withdraw(submission=made, actor=owner, now=timezone.now())
+    builders.infer_all()
+    assert not Analysis.objects.exists()
+
+
+def test_many_sequences_give_a_bounded_number_of_points(val: Edition) -> None:
+    truth = evaluator.GroundTruth.from_table(ground_truth.load(val.ground_truth_id).to_table())
+    rng = np.random.default_rng(3)
+    n = 2_000
+    table = truth.to_table()
+    table.anno_id = list(range(n))
+    table.bag_stamp = [f"{row // 40:04d}" for row in range(n)]
+    table.cam_id, table.track_id = ["1"] * n, ["1"] * n
+    table.ts_ns = [1_000 * row for row in range(n)]
+    table.ttc_s = rng.uniform(0.3, 25, n).tolist()
+    truth = evaluator.GroundTruth.from_table(table)
+    predictions = evaluator.Predictions.from_arrays(
+        ttc_s=truth.ttc_s * rng.choice([-1e-3, 1e-3, 1, 30], n), manifest=truth.manifest
+    )
+    content = analyses.content_of(predictions, truth, protocol="tsttc-1")
+    points = content["scatter"]["predicted_s"]
+    assert len(points) == analyses.MAX_POINTS
+    assert all(0.05 <= point <= 20 or -20 <= point <= -0.15 for point in points)
+    assert all(row["n"] > 0 for row in content["curve"])

@@ -1,0 +1,44 @@
+"""The verdict over a comparison, in words: whom the best is told apart from, and whom it is not."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from leaderboard.comparisons import Compared, Difference, Pair
+from leaderboard.entries import Entry
+from leaderboard.web import compare_tables
+
+A, B, C = (
+    Entry(kind="submission", method=name, team="T", scores={"mid": value})
+    for name, value in (("A", 10.0), ("B", 12.0), ("C", 14.0))
+)
+
+
+def compared(p_of_b: float, p_of_c: float, *, reason: str = "") -> Compared:
+    def pair(first: Entry, second: Entry, p: float) -> Pair:
+        return Pair(first, second, {"mid": Difference(-2.0, -3.0, -1.0, p)})
+
+    pairs = (pair(A, B, p_of_b), pair(A, C, p_of_c), pair(B, C, 0.5))
+    nothing = cast("Any", SimpleNamespace())
+    return Compared(nothing, nothing, (A, B, C), pairs, is_complete=True, reason=reason)
+
+
+@pytest.mark.parametrize(
+    ("p_of_b", "p_of_c", "said"),
+    [
+        (0.001, 0.001, "it is significantly better than B and C."),
+        (0.4, 0.4, "it is not told apart from B and C."),
+        (0.4, 0.001, "it is significantly better than C, and not told apart from B."),
+    ],
+)
+def test_the_best_of_three_is_named_and_whom_it_is_told_apart_from(
+    p_of_b: float, p_of_c: float, said: str
+) -> None:
+    sentence = compare_tables.verdict(compared(p_of_b, p_of_c))
+    assert sentence == f"Of these three, A has the lowest MiD, 10.00. On these recordings {said}"
+
+
+def test_with_too_few_recordings_nothing_is_claimed() -> None:
+    sentence = compare_tables.verdict(compared(0.001, 0.001, reason="There are 12 recordings."))
+    assert sentence.endswith("There are too few recordings to say what the differences mean.")

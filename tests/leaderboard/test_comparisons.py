@@ -1,0 +1,244 @@
+"""Comparisons of two to five methods: what is answered at once, what a worker adds, and who may ask."""
+
+import uuid
+from collections.abc import Mapping
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.models import AnonymousUser
+from django.utils import timezone
+
+from evaluator import SCORE_NAMES, compare_predictions, published, read_predictions
+from leaderboard import backlog, bags, comparisons, files, ground_truth, submissions
+from leaderboard.comparisons import BadComparison, Difference, NotOnTheBoard, UnknownMethod, sentence
+from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
+from tests import builders
+from tests.editions import ANYBODY
+
+
+def ask(
+    *sent: Submission, viewer: User | AnonymousUser = ANYBODY, split: str = "test"
+) -> comparisons.Compared:
+    return comparisons.of(
+        methods=[submission.method_id for submission in sent],
+        split=Split.objects.select_related("published_edition__ground_truth").get(pk=split),
+        viewer=viewer,
+        now=timezone.now(),
+    )
+
+
+def known(pair: comparisons.Pair) -> Mapping[str, Difference]:
+    assert pair.differences is not None
+    return pair.differences
+
+
+def set_visibility(submission: Submission, visibility: Visibility) -> None:
+    shown_at = None if visibility == Visibility.PRIVATE else timezone.now()
+    Method.objects.filter(pk=submission.method_id).update(visibility=visibility, shown_at=shown_at)
+
+
+def test_a_comparison_is_asked_for_once_and_answered_by_a_worker(
+    entries: list[Submission], edition: Edition
+) -> None:
+    first = ask(*entries[:3])
+    assert not first.is_complete
+    assert [pair.differences for pair in first.pairs] == [None] * 3
+    assert [entry.method_id for entry in first.entries] == [sent.method_id for sent in entries[:3]]
+    assert not ask(*entries[:3]).is_complete
+    assert Comparison.objects.count() == 3
+    builders.infer_all()
+
+    answer = ask(*entries[:3])
+    assert answer.is_complete
+    assert answer.reason == ""
+    assert {(pair.first.method, pair.second.method) for pair in answer.pairs} == {
+        ("M1.05", "M1.1"),
+        ("M1.05", "M1.2"),
+        ("M1.1", "M1.2"),
+    }
+    for pair in answer.pairs:
+        assert list(pair.differences) == list(SCORE_NAMES)
+        for name, found in known(pair).items():
+            assert found.difference == published(pair.first.scores[name] - pair.second.scores[name])
+        overall = known(pair)["mid"]
+        assert overall.low <= overall.difference <= overall.high < 0
+        assert overall.is_significant
+        assert pair.sentence().startswith(f"{pair.first.method}'s MiD is ")
+        assert pair.sentence("mid_small").startswith(f"{pair.first.method}'s MiD on small is ")
+
+
+def test_the_worker_computes_what_the_evaluator_says_offline(
+    entries: list[Submission], edition: Edition
+) -> None:
+    ask(*entries[:2])
+    builders.infer_all()
+    (pair,) = ask(*entries[:2]).pairs
+    truth = ground_truth.load(edition.ground_truth_id)
+    read = []
+    for sent in entries[:2]:
+        with files.opened_predictions(sent.digest) as kept:
+            read.append(read_predictions(kept.read(), manifest=truth.manifest))
+    offline = compare_predictions(read[0], read[1], truth)
+    for name, found in known(pair).items():
+        assert found.low == published(offline[name].low), name
+        assert found.high == published(offline[name].high)
+        assert found.p == (None if offline[name].p is None else pytest.approx(offline[name].p, rel=0.05))
+        assert found.difference == pytest.approx(offline[name].difference, abs=0.011)
+
+
+def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[Submission]) -> None:
+    ask(*entries[:2])
+    builders.infer_all()
+    (pair,), (turned,) = ask(*entries[:2]).pairs, ask(*entries[1::-1]).pairs
+    assert Comparison.objects.count() == 1
+    for name, found in known(pair).items():
+        other = known(turned)[name]
+        assert other.difference == -found.difference
+        assert (other.low, other.high, other.p) == (
+            None if found.high is None else -found.high,
+            None if found.low is None else -found.low,
+            found.p,
+        )
+
+
+def test_a_method_is_compared_as_it_stands_now(
+    entries: list[Submission], edition: Edition, owner: User
+) -> None:
+    ask(*entries[:2])
+    builders.infer_all()
+    builders.submit(owner, builders.predictions(edition, factor=1.01), method="M1.1")
+    builders.score_all()
+    assert not ask(*entries[:2]).is_complete
+    builders.infer_all()
+    assert known(ask(*entries[:2]).pairs[0])["mid"].difference > 0
+
+
+def test_unknown_and_invisible_methods_are_told_apart_by_nobody(
+    entries: list[Submission], owner: User, stranger: User
+) -> None:
+    set_visibility(entries[0], Visibility.PRIVATE)
+    texts = []
+    for viewer in (ANYBODY, stranger):
+        with pytest.raises(UnknownMethod) as refused:
+            ask(entries[0], entries[1], viewer=viewer)
+        texts.append(str(refused.value).replace(str(entries[0].method_id), "ID"))
+    unknown = uuid.uuid4()
+    split = Split.objects.select_related("published_edition").get(pk="test")
+    with pytest.raises(UnknownMethod) as refused:
+        comparisons.of(
+            methods=[unknown, entries[1].method_id], split=split, viewer=ANYBODY, now=timezone.now()
+        )
+    assert {*texts, str(refused.value).replace(str(unknown), "ID")} == {
+        "There is no method ID that you may see; expected one of the board."
+    }
+    assert not Comparison.objects.exists()
+    assert len(ask(entries[0], entries[1], viewer=owner).pairs) == 1
+
+
+def test_an_anonymous_method_is_compared_under_its_pseudonym(entries: list[Submission], owner: User) -> None:
+    set_visibility(entries[0], Visibility.ANONYMOUS)
+    ask(*entries[:2])
+    builders.infer_all()
+    pseudonym = Method.objects.get(pk=entries[0].method_id).pseudonym
+    assert ask(*entries[:2]).pairs[0].sentence().startswith(f"{pseudonym}'s MiD is ")
+    assert "M1.05" not in repr(ask(*entries[:2]))
+
+
+def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission], owner: User) -> None:
+    many = [entries[0], entries[1], entries[2], entries[3]]
+    with pytest.raises(BadComparison, match=r"1 methods were named; expected 2 to 5"):
+        ask(entries[0])
+    with pytest.raises(BadComparison, match=r"6 methods were named"):
+        ask(*many, *many[:2])
+    with pytest.raises(BadComparison, match=r"named twice"):
+        ask(entries[0], entries[0])
+    with pytest.raises(NotOnTheBoard, match=r"val has no board"):
+        ask(*many, split="val")
+    submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+    with pytest.raises(NotOnTheBoard, match=r"no scored submission on test"):
+        ask(*many)
+    codes = {kind.code for kind in (BadComparison, UnknownMethod, NotOnTheBoard)}
+    assert codes == {"bad-comparison", "unknown-method", "not-on-the-board"}
+
+
+def test_questions_beyond_a_limit_wait_to_be_asked_again(
+    entries: list[Submission], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(comparisons, "MAX_WAITING", 1)
+    ask(*entries[:2])
+    assert not ask(*entries[1:3]).is_complete
+    assert Comparison.objects.count() == 1
+    builders.infer_all()
+    ask(*entries[1:3])
+    assert Comparison.objects.count() == 2
+
+
+def test_what_cannot_be_computed_keeps_nothing_else_waiting(
+    entries: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(backlog, "MAX_AT_ONCE", 1)
+    lost, manifest = entries[0].digest, ground_truth.load(edition.ground_truth_id).manifest
+    bags.path(edition, digest=lost).unlink()
+    files.store().delete(files.aligned_name(manifest_digest=manifest.digest, digest=lost))
+    files.store().delete(files.predictions_name(lost))
+    ask(*entries[:2])
+    ask(*entries[1:3])
+    for _ in range(2):
+        builders.infer_all()
+    assert not ask(*entries[:2]).is_complete
+    assert ask(*entries[1:3]).is_complete
+
+
+def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: User, tmp_path: Path) -> None:
+    edition = builders.import_truth(tmp_path, n_recordings=10)
+    sent = [
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
+        for factor in (1.1, 1.2)
+    ]
+    builders.score_all()
+    ask(*sent)
+    builders.infer_all()
+    answer = ask(*sent)
+    assert "this ground truth has 10" in answer.reason
+    found = known(answer.pairs[0])["mid"]
+    assert (found.low, found.high, found.p, found.is_significant) == (None, None, None, False)
+    assert answer.pairs[0].sentence().endswith("too few recordings to say whether that means anything.")
+
+
+def test_an_equal_file_makes_no_difference(
+    entries: list[Submission], edition: Edition, stranger: User
+) -> None:
+    same = builders.submit(stranger, builders.predictions(edition, factor=1.05), method="Same")
+    builders.score_all()
+    ask(entries[0], same)
+    builders.infer_all()
+    (pair,) = ask(entries[0], same).pairs
+    assert all(found == Difference(0.0, 0.0, 0.0, 1.0) for found in known(pair).values() if found.p)
+    assert pair.sentence() == "M1.05 and Same have the same MiD."
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (Difference(-4.1, -5.3, -2.9, 0.0003), "A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003."),
+        (Difference(13.27, 2.0, 25.0, 0.0123), "A's MiD on crucial is 13 ± 12 higher than B's; p = 0.012."),
+        (
+            Difference(0.04, -0.03, 0.11, 0.3),
+            "A's MiD on crucial is 0.04 ± 0.07 higher than B's; p = 0.3, "
+            "which chance alone may well have made.",
+        ),
+        (Difference(0.0, -0.2, 0.2, 1.0), "A and B have the same MiD on crucial."),
+    ],
+)
+def test_a_sentence_says_how_much_and_how_surely(found: Difference, said: str) -> None:
+    assert sentence("A", "B", name="mid_crucial", found=found) == said
+
+
+def test_waiting_questions_are_told_to_the_workers_again(entries: list[Submission], edition: Edition) -> None:
+    builders.infer_all()
+    assert backlog.editions_waiting(now=timezone.now() + timedelta(hours=1)) == []
+    ask(*entries[:2])
+    assert backlog.editions_waiting(now=timezone.now()) == [edition.pk]
+    assert comparisons.waiting(held=set()).count() == 0
+    assert comparisons.waiting(held=ground_truth.held()).count() == 1

@@ -1,0 +1,359 @@
+"""Intervals and rank ranges on the server: what is written beside the scores, when, and for whom."""
+
+import random
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+import pytest
+from django.conf import settings
+from django.db import connection
+from django.utils import timezone
+from scipy import stats
+
+from evaluator import SCORE_NAMES, published, uncertainty
+from leaderboard import backlog, bags, broker, files, ground_truth, inference, queue, standings, submissions
+from leaderboard.models import (
+    BoardVersion,
+    Edition,
+    Evaluation,
+    Method,
+    PublishedResult,
+    Score,
+    Submission,
+    User,
+    Visibility,
+)
+from tests import builders
+from tests.editions import ANYBODY, board_now, corrected, open_edition, publish
+
+INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
+
+
+def scores_of(submission: Submission, edition: Edition) -> dict[str, Score]:
+    rows = Score.objects.filter(evaluation__submission=submission, evaluation__edition=edition)
+    return {row.metric if row.interval == "overall" else f"{row.metric}_{row.interval}": row for row in rows}
+
+
+def everything() -> list[tuple[object, ...]]:
+    """All that was ever inferred, to be compared byte for byte."""
+    return list(Score.objects.order_by("pk").values_list("pk", *INFERRED))
+
+
+def hide(submission: Submission) -> None:
+    Method.objects.filter(pk=submission.method_id).update(visibility=Visibility.PRIVATE)
+
+
+def version() -> int:
+    return BoardVersion.objects.filter(split="test").values_list("number", flat=True).first() or 0
+
+
+def plain_interval(submission: Submission, edition: Edition) -> tuple[float, float]:
+    """The interval of the overall MiD by a loop over recordings, with the weights of the ground truth."""
+    truth = ground_truth.load(edition.ground_truth_id)
+    with files.opened_predictions(submission.digest) as kept:
+        predictions = builders.evaluator.read_predictions(kept.read(), manifest=truth.manifest)
+    report = builders.evaluator.evaluate(predictions, truth, keep_sequences=True)
+    assert report.sequences is not None
+    generator = uncertainty.generator_of(truth.digest, purpose="weights")
+    weights = generator.standard_exponential((10_000, truth.manifest.n_recordings), dtype=np.float32)
+    sums, counts = np.zeros(10_000), np.zeros(10_000)
+    for row, recording in enumerate(truth.manifest.recording_index):
+        sums += weights[:, recording] * report.sequences.mid[row]
+        counts += weights[:, recording]
+    # All 24 recordings have five sequences, so they count as 24.
+    tail = stats.norm.cdf(-stats.t.ppf(0.975, 23) * (24 / 23) ** 0.5)
+    low, high = np.quantile(sums / counts, [tail, 1 - tail])
+    return float(low), float(high)
+
+
+@pytest.fixture
+def inferred(entries: list[Submission]) -> list[Submission]:
+    """Four scored submissions, and what workers make of them afterwards."""
+    assert builders.infer_all() == 1
+    return entries
+
+
+def test_every_value_gets_an_interval_and_a_rank_range_that_hold_what_is_published(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    entries = board_now().entries
+    submitted = [entry for entry in entries if entry.kind == "submission"]
+    assert len(submitted) == 4
+    for entry in submitted:
+        interval = entry.intervals["mid"]
+        assert interval.low <= entry.scores["mid"] <= interval.high
+        assert interval.rank_low <= entry.rank <= interval.rank_high
+    assert [entry.intervals["mid"].is_with_best for entry in submitted] == [True, False, False, False]
+    assert all(not entry.intervals for entry in entries if entry.kind == "published")
+    for submission in inferred[:2]:
+        found = scores_of(submission, edition)["mid"]
+        assert (found.low, found.high) == pytest.approx(plain_interval(submission, edition), abs=0.006)
+        assert found.low == published(found.low)
+
+
+def test_a_column_in_too_few_recordings_has_no_interval_while_others_have(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    usable = uncertainty.usable_columns(bags.counts_of(edition))
+    assert 0 < usable.sum() < len(SCORE_NAMES)
+    for name, row in scores_of(inferred[0], edition).items():
+        has_interval = bool(usable[SCORE_NAMES.index(name)])
+        assert [getattr(row, field) is not None for field in INFERRED] == [has_interval] * 5, name
+
+
+def test_an_edition_without_enough_recordings_has_no_interval_and_says_why(
+    benchmark: None, tmp_path: Path, owner: User
+) -> None:
+    edition = builders.import_truth(tmp_path, n_recordings=19)
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    builders.infer_all()
+    assert not Score.objects.exclude(low=None, high=None, rank_low=None, is_with_best=None).exists()
+    edition.refresh_from_db()
+    assert edition.inferred_at is not None
+    assert inference.why_no_interval(edition) == (
+        "There are no intervals: they are made by drawing recordings anew, and this ground truth has 19; "
+        "expected at least 20."
+    )
+
+
+def test_what_holds_is_not_made_again_and_what_changed_is(
+    inferred: list[Submission], edition: Edition, owner: User
+) -> None:
+    before = everything()
+    assert builders.infer_all() == 0
+    submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
+    assert builders.infer_all() == 1
+    withdrawn, *others = (scores_of(submission, edition)["mid"] for submission in inferred)
+    assert (withdrawn.rank_low, withdrawn.rank_high, withdrawn.is_with_best) == (None, None, None)
+    assert others[0].is_with_best
+    assert everything() != before
+    assert all(
+        (row.low, row.high) == (low, high) for row in Score.objects.all() for low, high in [kept(before, row)]
+    )
+
+
+def kept(rows: list[tuple[object, ...]], score: Score) -> tuple[object, object]:
+    """The interval that a score had before: it is its own, and stays."""
+    return next((row[1], row[2]) for row in rows if row[0] == score.pk)
+
+
+def test_private_entries_get_an_interval_and_change_nothing_that_others_see(
+    inferred: list[Submission], edition: Edition, stranger: User
+) -> None:
+    before, number = everything(), version()
+    hidden = builders.submit(stranger, builders.predictions(edition, factor=1.01), method="Hidden")
+    hide(hidden)
+    builders.score_all()
+    number = version()
+    assert builders.infer_all() == 1
+    row = scores_of(hidden, edition)["mid"]
+    assert row.low is not None
+    assert (row.rank_low, row.rank_high, row.is_with_best) == (None, None, None)
+    assert [row for row in everything() if row[0] in {old[0] for old in before}] == before
+    assert version() == number
+
+    Method.objects.filter(pk=hidden.method_id).update(
+        visibility=Visibility.ANONYMOUS, shown_at=timezone.now()
+    )
+    assert builders.infer_all() == 1
+    assert scores_of(hidden, edition)["mid"].is_with_best
+    assert not scores_of(inferred[0], edition)["mid"].is_with_best
+    assert version() == number + 1
+
+
+def test_only_the_best_submission_of_a_method_is_ranked_and_all_have_intervals(
+    inferred: list[Submission], edition: Edition, owner: User
+) -> None:
+    worse = builders.submit(owner, builders.predictions(edition, factor=1.5), method="M1.05")
+    builders.score_all()
+    builders.infer_all()
+    row = scores_of(worse, edition)["mid"]
+    assert row.low is not None
+    assert row.rank_low is None
+    best = scores_of(inferred[0], edition)["mid"]
+    assert (best.rank_low, best.is_with_best) == (1, True)
+
+
+def test_printed_rows_are_counted_where_they_surely_or_possibly_stand(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    PublishedResult.objects.filter(split="test").delete()
+    assert builders.infer_all() == 1
+    first = scores_of(inferred[0], edition)["mid"]
+    assert (first.rank_low, first.rank_high) == (1, 1)
+    for slug, value in (("above", first.low - 1), ("beside", first.value), ("below", 1e6)):
+        PublishedResult.objects.create(
+            split_id="test",
+            slug=slug,
+            method_name=slug,
+            authors="A",
+            source_title="T",
+            source_url="https://example.org",
+            source_table="1",
+            year=2023,
+            scores={"mid": value},
+        )
+    assert builders.infer_all() == 1
+    first.refresh_from_db()
+    assert (first.rank_low, first.rank_high) == (2, 3)
+    for entry in board_now().entries:
+        if entry.kind == "submission":
+            interval = entry.intervals["mid"]
+            assert interval.rank_low <= entry.rank <= interval.rank_high
+
+
+def test_a_printed_number_that_is_published_alike_is_not_above() -> None:
+    # 14.804 in every recording: published as 14.80, which the paper prints, and never below 14.804.
+    value, end, paper = (np.full((1, len(SCORE_NAMES)), number) for number in (14.8, 14.804, 14.8))
+    above, beside = inference._among_printed([tuple(paper[0])], value, low=end, high=end)
+    assert (above.tolist(), beside.tolist()) == ([[0] * 10], [[1] * 10])
+
+
+def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
+    inferred: list[Submission], edition: Edition, owner: User
+) -> None:
+    best, *others = inferred
+    submissions.withdraw(submission=best, actor=owner, now=timezone.now())
+    rows = {row.submission_id: row for row in board_now().entries}
+    gone = [rows[other.pk].intervals["mid"] for other in others]
+    assert [found.rank_low for found in gone] == [None] * 3
+    assert all(found.low is not None for found in gone)
+    builders.infer_all()
+    rows = {row.submission_id: row for row in board_now().entries}
+    for other in others:
+        found, rank = rows[other.pk].intervals["mid"], rows[other.pk].rank
+        assert found.rank_low <= rank <= found.rank_high
+
+
+def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    then = standings.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
+    rows = [entry for entry in then.entries if entry.kind == "submission"]
+    assert len(rows) == len(inferred)
+    for entry in rows:
+        found = entry.intervals["mid"]
+        assert None not in (found.low, found.high)
+        assert (found.rank_low, found.rank_high, found.is_with_best) == (None, None, None)
+
+
+def test_an_edition_in_preparation_shows_intervals_as_soon_as_it_is_published(
+    rescored: Edition,
+) -> None:
+    number = version()
+    assert builders.infer_all() == 2
+    assert version() == number + 1
+    publish(rescored)
+    submitted = [entry for entry in board_now().entries if entry.kind == "submission"]
+    assert all(entry.intervals["mid"].rank_low for entry in submitted)
+    assert builders.infer_all() == 0
+
+
+def test_sums_that_are_gone_are_made_anew_from_values_and_from_the_file(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    digest = inferred[0].digest
+    first = bags.sums_of(edition, digest=digest)
+    path = bags.path(edition, digest=digest)
+    assert path.is_relative_to(settings.GROUND_TRUTH_DIR)
+    path.write_bytes(b"cut off")
+    assert np.array_equal(bags.sums_of(edition, digest=digest), first)
+    path.unlink()
+    manifest = ground_truth.load(edition.ground_truth_id).manifest
+    files.store().delete(files.aligned_name(manifest_digest=manifest.digest, digest=digest))
+    assert np.array_equal(bags.sums_of(edition, digest=digest), first)
+    assert path.stat().st_size == first.nbytes
+    truth = ground_truth.load(edition.ground_truth_id)
+    means = first.sum(axis=0) / bags.counts_of(edition).sum(axis=0)
+    with files.opened_predictions(digest) as source:
+        predictions = builders.evaluator.read_predictions(source.read(), manifest=truth.manifest)
+    assert means == pytest.approx(list(builders.evaluator.evaluate(predictions, truth).flat().values()))
+
+
+def test_nothing_is_written_when_the_entries_change_meanwhile(
+    entries: list[Submission], edition: Edition, owner: User
+) -> None:
+    edition.refresh_from_db()
+    before = everything()
+
+    def withdraw() -> None:
+        submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+
+    assert not inference.infer(edition=edition, now=timezone.now(), between=withdraw)
+    assert everything() == before
+    assert builders.infer_all() == 1
+
+
+def test_live_submissions_are_decided_before_the_work_behind_them_goes_on(
+    entries: list[Submission], edition: Edition, stranger: User
+) -> None:
+    late = builders.submit(stranger, builders.predictions(edition, factor=1.02), method="Late")
+    later = timezone.now() + 2 * inference.PATIENCE
+    assert backlog.work_off(now=later, rng=random.Random(0)) == 1
+    assert Evaluation.objects.get(submission=late).status == "SCORED"
+
+
+def test_a_worker_that_is_to_end_leaves_the_work_to_others(entries: list[Submission]) -> None:
+    assert backlog.work_off(now=timezone.now(), rng=random.Random(0), is_stopping=lambda: True) == 0
+    assert not Edition.objects.exclude(inferred_at=None).exists()
+
+
+def test_an_edition_that_is_being_scored_has_patience_but_not_for_ever(
+    inferred: list[Submission], edition: Edition, tmp_path: Path
+) -> None:
+    prepared = open_edition(corrected(tmp_path, factor=1.3))
+    held = ground_truth.held()
+    now = timezone.now()
+    assert prepared not in inference.stale(now=now, held=held)
+    assert prepared in inference.stale(now=now + 2 * inference.PATIENCE, held=held)
+    assert prepared not in inference.stale(now=now + 2 * inference.PATIENCE, held=set())
+
+
+def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submission], edition: Edition) -> None:
+    chosen = {row.evaluation_id for row in inference.ranked(inference.standing(edition))}
+    board = standings.board(split=edition.split, viewer=ANYBODY)
+    assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
+
+
+def test_only_one_worker_at_a_time_is_at_an_edition(entries: list[Submission], edition: Edition) -> None:
+    if connection.vendor != "postgresql":
+        pytest.skip("SQLite's workers are one; `python -m tests.on_postgresql` runs this")
+    edition.refresh_from_db()
+    other = connection.copy()
+    try:
+        with other.cursor() as cursor:
+            cursor.execute("SELECT pg_advisory_lock(%s, %s)", [inference.LOCKS, edition.pk])
+        assert not inference.infer(edition=edition, now=timezone.now())
+    finally:
+        other.close()
+    assert inference.infer(edition=edition, now=timezone.now())
+
+
+def test_the_sweep_tells_the_workers_of_what_nobody_heard(
+    entries: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[int] = []
+
+    def tell(about: int) -> bool:
+        told.append(about)
+        return True
+
+    monkeypatch.setattr(broker, "infer", tell)
+    monkeypatch.setattr(broker, "nudge", lambda evaluation_id: True)
+    queue.sweep(rng=random.Random(0))
+    assert told == [edition.pk]
+    builders.infer_all()
+    queue.sweep(rng=random.Random(0))
+    assert told == [edition.pk]
+
+
+def test_a_large_board_rests_between_two_rounds(
+    inferred: list[Submission], edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(inference, "REST_PER_PAIR", timedelta(seconds=1))
+    submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
+    held = ground_truth.held()
+    assert inference.stale(now=timezone.now(), held=held) == []
+    assert inference.stale(now=timezone.now() + timedelta(seconds=20), held=held) == [edition]
