@@ -65,9 +65,8 @@ def latest_change(split: Split) -> Publication | None:
     return latest if latest and latest.replaced_id else None
 
 
-def history(split: Split) -> tuple[Past, ...]:
-    """Every edition that was ever published, the newest first."""
-    publications = changelog(split)
+def history(split: Split, publications: tuple[Publication, ...]) -> tuple[Past, ...]:
+    """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
     return tuple(_past(edition, split, publications) for edition in published.order_by("-number"))
 

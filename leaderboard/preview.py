@@ -9,7 +9,7 @@ from django.contrib.auth.models import AnonymousUser
 
 from evaluator.protocol import SCORE_NAMES
 from leaderboard import rescoring, standings
-from leaderboard.models import Edition, Evaluation, Status, Submission, Visibility
+from leaderboard.models import Edition, Evaluation, Status, Submission
 
 ABSENT = "ABSENT"  # not evaluated in that edition
 COLUMNS: Final = (
@@ -30,7 +30,7 @@ class Change:
     submission_id: UUID
     method: str
     team: str
-    is_public: bool
+    is_seen_by_all: bool
     old_status: str
     new_status: str
     old: Mapping[str, float | None]
@@ -192,7 +192,7 @@ def _change(submission: Submission, old: _Side, new: _Side) -> Change:
         submission_id=submission.pk,
         method=submission.method.name,
         team=submission.method.team.name,
-        is_public=submission.method.visibility == Visibility.PUBLIC,
+        is_seen_by_all=submission.method.was_shown(),
         old_status=old.status(submission),
         new_status=new.status(submission),
         old=old.values(submission),

@@ -1,27 +1,33 @@
 """Who stands where: the board of a split in one edition, submissions and published rows together."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, time
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
-from django.db.models import Q, QuerySet
+from django.db.models import Count, Exists, OuterRef
 from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator import ranking
 from evaluator.protocol import SCORE_NAMES
-from leaderboard.models import (
-    Edition,
-    Evaluation,
-    Method,
-    PublishedResult,
-    Score,
-    Split,
-    Status,
-    User,
-    Visibility,
+from leaderboard.entries import (
+    Entry,
+    Scored,
+    flat_scores,
+    named,
+    placed,
+    profile_of,
+    published_entry,
+    scored_in,
+    scores_in,
+    submitted_entry,
 )
+from leaderboard.filters import Filters
+from leaderboard.models import Edition, Evaluation, Method, Split, Status, Submission, User, Visibility
+from leaderboard.models.methods import MethodQuerySet
+
+__all__ = ["Board", "Entry", "board", "everybodys", "flat_scores", "scores_in", "with_own"]
 
 PRIMARY = "mid"
 TEXT_COLUMNS = ("rank", "method", "team", "date")
@@ -48,38 +54,8 @@ class BadMoment(ValueError):
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One row of a board. `scores` maps the ten names to published values; None where there is none."""
-
-    kind: str  # "submission" or "published"
-    method: str
-    team: str
-    scores: Mapping[str, float | None]
-    description: str = ""
-    rank: int | None = None
-    date: datetime | None = None
-    year: int | None = None
-    method_id: UUID | None = None
-    submission_id: UUID | None = None
-    paper_url: str = ""
-    code_url: str = ""
-    source: str = ""  # a published row's citation
-    best: frozenset[str] = frozenset()
-    second: frozenset[str] = frozenset()
-    is_mine: bool = False
-    is_visible_to_all: bool = True
-    withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
-    is_unscorable: bool = False  # of a former edition, whose successor cannot score the file
-
-    @property
-    def date_text(self) -> str:
-        """The date as shown: a day for submissions, a year for published rows."""
-        return f"{self.date:%Y-%m-%d}" if self.date else str(self.year or "")
-
-
-@dataclass(frozen=True)
 class Board:
-    """A ranked board: one split, one edition, one point in time."""
+    """A ranked board: one split, one edition, one point in time. `entries` are those that fit the filters."""
 
     split: Split
     edition: Edition | None
@@ -88,32 +64,13 @@ class Board:
     at: datetime | None = None
     updated_at: datetime | None = None
     is_open: bool = field(default=False)
+    filters: Filters = field(default_factory=Filters)
+    n_in_all: int = 0  # rows before the filters
 
     @property
     def n_submissions(self) -> int:
         """How many rows are submissions."""
         return sum(entry.kind == "submission" for entry in self.entries)
-
-
-def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
-    """The ten names and their values; None where an interval is empty."""
-    values: dict[str, float | None] = dict.fromkeys(SCORE_NAMES)
-    for score in scores:
-        values[_name(score.metric, score.interval)] = score.value
-    return values
-
-
-def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
-    """The ten names and their values of every evaluation in an edition: one query, whatever their number."""
-    found: dict[UUID, dict[str, float | None]] = {}
-    rows = Score.objects.filter(evaluation__edition=edition)
-    for pk, metric, interval, value in rows.values_list("evaluation_id", "metric", "interval", "value"):
-        found.setdefault(pk, dict.fromkeys(SCORE_NAMES))[_name(metric, interval)] = value
-    return found
-
-
-def _name(metric: str, interval: str) -> str:
-    return metric if interval == "overall" else f"{metric}_{interval}"
 
 
 def parse_moment(text: str) -> datetime:
@@ -137,36 +94,64 @@ def board(
     viewer: User | AnonymousUser,
     sort: str = "rank",
     at: datetime | None = None,
+    filters: Filters | None = None,
 ) -> Board:
     """The board of a split in one edition (the published one unless named), as `viewer` may see it.
 
-    With `at` the board as it stood then: the edition that was published, with what it had scored by then.
-    Ranks are by published MiD among everything that everybody sees; ties share a rank; a row without that
-    value has none. Each method is represented by the best of its standing submissions; one whose submissions
-    were all withdrawn leaves a row without values. Rows that only the viewer's own team sees carry the rank
-    that they would have, and take nobody's place. Raises `UnknownColumn`.
+    With `at` the board as it stood then: the edition that was published, with what it had scored by then of
+    what had been shown by then. Ranks are by published MiD among everything that everybody sees, whatever
+    the filters; ties share a rank; a row without that value has none. Each method is represented by the best
+    of its standing submissions; one whose submissions were all withdrawn leaves a row without values. Rows
+    that only the viewer's own team sees carry the rank that they would have, and take nobody's place. Raises
+    `UnknownColumn`.
     """
+    require_column(sort)
+    edition = edition or (edition_at(split, at) if at else split.published_edition)
+    shown = everybodys(split=split, edition=edition, at=at)
+    return arranged(
+        with_own(shown, split=split, edition=edition, viewer=viewer, at=at),
+        split=split,
+        edition=edition,
+        sort=sort,
+        at=at,
+        filters=filters,
+    )
+
+
+def require_column(sort: str) -> None:
+    """Raise `UnknownColumn` for what no board can be sorted by."""
     if sort.removeprefix("-") not in SORTABLE:
         raise UnknownColumn(sort)
-    edition = edition or (_edition_at(split, at) if at else split.published_edition)
-    entries = [_published_entry(result) for result in split.published_results.all()]
-    submitted = _submitted_entries(split, edition, viewer, at) if edition else []
-    ranked = _marked(_ranked([*entries, *submitted]))
-    dates = [entry.date for entry in submitted if entry.date]
+
+
+def arranged(
+    entries: Sequence[Entry],
+    *,
+    split: Split,
+    edition: Edition | None,
+    sort: str = "rank",
+    at: datetime | None = None,
+    filters: Filters | None = None,
+) -> Board:
+    """A board of ranked rows: those that fit the filters, in the order of one column."""
+    filters = filters or Filters()
+    dates = [entry.date for entry in entries if entry.date]
     if edition and edition.published_at:
         dates.append(edition.published_at)
     return Board(
         split=split,
         edition=edition,
-        entries=tuple(_sorted(ranked, sort)),
+        entries=tuple(_sorted([entry for entry in entries if filters.admits(entry)], sort)),
         sort=sort,
         at=at,
         updated_at=max(dates, default=None),
         is_open=split.accepts_submissions(),
+        filters=filters,
+        n_in_all=len(entries),
     )
 
 
-def _edition_at(split: Split, at: datetime) -> Edition | None:
+def edition_at(split: Split, at: datetime) -> Edition | None:
     """The edition that was the board at that time."""
     publication = (
         split.publications.filter(at__lte=at)
@@ -177,47 +162,70 @@ def _edition_at(split: Split, at: datetime) -> Edition | None:
     return publication.edition if publication else None
 
 
-def _published_entry(result: PublishedResult) -> Entry:
-    return Entry(
-        kind="published",
-        method=result.method_name,
-        team=result.authors,
-        description=result.description,
-        scores={name: result.scores.get(name) for name in SCORE_NAMES},
-        year=result.year,
-        paper_url=result.source_url,
-        code_url=result.code_url,
-        source=f"{result.authors} ({result.year}). {result.source_title}. {result.source_table}.",
-    )
+# --- what everybody sees ---------------------------------------------------------------------------------
 
 
-def _submitted_entries(
-    split: Split, edition: Edition, viewer: User | AnonymousUser, at: datetime | None
+def everybodys(
+    *,
+    split: Split,
+    edition: Edition | None,
+    at: datetime | None = None,
+    supposed: Method | None = None,
+) -> tuple[Entry, ...]:
+    """The rows that everybody sees, ranked and marked, untouched by readers and private methods.
+
+    `supposed` is a method with a visibility that it does not have yet: the rows as they would be then.
+    """
+    entries = [published_entry(result) for result in split.published_results.order_by("pk")]
+    if edition is not None:
+        shown = Method.objects.shown(at=at)
+        if supposed is not None:
+            shown = shown | Method.objects.filter(pk=supposed.pk)
+        rows = _best_of_each(shown, split=split, edition=edition, at=at, supposed=supposed)
+        attempts = _attempts(shown, split=split, at=at, supposed=supposed)
+        entries += [replace(row, n_attempts=attempts.of(row)) for row in rows]
+    return tuple(_marked(_ranked(entries)))
+
+
+def _best_of_each(
+    methods: MethodQuerySet,
+    *,
+    split: Split,
+    edition: Edition,
+    at: datetime | None,
+    supposed: Method | None = None,
 ) -> list[Entry]:
-    """One entry for each method that the viewer may see: the best of its standing submissions."""
+    """One row for each of these methods, without its rank: the best of its submissions, masked if need be."""
     rows = Evaluation.objects.filter(
-        edition=edition, status=Status.SCORED, submission__method__in=_shown_methods(viewer)
+        edition=edition, status=Status.SCORED, submission__method__in=methods
     ).select_related("submission__method__team")
     if at is not None:
         rows = rows.filter(finished_at__lte=at)
-    mine = _team_ids(viewer)
+    # Before their scores, which are written with them; in an order of their own, so that bytes keep theirs.
+    evaluations = list(rows.order_by("pk"))
+    scored = scored_in(edition, methods=methods, has_ranges=at is None)
     unscorable = _unscorable(split, edition)
-    # The evaluations first: one that is scored has its scores already, written in the same transaction.
-    evaluations = list(rows)
-    scores = scores_in(edition)
     best: dict[UUID, Entry] = {}
     for evaluation in evaluations:
-        entry = _submitted_entry(
+        submission = evaluation.submission
+        if supposed is not None and submission.method_id == supposed.pk:
+            submission.method = supposed
+        withdrawn_at = submission.withdrawn_at
+        if at is not None and withdrawn_at is not None and withdrawn_at > at:
+            withdrawn_at = None
+        if withdrawn_at and not submission.method.was_shown(at=withdrawn_at):
+            continue  # nobody saw it: no stone for what was never there
+        method = submission.method
+        entry = submitted_entry(
             evaluation,
-            scores.get(evaluation.pk) or flat_scores([]),
-            mine,
-            at=at,
+            scored.get(evaluation.pk) or Scored(),
+            profile=profile_of(method, is_masked=method.visibility == Visibility.ANONYMOUS),
+            withdrawn_at=withdrawn_at,
             is_unscorable=evaluation.submission_id in unscorable,
         )
-        method_id = evaluation.submission.method_id
-        rival = best.get(method_id)
+        rival = best.get(method.pk)
         if rival is None or _key(entry) < _key(rival):
-            best[method_id] = entry
+            best[method.pk] = entry
     return list(best.values())
 
 
@@ -229,49 +237,117 @@ def _unscorable(split: Split, edition: Edition) -> set[UUID]:
     return set(rejected.values_list("submission", flat=True))
 
 
-def _shown_methods(viewer: User | AnonymousUser) -> QuerySet[Method]:
-    """Public methods, and the viewer's own team's; a maintainer's board is the public one as well."""
-    shown = Q(visibility=Visibility.PUBLIC)
-    if viewer.is_authenticated:
-        shown |= Q(team__memberships__user=viewer)
-    return Method.objects.filter(shown)
+@dataclass(frozen=True)
+class _Attempts:
+    """How many scored submissions each method has, and the public ones of each team together."""
+
+    by_method: Mapping[UUID, int]
+    by_team: Mapping[UUID, int]
+    team_of: Mapping[UUID, UUID]
+
+    def of(self, row: Entry) -> int:
+        """What a row says: a named one of all that its team shows, an anonymous one of nothing but itself."""
+        if row.method_id is None:
+            return 0
+        if row.visibility == Visibility.PUBLIC:
+            return self.by_team.get(self.team_of[row.method_id], 0)
+        return self.by_method.get(row.method_id, 0)
 
 
-def _team_ids(viewer: User | AnonymousUser) -> set[UUID]:
-    if not viewer.is_authenticated:
-        return set()
-    return set(viewer.teams.values_list("pk", flat=True))
-
-
-def _submitted_entry(
-    evaluation: Evaluation,
-    scores: Mapping[str, float | None],
-    mine: set[UUID],
-    *,
-    at: datetime | None,
-    is_unscorable: bool,
-) -> Entry:
-    submission = evaluation.submission
-    method = submission.method
-    withdrawn_at = submission.withdrawn_at
-    if at is not None and withdrawn_at is not None and withdrawn_at > at:
-        withdrawn_at = None
-    return Entry(
-        kind="submission",
-        method=method.name,
-        team=method.team.name,
-        description=method.description,
-        scores=flat_scores([]) if withdrawn_at else scores,
-        date=submission.submitted_at,
-        method_id=method.pk,
-        submission_id=submission.pk,
-        paper_url=method.paper_url,
-        code_url=method.code_url,
-        is_mine=method.team_id in mine,
-        is_visible_to_all=method.visibility == Visibility.PUBLIC,
-        withdrawn_at=withdrawn_at,
-        is_unscorable=is_unscorable,
+def _attempts(
+    methods: MethodQuerySet, *, split: Split, at: datetime | None, supposed: Method | None = None
+) -> _Attempts:
+    """Counted are submissions that were scored in a published edition: those that cost a slot for good."""
+    scored = Evaluation.objects.filter(
+        submission=OuterRef("pk"), status=Status.SCORED, edition__published_at__isnull=False
     )
+    if at is not None:
+        scored = scored.filter(finished_at__lte=at)
+    rows = (
+        Submission.objects.filter(Exists(scored), split=split, method__in=methods)
+        .order_by()
+        .values_list("method", "method__team", "method__visibility")
+        .annotate(n=Count("pk"))
+    )
+    by_method, by_team = dict[UUID, int](), dict[UUID, int]()
+    team_of: dict[UUID, UUID] = {}
+    for method_id, team_id, visibility, n in rows:
+        by_method[method_id] = n
+        team_of[method_id] = team_id
+        if supposed is not None and method_id == supposed.pk:
+            visibility = supposed.visibility  # noqa: PLW2901 - as if it were
+        if visibility == Visibility.PUBLIC:
+            by_team[team_id] = by_team.get(team_id, 0) + n
+    return _Attempts(by_method=by_method, by_team=by_team, team_of=team_of)
+
+
+# --- what a reader's own team sees beside ----------------------------------------------------------------
+
+
+def with_own(
+    shown: Sequence[Entry],
+    *,
+    split: Split,
+    edition: Edition | None,
+    viewer: User | AnonymousUser,
+    at: datetime | None = None,
+) -> tuple[Entry, ...]:
+    """What everybody sees, for one reader: their team's rows marked and named, and its private ones added.
+
+    A private row has the rank that it would take; the others keep theirs.
+    """
+    if not viewer.is_authenticated or edition is None:
+        return tuple(shown)
+    own = Method.objects.of(viewer).select_related("team")
+    by_id = {method.pk: method for method in own}
+    if not by_id:
+        return tuple(shown)
+    marked = [
+        unmasked(entry, by_id[entry.method_id]) if entry.method_id in by_id else entry for entry in shown
+    ]
+    hidden = [pk for pk, method in by_id.items() if not method.was_shown(at=at)]
+    if not hidden:
+        return tuple(marked)
+    return (*marked, *_private_rows(hidden, shown, split=split, edition=edition, at=at))
+
+
+def unmasked(entry: Entry, method: Method) -> Entry:
+    """The row as the method's own team reads it."""
+    return replace(
+        entry,
+        **named(profile_of(method)),
+        is_mine=True,
+        pseudonym=method.pseudonym if method.visibility == Visibility.ANONYMOUS else "",
+    )
+
+
+def _private_rows(
+    hidden: Collection[UUID],
+    shown: Sequence[Entry],
+    *,
+    split: Split,
+    edition: Edition,
+    at: datetime | None,
+) -> list[Entry]:
+    methods = Method.objects.filter(pk__in=hidden)
+    by_id = {method.pk: method for method in methods.select_related("team")}
+    rows = _best_of_each(methods, split=split, edition=edition, at=at)
+    attempts = _attempts(methods, split=split, at=at)
+    public = [entry.scores[PRIMARY] for entry in shown]
+    return [
+        replace(
+            unmasked(row, by_id[row.method_id]),
+            visibility=Visibility.PRIVATE,
+            pseudonym="",
+            rank=ranking.rank([*public, row.scores[PRIMARY]])[-1],
+            n_attempts=attempts.by_method.get(row.method_id, 0),
+        )
+        for row in rows
+        if row.method_id is not None
+    ]
+
+
+# --- order -----------------------------------------------------------------------------------------------
 
 
 def _key(entry: Entry) -> tuple[bool, float, datetime]:
@@ -282,27 +358,16 @@ def _key(entry: Entry) -> tuple[bool, float, datetime]:
 
 
 def _ranked(entries: list[Entry]) -> list[Entry]:
-    """Give every entry its rank among those that everybody sees."""
-    public = [entry.scores[PRIMARY] for entry in entries if entry.is_visible_to_all]
-    public_ranks = iter(ranking.rank(public))
-    return [
-        replace(
-            entry,
-            rank=next(public_ranks)
-            if entry.is_visible_to_all
-            else ranking.rank([*public, entry.scores[PRIMARY]])[-1],
-        )
-        for entry in entries
-    ]
+    ranks = ranking.rank([entry.scores[PRIMARY] for entry in entries])
+    return [placed(entry, rank) for entry, rank in zip(entries, ranks, strict=True)]
 
 
 def _marked(entries: list[Entry]) -> list[Entry]:
-    """Mark the best and the second of each column among what everybody sees."""
+    """Mark the best and the second of each column."""
     best: dict[int, set[str]] = {}
     second: dict[int, set[str]] = {}
     for name in SCORE_NAMES:
-        column = [entry.scores[name] if entry.is_visible_to_all else None for entry in entries]
-        firsts, seconds = ranking.best_and_second(column)
+        firsts, seconds = ranking.best_and_second([entry.scores[name] for entry in entries])
         for index in firsts:
             best.setdefault(index, set()).add(name)
         for index in seconds:
@@ -314,10 +379,10 @@ def _marked(entries: list[Entry]) -> list[Entry]:
 
 
 def _sorted(entries: list[Entry], sort: str) -> list[Entry]:
-    """In the order of one column; rows without a value come last either way, ties by rank and name."""
+    """In the order of one column; rows without a value come last, ties by rank, value and name."""
     column = sort.removeprefix("-")
     in_rank_order = sorted(
-        entries, key=lambda e: (e.rank is None, e.rank or 0, e.method.casefold(), e.date_text)
+        entries, key=lambda e: (e.rank or len(entries) + 1, e.scores[PRIMARY] or 0, e.method.casefold())
     )
 
     def value(entry: Entry) -> str | float | int | None:

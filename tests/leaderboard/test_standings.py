@@ -97,7 +97,7 @@ def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_place(
         assert standings.board(split=split_called(), viewer=viewer).entries == without.entries
     for viewer in (owner, teammate):
         board = standings.board(split=split_called(), viewer=viewer)
-        assert ranks(board)[:2] == [(1, "Deep Scale"), (1, "Secret")]
+        assert ranks(board)[:2] == [(1, "Secret"), (1, "Deep Scale")]
         secret = next(entry for entry in board.entries if entry.method == "Secret")
         assert secret.is_mine
         assert not secret.best
@@ -141,7 +141,7 @@ def test_a_board_takes_the_same_few_queries_whatever_its_size(
         builders.submit(owner, builders.predictions(edition, factor=1 + i / 10), method=f"M{i}")
     builders.score_all()
     split = split_called()
-    with django_assert_max_num_queries(3):
+    with django_assert_max_num_queries(4):
         assert len(standings.board(split=split, viewer=ANYBODY).entries) == 13
 
 

@@ -1,0 +1,18 @@
+"""Fills the `test` board of the database that the environment names with a thousand entries."""
+
+import sys
+import tempfile
+from pathlib import Path
+
+
+def main() -> None:
+    """Open the split with a made-up ground truth, and write the rows."""
+    from leaderboard import teams  # noqa: PLC0415 - Django is configured only now
+    from leaderboard.models import User  # noqa: PLC0415
+    from tests import board_rows, builders  # noqa: PLC0415
+
+    with tempfile.TemporaryDirectory() as folder:
+        edition = builders.import_truth(Path(folder))
+    user = User.objects.create_user("owner@example.org", "correct horse", name="Owls")
+    teams.team_of(user=user)
+    board_rows.fill(edition, n=int(sys.argv[1]), user=user)

@@ -1,0 +1,112 @@
+"""When the boards change: a number for each split that goes up with everything that everybody may see.
+
+Whoever keeps a copy of a board (see `leaderboard/snapshots.py`) knows by this number whether it still holds.
+It is raised inside the transaction that makes the change, so nobody ever sees the one without the other.
+"""
+
+import uuid
+from collections.abc import Iterable
+from functools import partial
+from typing import Any
+
+from django.db import connection, transaction
+from django.db.models import F
+from psycopg import Cursor
+from psycopg import Error as DriverError
+
+from leaderboard import audit, broker
+from leaderboard.models import BoardVersion, Evaluation, Split, Submission, Visibility
+
+
+def changed(split_id: str) -> None:
+    """What everybody sees of this split's boards has changed. To be called in the transaction of the change.
+
+    Call it where the verb records its deed, last of all that it writes: it waits in the same line as the
+    audit trail, so the two cannot wait for each other, and whoever submits waits for neither.
+    """
+    _hold()
+    _count(split_id)
+
+
+def _hold() -> None:
+    if not transaction.get_connection().in_atomic_block:
+        raise RuntimeError("boards.changed was called outside of the transaction of the change")
+    audit.hold()
+
+
+def _count(split_id: str) -> None:
+    if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
+        BoardVersion.objects.create(split_id=split_id, number=1)
+    # Robust: the rows are committed by then, and a reader draws what no worker has drawn.
+    transaction.on_commit(partial(broker.redraw, split_id), robust=True)
+    # What makes a board another one may make its rank ranges others as well; where not, that is soon seen.
+    transaction.on_commit(partial(broker.infer, split_id), robust=True)
+
+
+def number(split_id: str) -> int:
+    """How often a split's boards have changed."""
+    found = BoardVersion.objects.filter(split=split_id).values_list("number", flat=True).first()
+    return found or 0
+
+
+_STATE = "SELECT coalesce(sum(number), 0) FROM leaderboard_boardversion"
+
+
+def state() -> int:
+    """How often anything that everybody sees has changed: as long as it is the same, so is all of that."""
+    # The driver itself where it can be had, with a prepared statement: this is asked before every answer, and
+    # is all that most of them ask.
+    driver = connection.connection
+    if connection.vendor == "postgresql" and driver is not None and not _is_watched():
+        try:
+            return int(Cursor(driver).execute(_STATE, prepare=True).fetchone()[0])  # type: ignore[index]  # one row
+        except DriverError:
+            pass  # the connection broke meanwhile: below it is found out, and made anew
+    with connection.cursor() as cursor:
+        cursor.execute(_STATE)
+        return int(cursor.fetchone()[0])
+
+
+def state_of(splits: Iterable[Any]) -> int:
+    """The same of all splits that were read with `board_number`, as `snapshots.splits()` does."""
+    return sum(split.board_number or 0 for split in splits)
+
+
+def _is_watched() -> bool:
+    """Whether somebody counts or hinders statements, which they could not do to the driver's."""
+    return connection.queries_logged or bool(connection.execute_wrappers) or connection.in_atomic_block
+
+
+def changed_everywhere() -> None:
+    """The same for every split: a team's name, say, may stand on each of them."""
+    _hold()
+    for split_id in Split.objects.order_by("name").values_list("name", flat=True):
+        _count(split_id)
+
+
+def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
+    """The same for the splits that these methods have submissions to."""
+    methods = list(method_ids)
+    submissions = Submission.objects.filter(method__in=methods)
+    split_ids = sorted(set(submissions.order_by().values_list("split", flat=True).distinct()))
+    if methods and not split_ids:
+        # On no board, and yet with a page of its own: any of the numbers will do.
+        split_ids = list(Split.objects.order_by("name").values_list("name", flat=True)[:1])
+    if split_ids:
+        _hold()
+    for split_id in split_ids:
+        _count(split_id)
+
+
+def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
+    """The same for the splits on whose boards these evaluations stand, just decided, for everybody to see.
+
+    Private methods and editions in preparation change nothing that anybody else sees, also not this number.
+    """
+    # Before looking who is private: whoever shows a method holds this until it is shown.
+    _hold()
+    shown = Evaluation.objects.filter(
+        pk__in=list(evaluation_ids), edition__published_at__isnull=False
+    ).exclude(submission__method__visibility=Visibility.PRIVATE)
+    for split_id in sorted(set(shown.order_by().values_list("edition__split", flat=True).distinct())):
+        _count(split_id)

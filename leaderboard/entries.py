@@ -1,0 +1,242 @@
+"""What a row of a board is, and what of a method a reader is told.
+
+Rows are made from evaluations and from results printed in papers. An anonymous method is masked here, once,
+for every page and format: whatever is made of an `Entry` or a `Profile` later cannot tell what neither holds.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field, replace
+from datetime import datetime
+from typing import Any
+from uuid import UUID
+
+from evaluator.protocol import SCORE_NAMES
+from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility
+from leaderboard.models.methods import MethodQuerySet
+
+ANONYMOUS_TEAM = "Anonymous"
+_INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
+
+
+@dataclass(frozen=True)
+class Details:
+    """What a method uses and costs, as its team says; empty or None where nothing was said."""
+
+    n_frames: int | None = None
+    cameras: str = ""
+    box_source: str = ""
+    uses_nerf: bool | None = None
+    uses_extra_data: bool | None = None
+    pretraining: str = ""
+    n_parameters: int | None = None
+    latency_ms: float | None = None
+    hardware: str = ""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """What a reader is told of a method: everything, or what an anonymous one shows."""
+
+    name: str
+    team: str
+    description: str = ""
+    paper_url: str = ""
+    code_url: str = ""
+    details: Details = field(default_factory=Details)
+
+
+@dataclass(frozen=True)
+class Interval:
+    """Where a value may lie, and its row in that column, at 95 %; None until a worker has computed it."""
+
+    low: float | None = None
+    high: float | None = None
+    rank_low: int | None = None
+    rank_high: int | None = None
+    is_with_best: bool | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One row of a board. `scores` maps the ten names to published values; None where there is none."""
+
+    kind: str  # "submission" or "published"
+    method: str
+    team: str
+    scores: Mapping[str, float | None]
+    description: str = ""
+    rank: int | None = None
+    date: datetime | None = None
+    year: int | None = None
+    method_id: UUID | None = None
+    submission_id: UUID | None = None
+    evaluation_id: UUID | None = None
+    paper_url: str = ""
+    code_url: str = ""
+    source: str = ""  # a published row's citation
+    source_title: str = ""  # of the paper in it
+    details: Details = field(default_factory=Details)
+    # Scored submissions of the team's public methods to the split; of an anonymous or private one its own.
+    n_attempts: int | None = None
+    intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
+    best: frozenset[str] = frozenset()
+    second: frozenset[str] = frozenset()
+    is_mine: bool = False
+    visibility: str = Visibility.PUBLIC
+    pseudonym: str = ""  # of one's own anonymous row: under which everybody else sees it
+    withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
+    is_unscorable: bool = False  # of a former edition, whose successor cannot score the file
+
+    @property
+    def is_visible_to_all(self) -> bool:
+        """Whether everybody sees this row, be it under a pseudonym."""
+        return self.visibility != Visibility.PRIVATE
+
+    @property
+    def date_text(self) -> str:
+        """The date as shown: a day for submissions, a year for published rows."""
+        return f"{self.date:%Y-%m-%d}" if self.date else str(self.year or "")
+
+
+def details_of(method: Method) -> Details:
+    """A method's typed details."""
+    return Details(**{name: getattr(method, name) for name in Details.__dataclass_fields__})
+
+
+def profile_of(method: Method, *, is_masked: bool = False) -> Profile:
+    """What is said of a method. Masked: its pseudonym, and those details that are choices or numbers."""
+    details = details_of(method)
+    if is_masked:
+        told = asdict(details) | {"pretraining": "", "hardware": ""}
+        return Profile(name=method.pseudonym, team=ANONYMOUS_TEAM, details=Details(**told))
+    return Profile(
+        name=method.name,
+        team=method.team.name,
+        description=method.description,
+        paper_url=method.paper_url,
+        code_url=method.code_url,
+        details=details,
+    )
+
+
+def published_entry(result: PublishedResult) -> Entry:
+    """The row of a result that is printed in a paper."""
+    return Entry(
+        kind="published",
+        method=result.method_name,
+        team=result.authors,
+        description=result.description,
+        scores={name: result.scores.get(name) for name in SCORE_NAMES},
+        year=result.year,
+        paper_url=result.source_url,
+        code_url=result.code_url,
+        source=f"{result.authors} ({result.year}). {result.source_title}. {result.source_table}.",
+        source_title=result.source_title,
+        details=Details(uses_nerf=result.uses_nerf, latency_ms=result.latency_ms, hardware=result.hardware),
+    )
+
+
+def named(profile: Profile) -> dict[str, Any]:
+    """The fields of a row that say what the method is."""
+    said = {
+        name: getattr(profile, name) for name in ("team", "description", "paper_url", "code_url", "details")
+    }
+    return {"method": profile.name, **said}
+
+
+def submitted_entry(
+    evaluation: Evaluation,
+    scored: "Scored",
+    *,
+    profile: Profile,
+    withdrawn_at: datetime | None = None,
+    is_unscorable: bool = False,
+) -> Entry:
+    """The row of a submission, as `profile` tells of its method."""
+    submission = evaluation.submission
+    return Entry(
+        kind="submission",
+        **named(profile),
+        scores=flat_scores([]) if withdrawn_at else scored.values,
+        intervals={} if withdrawn_at else scored.intervals,
+        date=submission.submitted_at,
+        method_id=submission.method_id,
+        submission_id=submission.pk,
+        evaluation_id=evaluation.pk,
+        visibility=submission.method.visibility,
+        withdrawn_at=withdrawn_at,
+        is_unscorable=is_unscorable,
+    )
+
+
+# --- their values ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Scored:
+    """The ten values of an evaluation, and the intervals of those that have one."""
+
+    values: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(SCORE_NAMES))
+    intervals: dict[str, Interval] = field(default_factory=dict)
+
+
+def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
+    """The ten names and their values; None where an interval is empty."""
+    values: dict[str, float | None] = dict.fromkeys(SCORE_NAMES)
+    for score in scores:
+        values[_name(score.metric, score.interval)] = score.value
+    return values
+
+
+def scored_of(scores: Iterable[Score]) -> Scored:
+    """The values of one evaluation with their intervals."""
+    found = Scored()
+    for score in scores:
+        name = _name(score.metric, score.interval)
+        found.values[name] = score.value
+        inferred = [getattr(score, column) for column in _INFERRED]
+        if any(item is not None for item in inferred):
+            found.intervals[name] = Interval(*inferred)
+    return found
+
+
+def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
+    """The ten names and their values of every evaluation in an edition: one query, whatever their number."""
+    return {pk: scored.values for pk, scored in scored_in(edition).items()}
+
+
+def scored_in(
+    edition: Edition, *, methods: MethodQuerySet | None = None, has_ranges: bool = True
+) -> dict[UUID, Scored]:
+    """Values and intervals of every evaluation in an edition, or of these methods: one query.
+
+    Ranges are of the entries that stand now; without `has_ranges` they are left out.
+    """
+    rows = Score.objects.filter(evaluation__edition=edition)
+    if methods is not None:
+        rows = rows.filter(evaluation__submission__method__in=methods)
+    found: dict[UUID, Scored] = {}
+    for pk, metric, interval, value, *inferred in rows.values_list(
+        "evaluation_id", "metric", "interval", "value", *_INFERRED
+    ):
+        scored = found.setdefault(pk, Scored())
+        name = _name(metric, interval)
+        scored.values[name] = value
+        if any(item is not None for item in inferred):
+            scored.intervals[name] = Interval(*(inferred if has_ranges else inferred[:2]))
+    return found
+
+
+def placed(entry: Entry, rank: int | None) -> Entry:
+    """The row with its rank. A range that does not hold it is of the board before, and left out."""
+    found = entry.intervals.get("mid", Interval())
+    if rank is None or found.rank_low is None or found.rank_high is None:
+        return replace(entry, rank=rank)
+    if found.rank_low <= rank <= found.rank_high:
+        return replace(entry, rank=rank)
+    unplaced = replace(found, rank_low=None, rank_high=None)
+    return replace(entry, rank=rank, intervals={**entry.intervals, "mid": unplaced})
+
+
+def _name(metric: str, interval: str) -> str:
+    return metric if interval == "overall" else f"{metric}_{interval}"

@@ -1,0 +1,95 @@
+"""Boards of any size, written row by row: what readers are answered, without scoring a single file."""
+
+import random
+from collections.abc import Sequence
+from datetime import timedelta
+
+from django.db import transaction
+from django.utils import timezone
+
+from evaluator.protocol import INTERVAL_NAMES, METRICS
+from leaderboard import boards
+from leaderboard.models import (
+    Edition,
+    Evaluation,
+    Method,
+    Score,
+    Status,
+    Submission,
+    Team,
+    User,
+    Visibility,
+)
+from leaderboard.names import look
+
+
+def fill(edition: Edition, *, n: int, user: User, seed: int = 0) -> list[Method]:
+    """`n` public methods, each of its own team and with one scored submission, as finalising leaves them."""
+    now = timezone.now()
+    first = Team.objects.count()
+    names = [f"Team {first + i}" for i in range(n)]
+    teams = Team.objects.bulk_create(Team(name=name, look=look(name)) for name in names)
+    methods = Method.objects.bulk_create(
+        Method(
+            team=team,
+            name=f"Method {first + i} of scale and time",
+            description="It measures how an object grows from frame to frame.",
+            paper_url=f"https://example.org/papers/{first + i}" if i % 3 == 0 else "",
+            code_url=f"https://example.org/code/{first + i}" if i % 2 == 0 else "",
+            n_frames=2 + i % 5,
+            latency_ms=5.0 + i % 40,
+            visibility=Visibility.PUBLIC,
+            shown_at=now,
+        )
+        for i, team in enumerate(teams)
+    )
+    score(edition, methods=methods, user=user, seed=seed)
+    with transaction.atomic():
+        boards.changed(edition.split_id)
+    return methods
+
+
+def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int = 0) -> None:
+    """One scored submission of each of these methods."""
+    rng = random.Random(seed)
+    now = timezone.now()
+    submissions = Submission.objects.bulk_create(
+        Submission(
+            split_id=edition.split_id,
+            method=method,
+            submitted_by=user,
+            submitted_at=now - timedelta(minutes=i),
+            via=Submission.Via.API,
+            digest=f"sha256:{rng.getrandbits(256):064x}",
+            size_bytes=1000,
+        )
+        for i, method in enumerate(methods)
+    )
+    evaluations = Evaluation.objects.bulk_create(
+        Evaluation(
+            submission=submission,
+            edition=edition,
+            status=Status.SCORED,
+            attempt=1,
+            finished_attempt=1,
+            finished_at=now,
+        )
+        for submission in submissions
+    )
+    Score.objects.bulk_create(
+        Score(
+            evaluation=evaluation,
+            metric=metric,
+            interval=interval,
+            value=value,
+            low=round(value * 0.95, 2),
+            high=round(value * 1.05, 2),
+            rank_low=max(1, i - 3),
+            rank_high=i + 4,
+            is_with_best=i < 3,
+        )
+        for i, evaluation in enumerate(evaluations)
+        for metric in METRICS
+        for interval in INTERVAL_NAMES
+        for value in [round(rng.uniform(8, 80), 2)]
+    )

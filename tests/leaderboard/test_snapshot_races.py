@@ -1,0 +1,78 @@
+"""Boards that change while many read them, each on a connection of its own (SQLite has one writer)."""
+
+import threading
+from pathlib import Path
+
+import pytest
+from django.db import connection, transaction
+from django.test import Client
+
+from leaderboard import boards
+from leaderboard.models import BoardVersion, Score, Split, User
+from tests import board_rows, builders
+
+API = "/api/v1/splits/test/board"
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.services,
+    pytest.mark.django_db(transaction=True),
+    pytest.mark.skipif(
+        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
+    ),
+]
+
+
+def test_no_reader_gets_a_board_that_is_half_changed(benchmark: None, tmp_path: Path, owner: User) -> None:
+    edition = builders.import_truth(tmp_path)
+    board_rows.fill(edition, n=20, user=owner)
+    stopping, faults, n_read = threading.Event(), [], [0] * 3
+
+    def read(reader: int) -> None:
+        client = Client()
+        while not stopping.is_set():
+            entries = client.get(API).json()["entries"]
+            shown = {(e["scores"]["mid"], e["scores"]["rte"]) for e in entries if e["kind"] == "submission"}
+            if len(shown) != 1 and None not in shown:
+                faults.append(shown)
+            n_read[reader] += 1
+        connection.close()
+
+    def set_all(value: float) -> None:
+        with transaction.atomic():
+            Score.objects.filter(interval="overall", metric="mid").update(value=value)
+            Score.objects.filter(interval="overall", metric="rte").update(value=value)
+            boards.changed("test")
+
+    set_all(1.0)
+    readers = [threading.Thread(target=read, args=(i,)) for i in range(3)]
+    for thread in readers:
+        thread.start()
+    try:
+        for round_ in range(12):
+            set_all(2.0 + round_)
+            answered = {
+                e["scores"]["mid"] for e in Client().get(API).json()["entries"] if e["kind"] == "submission"
+            }
+            assert answered == {2.0 + round_}
+    finally:
+        stopping.set()
+        for thread in readers:
+            thread.join()
+    assert faults == []
+    assert min(n_read) > 0
+
+
+def test_numbers_of_changes_that_come_at_once_are_all_counted(benchmark: None) -> None:
+    def change() -> None:
+        for _ in range(10):
+            with transaction.atomic():
+                boards.changed_everywhere()
+        connection.close()
+
+    threads = [threading.Thread(target=change) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    counts = dict(BoardVersion.objects.values_list("split", "number"))
+    assert counts == dict.fromkeys(Split.objects.values_list("pk", flat=True), 40)

@@ -1,0 +1,350 @@
+"""What everybody sees is drawn once, is never old, never mixed, and says nothing of what is private."""
+
+import gzip
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from django.conf import settings
+from django.core.files.base import ContentFile
+from django.db import connection, transaction
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.utils import timezone
+
+from leaderboard import boards, snapshots, standings, submissions, teams
+from leaderboard.models import (
+    Edition,
+    Evaluation,
+    Method,
+    PublishedResult,
+    Score,
+    Snapshot,
+    Status,
+    Submission,
+    User,
+    Visibility,
+)
+from leaderboard.web.kept import memory
+from tests import board_rows, builders
+from tests.editions import corrected, open_edition, publish
+
+API = "/api/v1/splits/test/board"
+PAGE = "/board/test/"
+MAX_QUERIES = 3
+PUBLIC = (
+    *("/", PAGE, "/board/test/?sort=-rte&columns=rte", "/board/test/?q=scale", "/board/test/?page=2"),
+    *(
+        "/board/test/editions/",
+        "/board/test/editions/1/",
+        "/methods/{method}/",
+        "/compare/?m={method}&m={other}",
+    ),
+    *(API, f"{API}?sort=mid", f"{API}?nerf=no", "/api/v1/splits", "/api/v1/splits/test/editions"),
+    *("/api/v1/splits/test/editions/1/board", "/api/v1/splits/test/changelog"),
+    *("/board/test/charts/", "/board/test.csv", "/board/test.tex?intervals=1", "/board/test.md?sort=rte"),
+    *("/board/test.bib", "/board/test/editions/1.csv", "/feed.atom", "/board/test/feed.atom"),
+    *("/methods/{method}/badge.svg", "/methods/{method}/badge.svg?split=val"),
+)
+
+
+@pytest.fixture
+def filled(edition: Edition, owner: User) -> list[Method]:
+    """A board of a dozen rows."""
+    return board_rows.fill(edition, n=12, user=owner)
+
+
+def by_hand(change: Callable[[], object], *, split: str = "test") -> None:
+    """Change rows past the verbs, and say so as a verb would."""
+    with transaction.atomic():
+        change()
+        boards.changed(split)
+
+
+def n_queries(client: Client, address: str) -> int:
+    with CaptureQueriesContext(connection) as captured:
+        assert client.get(address).status_code == 200, address
+    return len(captured)
+
+
+def etag(client: Client, address: str = API) -> str:
+    return str(client.get(address)["ETag"])
+
+
+# --- it is what it was drawn from --------------------------------------------------------------------------
+
+
+def test_what_is_kept_is_what_the_database_says(edition: Edition, filled: list[Method]) -> None:
+    drawn = snapshots.draw(edition)
+    kept = snapshots._decoded(bytes(Snapshot.objects.get().body))
+    assert kept == drawn
+    assert kept is not None
+    assert kept.entries == standings.everybodys(split=edition.split, edition=edition)
+    assert len(kept.entries) == 12 + edition.split.published_results.count()
+    assert {attempt.method_id for attempt in kept.attempts} == {method.pk for method in filled}
+
+
+def test_two_processes_that_draw_the_same_write_the_same_bytes(
+    edition: Edition, filled: list[Method]
+) -> None:
+    first, second = snapshots._at_present(edition)[0], snapshots._at_present(edition)[0]
+    assert first == second
+
+
+def test_the_order_in_which_rows_lie_changes_no_byte(edition: Edition, filled: list[Method]) -> None:
+    shown, _ = snapshots._at_present(edition)
+    for row in Evaluation.objects.order_by("-pk"):
+        # PostgreSQL writes it anew, behind all others.
+        Evaluation.objects.filter(pk=row.pk).update(last_error="")
+    for result in PublishedResult.objects.order_by("-pk"):
+        PublishedResult.objects.filter(pk=result.pk).update(year=result.year)
+    assert snapshots._at_present(edition)[0] == shown
+
+
+def test_another_program_s_snapshot_is_drawn_anew(
+    edition: Edition, filled: list[Method], client: Client
+) -> None:
+    right = client.get(API).json()
+    Snapshot.objects.update(body=b'{"shape": "of old", "drawn": {"entries": []}}', etag="another")
+    memory.clear()
+    assert client.get(API).json() == right
+    Snapshot.objects.update(body=b"\x80nothing that can be read", etag="broken")
+    memory.clear()
+    assert client.get(API).json() == right
+
+
+# --- it is never old ---------------------------------------------------------------------------------------
+
+
+def test_every_change_is_seen_by_the_very_next_reader(edition: Edition, owner: User, client: Client) -> None:
+    def rows() -> int:
+        return len([e for e in client.get(API).json()["entries"] if e["kind"] == "submission"])
+
+    assert rows() == 0
+    submission = builders.submit(owner, builders.predictions(edition), method="Foo")
+    assert rows() == 0
+    builders.score_all()
+    assert rows() == 1
+    assert "Foo" in client.get(PAGE).text
+    submissions.withdraw(submission=submission, actor=owner, now=timezone.now())
+    [entry] = [e for e in client.get(API).json()["entries"] if e["kind"] == "submission"]
+    assert entry["withdrawn_at"] is not None
+    assert "withdrawn" in client.get(PAGE).text
+
+
+def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
+    edition: Edition, owner: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
+    builders.score_all()
+    number, is_shown = boards.number("test"), list[bool]()
+
+    def show_meanwhile(execute, sql, params, many, context):
+        if sql.startswith('UPDATE "leaderboard_method"') and not is_shown:
+            is_shown.append(True)
+            Method.objects.update(visibility=Visibility.PUBLIC, shown_at=timezone.now())
+        return execute(sql, params, many, context)
+
+    data = builders.predictions(edition, factor=1.2)
+    with connection.execute_wrapper(show_meanwhile):
+        submissions.submit(
+            user=owner,
+            split_name="test",
+            method_name="Foo",
+            upload=ContentFile(data, name="x"),
+            via="API",
+            now=timezone.now(),
+            description="Said anew.",
+        )
+    assert is_shown
+    assert boards.number("test") == number + 1
+
+
+def test_changing_outside_of_a_transaction_is_refused() -> None:
+    with pytest.raises(RuntimeError, match="outside of the transaction"):
+        boards.changed("test")
+
+
+def test_nobody_hears_of_a_change_that_was_taken_back(edition: Edition, filled: list[Method]) -> None:
+    before = boards.state()
+    with transaction.atomic():
+        boards.changed("test")
+        transaction.set_rollback(True)
+    assert boards.state() == before
+
+
+def test_editions_in_preparation_move_no_number(
+    edition: Edition, entries: list[Submission], second: Edition
+) -> None:
+    before = boards.state()
+    assert builders.score_all() > 0
+    assert second.evaluations.filter(status=Status.SCORED).count() == len(entries)
+    assert boards.state() == before
+
+
+def test_what_was_changed_by_hand_is_found_by_the_sweep(
+    edition: Edition, filled: list[Method], client: Client
+) -> None:
+    old = client.get(API).json()
+    Score.objects.filter(metric="mid", interval="overall").update(value=1.0)
+    assert client.get(API).json() == old
+    assert snapshots.check(now=timezone.now()) == 0  # it was drawn a moment ago
+    assert snapshots.check(now=timezone.now() + timedelta(hours=1)) == 1
+    assert {e["scores"]["mid"] for e in client.get(API).json()["entries"] if e["kind"] == "submission"} == {
+        1.0
+    }
+
+
+def test_a_worker_draws_what_changed_before_anybody_asks(edition: Edition, filled: list[Method]) -> None:
+    assert snapshots.redraw(split_id="test", now=timezone.now())
+    assert not snapshots.redraw(split_id="test", now=timezone.now())
+    by_hand(lambda: None)
+    assert not snapshots.redraw(split_id="test", now=timezone.now())  # again at once: left to the reader
+    assert snapshots.redraw(split_id="test", now=timezone.now() + timedelta(seconds=2))
+    assert not snapshots.redraw(split_id="val", now=timezone.now())  # there is no board yet
+    assert not snapshots.redraw(split_id="nowhere", now=timezone.now())
+
+
+# --- what is private moves nothing -------------------------------------------------------------------------
+
+
+def test_a_private_submission_changes_no_byte_and_no_tag(
+    edition: Edition, filled: list[Method], owner: User, client: Client
+) -> None:
+    addresses = [address.format(method=filled[0].pk, other=filled[1].pk) for address in PUBLIC]
+    before = {address: client.get(address) for address in addresses}
+    method = Method.objects.create(team=teams.team_of(user=owner), name="Secret")
+    by_hand(lambda: board_rows.score(edition, methods=[method], user=owner))
+    for address, old in before.items():
+        new = client.get(address)
+        assert new.content == old.content, address
+        assert new.headers.get("ETag") == old.headers.get("ETag"), address
+
+
+def test_own_private_rows_are_added_for_their_team_alone(
+    edition: Edition, filled: list[Method], owner: User, stranger: User, client: Client
+) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Secret")
+    Method.objects.filter(name="Secret").update(visibility=Visibility.PRIVATE)
+    builders.score_all()
+    public = client.get(API).json()["entries"]
+    client.force_login(owner)
+    mine = client.get(API)
+    assert [e["method"] for e in mine.json()["entries"] if e not in public] == ["Secret"]
+    assert mine["Cache-Control"].startswith("private")
+    assert "Cookie" in mine["Vary"]
+    client.force_login(stranger)
+    assert client.get(API).json()["entries"] == public
+
+
+# --- what it costs -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("n", [3, 300])
+def test_a_public_page_takes_three_statements_whatever_its_size(
+    edition: Edition, owner: User, client: Client, n: int
+) -> None:
+    methods = board_rows.fill(edition, n=n, user=owner)
+    client.get(PAGE)  # whoever finds a changed board draws it, for all who follow
+    addresses = [address.format(method=methods[0].pk, other=methods[1].pk) for address in PUBLIC]
+    for address in addresses:
+        if address.startswith("/compare/"):
+            client.get(address)  # whoever compares first asks a worker to
+    for forget in (lambda: None, snapshots._remembered.clear):
+        memory.clear()
+        forget()
+        counts = {address: n_queries(client, address) for address in addresses}
+        assert {address: count for address, count in counts.items() if count > MAX_QUERIES} == {}
+    again = {address: n_queries(client, address) for address in addresses if "compare" not in address}
+    assert set(again.values()) == {1}
+
+
+# --- conditional requests and compression ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("address", [PAGE, API, "/board/test/editions/1/"])
+def test_who_knows_an_answer_is_not_sent_it_again(
+    edition: Edition, filled: list[Method], client: Client, address: str
+) -> None:
+    first = client.get(address)
+    tag = first["ETag"]
+    assert tag.startswith('"')
+    assert first["Cache-Control"] == "public, no-cache"
+    assert {"Cookie", "Authorization", "Accept-Encoding"} <= set(first["Vary"].split(", "))
+    second = client.get(address, headers={"If-None-Match": f'"other", {tag}'})
+    assert (second.status_code, second.content, second["ETag"]) == (304, b"", tag)
+    assert client.get(address, headers={"If-None-Match": f"W/{tag}"}).status_code == 304
+    by_hand(lambda: Method.objects.filter(pk=filled[0].pk).update(name="Renamed"))
+    third = client.get(address, headers={"If-None-Match": tag})
+    assert third.status_code == 200
+    assert "Renamed" in third.text
+
+
+def test_a_change_that_nobody_sees_keeps_the_tag(
+    edition: Edition, filled: list[Method], client: Client
+) -> None:
+    before = etag(client)
+    by_hand(lambda: None)
+    assert etag(client) == before
+
+
+def test_answers_come_compressed_for_who_takes_that(
+    edition: Edition, filled: list[Method], client: Client
+) -> None:
+    plain = client.get(API)
+    packed = client.get(API, headers={"Accept-Encoding": "br, gzip"})
+    assert packed["Content-Encoding"] == "gzip"
+    assert gzip.decompress(packed.content) == plain.content
+    assert packed["ETag"] != plain["ETag"]  # other bytes, another strong tag
+    refusing = client.get(API, headers={"Accept-Encoding": "gzip;q=0, *"})
+    assert refusing.content == plain.content
+    assert int(packed["Content-Length"]) == len(packed.content) < len(plain.content) / 3
+    known = {"Accept-Encoding": "gzip", "If-None-Match": packed["ETag"]}
+    assert client.get(API, headers=known).status_code == 304
+
+
+def test_head_says_the_same_without_the_bytes(edition: Edition, filled: list[Method], client: Client) -> None:
+    whole = client.get(API)
+    head = client.head(API)
+    assert head.content == b""
+    assert {name: head[name] for name in ("ETag", "Content-Length", "Content-Type")} == {
+        name: whole[name] for name in ("ETag", "Content-Length", "Content-Type")
+    }
+
+
+def test_security_headers_are_those_of_any_page(
+    edition: Edition, filled: list[Method], client: Client
+) -> None:
+    client.get(PAGE)
+    kept = client.get(PAGE)
+    for name in ("Content-Security-Policy", "X-Frame-Options", "X-Content-Type-Options", "X-Request-ID"):
+        assert kept.headers.get(name), name
+
+
+def test_only_whole_answers_are_remembered(edition: Edition, client: Client) -> None:
+    for address in (f"{API}?sort=nothing", "/board/nowhere/", f"{API}?at=2026-01-01"):
+        first = client.get(address)
+        assert not first.has_header("ETag"), address
+        assert memory.get(address) is None, address
+
+
+def test_nobody_chooses_what_others_are_answered_from_memory(edition: Edition, tmp_path: Path) -> None:
+    publish(open_edition(corrected(tmp_path, factor=1.3)))
+    address = "/api/v1/splits/test/editions?limit=1"
+    first = Client().get(address, headers={"accept": "application/json; indent=8", "host": "evil.example"})
+    then = Client().get(address)
+    assert then.content == first.content
+    assert b"\n" not in then.content
+    assert then.headers["Link"].startswith(f"<{settings.SITE_URL}{address}&after=")
+
+
+def test_what_is_remembered_is_bounded(edition: Edition, filled: list[Method], client: Client) -> None:
+    small = type(memory)(limit_bytes=100_000)
+    client.get(API)
+    found = memory.get(API)
+    assert found is not None
+    for i in range(50):
+        small.put(f"/{i}", *found)
+    assert small.get("/0") is None
+    assert small.get("/49") is not None
