@@ -1,9 +1,33 @@
-"""Tables for programs and spreadsheets."""
+"""Tables to take along: a board as CSV, LaTeX and Markdown, and any rows as CSV.
+
+Every number is the text that the page shows. The texts of strangers are shown as they are and have no power
+over what is around them, in a spreadsheet, a paper or a note.
+"""
 
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, fields
 from typing import Final
+
+from evaluator import layouts
+from evaluator.protocol import METRICS, SCORE_NAMES
+from evaluator.report import format_published
+from leaderboard.entries import Details, Entry, Interval
+from leaderboard.filters import BadFilter
+from leaderboard.standings import Board
+
+DECIMALS: Final = 2
+_DETAILS: Final = tuple(field.name for field in fields(Details))
+CSV_COLUMNS: Final = (
+    *("rank", "rank_low", "rank_high", "kind", "method", "team", "date"),
+    *SCORE_NAMES,
+    *("n_attempts", *_DETAILS, "description", "paper_url", "code_url", "source"),
+    *("method_id", "withdrawn_at"),
+)
+"""Of a board; with intervals the lower and upper ends of the ten values follow."""
+
+INTERVAL_COLUMNS: Final = tuple(f"{name}_{end}" for name in SCORE_NAMES for end in ("low", "high"))
 
 # A spreadsheet takes a cell that begins like this for a formula and runs it; the wide forms as well.
 _FORMULA_STARTS: Final = tuple("=+-@\t\r\n＝＋－＠")
@@ -34,3 +58,141 @@ def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -
         line.truncate()
         writer.writerow({name: guarded(v) if isinstance(v, str) else v for name, v in row.items()})
     yield line.getvalue()
+
+
+WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
+
+
+def has_intervals(text: str) -> bool:
+    """Whether an address asks for intervals; without a word it does not. Raises `filters.BadFilter`."""
+    if text and text not in WITH_INTERVALS:
+        raise BadFilter("intervals", text, f"one of {', '.join(WITH_INTERVALS)}")
+    return WITH_INTERVALS.get(text, False)
+
+
+# --- a board ---------------------------------------------------------------------------------------------
+
+
+def printed_decimals(values: Iterable[float | None]) -> int:
+    """With how many decimals a row was printed: one, or two where any of its values has two.
+
+    >>> printed_decimals([14.8, 55.0]), printed_decimals([14.82, 55.0])
+    (1, 2)
+    """
+    known = [value for value in values if value is not None]
+    return 1 if all(round(value, 1) == value for value in known) else DECIMALS
+
+
+def _decimals(entry: Entry) -> int:
+    return printed_decimals(entry.scores.values()) if entry.kind == "published" else DECIMALS
+
+
+def board_csv(board: Board, *, has_intervals: bool = False) -> str:
+    """Every row of a board, as it is shown: one line for each, empty cells where nothing is known."""
+    columns = (*CSV_COLUMNS, *(INTERVAL_COLUMNS if has_intervals else ()))
+    rows = (_csv_row(entry, has_intervals=has_intervals) for entry in board.entries)
+    return csv_text(rows, columns=columns)
+
+
+def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
+    decimals = _decimals(entry)
+    ranks = entry.intervals.get("mid", Interval())
+    row: dict[str, object] = {
+        "rank": entry.rank,
+        "rank_low": ranks.rank_low,
+        "rank_high": ranks.rank_high,
+        **{name: getattr(entry, name) for name in ("kind", "method", "team", "n_attempts")},
+        "date": entry.date_text,
+        **{name: format_published(entry.scores[name], decimals=decimals, missing="") for name in SCORE_NAMES},
+        **asdict(entry.details),
+        **{name: getattr(entry, name) for name in ("description", "paper_url", "code_url", "source")},
+        "method_id": entry.method_id,
+        "withdrawn_at": entry.withdrawn_at.isoformat() if entry.withdrawn_at else None,
+    }
+    if has_intervals:
+        for name in SCORE_NAMES:
+            found = entry.intervals.get(name, Interval())
+            row[f"{name}_low"] = format_published(found.low, missing="")
+            row[f"{name}_high"] = format_published(found.high, missing="")
+    return row
+
+
+def board_latex(
+    board: Board, *, address: str, metrics: Sequence[str] = METRICS, has_intervals: bool = False
+) -> str:
+    """A board as a table of LaTeX (booktabs), without what was withdrawn; comments say what it is."""
+    rows = _layout(board, metrics=metrics, has_intervals=has_intervals)
+    return layouts.as_latex(rows, about=about(board, address=address), metrics=metrics)
+
+
+def board_markdown(
+    board: Board, *, address: str, metrics: Sequence[str] = METRICS, has_intervals: bool = False
+) -> str:
+    """A board as a table of Markdown, without what was withdrawn; below it stands what it is."""
+    rows = _layout(board, metrics=metrics, has_intervals=has_intervals)
+    return layouts.as_markdown(rows, about=about(board, address=address), metrics=metrics)
+
+
+def about(board: Board, *, address: str) -> tuple[str, ...]:
+    """What a table was taken from: enough to find it again when the board has moved on."""
+    lines = [f"TSTTC leaderboard, {board.split.pk}: {address}"]
+    if board.edition is not None:
+        truth = board.edition.ground_truth
+        lines += [
+            f"Edition {board.edition.number}, protocol {board.edition.protocol}, "
+            f"{truth.n_sequences:,} sequences of {truth.n_recordings:,} recordings",
+            f"Ground truth {truth.digest}",
+        ]
+    moment = board.at or board.updated_at
+    if moment is not None:
+        lines.append(f"As of {moment:%Y-%m-%d %H:%M} UTC")
+    return tuple(lines)
+
+
+def _layout(board: Board, *, metrics: Sequence[str], has_intervals: bool) -> list[layouts.Row]:
+    columns = layouts.columns(metrics)
+    return [
+        layouts.Row(
+            rank=_rank(entry, has_range=has_intervals),
+            method=entry.method,
+            team=short_authors(entry.team) if entry.kind == "published" else entry.team,
+            cells=tuple(_cell(entry, name, has_interval=has_intervals) for name in columns),
+        )
+        for entry in board.entries
+        if entry.withdrawn_at is None
+    ]
+
+
+def _rank(entry: Entry, *, has_range: bool) -> str:
+    text = layouts.ABSENT if entry.rank is None else str(entry.rank)
+    found = entry.intervals.get("mid", Interval())
+    if not has_range or found.rank_low is None or found.rank_high is None:
+        return text
+    both = str(found.rank_low) if found.rank_low == found.rank_high else f"{found.rank_low}–{found.rank_high}"
+    return f"{text} ({both})"
+
+
+def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:
+    found = entry.intervals.get(name, Interval()) if has_interval else Interval()
+    return layouts.Cell(
+        text=format_published(entry.scores[name], decimals=_decimals(entry), missing=layouts.ABSENT),
+        low=format_published(found.low, missing=""),
+        high=format_published(found.high, missing=""),
+        is_best=name in entry.best,
+        is_second=name in entry.second,
+    )
+
+
+def short_authors(authors: str) -> str:
+    """Authors as a table has room for them.
+
+    >>> short_authors("Yuheng Shi, Zehao Huang, Yan Yan")
+    'Shi et al.'
+    >>> short_authors("Ada Lovelace, Charles Babbage"), short_authors("Ada Lovelace")
+    ('Lovelace and Babbage', 'Ada Lovelace')
+    """
+    names = [name.strip() for name in authors.split(",") if name.strip()]
+    if len(names) < 2:
+        return authors
+    surnames = [name.split()[-1] for name in names]
+    return " and ".join(surnames) if len(names) == 2 else f"{surnames[0]} et al."

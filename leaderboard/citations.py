@@ -1,0 +1,112 @@
+"""BibTeX: of the benchmark's paper, of the papers that published rows are quoted from, and of methods."""
+
+import json
+import re
+import unicodedata
+from collections.abc import Iterable
+from functools import lru_cache
+from typing import Final
+
+from evaluator.escaping import latex, one_line
+from leaderboard.benchmark import PUBLISHED_DIR
+from leaderboard.entries import Entry
+
+_ARXIV: Final = re.compile(
+    r"https?://(?:www\.)?arxiv\.org/(?:abs|pdf)/([0-9]{4}\.[0-9]{4,5})(?:v[0-9]+)?(?:\.pdf)?"
+)
+# What would end a field, or LaTeX's reading of an address, is written as the address' own escape.
+_IN_ADDRESSES: Final = {character: f"%{ord(character):02X}" for character in '{}\\^~"` |<>'}
+
+
+def board_bibtex(entries: Iterable[Entry]) -> str:
+    """The benchmark's paper, then one entry for each further paper that a row names."""
+    found = {benchmark_key(): of_benchmark()}
+    for entry in entries:
+        if entry.withdrawn_at is None and (entry.source_title or entry.paper_url):
+            found.setdefault(key_of(entry), of_entry(entry))
+    return "\n".join(found.values())
+
+
+@lru_cache(maxsize=1)
+def _benchmark() -> dict[str, str]:
+    path = PUBLISHED_DIR / "tsttc-2023.json"
+    source: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))["source"]
+    return source
+
+
+def benchmark_key() -> str:
+    """How the benchmark's paper is cited."""
+    source = _benchmark()
+    return _paper_key(source["authors"], source["year"], source["title"])
+
+
+def of_benchmark() -> str:
+    """The benchmark's paper."""
+    source = _benchmark()
+    return _paper(benchmark_key(), source["title"], source["authors"], str(source["year"]), source["url"])
+
+
+def key_of(entry: Entry) -> str:
+    """How a row is cited: a published one by its paper, a method by its name and the start of its id."""
+    if entry.kind == "published":
+        return _paper_key(entry.team, entry.year or "", entry.source_title)
+    name = _plain(entry.method)[:40].strip("-") or "method"
+    return f"{name}-{entry.method_id.hex[:6] if entry.method_id else ''}"
+
+
+def of_entry(entry: Entry, *, page: str = "") -> str:
+    """A row's own entry. Of a method it names the team and the paper's address, which is all that is known.
+
+    A method without a paper is cited by its `page`.
+    """
+    if entry.kind == "published":
+        year = str(entry.year or "")
+        return _paper(key_of(entry), entry.source_title, entry.team, year, entry.paper_url)
+    return _entry(
+        key_of(entry),
+        {
+            "title": f"{{{latex(entry.method)}}}",
+            "author": f"{{{latex(entry.team)}}}",
+            "year": f"{entry.date:%Y}" if entry.date else "",
+            **_address(entry.paper_url or page),
+            "note": "TSTTC leaderboard",
+        },
+    )
+
+
+def _paper(key: str, title: str, authors: str, year: str, url: str) -> str:
+    names = [name.strip() for name in authors.split(",") if name.strip()]
+    return _entry(
+        key,
+        {
+            "title": f"{{{latex(title)}}}",
+            "author": " and ".join(latex(name) for name in names),
+            "year": year,
+            **_address(url),
+        },
+    )
+
+
+def _address(url: str) -> dict[str, str]:
+    fields = {"url": "".join(_IN_ADDRESSES.get(c, c) for c in one_line(url))}
+    arxiv = _ARXIV.fullmatch(url)
+    return {"eprint": arxiv[1], "archivePrefix": "arXiv", **fields} if arxiv else fields
+
+
+def _entry(key: str, fields: dict[str, str]) -> str:
+    lines = [f"  {name} = {{{value}}}," for name, value in fields.items() if value]
+    return "\n".join([f"@misc{{{key},", *lines, "}", ""])
+
+
+def _paper_key(authors: str, year: object, title: str) -> str:
+    first_author = authors.partition(",")[0]
+    surname = _plain(first_author.rpartition(" ")[2]) or "paper"
+    words = [_plain(word) for word in re.split(r"[\s:-]+", title)]
+    word = next((word for word in words if len(word) > 3), "")
+    return f"{surname}{year}{word}"
+
+
+def _plain(text: str) -> str:
+    """Letters and digits of ASCII, with hyphens between: what every BibTeX takes in a key."""
+    ascii_text = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", ascii_text).strip("-")

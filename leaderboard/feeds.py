@@ -1,0 +1,78 @@
+"""New entries as an Atom feed (RFC 4287): what everybody sees, under the names that everybody sees."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Final
+from uuid import NAMESPACE_URL, UUID, uuid5
+from xml.etree import ElementTree as ET
+
+from evaluator.escaping import one_line
+from evaluator.report import format_published
+from leaderboard.entries import Entry
+from leaderboard.models import Split
+
+MAX_ENTRIES: Final = 50
+_ATOM: Final = "http://www.w3.org/2005/Atom"
+# Of a feed in which nothing has happened yet: when the benchmark was published.
+_BEGINNING: Final = datetime(2023, 9, 4, tzinfo=UTC)
+
+
+@dataclass(frozen=True)
+class Item:
+    """A row of a board, and where it is told of."""
+
+    split: Split
+    entry: Entry
+    address: str
+
+    @property
+    def at(self) -> datetime:
+        """When what stands there was submitted."""
+        return self.entry.date or _BEGINNING
+
+    @property
+    def id(self) -> UUID:
+        """The same as long as the method is on the board, whatever it is called and has scored."""
+        assert self.entry.method_id is not None  # noqa: S101 - for the type checker: rows of submissions have one
+        return uuid5(self.entry.method_id, self.split.pk)
+
+
+def is_news(entry: Entry) -> bool:
+    """Whether a row is told of: one that somebody submitted, and that still stands."""
+    return entry.kind == "submission" and entry.withdrawn_at is None
+
+
+def atom(items: Iterable[Item], *, title: str, address: str, page: str) -> bytes:
+    """The newest of these as a feed at `address`, which tells of what `page` shows."""
+    newest = sorted(items, key=lambda item: (item.at, item.id.int), reverse=True)[:MAX_ENTRIES]
+    feed = ET.Element("feed", xmlns=_ATOM)
+    _text(feed, "id", uuid5(NAMESPACE_URL, address).urn)
+    _text(feed, "title", title)
+    _text(feed, "updated", _moment(newest[0].at if newest else _BEGINNING))
+    ET.SubElement(feed, "link", rel="self", type="application/atom+xml", href=address)
+    ET.SubElement(feed, "link", rel="alternate", type="text/html", href=page)
+    for item in newest:
+        _entry(feed, item)
+    return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(feed, encoding="utf-8")
+
+
+def _entry(feed: ET.Element, item: Item) -> None:
+    entry = item.entry
+    element = ET.SubElement(feed, "entry")
+    _text(element, "id", item.id.urn)
+    _text(element, "title", f"{entry.method} on {item.split.pk}: MiD {format_published(entry.scores['mid'])}")
+    _text(element, "updated", _moment(item.at))
+    _text(ET.SubElement(element, "author"), "name", entry.team)
+    ET.SubElement(element, "link", rel="alternate", type="text/html", href=item.address)
+    rank = f"Rank {entry.rank}. " if entry.rank is not None else ""
+    mid, rte = format_published(entry.scores["mid"]), format_published(entry.scores["rte"])
+    _text(element, "summary", f"{rank}MiD {mid} ×10⁻⁴, RTE {rte} %; lower is better.")
+
+
+def _text(parent: ET.Element, name: str, text: str) -> None:
+    ET.SubElement(parent, name).text = one_line(text)
+
+
+def _moment(at: datetime) -> str:
+    return at.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -1,0 +1,285 @@
+"""Boards to take along: the page's numbers, and names of strangers that have no power in any form."""
+
+import csv
+import io
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+from django.db import transaction
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import boards, submissions
+from leaderboard.models import Edition, Method, User, Visibility
+from tests import board_rows, builders, pages
+from tests.services import REQUIRED
+
+FORMS = ("csv", "json", "tex", "md", "bib")
+HOSTILE = (
+    "=HYPERLINK(1)|*b* <script>alert(1)</script>",
+    r"\input{/etc/passwd} $x^2$ 50 % _a_ #1 & ~ } {",
+    "--- ''quoted'' `` ?` \"x\" [1] (y) ]",
+    "中文 Ελληνικά Ŝtrąża 😀 Müller",
+    "@everyone www.example.org https://example.org a\\",
+    "![image](https://example.org/x.png) | --- |",
+)
+BIDI = "Turned \u202eround\u202c"
+
+
+@pytest.fixture
+def hostile(edition: Edition, owner: User) -> list[Method]:
+    """A board whose methods, teams and addresses are called what nobody should be called."""
+    methods = board_rows.fill(edition, n=len(HOSTILE) + 1, user=owner)
+    for method, name in zip(methods, (*HOSTILE, BIDI), strict=True):
+        Method.objects.filter(pk=method.pk).update(
+            name=name, description=name, paper_url=r"https://example.org/a_b%20{c}?x=1&y=#\d"
+        )
+        method.team.name = name[:70]
+        method.team.save()
+    return methods
+
+
+def text_of(client: Client, form: str, query: str = "", split: str = "test") -> str:
+    response = client.get(f"/board/{split}.{form}{query}", follow=True)
+    assert response.status_code == 200, response.content[:300]
+    return response.text
+
+
+def csv_rows(client: Client, query: str = "") -> list[dict[str, str]]:
+    return list(csv.DictReader(io.StringIO(text_of(client, "csv", query))))
+
+
+def page_numbers(client: Client, query: str = "") -> list[list[str]]:
+    """The ten numbers of every row as the page shows them."""
+    rows = pages.board_rows(pages.page(client.get(f"/board/test/{query}")))
+    return [[_number(text) for text in row[4:14]] for row in rows]
+
+
+def _number(text: str) -> str:
+    found = re.match(r"[0-9.]+|–", text)
+    return found[0] if found else text
+
+
+# --- the same as the page ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("query", ["", "?sort=-rte_large", "?q=scale&sort=method", "?code=yes"])
+def test_every_form_has_the_page_s_rows_in_its_order_with_its_numbers(
+    edition: Edition, owner: User, client: Client, query: str
+) -> None:
+    board_rows.fill(edition, n=8, user=owner)
+    shown = page_numbers(client, query)
+    names = csv_rows(client, query)[0].keys() - {"rank"}
+    assert "mid_crucial" in names
+    from_csv = [
+        [v or "–" for k, v in row.items() if re.match(r"(mid|rte)", k)] for row in csv_rows(client, query)
+    ]
+    assert from_csv == shown
+    lines = [line for line in text_of(client, "md", query).splitlines() if line.startswith("|")][2:]
+    assert [[re.sub(r"\*", "", c.strip()) for c in line.split("|")[4:14]] for line in lines] == shown
+    body = text_of(client, "tex", query).partition("\\midrule\n")[2].partition("\\bottomrule")[0]
+    cells = [
+        [
+            re.sub(r"\\(textbf|underline)\{(.*)\}", r"\2", c.removesuffix(" \\\\").strip())
+            for c in r.split(" & ")
+        ]
+        for r in body.splitlines()
+    ]
+    assert [[c.replace("--", "–") for c in row[3:]] for row in cells] == shown
+    values = [list(e["scores"].values()) for e in json.loads(text_of(client, "json", query))["entries"]]
+    assert [[f"{float(text):g}" for text in row] for row in shown] == [
+        [f"{v:g}" for v in row] for row in values
+    ]
+
+
+def test_best_is_bold_and_second_is_underlined_as_on_the_page(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    board_rows.fill(edition, n=8, user=owner)
+    table = pages.page(client.get("/board/test/")).one("table", class_="board")
+    best = sorted(_number(e.text) for e in table.all("strong"))
+    second = sorted(_number(e.text) for e in table.all("u"))
+    tex, md = text_of(client, "tex"), text_of(client, "md").rpartition("lower is better")[0]
+    assert sorted(re.findall(r"\\textbf\{([0-9.]+)\}", tex)) == best
+    assert sorted(re.findall(r"\\underline\{([0-9.]+)\}", tex)) == second
+    assert sorted(re.findall(r"\*\*([0-9.]+)\*\*", md)) == best
+    assert sorted(re.findall(r" \*([0-9.]+)\*", md)) == second
+
+
+def test_intervals_come_for_who_asks(edition: Edition, owner: User, client: Client) -> None:
+    board_rows.fill(edition, n=3, user=owner)
+    assert r"\scriptsize" not in text_of(client, "tex")
+    assert text_of(client, "tex", "?intervals=1").count(r"\scriptsize") == 30
+    assert re.search(r"\*?[0-9.]+\*? \[[0-9.]+, [0-9.]+\]", text_of(client, "md", "?intervals=1"))
+    rows = csv_rows(client, "?intervals=1")
+    scored = next(row for row in rows if row["kind"] == "submission")
+    assert float(scored["mid_low"]) < float(scored["mid"]) < float(scored["mid_high"])
+    assert next(row for row in rows if row["kind"] == "published")["mid_low"] == ""
+    for query, n in (("", 0), ("?intervals=1", 10)):
+        entries = json.loads(text_of(client, "json", query))["entries"]
+        assert {len(e["intervals"]) for e in entries if e["kind"] == "submission"} == {n}
+    for form in ("tex", "json"):
+        assert client.get(f"/board/test.{form}?intervals=perhaps", follow=True).status_code == 400
+
+
+def test_columns_of_one_error_are_taken_alone(edition: Edition, owner: User, client: Client) -> None:
+    board_rows.fill(edition, n=2, user=owner)
+    assert "RTE" not in text_of(client, "tex", "?columns=mid")
+    assert "MiD" not in text_of(client, "md", "?columns=rte").partition("TSTTC")[0]
+
+
+def test_tables_say_what_they_were_taken_from(edition: Edition, owner: User, client: Client) -> None:
+    board_rows.fill(edition, n=2, user=owner)
+    for form in ("tex", "md"):
+        text = text_of(client, form, "?sort=rte").replace("\\", "").replace("&#58;", ":")
+        assert f"/board/test/editions/{edition.number}/?sort=rte" in text
+        assert edition.ground_truth_id in text
+        assert f"{timezone.now():%Y-%m-%d}" in text
+
+
+def test_the_board_as_of_a_time_is_taken_as_of_that_time(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    board_rows.fill(edition, n=2, user=owner)
+    assert "Method 0" not in text_of(client, "csv", "?at=2020-01-01")
+    assert "/board/test/?at=2020-01-01" in text_of(client, "tex", "?at=2020-01-01")
+
+
+def test_editions_are_taken_along_at_an_address_that_stays(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    board_rows.fill(edition, n=2, user=owner)
+    for form in FORMS:
+        response = client.get(f"/board/test/editions/1.{form}", follow=True)
+        assert response.status_code == 200
+        assert form == "json" or f"tsttc-test-edition-1.{form}" in response["Content-Disposition"]
+    assert client.get("/board/test/editions/9.csv").status_code == 404
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_a_board_without_ground_truth_has_its_published_rows(
+    benchmark: None, client: Client, form: str
+) -> None:
+    text = text_of(client, form)
+    assert ("Deep Scale" in text) == (form != "bib")
+
+
+@pytest.mark.parametrize(
+    ("address", "status"),
+    [
+        ("/board/nowhere.csv", 404),
+        ("/board/test.xls", 404),
+        ("/board/test.tex?sort=beauty", 400),
+        ("/board/test.md?at=yesterday", 400),
+        ("/board/test.csv?nerf=perhaps", 400),
+    ],
+)
+def test_what_cannot_be_is_said_clearly(edition: Edition, client: Client, address: str, status: int) -> None:
+    assert client.get(address).status_code == status
+
+
+# --- who may see what --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_no_form_tells_a_stranger_of_what_is_private_or_anonymous(
+    edition: Edition, owner: User, stranger: User, client: Client, form: str
+) -> None:
+    secret, masked = board_rows.fill(edition, n=2, user=owner)
+    Method.objects.filter(pk=secret.pk).update(visibility=Visibility.PRIVATE, name="Secretissimo")
+    Method.objects.filter(pk=masked.pk).update(visibility=Visibility.ANONYMOUS, name="Maskenball")
+    boards_changed()
+    client.force_login(stranger)
+    for text in (text_of(client, form), text_of(Client(), form)):
+        assert "ecretissimo" not in text
+        assert "askenball" not in text
+        assert "Team 1" not in text
+        assert (masked.pseudonym in text) == (form != "bib")
+
+
+def boards_changed() -> None:
+    with transaction.atomic():
+        boards.changed_everywhere()
+
+
+def test_what_was_withdrawn_stays_in_data_and_leaves_the_tables_of_papers(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    submission = builders.submit(owner, builders.predictions(edition), method="Gone")
+    builders.score_all()
+    submissions.withdraw(submission=submission, actor=owner, now=timezone.now())
+    assert next(row for row in csv_rows(client) if row["method"] == "Gone")["withdrawn_at"]
+    assert "Gone" not in text_of(client, "tex")
+    assert "Gone" not in text_of(client, "md")
+
+
+# --- names without power -----------------------------------------------------------------------------------
+
+
+def test_no_name_is_a_formula_of_a_spreadsheet(hostile: list[Method], client: Client) -> None:
+    for row in csv.reader(io.StringIO(text_of(client, "csv"))):
+        assert [cell for cell in row if cell[:1] in {*"=+-@\t\r＝＋－＠"}] == []
+    assert "'=HYPERLINK(1)|*b* <script>alert(1)</script>" in {row["method"] for row in csv_rows(client)}
+
+
+def test_no_name_is_markup_in_a_note(hostile: list[Method], client: Client) -> None:
+    text = text_of(client, "md")
+    lines = [line for line in text.splitlines() if line.startswith("|")]
+    assert {len(re.findall(r"(?<!\\)\|", line)) for line in lines} == {14}
+    assert "<script" not in text
+    assert "](http" not in text
+    assert "www." not in text
+    assert BIDI[7] not in text
+
+
+def test_json_holds_the_names_as_they_are(hostile: list[Method], client: Client) -> None:
+    assert set(HOSTILE) < {entry["method"] for entry in json.loads(text_of(client, "json"))["entries"]}
+
+
+def test_bibtex_has_no_unbalanced_brace_and_no_key_twice(hostile: list[Method], client: Client) -> None:
+    text = text_of(client, "bib")
+    assert text.count("{") == text.count("}")
+    keys = re.findall(r"^@misc\{([a-z0-9-]+),$", text, flags=re.MULTILINE)
+    assert len(keys) == len(set(keys)) == 1 + len(hostile)
+    assert "eprint = {2309.01539}" in text
+
+
+@pytest.fixture
+def pdflatex() -> str:
+    """The TeX that Debian calls texlive-latex-base; CI has it."""
+    found = shutil.which("pdflatex")
+    if found is None:
+        if REQUIRED:
+            pytest.fail("pdflatex is not installed")
+        pytest.skip("pdflatex is not installed (Debian: texlive-latex-base, texlive-latex-recommended)")
+    return found
+
+
+def test_latex_and_bibtex_compile_with_any_name(
+    hostile: list[Method], client: Client, tmp_path: Path, pdflatex: str
+) -> None:
+    (tmp_path / "plain.tex").write_text(text_of(client, "tex"), encoding="utf-8")
+    (tmp_path / "sure.tex").write_text(text_of(client, "tex", "?intervals=1&columns=mid"), encoding="utf-8")
+    (tmp_path / "board.bib").write_text(text_of(client, "bib"), encoding="utf-8")
+    (tmp_path / "paper.tex").write_text(
+        r"\documentclass{article}\usepackage{booktabs}\begin{document}\tiny\input{plain}\par\input{sure}"
+        r"\nocite{*}\bibliographystyle{plain}\bibliography{board}\end{document}"
+    )
+    for command in ([pdflatex], ["bibtex"], [pdflatex], [pdflatex]):
+        options = ["-halt-on-error", "-interaction=nonstopmode"] if command == [pdflatex] else []
+        done = subprocess.run(
+            [*command, *options, "paper"],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            check=False,
+        )
+        assert done.returncode == 0, done.stdout[-3000:]
+        assert "Warning--" not in done.stdout, done.stdout
+    assert (tmp_path / "paper.pdf").stat().st_size > 10_000
+    assert (tmp_path / "plain.tex").read_bytes().isascii()
