@@ -4,7 +4,6 @@ from typing import cast
 
 from django.utils import timezone
 from drf_spectacular.utils import extend_schema
-from rest_framework.parsers import JSONParser
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
 from rest_framework.response import Response
@@ -12,6 +11,7 @@ from rest_framework.views import APIView
 
 from leaderboard import quotas, teams, tokens
 from leaderboard.api.authentication import split_of
+from leaderboard.api.bodies import DocumentParser
 from leaderboard.api.problems import problem
 from leaderboard.api.serializers import (
     ErrorSerializer,
@@ -33,10 +33,11 @@ class QuotaView(APIView):
     def get(self, request: Request) -> Response:
         """For each split: how many submissions are left, and when the next slot opens."""
         now = timezone.now()
-        team = teams.present_team_of(user=cast("User", request.user))
+        user = cast("User", request.user)
+        team = teams.present_team_of(user=user)
         only = split_of(request.auth)
         splits = Split.objects.filter(pk=only) if only is not None else Split.objects.all()
-        rows = [quotas.state(team=team, split=split, now=now) for split in splits]
+        rows = [quotas.state(team=team, user=user, split=split, now=now) for split in splits]
         return Response(QuotaSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
@@ -45,7 +46,7 @@ class RevokeView(APIView):
 
     authentication_classes = ()
     permission_classes = [AllowAny]
-    parser_classes = [JSONParser]
+    parser_classes = [DocumentParser]
     throttle_classes = [RevokeThrottle]
 
     @extend_schema(

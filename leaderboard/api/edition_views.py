@@ -7,9 +7,9 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import preview, rescoring, standings
+from leaderboard import preview, rescoring
+from leaderboard.api import listing
 from leaderboard.api.serializers import (
-    BoardSerializer,
     EditionSerializer,
     ErrorSerializer,
     PreviewSerializer,
@@ -27,30 +27,18 @@ class EditionsView(APIView):
 
     permission_classes = [AllowAny]
 
-    @extend_schema(operation_id="list_editions", responses={200: EditionSerializer(many=True), **NOT_FOUND})
+    @extend_schema(
+        operation_id="list_editions",
+        parameters=listing.PARAMETERS,
+        responses={200: EditionSerializer(many=True), **NOT_FOUND},
+    )
     def get(self, request: Request, split: str) -> Response:
-        """The newest first."""
+        """The newest first, a page at a time; `Link` names the next page."""
         get_object_or_404(Split, pk=split)
-        rows = EDITIONS.filter(split=split).exclude(published_at=None).order_by("-number")
-        return Response(EditionSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
-
-
-class EditionBoardView(APIView):
-    """The board of one edition, for ever."""
-
-    permission_classes = [AllowAny]
-
-    @extend_schema(operation_id="edition_board", responses={200: BoardSerializer, **NOT_FOUND})
-    def get(self, request: Request, split: str, number: int) -> Response:
-        """Submissions and published rows as that edition ranks them."""
-        edition = get_object_or_404(EDITIONS.exclude(published_at=None), split=split, number=number)
-        board = standings.board(
-            split=edition.split,
-            edition=edition,
-            viewer=request.user,
-            sort=request.query_params.get("sort", "rank"),
-        )
-        return Response(BoardSerializer(board).data)
+        rows = EDITIONS.filter(split=split).exclude(published_at=None)
+        page = listing.page_of(rows, request, order="-number")
+        data = EditionSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says
+        return Response(data, headers=page.headers)
 
 
 class ChangelogView(APIView):
@@ -58,12 +46,18 @@ class ChangelogView(APIView):
 
     permission_classes = [AllowAny]
 
-    @extend_schema(operation_id="changelog", responses={200: PublicationSerializer(many=True), **NOT_FOUND})
+    @extend_schema(
+        operation_id="changelog",
+        parameters=listing.PARAMETERS,
+        responses={200: PublicationSerializer(many=True), **NOT_FOUND},
+    )
     def get(self, request: Request, split: str) -> Response:
-        """Which edition became the board, when and why; the newest first."""
+        """Which edition became the board, when and why; the newest first, a page at a time."""
         get_object_or_404(Split, pk=split)
         rows = Publication.objects.filter(split=split).select_related("edition", "replaced")
-        return Response(PublicationSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
+        page = listing.page_of(rows, request, order="-at")
+        data = PublicationSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says
+        return Response(data, headers=page.headers)
 
 
 class ProgressView(APIView):

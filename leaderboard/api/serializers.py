@@ -1,5 +1,6 @@
 """The shapes that programs see. A field once here stays."""
 
+from dataclasses import replace
 from typing import Any
 
 from django.conf import settings
@@ -8,9 +9,10 @@ from rest_framework import serializers
 
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
 from leaderboard import preview, rescoring, submissions
+from leaderboard.entries import Details, Entry, Interval
 from leaderboard.models import Edition, Publication, Split, Status, Submission
 from leaderboard.quotas import Quota
-from leaderboard.standings import Board, Entry
+from leaderboard.standings import Board
 
 
 class ScoresSerializer(serializers.Serializer[Any]):
@@ -202,6 +204,34 @@ class SplitSerializer(serializers.Serializer[Split]):
     )
 
 
+class DetailsSerializer(serializers.Serializer[Details]):
+    """What a method uses and costs, as its team says; null or empty where nothing was said."""
+
+    n_frames = serializers.IntegerField(allow_null=True, help_text="Frames used, 2 to 6.")
+    cameras = serializers.CharField(allow_blank=True, help_text="ONE or SEVERAL.")
+    box_source = serializers.CharField(allow_blank=True, help_text="GIVEN, DETECTED or NONE.")
+    uses_nerf = serializers.BooleanField(allow_null=True)
+    uses_extra_data = serializers.BooleanField(allow_null=True)
+    pretraining = serializers.CharField(allow_blank=True)
+    n_parameters = serializers.IntegerField(allow_null=True)
+    latency_ms = serializers.FloatField(allow_null=True)
+    hardware = serializers.CharField(allow_blank=True)
+
+
+class UncertaintySerializer(serializers.Serializer[Interval]):
+    """How sure one value is, at 95 %; null where it is not known."""
+
+    low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95 % interval.")
+    high = serializers.FloatField(allow_null=True, help_text="Its upper end.")
+    rank_low = serializers.IntegerField(
+        allow_null=True, help_text="The best rank in this column that the data allow."
+    )
+    rank_high = serializers.IntegerField(allow_null=True, help_text="The worst one.")
+    is_with_best = serializers.BooleanField(
+        allow_null=True, help_text="Not significantly worse than the best of the column."
+    )
+
+
 class EntrySerializer(serializers.Serializer[Entry]):
     """One row of a board."""
 
@@ -221,7 +251,22 @@ class EntrySerializer(serializers.Serializer[Entry]):
     is_unscorable = serializers.BooleanField(
         help_text="In a former edition: the published one's ground truth cannot score this file."
     )
+    details = DetailsSerializer()
+    n_attempts = serializers.IntegerField(
+        allow_null=True,
+        help_text="Scored submissions of the team's public methods to the split; anonymous: its own.",
+    )
     scores = ScoresSerializer()
+    intervals = serializers.DictField(
+        child=UncertaintySerializer(),
+        help_text="By the names of the scores, where they are computed; empty unless `intervals=1`.",
+    )
+
+    def to_representation(self, instance: Entry) -> dict[str, Any]:
+        """The row; its intervals, which are most of its bytes, for who asks."""
+        if instance.intervals and not self.context.get("has_intervals"):
+            instance = replace(instance, intervals={})
+        return super().to_representation(instance)
 
 
 class BoardSerializer(serializers.Serializer[Board]):

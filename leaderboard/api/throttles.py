@@ -1,31 +1,84 @@
 """How often one may ask: per account, else per address, which nobody can choose for themselves.
 
+All web processes count together (see leaderboard/rates.py).
 The address is the one that the connection comes from, or with `TSTTC_TRUSTED_PROXIES` the one that our own
 proxy wrote down; what a visitor puts into X-Forwarded-For before that counts for nothing.
 """
 
+import re
+import time
+from dataclasses import dataclass
 from ipaddress import IPv6Address, ip_address, ip_network
 from typing import TYPE_CHECKING
 
 from django.conf import settings
+from django.http import HttpRequest
 from rest_framework.request import Request
-from rest_framework.throttling import SimpleRateThrottle
+from rest_framework.throttling import BaseThrottle
+
+from leaderboard import rates
 
 if TYPE_CHECKING:  # views make their classes with these
     from rest_framework.views import APIView
 
+PERIODS_S = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+RATE = re.compile(r"(?P<n>\d+)/(?P<period>[smhd])[a-z]*")
 
-class Throttle(SimpleRateThrottle):
-    """A rate of the settings, which may be none."""
 
-    def get_rate(self) -> str | None:
-        """Read when it is needed and not once for ever, so that settings hold."""
-        rate: str | None = settings.API_RATES[self.scope or ""]
-        return rate
+def rate_of(text: str) -> rates.Rate:
+    """A rate as the settings have it.
 
-    def named(self, identity: object) -> str:
-        """Under which the times of somebody's requests are kept."""
-        return f"throttle:{self.scope}:{identity}"
+    >>> rate_of("600/min")
+    Rate(n=600, period_s=60)
+    """
+    found = RATE.fullmatch(text)
+    if found is None:
+        raise ValueError(f"{text!r} is no rate; expected one such as '600/min'")
+    return rates.Rate(n=int(found["n"]), period_s=PERIODS_S[found["period"]])
+
+
+@dataclass(frozen=True)
+class Counted:
+    """That a request was counted: by which throttle, at which rate, and what it found."""
+
+    name: str
+    rate: rates.Rate
+    answer: rates.Answer
+
+
+def counted(request: HttpRequest) -> list[Counted]:
+    """The throttles that counted this request, for its answer's headers; a list to add to."""
+    found: list[Counted] = request.__dict__.setdefault("_counted", [])
+    return found
+
+
+class Throttle(BaseThrottle):
+    """A rate of the settings, which may be none. After it was asked, `answer` says what it found."""
+
+    scope = ""
+    answer: rates.Answer | None = None
+
+    def allow_request(self, request: Request, view: "APIView") -> bool:
+        """Count this request. The rate is read anew, so that settings hold."""
+        text: str | None = settings.API_RATES[self.scope]
+        identity = self.identity(request) if text else None
+        if text and identity is not None:
+            rate = rate_of(text)
+            self.answer = self.take(f"{self.scope}:{identity}", rate)
+            counted(request._request).append(Counted(self.scope, rate, self.answer))
+        return self.answer is None or self.answer.is_allowed
+
+    def take(self, who: str, rate: rates.Rate) -> rates.Answer:
+        """Count it where all processes see it."""
+        return rates.take(who=who, rate=rate, now_s=time.time())
+
+    def wait(self) -> float | None:
+        """Seconds until the next request is let through."""
+        return self.answer.wait_s if self.answer else None
+
+    def identity(self, request: Request) -> object | None:
+        """Who is counted; None: not this throttle's concern."""
+        raise NotImplementedError
 
     def address(self, request: Request) -> str:
         """Where a request comes from. Who has an IPv6 address has 2⁶⁴ of them: they count as one."""
@@ -41,9 +94,9 @@ class SignedInThrottle(Throttle):
 
     scope = "signed_in"
 
-    def get_cache_key(self, request: Request, view: "APIView") -> str | None:
-        """None: not this throttle's concern."""
-        return self.named(request.user.pk) if request.user.is_authenticated else None
+    def identity(self, request: Request) -> object | None:
+        """The account."""
+        return request.user.pk if request.user.is_authenticated else None
 
 
 class VisitorThrottle(Throttle):
@@ -51,9 +104,9 @@ class VisitorThrottle(Throttle):
 
     scope = "visitor"
 
-    def get_cache_key(self, request: Request, view: "APIView") -> str | None:
-        """None: not this throttle's concern."""
-        return None if request.user.is_authenticated else self.named(self.address(request))
+    def identity(self, request: Request) -> object | None:
+        """The address."""
+        return None if request.user.is_authenticated else self.address(request)
 
 
 class SubmitThrottle(SignedInThrottle):
@@ -61,9 +114,9 @@ class SubmitThrottle(SignedInThrottle):
 
     scope = "submit"
 
-    def get_cache_key(self, request: Request, view: "APIView") -> str | None:
-        """None: not this throttle's concern."""
-        return super().get_cache_key(request, view) if request.method == "POST" else None
+    def identity(self, request: Request) -> object | None:
+        """The account, when it sends something."""
+        return super().identity(request) if request.method == "POST" else None
 
 
 class RevokeThrottle(Throttle):
@@ -71,6 +124,25 @@ class RevokeThrottle(Throttle):
 
     scope = "revoke"
 
-    def get_cache_key(self, request: Request, view: "APIView") -> str:
-        """Everybody, also who is signed in."""
-        return self.named(self.address(request))
+    def identity(self, request: Request) -> object | None:
+        """The address, also of who is signed in."""
+        return self.address(request)
+
+
+# --- requests that are turned away before any view ----------------------------------------------------------
+
+
+class RefusedThrottle(RevokeThrottle):
+    """Requests from one address whose token opens nothing: they end before the throttles above are asked."""
+
+    scope = "refused"
+
+
+class MalformedThrottle(RefusedThrottle):
+    """The same without the database, which what is no token at all never reaches."""
+
+    memory = rates.InMemory()
+
+    def take(self, who: str, rate: rates.Rate) -> rates.Answer:
+        """Count it in this process."""
+        return self.memory.take(who=who, rate=rate, now_s=time.time())

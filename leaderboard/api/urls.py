@@ -5,20 +5,41 @@ from django.views.generic import RedirectView
 from drf_spectacular.views import SpectacularAPIView
 from rest_framework.permissions import AllowAny
 
-from leaderboard.api import account_views, edition_views, views
+from leaderboard.api import (
+    account_views,
+    board_views,
+    compare_views,
+    edition_views,
+    method_views,
+    receipt_views,
+    submission_views,
+    views,
+)
+from leaderboard.keeping import kept
 
 urlpatterns = [
-    path("submissions", views.SubmissionsView.as_view(), name="api-submissions"),
-    path("submissions/<uuid:submission_id>", views.SubmissionView.as_view(), name="api-submission"),
+    path("submissions", submission_views.SubmissionsView.as_view(), name="api-submissions"),
+    path(
+        "submissions/<uuid:submission_id>", submission_views.SubmissionView.as_view(), name="api-submission"
+    ),
+    path("submissions/<uuid:submission_id>/receipt", receipt_views.ReceiptView.as_view(), name="api-receipt"),
+    path("methods", method_views.MethodsView.as_view(), name="api-methods"),
+    path("methods/<uuid:method_id>", kept(method_views.MethodView.as_view()), name="api-method"),
+    path(
+        "methods/<uuid:method_id>/visibility",
+        method_views.VisibilityView.as_view(),
+        name="api-method-visibility",
+    ),
     path("quota", account_views.QuotaView.as_view(), name="api-quota"),
     path("tokens/revoke", account_views.RevokeView.as_view(), name="api-revoke-token"),
-    path("splits", views.SplitsView.as_view(), name="api-splits"),
-    path("splits/<slug:split>/board", views.BoardView.as_view(), name="api-board"),
+    path("compare", compare_views.CompareView.as_view(), name="api-compare"),
+    path("splits", kept(views.SplitsView.as_view()), name="api-splits"),
+    path("splits/<slug:split>/board", kept(board_views.BoardView.as_view()), name="api-board"),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),
-    path("splits/<slug:split>/editions", edition_views.EditionsView.as_view(), name="api-editions"),
+    path("splits/<slug:split>/editions", kept(edition_views.EditionsView.as_view()), name="api-editions"),
     path(
         "splits/<slug:split>/editions/<int:number>/board",
-        edition_views.EditionBoardView.as_view(),
+        kept(board_views.EditionBoardView.as_view()),
         name="api-edition-board",
     ),
     path(
@@ -31,8 +52,12 @@ urlpatterns = [
         edition_views.PreviewView.as_view(),
         name="api-edition-preview",
     ),
-    path("splits/<slug:split>/changelog", edition_views.ChangelogView.as_view(), name="api-changelog"),
+    path("splits/<slug:split>/changelog", kept(edition_views.ChangelogView.as_view()), name="api-changelog"),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
     path("schema", SpectacularAPIView.as_view(permission_classes=[AllowAny]), name="api-schema"),
-    path("docs", RedirectView.as_view(pattern_name="api_reference"), name="api-docs"),
+    path(
+        "docs",
+        RedirectView.as_view(pattern_name="api_reference", http_method_names=["get", "head", "options"]),
+        name="api-docs",
+    ),
 ]

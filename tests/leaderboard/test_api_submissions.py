@@ -143,6 +143,7 @@ def test_token_is_hashed_at_rest(owner: User) -> None:
     ("fields", "status", "code", "where"),
     [
         ({"split": "nope"}, 422, "unknown-split", "split"),
+        ({"split": "te\x00st"}, 422, "unknown-split", "split"),
         ({"split": "val"}, 409, "split-not-open", "split"),
         ({"method": ""}, 422, "missing-field", "method"),
         ({"paper_url": "javascript:alert(1)"}, 422, "bad-address", "paper_url"),

@@ -3,22 +3,25 @@
 from typing import Any
 
 import pytest
-from django.core.cache import cache
-from pytest_django import Settings
+from django.utils import timezone
+from pytest_django import DjangoAssertNumQueries, Settings
 from rest_framework.test import APIClient
 
-from leaderboard.models import Edition, User
+from leaderboard.api.throttles import MalformedThrottle
+from leaderboard.models import ApiToken, Edition, User
 from tests import builders
 from tests.leaderboard.test_api_submissions import client_of, post
+from tests.leaderboard.test_tokens import client_with
 
-BOARD = "/api/v1/splits/test/board"
+# As of a time: the present board is answered from memory, which is counted nowhere.
+BOARD = "/api/v1/splits/test/board?at=2026-01-01"
 REVOKE = "/api/v1/tokens/revoke"
 
 
 @pytest.fixture(autouse=True)
 def rates(settings: Settings) -> None:
     """Three a minute of everything, counted from nothing."""
-    cache.clear()
+    MalformedThrottle.memory.forget()
     settings.API_RATES = dict.fromkeys(settings.API_RATES, "3/min")
 
 
@@ -100,3 +103,40 @@ def test_rates_can_be_off(edition: Edition, settings: Settings) -> None:
 @pytest.mark.parametrize("address", ["", "nonsense", "unix:", "300.0.0.1"])
 def test_a_connection_without_an_address_is_counted_too(edition: Edition, address: str) -> None:
     assert statuses(APIClient(REMOTE_ADDR=address)) == [200, 200, 200, 429]
+
+
+# --- requests that open nothing --------------------------------------------------------------------------
+
+MINE = "/api/v1/submissions"
+
+
+@pytest.mark.parametrize("secret", ["nonsense", "tsttc_" + "0" * 64, "", "a b"])
+def test_tokens_that_open_nothing_are_throttled_by_address(edition: Edition, secret: str) -> None:
+    client = client_with(secret)
+    assert statuses(client, MINE) == [401, 401, 401, 429]
+    spoofed = client.get(MINE, HTTP_X_FORWARDED_FOR="10.0.0.1")
+    assert (spoofed.status_code, spoofed.json()["code"]) == (429, "throttled")
+    assert 1 <= int(spoofed.headers["Retry-After"]) <= 60
+    assert client.get(MINE, REMOTE_ADDR="192.0.2.9").status_code == 401
+
+
+def test_expired_revoked_and_insufficient_tokens_are_throttled_too(edition: Edition, owner: User) -> None:
+    expired, revoked = builders.token(owner), builders.token(owner)
+    for secret, change in ((expired, {"expiry": timezone.now()}), (revoked, {"revoked_at": timezone.now()})):
+        ApiToken.objects.filter(token_key=secret[:15]).update(**change)
+    clients = [client_with(secret) for secret in (expired, revoked, builders.token(owner, scopes=["submit"]))]
+    assert [client.get(MINE).status_code for client in clients] == [401, 401, 403]
+    assert [client.get(MINE).status_code for client in clients] == [429, 429, 429]
+    # Whoever has a good one is counted by account, not by this address.
+    assert client_of(owner).get(MINE).status_code == 200
+
+
+def test_asking_without_an_account_is_throttled_too(edition: Edition) -> None:
+    assert statuses(APIClient(), MINE) == [401, 401, 401, 429]
+
+
+def test_what_is_no_token_never_reaches_the_database_even_to_be_counted(
+    db: None, django_assert_num_queries: DjangoAssertNumQueries
+) -> None:
+    with django_assert_num_queries(0):
+        assert statuses(client_with("' or 1=1"), MINE) == [401, 401, 401, 429]

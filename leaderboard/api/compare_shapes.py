@@ -1,0 +1,73 @@
+"""The shapes of comparisons."""
+
+from typing import Any
+
+from drf_spectacular.utils import extend_schema_field
+from rest_framework import serializers
+
+from evaluator.protocol import SCORE_NAMES
+from leaderboard.api.serializers import EntrySerializer
+from leaderboard.comparisons import Compared, Difference, Pair
+
+
+class DifferenceSerializer(serializers.Serializer[Difference]):
+    """First minus second in one column; below 0 the first is better."""
+
+    difference = serializers.FloatField(help_text="In the column's unit.")
+    low = serializers.FloatField(
+        allow_null=True, help_text="Lower end of its 95 % interval; null: too few recordings."
+    )
+    high = serializers.FloatField(
+        allow_null=True, help_text="Upper end of its 95 % interval; null: too few recordings."
+    )
+    p = serializers.FloatField(
+        allow_null=True, help_text="Of the two-sided cluster sign-flip test; null: too few recordings."
+    )
+    is_significant = serializers.BooleanField(help_text="Whether p is below 0.05.")
+
+
+class DifferencesSerializer(serializers.Serializer[Any]):
+    """A difference for each of the ten names."""
+
+    def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
+        """One nullable difference for each."""
+        text = "Null: one of the two has no value in this column."
+        return {name: DifferenceSerializer(allow_null=True, help_text=text) for name in SCORE_NAMES}
+
+
+class PairSerializer(serializers.Serializer[Pair]):
+    """Two of the methods."""
+
+    first = serializers.UUIDField(source="first.method_id", help_text="Id of the one method.")
+    second = serializers.UUIDField(source="second.method_id", help_text="Id of the other.")
+    differences = serializers.SerializerMethodField(
+        help_text="First minus second, by column; null while a worker computes it."
+    )
+    sentence = serializers.SerializerMethodField(
+        help_text="What the difference in MiD means, in words; empty while it is computed."
+    )
+
+    @extend_schema_field(DifferencesSerializer(allow_null=True))
+    def get_differences(self, pair: Pair) -> dict[str, Any] | None:
+        """All ten names, once they are computed."""
+        if pair.differences is None:
+            return None
+        found = {name: pair.differences.get(name) for name in SCORE_NAMES}
+        return dict(DifferencesSerializer(found).data)
+
+    def get_sentence(self, pair: Pair) -> str:
+        """Of the overall MiD."""
+        return pair.sentence()
+
+
+class ComparedSerializer(serializers.Serializer[Compared]):
+    """Two to five methods of one board side by side."""
+
+    split = serializers.CharField(source="split.name", help_text="Name of the split.")
+    edition = serializers.IntegerField(source="edition.number", help_text="Number of the edition.")
+    is_complete = serializers.BooleanField(
+        help_text="Whether every pair is computed; if not, ask again after Retry-After seconds."
+    )
+    reason = serializers.CharField(help_text="Why there are no intervals, where there are none.")
+    entries = EntrySerializer(many=True, help_text="The methods' rows, in the order asked for.")
+    pairs = PairSerializer(many=True, help_text="Every two of them.")

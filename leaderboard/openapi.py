@@ -1,0 +1,34 @@
+"""The API's frame, and how it is described to programs: settings that no variable changes."""
+
+from typing import Any, Final
+
+REST_FRAMEWORK: Final[dict[str, Any]] = {
+    "DEFAULT_AUTHENTICATION_CLASSES": [
+        "leaderboard.api.authentication.BearerAuthentication",
+        "rest_framework.authentication.SessionAuthentication",
+    ],
+    "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
+    "DEFAULT_RENDERER_CLASSES": ["leaderboard.api.bodies.DocumentRenderer"],
+    "DEFAULT_PARSER_CLASSES": ["rest_framework.parsers.MultiPartParser", "rest_framework.parsers.JSONParser"],
+    "DEFAULT_SCHEMA_CLASS": "drf_spectacular.openapi.AutoSchema",
+    "EXCEPTION_HANDLER": "leaderboard.api.refusals.exception_handler",
+    "DEFAULT_THROTTLE_CLASSES": [
+        "leaderboard.api.throttles.SignedInThrottle",
+        "leaderboard.api.throttles.VisitorThrottle",
+    ],
+}
+SPECTACULAR_SETTINGS: Final[dict[str, Any]] = {
+    "TITLE": "TSTTC leaderboard API",
+    "DESCRIPTION": "Submit prediction files, follow their evaluation, read the boards. Errors are problem "
+    "details (RFC 9457) with stable codes.",
+    "VERSION": "1",
+    "OAS_VERSION": "3.1.0",
+    "SERVE_INCLUDE_SCHEMA": False,
+    # What a request may hold differs from what an answer holds; a file is bytes in the one alone.
+    "COMPONENT_SPLIT_REQUEST": True,
+    "SCHEMA_PATH_PREFIX": "/api/v1",
+    "POSTPROCESSING_HOOKS": [
+        "drf_spectacular.hooks.postprocess_schema_enums",
+        "leaderboard.api.schema.complete",
+    ],
+}

@@ -1,0 +1,107 @@
+"""Score receipts: what a submission scored, signed with the site's key, for its team to hand on.
+
+A receipt names its method as the team does, whoever else may see the method: it is given to the team alone,
+and the team decides who reads it. It attests to one edition for ever, also once a later one is the board.
+"""
+
+from collections.abc import Sequence
+from typing import Any
+
+from django.conf import settings
+from django.core.checks import CheckMessage, Error
+from django.core.exceptions import ImproperlyConfigured
+
+from evaluator import receipts
+from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES, get_protocol
+from leaderboard import standings, submissions
+from leaderboard.models import Evaluation, Status, Submission
+
+
+class NoReceipt(Exception):
+    """There is no receipt for this; `code` is stable."""
+
+    def __init__(self, code: str, message: str) -> None:
+        super().__init__(message)
+        self.code = code
+
+
+def receipt(*, submission: Submission, edition_number: int | None = None) -> dict[str, Any]:
+    """The signed receipt of what a submission scored, in the edition of that number or in the present one.
+
+    The same every time, unless its method was renamed. Raises `NoReceipt`.
+    """
+    evaluation = _scored(submission, edition_number)
+    edition = evaluation.edition
+    scores = standings.flat_scores(evaluation.scores.all())
+    counts = (evaluation.report or {})["counts"]
+    decimals = get_protocol(edition.protocol).decimals
+    assert evaluation.finished_at is not None  # noqa: S101 - for the type checker: what is scored is finished
+    document = {
+        "site": settings.SITE_URL,
+        "submission": str(submission.pk),
+        "split": submission.split_id,
+        "edition": edition.number,
+        "protocol": edition.protocol,
+        "ground_truth": edition.ground_truth_id,
+        "file": submission.digest,
+        "method": {"id": str(submission.method_id), "name": submission.method.name},
+        "scores": {name: receipts.decimal(scores[name], decimals=decimals) for name in SCORE_NAMES},
+        "counts": {name: counts[name] for name in INTERVAL_NAMES},
+        "scored_at": f"{evaluation.finished_at:%Y-%m-%dT%H:%M:%SZ}",
+    }
+    return receipts.sign(document, private_key=private_key())
+
+
+def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
+    if submission.withdrawn_at:
+        raise NoReceipt("withdrawn", "The submission is withdrawn; expected one that stands.")
+    if edition_number is None:
+        evaluation = submissions.evaluation_of(submission)
+    else:
+        # An edition in preparation may still be given up: nothing of it is anybody's to quote.
+        published = submission.evaluations.exclude(edition__published_at=None)
+        found = published.filter(edition__number=edition_number).first()
+        if found is None:
+            raise NoReceipt(
+                "edition-unknown",
+                f"The submission has no score in an edition {edition_number} of {submission.split_id}; "
+                "expected the number of an edition that was published.",
+            )
+        evaluation = found
+    if evaluation.status != Status.SCORED or evaluation.edition.published_at is None:
+        state = evaluation.get_status_display()
+        raise NoReceipt("not-scored", f"The submission is {state}; expected one that is scored.")
+    return evaluation
+
+
+def private_key() -> bytes:
+    """The seed that receipts are signed with."""
+    return _key("TSTTC_RECEIPT_KEY", settings.RECEIPT_KEY)
+
+
+def public_keys() -> dict[str, Any]:
+    """The key set that the site publishes: the present key first, then those of former days."""
+    former = [_key("TSTTC_RECEIPT_OLD_KEYS", text) for text in settings.RECEIPT_OLD_KEYS]
+    return receipts.key_set([receipts.public_key(private_key()), *former])
+
+
+def _key(name: str, text: str) -> bytes:
+    try:
+        key = receipts.decode(text.strip())
+    except ValueError:
+        key = b""
+    if len(key) != receipts.KEY_BYTES:
+        raise ImproperlyConfigured(
+            f"{name} is malformed; expected 43 characters of base64url, as `manage.py make_receipt_key` "
+            "prints them."
+        )
+    return key
+
+
+def check_keys(app_configs: Sequence[Any] | None = None, **kwargs: Any) -> list[CheckMessage]:
+    """Django's system check of the keys: a typing error is found at the start, not at the first receipt."""
+    try:
+        public_keys()
+    except ImproperlyConfigured as fault:
+        return [Error(str(fault), id="leaderboard.E001")]
+    return []

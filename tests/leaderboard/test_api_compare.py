@@ -1,0 +1,79 @@
+"""Comparisons over the API: what is known at once, the rest a moment later."""
+
+import pytest
+from rest_framework.test import APIClient
+
+from evaluator.protocol import SCORE_NAMES
+from leaderboard.models import Edition, Method, Submission, User, Visibility
+from tests import builders
+from tests.leaderboard.test_api_submissions import client_of
+
+
+def address(*methods: object, split: str = "test", more: str = "") -> str:
+    named = "".join(f"&m={method}" for method in methods)
+    return f"/api/v1/compare?split={split}{named}{more}"
+
+
+def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submission], owner: User) -> None:
+    client = client_of(owner)
+    ids = [str(entry.method_id) for entry in entries[:3]]
+    first = client.get(address(*ids))
+    body = first.json()
+    assert (first.status_code, body["is_complete"]) == (202, False)
+    assert int(first.headers["Retry-After"]) >= 1
+    assert [pair["differences"] for pair in body["pairs"]] == [None] * 3
+    builders.infer_all()
+    then = client.get(address(*ids))
+    body = then.json()
+    assert (then.status_code, body["is_complete"], "Retry-After" in then.headers) == (200, True, False)
+    assert [entry["method_id"] for entry in body["entries"]] == ids
+    assert [(pair["first"], pair["second"]) for pair in body["pairs"]] == [
+        (ids[0], ids[1]),
+        (ids[0], ids[2]),
+        (ids[1], ids[2]),
+    ]
+    for pair in body["pairs"]:
+        assert list(pair["differences"]) == list(SCORE_NAMES)
+        found = pair["differences"]["mid"]
+        assert found["low"] <= found["difference"] <= found["high"]
+        assert "MiD is" in pair["sentence"]
+    assert client.get(address(*ids, more="&edition=1")).json() == body
+
+
+def test_strangers_methods_are_not_there_until_they_are_shown(
+    entries: list[Submission], stranger: User
+) -> None:
+    ids = [entry.method_id for entry in entries[:2]]
+    Method.objects.update(visibility=Visibility.PRIVATE, shown_at=None)
+    for client in (APIClient(), client_of(stranger)):
+        response = client.get(address(*ids))
+        assert (response.status_code, response.json()["code"]) == (404, "unknown-method")
+
+
+@pytest.mark.parametrize(
+    ("methods", "more", "status", "code"),
+    [
+        ([], "", 400, "bad-comparison"),
+        (["same", "same"], "", 400, "bad-comparison"),
+        (["x", "y"], "", 404, "unknown-method"),
+        (["first", "second"], "&edition=x", 400, "bad-edition"),
+        (["first", "second"], "&edition=9", 404, "not-found"),
+    ],
+)
+def test_what_cannot_be_compared_is_a_problem_that_says_why(
+    edition: Edition, owner: User, methods: list[str], more: str, status: int, code: str
+) -> None:
+    response = client_of(owner).get(
+        address(*(str(edition.ground_truth_id) if m == "x" else _id(m) for m in methods), more=more)
+    )
+    assert (response.status_code, response.json()["code"]) == (status, code)
+
+
+def _id(name: str) -> str:
+    return f"00000000-0000-4000-8000-{sum(name.encode()):012d}"
+
+
+def test_a_split_that_there_is_not_is_a_404(benchmark: None) -> None:
+    assert APIClient().get(address("x", split="nope")).json()["code"] == "not-found"
+    assert APIClient().get("/api/v1/compare").status_code == 404
+    assert APIClient().get(address("x", split="te%00st")).json()["code"] == "not-found"

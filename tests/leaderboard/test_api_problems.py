@@ -1,0 +1,252 @@
+"""Errors of the API: one shape at every door, and a documented code for each."""
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.test import Client
+from pytest_django import Settings
+from rest_framework.test import APIClient
+
+from evaluator.problems import PROBLEM_CODES
+from leaderboard import files, submissions
+from leaderboard.models import Edition, Split, User
+from leaderboard.problem_codes import API_CODES
+from tests import builders
+from tests.leaderboard.test_api_submissions import client_of, post
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+CODE = re.compile(r"[a-z][a-z0-9]*(-[a-z0-9]+)+|throttled|withdrawn|invalid")
+
+
+def checked(response: Any, status: int, code: str) -> dict[str, Any]:
+    """The problem that a response is, its whole shape looked at."""
+    assert response.status_code == status, response.content
+    assert response.headers["Content-Type"] == "application/problem+json"
+    body = response.json()
+    assert set(body) == {"type", "title", "status", "code", "detail", "problems"}
+    assert (body["status"], body["code"]) == (status, code)
+    assert body["type"].endswith(f"/docs/api/#problem-{code}")
+    assert body["detail"].endswith(".")
+    assert [set(problem) for problem in body["problems"]] == [{"code", "message", "where"}]
+    assert code in API_CODES
+    return body
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        "/api/",
+        "/api",
+        "/api/v1",
+        "/api/v1/",
+        "/api/v2/splits",
+        "/api/v1/submissions/7",
+        "/api/v1/submissions/",
+        "/api/v1/splits/test/board/",
+        "/api/v1/%00",
+    ],
+)
+@pytest.mark.parametrize("method", ["get", "post", "delete"])
+def test_every_address_that_is_none_is_a_404_of_the_same_shape(db: None, path: str, method: str) -> None:
+    checked(getattr(Client(), method)(path), 404, "not-found")
+
+
+def test_the_requests_own_faults(edition: Edition, owner: User) -> None:
+    client = client_of(owner)
+    checked(client.put("/api/v1/submissions"), 405, "method-not-allowed")
+    checked(client.get("/api/v1/splits", HTTP_ACCEPT="application/xml"), 406, "not-acceptable")
+    checked(client.post("/api/v1/submissions", {}, format="json"), 415, "unsupported-media-type")
+    bad = client.generic("POST", "/api/v1/tokens/revoke", b"{", content_type="application/json")
+    checked(bad, 400, "parse-error")
+    fields = {f"field{n}": "x" for n in range(200)}
+    checked(post(client, b"{}", **fields), 400, "bad-request")
+    checked(post(client, b"{}", note="x" * 2_000_000), 413, "too-large")
+
+
+def test_who_asks_and_how_often(edition: Edition, owner: User, stranger: User, settings: Settings) -> None:
+    checked(APIClient().get("/api/v1/quota"), 401, "not-authenticated")
+    progress = "/api/v1/splits/test/editions/1/progress"
+    checked(client_of(owner).get(progress), 403, "permission-denied")
+    Split.objects.filter(pk="test").update(quota_limit=0)
+    checked(post(client_of(owner), builders.predictions(edition)), 429, "quota-exceeded")
+    settings.API_RATES = dict.fromkeys(settings.API_RATES, "1/min")
+    client = client_of(stranger)
+    first = client.get("/api/v1/submissions")
+    assert first.headers["RateLimit-Policy"] == '"signed_in";q=1;w=60'
+    assert first.headers["RateLimit"].startswith('"signed_in";r=0;t=')
+    again = client.get("/api/v1/submissions")
+    checked(again, 429, "throttled")
+    assert again.headers["RateLimit"].partition("t=")[2] == again.headers["Retry-After"]
+
+
+def test_without_limits_nothing_is_said_of_them(edition: Edition, owner: User) -> None:
+    assert "RateLimit" not in client_of(owner).get("/api/v1/submissions").headers
+
+
+def test_our_own_faults(edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    client = client_of(owner)
+    client.raise_request_exception = False
+
+    def away(*args: object, **kwargs: object) -> None:
+        raise files.StoreAway
+
+    monkeypatch.setattr(files, "keep_predictions", away)
+    response = post(client, builders.predictions(edition))
+    checked(response, 503, "store-unavailable")
+    assert response.headers["Retry-After"]
+
+    def broken(*args: object, **kwargs: object) -> None:
+        raise ZeroDivisionError
+
+    monkeypatch.setattr(submissions, "submit", broken)
+    body = checked(post(client, builders.predictions(edition)), 500, "server-error")
+    assert "ZeroDivision" not in str(body)
+
+
+def test_what_is_malformed_before_any_view_is_told_alike(db: None, settings: Settings) -> None:
+    settings.ALLOWED_HOSTS = ["board.example.org"]
+    checked(Client().get("/api/v1/splits"), 400, "bad-request")
+    assert Client().get("/").headers["Content-Type"].startswith("text/html")
+
+
+def test_pages_keep_their_own_errors(db: None) -> None:
+    assert Client().get("/nowhere/").headers["Content-Type"].startswith("text/html")
+
+
+# --- conditional requests and pages of lists -------------------------------------------------------------
+
+
+def test_what_a_program_has_already_is_a_304(edition: Edition, owner: User) -> None:
+    client = client_of(owner)
+    builders.submit(owner, builders.predictions(edition))
+    first = client.get("/api/v1/submissions")
+    again = client.get("/api/v1/submissions", HTTP_IF_NONE_MATCH=first.headers["ETag"])
+    assert (again.status_code, again.content) == (304, b"")
+    assert again.headers["ETag"] == first.headers["ETag"]
+    builders.score_all()
+    assert client.get("/api/v1/submissions", HTTP_IF_NONE_MATCH=first.headers["ETag"]).status_code == 200
+
+
+def test_pages_of_a_list_have_every_row_once_also_while_rows_come(edition: Edition, owner: User) -> None:
+    client, data = client_of(owner), builders.predictions(edition)
+    made = [str(builders.submit(owner, data, method=f"M{n}").pk) for n in range(7)]
+    seen, address = [], "/api/v1/submissions?limit=3"
+    while address:
+        response = client.get(address)
+        seen += [row["id"] for row in response.json()]
+        builders.submit(owner, data, method=f"Later{len(seen)}")
+        link = response.headers.get("Link", "")
+        address = link.partition("<")[2].partition(">")[0]
+        assert not link or link.endswith('>; rel="next"')
+    assert seen == made[::-1]
+
+
+@pytest.mark.parametrize(
+    ("query", "code"),
+    [
+        ("limit=0", "bad-limit"),
+        ("limit=101", "bad-limit"),
+        ("limit=x", "bad-limit"),
+        ("after=x", "bad-cursor"),
+        ("after=00000000-0000-4000-8000-000000000000", "bad-cursor"),
+        ("after=%00", "bad-cursor"),
+    ],
+)
+def test_bad_pages_are_a_400(edition: Edition, owner: User, query: str, code: str) -> None:
+    checked(client_of(owner).get(f"/api/v1/submissions?{query}"), 400, code)
+
+
+def test_others_rows_are_no_places_to_go_on_from(edition: Edition, owner: User, stranger: User) -> None:
+    row = builders.submit(owner, builders.predictions(edition))
+    checked(client_of(stranger).get(f"/api/v1/submissions?after={row.pk}"), 400, "bad-cursor")
+
+
+@pytest.mark.parametrize("name", ["editions", "changelog"])
+def test_other_lists_come_in_pages_too(edition: Edition, name: str) -> None:
+    address = f"/api/v1/splits/test/{name}"
+    assert len(APIClient().get(f"{address}?limit=1").json()) == 1
+    checked(APIClient().get(f"{address}?limit=0"), 400, "bad-limit")
+    checked(APIClient().get(f"{address}?after=999999"), 400, "bad-cursor")
+
+
+# --- every code is documented ----------------------------------------------------------------------------
+
+
+def codes_in(path: Path) -> Iterator[str]:
+    """Codes that a source file gives to errors: `code=…`, a refusal's first text, tables of codes."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.keyword) and node.arg == "code":
+            yield from texts(node.value)
+        if isinstance(node, ast.Assign | ast.AnnAssign) and node.value is not None:
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            if any(isinstance(target, ast.Name) and "code" in target.id.lower() for target in targets):
+                yield from texts(node.value)
+        if isinstance(node, ast.Call) and node.args:
+            name = getattr(node.func, "id", getattr(node.func, "attr", ""))
+            if name in REFUSALS:
+                yield from texts(node.args[0])
+
+
+REFUSALS = {
+    "Refused",
+    "TooLarge",
+    "BadValue",
+    "NoReceipt",
+    "Unusable",
+    "NotVerified",
+    "reject",
+    "add",
+    "group",
+}
+
+
+def texts(node: ast.expr) -> Iterator[str]:
+    """The texts in an expression that look like codes."""
+    for each in ast.walk(node):
+        if isinstance(each, ast.Constant) and isinstance(each.value, str) and CODE.fullmatch(each.value):
+            yield each.value
+
+
+# Codes that no answer of the API bears: of forms on pages alone, and of the command line's own checks.
+ON_PAGES = {"too-many-tokens", "bad-days", "bad-scope"}
+
+
+def used() -> dict[str, str]:
+    found: dict[str, str] = {}
+    for path in sorted([*REPOSITORY.glob("leaderboard/**/*.py"), *REPOSITORY.glob("evaluator/**/*.py")]):
+        # The command line's own codes are those of its documents, in docs/cli.md.
+        if not {"migrations", "cli", "settings.py"} & set(path.parts):
+            found |= dict.fromkeys(codes_in(path), str(path.relative_to(REPOSITORY)))
+    return found
+
+
+def test_every_code_in_the_source_is_documented_and_every_documented_code_is_there() -> None:
+    in_source = used()
+    assert len(in_source) > 60
+    known = {*API_CODES, *PROBLEM_CODES, *ON_PAGES}
+    unknown = {code: path for code, path in in_source.items() if code not in known}
+    unknown = {code: path for code, path in unknown.items() if not code.startswith("receipt-")}
+    assert unknown == {}, "say what they mean in leaderboard/problem_codes.py, and in docs/api.md"
+    text = (REPOSITORY / "docs" / "api.md").read_text(encoding="utf-8")
+    documented = set(re.findall(r"^\| `([a-z0-9-]+)` \|", text, flags=re.MULTILINE))
+    receipts = {code for code in in_source if code.startswith("receipt-")}
+    missing = {*API_CODES, *PROBLEM_CODES, *receipts} - documented
+    assert missing == set(), "docs/api.md lists every code"
+    assert documented - {*API_CODES, *PROBLEM_CODES, *receipts} == set()
+
+
+def test_no_code_stands_in_the_list_that_nobody_gives() -> None:
+    by_the_framework = {
+        *("parse-error", "invalid", "not-found", "method-not-allowed", "not-acceptable", "throttled"),
+        *("unsupported-media-type", "not-authenticated", "authentication-failed", "permission-denied"),
+    }
+    source = "\n".join(
+        path.read_text(encoding="utf-8")
+        for path in REPOSITORY.glob("leaderboard/**/*.py")
+        if path.name != "problem_codes.py"
+    )
+    assert [c for c in API_CODES if c not in by_the_framework and f'"{c}"' not in source] == []

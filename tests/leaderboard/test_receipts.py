@@ -1,0 +1,162 @@
+"""Score receipts: for the team alone, and true for ever."""
+
+import json
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from django.core.exceptions import ImproperlyConfigured
+from django.core.management import call_command
+from django.test import Client
+from django.utils import timezone
+from pytest_django import Settings
+
+from evaluator import receipts as form
+from leaderboard import receipts, submissions
+from leaderboard.models import Edition, Submission, User, Visibility
+from tests import builders, pages
+from tests.editions import corrected, open_edition, publish
+from tests.leaderboard.test_api_submissions import client_of
+
+KEYS = "/.well-known/tsttc-receipt-keys.json"
+
+
+@pytest.fixture
+def scored(edition: Edition, owner: User) -> Submission:
+    submission = builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    return submission
+
+
+def address(submission: Submission) -> str:
+    return f"/api/v1/submissions/{submission.pk}/receipt"
+
+
+def verified(receipt: bytes) -> form.Verified:
+    return form.verify(receipt, form.read_keys(Client().get(KEYS).content))
+
+
+def test_receipt_verifies_against_the_published_key_and_says_what_the_api_says(
+    scored: Submission, edition: Edition, owner: User
+) -> None:
+    client = client_of(owner)
+    told = client.get(f"/api/v1/submissions/{scored.pk}").json()
+    found = verified(client.get(address(scored)).content)
+    assert found.scores == told["scores"]
+    assert found.counts == told["counts"]
+    assert (found.split, found.edition, found.protocol) == ("test", 1, "tsttc-1")
+    assert (found.ground_truth, found.file) == (edition.ground_truth_id, scored.digest)
+    assert (found.submission, found.method) == (str(scored.pk), "Foo")
+    assert found.site == "http://127.0.0.1:8000"
+    # Deterministic: whoever asks again has the same proof.
+    assert client.get(address(scored)).content == client.get(address(scored)).content
+
+
+def test_receipt_is_for_the_team_alone(
+    scored: Submission, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    found = [client_of(user).get(address(scored)).status_code for user in (owner, teammate)]
+    others = [client_of(user).get(address(scored)).status_code for user in (None, stranger, maintainer)]
+    assert (found, others) == ([200, 200], [401, 404, 404])
+
+
+def test_an_anonymous_methods_receipt_names_it_to_its_team(scored: Submission, owner: User) -> None:
+    scored.method.__class__.objects.update(visibility=Visibility.ANONYMOUS, shown_at=timezone.now())
+    assert verified(client_of(owner).get(address(scored)).content).method == "Foo"
+
+
+def test_only_what_is_scored_and_stands_has_a_receipt(edition: Edition, owner: User) -> None:
+    client = client_of(owner)
+    waiting = builders.submit(owner, builders.predictions(edition))
+    response = client.get(address(waiting))
+    assert (response.status_code, response.json()["code"]) == (409, "not-scored")
+    assert "queued" in response.json()["detail"]
+    builders.score_all()
+    rejected = builders.submit(owner, b"{}")
+    builders.score_all()
+    assert client.get(address(rejected)).json()["code"] == "not-scored"
+    submissions.withdraw(submission=waiting, actor=owner, now=timezone.now())
+    response = client.get(address(waiting))
+    assert (response.status_code, response.json()["code"]) == (409, "withdrawn")
+
+
+def test_receipt_of_a_superseded_edition_still_verifies_and_says_which(
+    scored: Submission, owner: User, tmp_path: Path
+) -> None:
+    client = client_of(owner)
+    before = client.get(address(scored)).content
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    # What is in preparation may still be given up.
+    assert client.get(f"{address(scored)}?edition=2").json()["code"] == "edition-unknown"
+    publish(second)
+    assert verified(before).edition == 1
+    after = client.get(address(scored)).content
+    assert verified(after).edition == 2
+    assert verified(after).scores != verified(before).scores
+    assert client.get(f"{address(scored)}?edition=1").content == before
+    for number, code in (("3", "edition-unknown"), ("x", "bad-edition"), ("-1", "bad-edition")):
+        assert client.get(f"{address(scored)}?edition={number}").json()["code"] == code
+
+
+def test_what_a_former_key_signed_verifies_after_another_took_its_place(
+    scored: Submission, owner: User, settings: Settings
+) -> None:
+    before = client_of(owner).get(address(scored)).content
+    former = form.encode(form.public_key(receipts.private_key()))
+    settings.RECEIPT_KEY = form.encode(bytes(range(32)))
+    with pytest.raises(form.NotVerified, match="key set has"):
+        verified(before)
+    settings.RECEIPT_OLD_KEYS = [former]
+    after = client_of(owner).get(address(scored)).content
+    assert verified(before).scores == verified(after).scores
+    assert verified(before).key_id != verified(after).key_id
+
+
+def test_keys_are_a_key_set_that_everybody_may_keep_for_an_hour() -> None:
+    response = Client().get(KEYS)
+    assert response.headers["Content-Type"] == "application/jwk-set+json"
+    assert "max-age=3600" in response.headers["Cache-Control"]
+    [key] = response.json()["keys"]
+    assert (key["kty"], key["crv"], key["alg"]) == ("OKP", "Ed25519", "EdDSA")
+    assert "d" not in key
+
+
+def test_receipt_is_a_file_on_the_submissions_page(
+    scored: Submission, client: Client, owner: User, stranger: User
+) -> None:
+    client.force_login(owner)
+    page = pages.page(client.get(f"/submissions/{scored.pk}/"))
+    [link] = [a for a in page.all("a") if a.text == "Score receipt"]
+    response = client.get(link.attributes["href"])
+    assert f'filename="tsttc-receipt-{scored.pk}.json"' in response.headers["Content-Disposition"]
+    assert verified(response.content).submission == str(scored.pk)
+    client.force_login(stranger)
+    assert client.get(link.attributes["href"]).status_code == 404
+
+
+def test_there_is_no_link_and_no_file_before_the_score(edition: Edition, client: Client, owner: User) -> None:
+    waiting = builders.submit(owner, builders.predictions(edition))
+    client.force_login(owner)
+    assert "Score receipt" not in client.get(f"/submissions/{waiting.pk}/").content.decode()
+    assert client.get(f"/submissions/{waiting.pk}/receipt.json").status_code == 409
+
+
+def test_command_makes_a_key_that_signs(settings: Settings) -> None:
+    call_command("make_receipt_key", stdout=(out := StringIO()), stderr=(err := StringIO()))
+    name, _, key = out.getvalue().strip().partition("=")
+    assert name == "TSTTC_RECEIPT_KEY"
+    settings.RECEIPT_KEY = key
+    published = receipts.public_keys()["keys"][0]
+    assert published["kid"] in err.getvalue()
+    assert published["x"] in err.getvalue()
+    assert key not in json.dumps(published) + err.getvalue()
+
+
+@pytest.mark.parametrize("key", ["", "x", "A" * 42, "A" * 44, "A" * 42 + "B", "Ä" * 43])
+def test_malformed_key_is_found_at_the_start(settings: Settings, key: str) -> None:
+    settings.RECEIPT_KEY = key
+    [error] = receipts.check_keys()
+    assert "TSTTC_RECEIPT_KEY is malformed" in error.msg
+    with pytest.raises(ImproperlyConfigured):
+        receipts.private_key()
