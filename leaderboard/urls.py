@@ -1,13 +1,20 @@
 """Addresses: pages, API, administration, accounts, and those for monitoring."""
 
+from allauth.account.decorators import secure_admin_login
 from django.contrib import admin
-from django.urls import include, path
+from django.urls import include, path, re_path
 
-from leaderboard.web import health
+from leaderboard.api.problems import NowhereView
+from leaderboard.web import health, receipt_views
+
+# Its own form knows no limit of how often one may guess.
+admin.site.login = secure_admin_login(admin.site.login)  # type: ignore[method-assign]  # the way that allauth documents
 
 urlpatterns = [
     path("", include("leaderboard.web.urls")),
     path("api/v1/", include("leaderboard.api.urls")),
+    re_path(r"^api(/|$)", NowhereView.as_view()),
+    path(".well-known/tsttc-receipt-keys.json", receipt_views.receipt_keys, name="receipt_keys"),
     path("accounts/", include("allauth.urls")),
     path("admin/", admin.site.urls),
     path("healthz", health.healthz, name="healthz"),
@@ -16,4 +23,5 @@ urlpatterns = [
 ]
 
 # What no view has handled: an outage is told as such, everything else is a 500.
+handler400 = "leaderboard.web.outages.bad_request"
 handler500 = "leaderboard.web.outages.server_error"

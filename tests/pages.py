@@ -87,11 +87,13 @@ def page(response: HttpResponseBase) -> Element:
 
 
 def board_rows(root: Element) -> list[list[str]]:
-    """The board as texts, without what is only spoken."""
+    """The board as texts, without what is only spoken, drawn, or to be ticked."""
     rows = []
     for row in root.one("table", class_="board").one("tbody").all("tr"):
         cells = []
         for cell in row.children:
+            if {"interval", "choose"} & set(cell.classes):
+                continue
             spoken = " ".join(e.text for e in cell.all("span", class_="spoken"))
             cells.append(cell.text.removesuffix(spoken).strip())
         rows.append(cells)

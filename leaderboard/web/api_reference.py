@@ -12,6 +12,9 @@ from typing import Any
 
 from drf_spectacular.generators import SchemaGenerator
 
+from evaluator.problems import PROBLEM_CODES
+from leaderboard import problem_codes
+
 Node = Mapping[str, Any]
 
 
@@ -72,6 +75,10 @@ class Reference:
 
     operations: tuple[Operation, ...]
     shapes: tuple[Shape, ...]
+    codes: tuple[tuple[str, str], ...] = tuple(problem_codes.API_CODES.items())
+    file_codes: tuple[tuple[str, str], ...] = tuple(
+        (code, about) for code, about in PROBLEM_CODES.items() if code not in problem_codes.API_CODES
+    )
 
 
 @cache
@@ -133,6 +140,9 @@ def _operation(path: str, method: str, node: Node, shapes: Node) -> Operation:
 
 def _answers(responses: Node) -> Iterable[Answer]:
     for status, node in sorted(responses.items()):
+        if "$ref" in node:
+            # What any operation may answer with; the page says it once.
+            continue
         media = next(iter(node.get("content", {"": {}}).values()))
         yield Answer(
             status=int(status),

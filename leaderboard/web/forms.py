@@ -10,7 +10,7 @@ from django.conf import settings
 from django.http import HttpRequest
 from django.utils import timezone
 
-from leaderboard import quotas, submissions, teams
+from leaderboard import names, quotas, submissions, teams
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.quotas import QuotaExceeded
 from leaderboard.submissions import Refused
@@ -26,14 +26,24 @@ class SignupForm(forms.Form):
         max_length=80,
         required=False,
         help_text="Your own or your team's. Without one you appear as “Team” with a number; "
-        "your e-mail address is never shown.",
+        "your e-mail address is shown to your team alone.",
         widget=forms.TextInput(attrs={"autocomplete": "nickname"}),
     )
     field_order = ["email", "name", "password1", "password2"]
 
+    def clean_name(self) -> str:
+        """The name as boards will show it; two teams whose names look alike get a number."""
+        name: str = self.cleaned_data["name"]
+        if not name.strip():
+            return ""
+        try:
+            return names.clean_name("name", name)
+        except Refused as refusal:
+            raise forms.ValidationError(str(refusal)) from None
+
     def signup(self, request: HttpRequest, user: User) -> None:
         """Called once the account exists."""
-        user.name = self.cleaned_data["name"].strip()
+        user.name = self.cleaned_data["name"]
         user.save(update_fields=["name"])
 
 
@@ -52,7 +62,7 @@ def offers_for(user: User, *, now: datetime) -> list[Offer]:
     found = []
     for split in Split.objects.select_related("published_edition"):
         refusal = submissions.refusal_of(split, now=now)
-        sentence = str(refusal or quotas.state(team=team, split=split, now=now).sentence)
+        sentence = str(refusal or quotas.state(team=team, user=user, split=split, now=now).sentence)
         found.append(Offer(split=split, is_open=refusal is None, sentence=sentence))
     return found
 

@@ -6,7 +6,7 @@ from django.conf import settings
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
 
-from leaderboard import submissions
+from leaderboard import problem_codes, submissions
 
 # Room for the other fields and the boundaries of a multipart body.
 FORM_BYTES = 100_000
@@ -28,15 +28,8 @@ class UploadLimitMiddleware:
             response = render(request, "413.html", {"sentence": sentence}, status=413)
         else:
             response = JsonResponse(
-                {
-                    "type": "about:blank",
-                    "title": "Content too large",
-                    "status": 413,
-                    "code": "too-large",
-                    "detail": sentence,
-                    "problems": [{"code": "too-large", "message": sentence, "where": "file"}],
-                },
+                problem_codes.document(status=413, code="too-large", detail=sentence, where="file"),
                 status=413,
-                content_type="application/problem+json",
+                content_type=problem_codes.MEDIA_TYPE,
             )
         return response

@@ -4,8 +4,11 @@ import sys
 
 from django.http import HttpRequest, HttpResponse, HttpResponseServerError, JsonResponse
 from django.template.loader import render_to_string
+from django.views import defaults
 
-from leaderboard import outages
+from leaderboard import outages, problem_codes
+
+SORRY = "That was our fault, not yours. It stands in our logs; the same request may well work later."
 
 
 def server_error(request: HttpRequest) -> HttpResponse:
@@ -14,22 +17,31 @@ def server_error(request: HttpRequest) -> HttpResponse:
     Rendered without the request: the usual frame asks the database who is reading.
     """
     outage = outages.outage_of(sys.exception())
+    status, code, sentence, headers = (
+        (outage.status, outage.code, outage.sentence, outage.headers)
+        if outage is not None
+        else (500, "server-error", SORRY, {})
+    )
+    if request.path.startswith("/api/"):
+        return JsonResponse(
+            problem_codes.document(status=status, code=code, detail=sentence),
+            status=status,
+            headers=headers,
+            content_type=problem_codes.MEDIA_TYPE,
+        )
     if outage is None:
         return HttpResponseServerError(render_to_string("500.html"))
-    if request.path.startswith("/api/"):
-        problem = {"code": outage.code, "message": outage.sentence, "where": ""}
-        return JsonResponse(
-            {
-                "type": "about:blank",
-                "title": outage.title,
-                "status": outage.status,
-                "code": outage.code,
-                "detail": outage.sentence,
-                "problems": [problem],
-            },
-            status=outage.status,
-            headers=outage.headers,
-            content_type="application/problem+json",
-        )
     page = render_to_string("outage.html", {"outage": outage})
     return HttpResponse(page, status=outage.status, headers=outage.headers)
+
+
+def bad_request(request: HttpRequest, exception: Exception) -> HttpResponse:
+    """Django's handler of a request that is malformed before any view has seen it."""
+    if not request.path.startswith("/api/"):
+        return defaults.bad_request(request, exception)
+    sentence = "The request is malformed, or was broken off; expected it whole, as the API describes it."
+    return JsonResponse(
+        problem_codes.document(status=400, code="bad-request", detail=sentence),
+        status=400,
+        content_type=problem_codes.MEDIA_TYPE,
+    )

@@ -8,7 +8,7 @@ from typing import Final
 from leaderboard.models import Status
 from leaderboard.submissions import Progress
 from leaderboard.templatetags.board import duration, grouped
-from leaderboard.web.tables import ResultGroup, result_groups
+from leaderboard.web.result_tables import ResultGroup, result_groups
 
 MAX_POINTS: Final = 20
 _ENDS: Final = {
@@ -46,7 +46,9 @@ def shown(progress: Progress) -> Shown:
     return Shown(
         steps=steps(progress),
         seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}",
-        groups=result_groups(progress.scores, progress.counts) if progress.scores else (),
+        groups=result_groups(progress.scores, progress.counts, intervals=progress.intervals)
+        if progress.scores
+        else (),
         truncation=truncation(progress.truncated),
         problems=tuple(progress.problems[:MAX_POINTS]),
         listing=listing(n_problems=progress.n_problems, n_points=len(progress.problems)),

@@ -1,5 +1,7 @@
 """One line a request, with its id, which the response bears as well."""
 
+import re
+
 import structlog
 from django.http import HttpRequest, HttpResponse
 from django.utils.functional import SimpleLazyObject
@@ -7,6 +9,9 @@ from django_structlog.middlewares import RequestMiddleware
 
 # Asked every few seconds by machines; worth a line only when they fail.
 QUIET = frozenset({"/healthz", "/readyz", "/metrics"})
+
+# What comes behind this is the secret of an invitation.
+SECRET_PATH = re.compile(r"^(/team/join/).+", re.DOTALL)
 
 
 class RequestLogMiddleware(RequestMiddleware):
@@ -22,8 +27,9 @@ class RequestLogMiddleware(RequestMiddleware):
 
     @staticmethod
     def format_request(request: HttpRequest) -> str:
-        """Method and path; the query stays out, since it holds what somebody searched for."""
-        return f"{request.method} {request.path}"
+        """Method and path; what stays out is the query, which somebody typed, and what lets its reader in."""
+        path = SECRET_PATH.sub(r"\1…", request.path)
+        return f"{request.method} {path}"
 
     @staticmethod
     def bind_user_id(request: HttpRequest) -> None:

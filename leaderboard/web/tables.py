@@ -3,54 +3,35 @@
 Templates only place what they are given; a thousand rows of number filters would cost more than the query.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Final
-from urllib.parse import urlencode
 
-from evaluator.protocol import INTERVALS, SCORE_NAMES, Interval
+from django.core.paginator import Page, Paginator
+from django.utils.safestring import SafeString
+
+from evaluator.protocol import INTERVALS, SCORE_NAMES
+from evaluator.protocol import Interval as TimeInterval
 from evaluator.report import format_published
-from leaderboard.methods import Result
-from leaderboard.models import Status, Submission
-from leaderboard.standings import Board, Entry, flat_scores
-from leaderboard.submissions import evaluation_of
-from leaderboard.templatetags.board import grouped
+from leaderboard import inference
+from leaderboard.entries import Interval
+from leaderboard.exports import printed_decimals, short_authors
+from leaderboard.standings import Board, Entry
+from leaderboard.web import drawing
+from leaderboard.web.board_query import PER_PAGE, BoardQuery
+from leaderboard.web.drawing import Scale
 
 METRIC_SYMBOLS: Final = {"mid": "MiD", "rte": "RTE"}
 METRIC_TITLES: Final = {"mid": "Motion-in-depth error (MiD)", "rte": "Relative TTC error (RTE)"}
 METRIC_UNITS: Final = {"mid": "×10⁻⁴", "rte": "%"}
 SCORED_DECIMALS: Final = 2
 ABSENT: Final = "–"
+NOTHING: Final = SafeString("")
 _INTERVALS: Final = {interval.name: interval for interval in INTERVALS}
 
 
-def printed_decimals(values: Iterable[float | None]) -> int:
-    """With how many decimals a row was printed: one, or two where any of its values has two.
-
-    >>> printed_decimals([14.8, 55.0]), printed_decimals([14.82, 55.0])
-    (1, 2)
-    """
-    known = [value for value in values if value is not None]
-    return 1 if all(round(value, 1) == value for value in known) else SCORED_DECIMALS
-
-
-def short_authors(authors: str) -> str:
-    """Authors as a table has room for them.
-
-    >>> short_authors("Yuheng Shi, Zehao Huang, Yan Yan")
-    'Shi et al.'
-    >>> short_authors("Ada Lovelace, Charles Babbage"), short_authors("Ada Lovelace")
-    ('Lovelace and Babbage', 'Ada Lovelace')
-    """
-    names = [name.strip() for name in authors.split(",") if name.strip()]
-    if len(names) < 2:
-        return authors
-    surnames = [name.split()[-1] for name in names]
-    return " and ".join(surnames) if len(names) == 2 else f"{surnames[0]} et al."
-
-
-def seconds_range(interval: Interval) -> str:
+def seconds_range(interval: TimeInterval) -> str:
     """An interval of time to contact in words of its ends.
 
     >>> [seconds_range(interval) for interval in INTERVALS]
@@ -61,7 +42,7 @@ def seconds_range(interval: Interval) -> str:
 
 @dataclass(frozen=True)
 class Heading:
-    """A column's head: a link that sorts by it, or turns the order round."""
+    """A column's head: a link that sorts by it, or turns the order round; and the scale of its whiskers."""
 
     name: str
     symbol: str
@@ -72,6 +53,7 @@ class Heading:
     unit: str = ""
     spoken: str = ""
     css: str = ""
+    axis: SafeString = NOTHING
 
 
 @dataclass(frozen=True)
@@ -82,6 +64,15 @@ class Cell:
     css: str = ""
     is_best: bool = False
     is_second: bool = False
+    is_with_best: bool = False  # not significantly worse than the best
+    interval: str = ""  # in words
+    whisker: SafeString = NOTHING
+    has_room: bool = False  # for a whisker: its column has one, though this value may have none
+
+    @property
+    def span(self) -> str:
+        """The interval as shortly as a narrow column has room for it."""
+        return self.interval.replace(" to ", "–")
 
 
 @dataclass(frozen=True)
@@ -92,8 +83,14 @@ class Row:
     rank: str
     team: str
     cells: tuple[Cell, ...]
+    rank_range: str = ""
     source_number: int | None = None
     note: str = ""  # why it stays in a former edition
+
+    @property
+    def can_be_compared(self) -> bool:
+        """Whether there is something of it to be compared: papers print no values per recording."""
+        return self.entry.method_id is not None and self.entry.scores["mid"] is not None
 
 
 @dataclass(frozen=True)
@@ -107,7 +104,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Group:
-    """One of the two errors, over its five columns."""
+    """One of the two errors, over its columns."""
 
     title: str
     unit: str
@@ -128,53 +125,96 @@ class IntervalFact:
 class BoardTable:
     """Everything that the board's template places."""
 
+    query: BoardQuery
     text_headings: tuple[Heading, ...]
     groups: tuple[Group, ...]
     score_headings: tuple[Heading, ...]
     rows: tuple[Row, ...]
     sources: tuple[Source, ...]
     intervals: tuple[IntervalFact, ...]
+    pages: "Page[Entry]"
+    has_intervals: bool
+    can_compare: bool
+    reason: str  # why there are no intervals; empty where there are
+
+    @property
+    def has_private_rows(self) -> bool:
+        """Whether the reader's own team has rows here that nobody else sees."""
+        return any(not row.entry.is_visible_to_all for row in self.rows)
+
+    @property
+    def next_href(self) -> str:
+        """The next page's address; empty on the last."""
+        return self._page_href(self.pages.number + 1) if self.pages.has_next() else ""
+
+    @property
+    def previous_href(self) -> str:
+        """The page's before; empty on the first."""
+        return self._page_href(self.pages.number - 1) if self.pages.has_previous() else ""
+
+    def _page_href(self, number: int) -> str:
+        return self.query.href(page=str(number) if number > 1 else "")
 
 
-@dataclass(frozen=True)
-class ResultGroup:
-    """One of the two errors of one result: five heads, five values, five counts."""
-
-    group: Group
-    columns: tuple[tuple[Heading, Cell, str], ...]
-
-
-@dataclass(frozen=True)
-class MethodResult:
-    """What a method achieved on a split, ready to be placed."""
-
-    result: Result
-    groups: tuple[ResultGroup, ...]
-
-
-def board_table(board: Board, *, query: Mapping[str, str]) -> BoardTable:
+def board_table(board: Board, *, query: BoardQuery) -> BoardTable:
     """The board, ready to be drawn; its links keep what else the address asks for."""
-    kept = {name: value for name, value in query.items() if name != "sort"}
-    sources = _sources(board.entries)
+    names = [name for name in SCORE_NAMES if name.partition("_")[0] in query.metrics]
+    scales = _scales(board.entries, names if len(query.metrics) == 1 else names[:1])
+    pages = Paginator(board.entries, PER_PAGE).get_page(query.page)
+    sources = _sources(pages.object_list)
     numbers = {source.citation: source.number for source in sources}
     counts = board.edition.ground_truth.counts if board.edition else {}
+    rows = tuple(_row(entry, names, numbers, scales) for entry in pages.object_list)
     return BoardTable(
-        text_headings=tuple(
-            _text_heading(name, board.sort, kept) for name in ("rank", "method", "team", "date")
-        ),
-        groups=score_groups(),
-        score_headings=tuple(score_heading(name, board.sort, kept) for name in SCORE_NAMES),
-        rows=tuple(_row(entry, numbers) for entry in board.entries),
+        query=query,
+        text_headings=tuple(_text_heading(name, query) for name in ("rank", "method", "team", "date")),
+        groups=score_groups(query.metrics, n_whiskers=len(scales)),
+        score_headings=tuple(score_heading(name, query, scales.get(name)) for name in names),
+        rows=rows,
         sources=sources,
         intervals=interval_facts(counts),
+        pages=pages,
+        has_intervals=bool(scales),
+        can_compare=_is_present(board) and sum(row.can_be_compared for row in rows) > 1,
+        reason=_reason(board, has_intervals=bool(scales)),
     )
 
 
-def score_groups() -> tuple[Group, ...]:
-    """The two errors over their columns, in the paper's order."""
+def _is_present(board: Board) -> bool:
+    return board.edition is not None and board.edition.pk == board.split.published_edition_id and not board.at
+
+
+def _reason(board: Board, *, has_intervals: bool) -> str:
+    """Why no value has an interval, where something was scored at all."""
+    if has_intervals or board.edition is None or not board.n_submissions:
+        return ""
+    return inference.why_no_interval(board.edition) or (
+        "The intervals are being computed; until then the values stand without them."
+    )
+
+
+def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Scale]:
+    """One scale for each of these columns that has an interval, the same for all rows of all pages."""
+    found = {}
+    for name in names:
+        known = [entry.intervals[name] for entry in entries if name in entry.intervals]
+        ends = [end for interval in known for end in (interval.low, interval.high) if end is not None]
+        values = [value for entry in entries if (value := entry.scores[name]) is not None]
+        scale = drawing.scale_of([*ends, *values]) if ends else None
+        if scale is not None:
+            found[name] = scale
+    return found
+
+
+def score_groups(metrics: Sequence[str] = tuple(METRIC_TITLES), *, n_whiskers: int = 0) -> tuple[Group, ...]:
+    """The errors over their columns, in the paper's order; the first has those of the whiskers besides."""
     return tuple(
-        Group(title=title, unit=METRIC_UNITS[metric], n_columns=1 + len(INTERVALS))
-        for metric, title in METRIC_TITLES.items()
+        Group(
+            title=METRIC_TITLES[metric],
+            unit=METRIC_UNITS[metric],
+            n_columns=1 + len(INTERVALS) + (n_whiskers if metric == metrics[0] else 0),
+        )
+        for metric in metrics
     )
 
 
@@ -191,7 +231,7 @@ def interval_facts(counts: Mapping[str, int]) -> tuple[IntervalFact, ...]:
     )
 
 
-def score_heading(name: str, sort: str = "", kept: Mapping[str, str] = MappingProxyType({})) -> Heading:
+def score_heading(name: str, query: BoardQuery | None = None, scale: Scale | None = None) -> Heading:
     """The head of one of the ten numbers."""
     metric, _, interval_name = name.partition("_")
     symbol = METRIC_SYMBOLS[metric]
@@ -205,91 +245,64 @@ def score_heading(name: str, sort: str = "", kept: Mapping[str, str] = MappingPr
         caption=interval_name or "overall",
         unit=METRIC_UNITS[metric],
         spoken=spoken,
-        href=_sort_href(name, sort, kept),
-        aria_sort=_aria_sort(name, sort),
+        href=_sort_href(name, query),
+        aria_sort=_aria_sort(name, query),
         css=f"{css} first" if interval is None else css,
+        axis=drawing.axis(scale) if scale else NOTHING,
     )
 
 
 def score_cells(
     scores: Mapping[str, float | None],
     *,
+    names: Sequence[str] = SCORE_NAMES,
+    intervals: Mapping[str, Interval] = MappingProxyType({}),
+    scales: Mapping[str, Scale] = MappingProxyType({}),
     decimals: int = SCORED_DECIMALS,
     best: frozenset[str] = frozenset(),
     second: frozenset[str] = frozenset(),
 ) -> tuple[Cell, ...]:
-    """The ten numbers of a result in the paper's order."""
-    return tuple(
-        Cell(
-            text=format_published(scores.get(name), decimals=decimals),
-            css=_cell_css(name, scores.get(name), decimals),
-            is_best=name in best,
-            is_second=name in second,
+    """The numbers of a result in the paper's order, each with its interval where it has one."""
+    cells = []
+    for name in names:
+        value, found = scores.get(name), intervals.get(name, Interval())
+        scale = scales.get(name)
+        cells.append(
+            Cell(
+                text=format_published(value, decimals=decimals),
+                css=_cell_css(name, value, decimals),
+                is_best=name in best,
+                is_second=name in second,
+                is_with_best=bool(found.is_with_best) and name not in best,
+                interval=interval_words(found),
+                has_room=scale is not None,
+                whisker=drawing.whisker(scale, value, found.low, found.high)
+                if scale and value is not None
+                else NOTHING,
+            )
         )
-        for name in SCORE_NAMES
-    )
+    return tuple(cells)
 
 
-def result_groups(
-    scores: Mapping[str, float | None],
-    counts: Mapping[str, int],
-    *,
-    best: frozenset[str] = frozenset(),
-    second: frozenset[str] = frozenset(),
-) -> tuple[ResultGroup, ...]:
-    """The ten numbers of one result, with the number of sequences behind each."""
-    headings = [score_heading(name) for name in SCORE_NAMES]
-    columns = [
-        (heading, cell, grouped(counts.get(heading.caption)))
-        for heading, cell in zip(headings, score_cells(scores, best=best, second=second), strict=True)
-    ]
-    groups = score_groups()
-    n_columns = groups[0].n_columns
-    return tuple(
-        ResultGroup(group=group, columns=tuple(columns[i * n_columns : (i + 1) * n_columns]))
-        for i, group in enumerate(groups)
-    )
+def interval_words(found: Interval) -> str:
+    """From where to where a value may lie; empty where that is not known.
+
+    >>> interval_words(Interval(low=13.9, high=14.523)), interval_words(Interval())
+    ('13.90 to 14.52', '')
+    """
+    if found.low is None or found.high is None:
+        return ""
+    return f"{format_published(found.low)} to {format_published(found.high)}"
 
 
-def method_results(results: Iterable[Result]) -> tuple[MethodResult, ...]:
-    """A method's results, ready to be placed."""
-    return tuple(
-        MethodResult(
-            result=result,
-            groups=result_groups(
-                result.entry.scores,
-                {"overall": result.edition.ground_truth.n_sequences, **result.edition.ground_truth.counts},
-                best=result.entry.best,
-                second=result.entry.second,
-            ),
-        )
-        for result in results
-    )
-
-
-@dataclass(frozen=True)
-class SubmissionRow:
-    """One line of a team's list of submissions."""
-
-    submission: Submission
-    state: str
-    state_label: str
-    cells: tuple[Cell, ...]
-
-
-def submission_rows(submissions: Iterable[Submission]) -> tuple[SubmissionRow, ...]:
-    """A team's submissions with their state and, once scored, their overall errors."""
-    rows = []
-    for submission in submissions:
-        evaluation = evaluation_of(submission)
-        scores = flat_scores(evaluation.scores.all())
-        cells = [
-            cell for name, cell in zip(SCORE_NAMES, score_cells(scores), strict=True) if name in METRIC_TITLES
-        ]
-        rows.append(
-            SubmissionRow(submission, evaluation.status, Status(evaluation.status).label, tuple(cells))
-        )
-    return tuple(rows)
+def rank_range(entry: Entry) -> str:
+    """Where an entry may stand at 95 %, behind its rank; empty where that is not known."""
+    found = entry.intervals.get("mid", Interval())
+    if found.rank_low is None or found.rank_high is None:
+        return ""
+    if found.rank_low == found.rank_high:
+        return f"({found.rank_low})"
+    return f"({found.rank_low}–{found.rank_high})"
 
 
 def _cell_css(name: str, value: float | None, decimals: int) -> str:
@@ -299,38 +312,50 @@ def _cell_css(name: str, value: float | None, decimals: int) -> str:
     return place if decimals == SCORED_DECIMALS else f"{place} d{decimals}"
 
 
-def _text_heading(name: str, sort: str, kept: Mapping[str, str]) -> Heading:
+def _text_heading(name: str, query: BoardQuery) -> Heading:
     label = {"rank": "Rank", "method": "Method", "team": "Team", "date": "Date"}[name]
     return Heading(
         name=name,
         symbol=label,
-        href=_sort_href(name, sort, kept),
-        aria_sort=_aria_sort(name, sort),
+        href=_sort_href(name, query),
+        aria_sort=_aria_sort(name, query),
         css=f"{name} wide" if name in {"team", "date"} else name,
     )
 
 
-def _sort_href(name: str, sort: str, kept: Mapping[str, str]) -> str:
+def _sort_href(name: str, query: BoardQuery | None) -> str:
     """Sort by this column; where it decides already, turn round. Dates begin with the newest."""
     usual, other = (f"-{name}", name) if name == "date" else (name, f"-{name}")
-    return "?" + urlencode({**kept, "sort": other if sort == usual else usual})
-
-
-def _aria_sort(name: str, sort: str) -> str:
-    """The attribute's value; empty for the columns that do not decide the order."""
-    if sort.removeprefix("-") != name:
+    if query is None:
         return ""
-    return "descending" if sort.startswith("-") else "ascending"
+    return query.href(sort=other if query.sort == usual else usual)
 
 
-def _row(entry: Entry, source_numbers: Mapping[str, int]) -> Row:
+def _aria_sort(name: str, query: BoardQuery | None) -> str:
+    """The attribute's value; empty for the columns that do not decide the order."""
+    if query is None or query.sort.removeprefix("-") != name:
+        return ""
+    return "descending" if query.sort.startswith("-") else "ascending"
+
+
+def _row(
+    entry: Entry, names: Sequence[str], source_numbers: Mapping[str, int], scales: Mapping[str, Scale]
+) -> Row:
     is_published = entry.kind == "published"
-    decimals = printed_decimals(entry.scores.values()) if is_published else SCORED_DECIMALS
     return Row(
         entry=entry,
         rank=ABSENT if entry.rank is None else str(entry.rank),
+        rank_range=rank_range(entry),
         team=short_authors(entry.team) if is_published else entry.team,
-        cells=score_cells(entry.scores, decimals=decimals, best=entry.best, second=entry.second),
+        cells=score_cells(
+            entry.scores,
+            names=names,
+            intervals=entry.intervals,
+            scales=scales,
+            decimals=printed_decimals(entry.scores.values()) if is_published else SCORED_DECIMALS,
+            best=entry.best,
+            second=entry.second,
+        ),
         source_number=source_numbers.get(entry.source),
     )
 

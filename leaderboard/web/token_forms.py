@@ -20,7 +20,7 @@ class TokenForm(forms.Form):
     )
     scopes = forms.MultipleChoiceField(
         choices=[
-            (Scope.SUBMIT, "submit: send and withdraw files"),
+            (Scope.SUBMIT, "submit: send and withdraw files, describe methods and show them to others"),
             (Scope.READ, "read: ask what became of them"),
         ],
         initial=list(Scope.values),

@@ -1,9 +1,27 @@
 """Addresses of the pages."""
 
-from django.urls import include, path
+from django.urls import include, path, register_converter
+from django.views.generic import RedirectView
 
-from leaderboard.web import audit_views, edition_views, maintainer_views, token_views, views
+from leaderboard.keeping import kept
+from leaderboard.web import (
+    analysis_views,
+    audit_views,
+    chart_views,
+    compare_views,
+    edition_views,
+    export_views,
+    maintainer_views,
+    method_views,
+    outside_views,
+    receipt_views,
+    team_views,
+    token_views,
+    views,
+)
 
+SAME_QUERY = {"query_string": True, "http_method_names": ["get", "head"]}
+register_converter(export_views.FormConverter, "board_form")
 MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
     path("progress/", maintainer_views.edition_progress, name="maintain_progress"),
@@ -14,16 +32,51 @@ MAINTAINED_EDITION = [
     path("discard/", maintainer_views.discard, name="maintain_discard"),
 ]
 urlpatterns = [
-    path("", views.home, name="home"),
-    path("board/<slug:split>/", views.board, name="board"),
-    path("board/<slug:split>/editions/", edition_views.editions, name="editions"),
-    path("board/<slug:split>/editions/<int:number>/", edition_views.edition, name="edition"),
+    path("", kept(views.home), name="home"),
+    path("board/<slug:split>/", kept(views.board), name="board"),
+    path("board/<slug:split>/charts/", kept(chart_views.board_charts), name="charts"),
+    path("board/<slug:split>/editions/", kept(edition_views.editions), name="editions"),
+    path("board/<slug:split>/editions/<int:number>/", kept(edition_views.edition), name="edition"),
+    # The API's own document, with the same query: there is one shape of a board.
+    path(
+        "board/<slug:split>.json", RedirectView.as_view(**SAME_QUERY, pattern_name="api-board"), name="json"
+    ),
+    path(
+        "board/<slug:split>/editions/<int:number>.json",
+        RedirectView.as_view(**SAME_QUERY, pattern_name="api-edition-board"),
+        name="edition_json",
+    ),
+    path("board/<slug:split>.<board_form:form>", kept(export_views.board), name="export"),
+    path(
+        "board/<slug:split>/editions/<int:number>.<board_form:form>",
+        kept(export_views.edition),
+        name="edition_export",
+    ),
+    path("board/<slug:split>/feed.atom", kept(outside_views.feed), name="feed"),
+    path("feed.atom", kept(outside_views.feed), name="feed_of_all"),
+    path("methods/<uuid:method_id>/badge.svg", kept(outside_views.badge), name="badge"),
     path("submit/", views.submit, name="submit"),
     path("submissions/", views.submissions, name="submissions"),
     path("submissions/<uuid:submission_id>/", views.submission, name="submission"),
+    path("submissions/<uuid:submission_id>/analysis/", analysis_views.analysis, name="analysis"),
     path("submissions/<uuid:submission_id>/state/", views.submission_state, name="submission_state"),
+    path("submissions/<uuid:submission_id>/receipt.json", receipt_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", views.withdraw, name="withdraw"),
-    path("methods/<uuid:method_id>/", views.method, name="method"),
+    path("methods/<uuid:method_id>/", kept(views.method), name="method"),
+    path("compare/", compare_views.compare, name="compare"),
+    path("methods/<uuid:method_id>/edit/", method_views.edit, name="method_edit"),
+    path("methods/<uuid:method_id>/visibility/", method_views.visibility, name="method_visibility"),
+    path("team/", team_views.team, name="team"),
+    path("team/invite/", team_views.invite, name="invite"),
+    path(
+        "team/invitations/<uuid:invitation_id>/revoke/",
+        team_views.revoke_invitation,
+        name="revoke_invitation",
+    ),
+    path("team/join/<str:secret>/", team_views.join, name="join_team"),
+    path("team/leave/", team_views.leave, name="leave_team"),
+    path("team/members/<int:user_id>/hand-over/", team_views.hand_over, name="hand_over_team"),
+    path("team/members/<int:user_id>/remove/", team_views.remove, name="remove_member"),
     path("tokens/", token_views.tokens, name="tokens"),
     path("tokens/revoke/", token_views.revoke, name="revoke_token"),
     path("docs/", views.docs, name="docs"),

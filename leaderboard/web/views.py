@@ -13,11 +13,21 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import editions, methods, quotas, standings
+from leaderboard import editions, methods, quotas, snapshots
 from leaderboard import submissions as verbs
 from leaderboard.models import Edition, Evaluation, Method, Split, Submission, User
 from leaderboard.web import api_reference as api
-from leaderboard.web import edition_tables, reference, tables
+from leaderboard.web import (
+    board_query,
+    edition_tables,
+    export_views,
+    method_tables,
+    reference,
+    result_tables,
+    tables,
+)
+from leaderboard.web.board_tools import tools
+from leaderboard.web.context import split_or_404, splits_of
 from leaderboard.web.forms import SubmissionForm
 from leaderboard.web.progress import shown
 
@@ -36,26 +46,34 @@ def home(request: HttpRequest) -> HttpResponse:
 @require_safe
 def board(request: HttpRequest, split: str) -> HttpResponse:
     """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
-    found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
+    found = split_or_404(request, split)
     return draw_board(request, "board.html", split=found, news=edition_tables.news(found))
 
 
 def draw_board(
     request: HttpRequest, template: str, *, split: Split, edition: Edition | None = None, **more: Any
 ) -> HttpResponse:
-    """A board in the order, and as of the time, that the address asks for; an edition's has no other time."""
-    names = ("sort",) if edition else ("sort", "at")
-    query = {name: request.GET[name] for name in names if name in request.GET}
+    """A board as its address asks for it; an edition's has no other time."""
     try:
-        at = standings.parse_moment(query["at"]) if "at" in query else None
-        at = at if at and at < timezone.now() else None  # what has not come yet is as it is now
-        shown = standings.board(
-            split=split, edition=edition, viewer=request.user, sort=query.get("sort", "rank"), at=at
-        )
-    except (standings.UnknownColumn, standings.BadMoment) as fault:
+        query = board_query.parse(request.GET, now=timezone.now(), has_time=edition is None)
+    except board_query.FAULTS as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=400)
+    shown = snapshots.board(
+        split=split,
+        edition=edition,
+        viewer=request.user,
+        sort=query.sort,
+        at=query.at,
+        filters=query.filters,
+    )
     table = edition_tables.with_reasons(tables.board_table(shown, query=query), shown)
-    return render(request, template, {"board": shown, "table": table, **more})
+    context = {
+        "board": shown,
+        "table": table,
+        "tools": tools(shown, query),
+        "exports": export_views.links(split, edition, query),
+    }
+    return render(request, template, context | more)
 
 
 @login_required
@@ -89,7 +107,7 @@ def submissions(request: HttpRequest) -> HttpResponse:
         .prefetch_related(Prefetch("evaluations", evaluations))
     )
     page = Paginator(sent, PER_PAGE).get_page(request.GET.get("page"))
-    return render(request, "submissions.html", {"page": page, "rows": tables.submission_rows(page)})
+    return render(request, "submissions.html", {"page": page, "rows": result_tables.submission_rows(page)})
 
 
 @login_required
@@ -130,10 +148,21 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 @require_safe
 def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """A method: what it is, and what it achieved on each split."""
-    rows = Method.objects.visible_to(request.user).select_related("team").distinct()
+    rows = Method.objects.visible_to(request.user).select_related("team")
     found = get_object_or_404(rows, pk=method_id)
-    results = methods.results(method=found, viewer=request.user)
-    return render(request, "method.html", {"method": found, "results": tables.method_results(results)})
+    results = methods.results(method=found, viewer=request.user, splits=splits_of(request))
+    profile = methods.profile(method=found, viewer=request.user)
+    context = {
+        "profile": profile,
+        "details": method_tables.detail_words(profile.details),
+        "visibility": found.visibility,
+        "is_named": found.is_named_for(request.user),
+        "is_mine": Method.objects.of(request.user).filter(pk=found.pk).exists(),
+        "method_id": found.pk,
+        "results": result_tables.method_results(results),
+        **export_views.of_method(results),
+    }
+    return render(request, "method.html", context)
 
 
 @require_safe

@@ -133,7 +133,7 @@ def test_any_other_fault_stays_a_500(
     def broken(**_: object) -> None:
         raise KeyError("a fault of our own")
 
-    monkeypatch.setattr("leaderboard.standings.board", broken)
+    monkeypatch.setattr("leaderboard.snapshots.board", broken)
     client.raise_request_exception = False
     for address in ("/", "/api/v1/splits/test/board"):
         answer = client.get(address)

@@ -118,3 +118,12 @@ def test_guessing_passwords_ends_on_a_page_that_says_so(client: Client, owner: U
     refused = pages.page(answers[-1]).one("main").text
     assert "Too many" in refused
     assert client.post("/accounts/login/", {**guess, "password": "correct horse"}).status_code != 302
+
+
+@pytest.mark.parametrize("name", ["a\u202eb", "Anonymous", "…", "x" * 81])
+def test_name_that_would_deceive_is_refused_in_words(client: Client, db: None, name: str) -> None:
+    response = sign_up(client, name=name)
+    assert response.status_code in {200, 422}
+    assert not User.objects.exists()
+    said = pages.page(response).one("main").text
+    assert "name" in said or "at most 80 characters" in said, said

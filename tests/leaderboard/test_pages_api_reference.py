@@ -3,6 +3,8 @@
 from django.test import Client
 from django.urls import reverse
 
+from evaluator.problems import PROBLEM_CODES
+from leaderboard.problem_codes import API_CODES
 from tests import pages
 
 
@@ -31,9 +33,17 @@ def test_links_between_shapes_lead_somewhere(client: Client, benchmark: None) ->
 def test_submitting_says_what_to_send_and_that_it_needs_an_account(client: Client, benchmark: None) -> None:
     section = get(client).one("section", **{"aria-labelledby": "submit"})
     assert "Needs an account" in section.text
-    fields = [row.all("td")[0].text for row in section.one("tbody").all("tr")]
+    fields = [row.all("td")[0].text for row in section.all("tbody")[-1].all("tr")]
     assert fields[:3] == ["split", "method", "file"]
-    assert [dt.text for dt in section.one("dl").all("dt")] == ["200", "201", "409", "413", "422", "429"]
+    answers = [dt.text for dt in section.one("dl").all("dt")]
+    assert answers == ["200", "201", "400", "409", "413", "422", "429"]
+
+
+def test_every_code_has_a_place_that_errors_lead_to(client: Client, benchmark: None) -> None:
+    ids = {e.attributes["id"] for e in get(client).everything() if "id" in e.attributes}
+    assert {f"problem-{code}" for code in (*API_CODES, *PROBLEM_CODES)} <= ids
+    said = client.get("/api/v1/nowhere").json()
+    assert said["type"].partition("#")[2] in ids
 
 
 def test_boards_need_no_account(client: Client, benchmark: None) -> None:

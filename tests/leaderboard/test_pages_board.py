@@ -10,10 +10,11 @@ from django.urls import reverse
 
 from leaderboard import teams
 from leaderboard.models import Edition, Method, PublishedResult, Split, User, Visibility
+from leaderboard.web.kept import memory
 from tests import builders, pages
 
 RANK, METHOD, TEAM, DATE, MID = range(5)
-N_COLUMNS = 14
+N_COLUMNS = 15
 ISSUE_COLUMNS = [
     *("Rank", "Method", "Team", "Date"),
     *("MiD", "MiDc", "MiDs", "MiDl", "MiDn"),
@@ -33,7 +34,8 @@ def row_of(root: pages.Element, name: str) -> pages.Element:
 
 
 def test_columns_are_the_papers_in_its_order(client: Client, benchmark: None) -> None:
-    heads = get(client).one("thead").all("tr")[1].all("th")
+    *heads, attempts = get(client).one("thead").all("tr")[1].all("th")
+    assert attempts.text == "Attempts"
     assert [head.one("a").children[0].text if head.one("a").children else head.text for head in heads] == (
         ISSUE_COLUMNS
     )
@@ -48,7 +50,7 @@ def test_published_numbers_stand_as_printed(client: Client, benchmark: None) -> 
     assert first[RANK] == "1"
     assert first[METHOD].startswith("Deep Scale")
     assert first[TEAM:MID] == ["Shi et al.", "2023"]
-    assert first[MID:] == ["14.8", "27.6", "15.6", "11.5", "13.7", "12.3", "6.5", "8.8", "13.1", "15.0"]
+    assert first[MID:-1] == ["14.8", "27.6", "15.6", "11.5", "13.7", "12.3", "6.5", "8.8", "13.1", "15.0"]
 
 
 def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, benchmark: None) -> None:
@@ -81,12 +83,12 @@ def test_submissions_are_ranked_among_published_rows(client: Client, edition: Ed
 def test_submitted_values_have_two_decimals(client: Client, edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition), method="Foo")
     builders.score_all()
-    cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:]
+    cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:-1]
     assert all(len(cell.partition(".")[2]) == 2 for cell in cells), cells
 
 
 def test_values_of_fewer_decimals_keep_the_room_of_the_missing_one(client: Client, benchmark: None) -> None:
-    cells = row_of(get(client), "SOT").all("td")[3:]
+    cells = row_of(get(client), "SOT").all("td")[3:-1]
     assert all("d1" in cell.classes for cell in cells)
 
 
@@ -258,11 +260,13 @@ def test_number_of_queries_does_not_grow_with_the_board(
     for i in range(3):
         builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10), method=f"Foo {i}")
         builders.score_all()
+        client.get("/")  # whoever finds a changed board draws it, for all who follow
+        memory.clear()
         with CaptureQueriesContext(connection) as captured:
             client.get("/")
         counts.append(len(captured))
     assert len(set(counts)) == 1, counts
-    assert counts[0] <= 8
+    assert counts[0] <= 3
 
 
 def test_splits_are_listed_in_their_order(client: Client, benchmark: None) -> None:

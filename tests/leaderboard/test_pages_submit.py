@@ -69,9 +69,11 @@ def test_same_file_again_leads_to_the_first_submission_and_says_so(
     assert "submitted before" in pages.page(signed_in.get(again.headers["Location"])).one("main").text
 
 
-def test_page_says_that_a_scored_submission_is_public(signed_in: Client, edition: Edition) -> None:
+def test_page_says_that_a_new_method_is_private_until_it_is_shown(
+    signed_in: Client, edition: Edition
+) -> None:
     said = pages.page(signed_in.get("/submit/")).one("main").text
-    assert "appears on the public board, with the name of your method and of your team" in said
+    assert "A new method is private: only your team sees what it scores, until you show it." in said
 
 
 def test_own_teams_methods_are_offered_and_nobody_elses(

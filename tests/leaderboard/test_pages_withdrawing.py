@@ -7,7 +7,7 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import lifecycle
+from leaderboard import lifecycle, submissions
 from leaderboard.models import AuditEvent, Edition, Evaluation, Publication, Status, Submission, User
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish, roll_back
@@ -176,7 +176,7 @@ def test_team_withdraws_and_is_told_when(
     board = pages.page(client.get("/board/test/"))
     (row,) = [row for row in pages.board_rows(board) if row[1].startswith(sent.method.name)]
     assert f"withdrawn {today()}" in row[1]
-    assert set(row[4:]) == {"–"}
+    assert set(row[4:-1]) == {"–"}  # the last is how often the team tried, which stays
 
 
 def test_next_best_of_the_method_stands_for_it(signed_in: Client, sent: Submission, owner: User) -> None:
@@ -247,3 +247,19 @@ def test_state_of_a_withdrawn_submission_is_still_told(
     lifecycle.cancel(submission=sent, actor=owner)
     signed_in.post(address(sent, "withdraw/"))
     assert signed_in.get(address(sent, "state/")).status_code == 286
+
+
+def test_an_edition_in_preparation_says_nothing_of_what_was_withdrawn_under_a_former_board(
+    entries: list[Submission], edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    publish(second)
+    open_edition(corrected(tmp_path, factor=1.6))
+    sent = builders.submit(owner, builders.predictions(edition, factor=1.15), method="Late")
+    builders.score_all()
+    assert sorted(sent.evaluations.values_list("edition__number", flat=True)) == [2, 3]
+    submissions.withdraw(submission=sent, actor=owner, now=timezone.now())
+    roll_back()
+    sent = Submission.objects.get(pk=sent.pk)
+    assert submissions.progress(sent).edition_number == 2

@@ -1,0 +1,70 @@
+"""The headers of every answer: who may keep it, what it depends on, and what browsers may do with it.
+
+What says who asks (a session, a token) makes the answer that person's alone: `private, no-store`, also where
+the same page would be the same for everybody. What nobody in particular asks for may be kept by anybody who
+asks again whether it holds; a view that knows better, as `leaderboard/web/kept.py` does, says so itself.
+"""
+
+from collections.abc import Callable
+from typing import Final
+
+from django.conf import settings
+from django.http import HttpRequest, HttpResponse
+from django.utils.cache import patch_vary_headers
+
+ONES_OWN: Final = "private, no-store"
+ANYBODYS: Final = "public, no-cache"
+FAULTS: Final = "no-store"
+VARY: Final = ("Cookie", "Authorization")
+# Nothing here films, listens, locates or pays, and nothing that is embedded could.
+PERMISSIONS: Final = ", ".join(
+    f"{feature}=()"
+    for feature in (
+        *("accelerometer", "autoplay", "camera", "display-capture", "encrypted-media", "fullscreen"),
+        *("geolocation", "gyroscope", "magnetometer", "microphone", "midi", "payment"),
+        *(
+            "picture-in-picture",
+            "publickey-credentials-get",
+            "screen-wake-lock",
+            "usb",
+            "xr-spatial-tracking",
+        ),
+    )
+)
+
+
+class HeadersMiddleware:
+    """Gives each answer the headers that it has not got from its view."""
+
+    def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
+        self._get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponse:
+        """Answer, then label the answer."""
+        response = self._get_response(request)
+        response.headers.setdefault("Permissions-Policy", PERMISSIONS)
+        # A view whose picture others show, as a badge, says `cross-origin`.
+        response.headers.setdefault("Cross-Origin-Resource-Policy", "same-origin")
+        if not request.path_info.startswith(settings.STATIC_URL):
+            patch_vary_headers(response, VARY)
+            self._say_who_may_keep(request, response)
+        return response
+
+    @staticmethod
+    def _say_who_may_keep(request: HttpRequest, response: HttpResponse) -> None:
+        said = response.headers.get("Cache-Control", "")
+        if _is_ones_own(request, response) or "no-store" in said:
+            response.headers["Cache-Control"] = ONES_OWN
+            response.headers.pop("Expires", None)
+        elif not said:
+            response.headers["Cache-Control"] = ANYBODYS if response.status_code < 400 else FAULTS
+
+
+def _is_ones_own(request: HttpRequest, response: HttpResponse) -> bool:
+    """Whether the request says who asks, does something, or leaves something with the one who asked."""
+    return (
+        settings.SESSION_COOKIE_NAME in request.COOKIES
+        or "HTTP_AUTHORIZATION" in request.META
+        or request.method not in {"GET", "HEAD"}
+        or bool(response.cookies)
+    )

@@ -1,0 +1,183 @@
+"""Comparisons as they are drawn: the verdict in words, the values, and each pair's differences."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from django.utils.safestring import SafeString
+
+from evaluator.protocol import SCORE_NAMES
+from evaluator.report import format_published
+from leaderboard.comparisons import Compared, Difference, Pair
+from leaderboard.standings import Entry
+from leaderboard.web import charts, drawing
+from leaderboard.web.charts import Chart
+from leaderboard.web.drawing import Scale
+from leaderboard.web.tables import Group, Heading, score_groups, score_heading
+
+_DIFFERENCE_PX: Final = 150.0
+_NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
+
+
+@dataclass(frozen=True)
+class DifferenceRow:
+    """One column of the board: both values, and first minus second."""
+
+    heading: Heading
+    first: str
+    second: str
+    difference: str
+    interval: str
+    p: str
+    is_significant: bool
+    drawn: SafeString
+
+
+@dataclass(frozen=True)
+class DifferenceGroup:
+    """One of the two errors: its rows on one scale."""
+
+    group: Group
+    axis: SafeString
+    rows: tuple[DifferenceRow, ...]
+
+
+@dataclass(frozen=True)
+class PairTable:
+    """Two methods: a sentence, and their differences; no groups while they are being computed."""
+
+    pair: Pair
+    sentence: str
+    groups: tuple[DifferenceGroup, ...]
+    has_intervals: bool
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Everything that the compare page places."""
+
+    compared: Compared
+    verdict: str
+    pairs: tuple[PairTable, ...]
+    profile: Chart
+
+
+def comparison(compared: Compared) -> Comparison:
+    """What was compared, ready to be placed."""
+    return Comparison(
+        compared=compared,
+        verdict=verdict(compared),
+        pairs=tuple(_pair_table(pair) for pair in compared.pairs),
+        profile=charts.profile(compared.entries),
+    )
+
+
+def verdict(compared: Compared) -> str:
+    """What came out, in words: a sentence for two, for more who is best and whom it is told apart from.
+
+    Empty while a worker still computes it.
+    """
+    if not compared.is_complete:
+        return ""
+    if len(compared.entries) == len(("first", "second")):
+        return compared.pairs[0].sentence()
+    best = min(compared.entries, key=lambda entry: entry.scores["mid"] or 0.0)
+    worse, alike = _told_apart(best, compared.pairs)
+    head = (
+        f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
+        f"{format_published(best.scores['mid'])}."
+    )
+    if compared.reason:
+        return f"{head} There are too few recordings to say what the differences mean."
+    relations = (("significantly better than", worse), ("not told apart from", alike))
+    parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
+    return f"{head} On these recordings it is {', and '.join(parts)}."
+
+
+def _told_apart(best: Entry, pairs: Sequence[Pair]) -> tuple[list[str], list[str]]:
+    """Whom the best is significantly better than in MiD, and whom it is not told apart from."""
+    worse: list[str] = []
+    alike: list[str] = []
+    for pair in pairs:
+        if best in (pair.first, pair.second) and pair.differences:
+            other = pair.second if pair.first == best else pair.first
+            found = pair.differences.get("mid")
+            (worse if found and found.is_significant else alike).append(other.method)
+    return worse, alike
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a sentence.
+
+    >>> _listed(["A"]), _listed(["A", "B", "C"])
+    ('A', 'A, B and C')
+    """
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _pair_table(pair: Pair) -> PairTable:
+    differences = pair.differences or {}
+    return PairTable(
+        pair=pair,
+        sentence=pair.sentence(),
+        groups=tuple(
+            _difference_group(group, names, pair, differences)
+            for group, names in zip(score_groups(), (SCORE_NAMES[:5], SCORE_NAMES[5:]), strict=True)
+        )
+        if differences
+        else (),
+        has_intervals=any(found.low is not None for found in differences.values()),
+    )
+
+
+def _difference_group(
+    group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
+) -> DifferenceGroup:
+    ends = [
+        end
+        for name in names
+        if name in differences
+        for end in (differences[name].low, differences[name].high, differences[name].difference)
+        if end is not None
+    ]
+    scale = drawing.zero_scale(ends, width_px=_DIFFERENCE_PX)
+    rows = tuple(
+        _difference_row(name, pair, differences[name], scale) for name in names if name in differences
+    )
+    return DifferenceGroup(group=group, axis=drawing.axis(scale), rows=rows)
+
+
+def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale) -> DifferenceRow:
+    return DifferenceRow(
+        heading=score_heading(name),
+        first=format_published(pair.first.scores[name]),
+        second=format_published(pair.second.scores[name]),
+        difference=signed(found.difference),
+        interval=""
+        if found.low is None or found.high is None
+        else f"{signed(found.low)} to {signed(found.high)}",
+        p="" if found.p is None else p_text(found.p),
+        is_significant=found.is_significant,
+        drawn=drawing.difference(scale, found.difference, found.low, found.high),
+    )
+
+
+def signed(value: float) -> str:
+    """A difference with its sign, and a minus that is one.
+
+    >>> signed(-4.1), signed(0.204), signed(-0.001)
+    ('−4.10', '+0.20', '0.00')
+    """
+    text = format_published(abs(value))
+    if not float(text):
+        return text
+    return f"{'−' if value < 0 else '+'}{text}"
+
+
+def p_text(p: float) -> str:
+    """A p-value with two digits.
+
+    >>> p_text(0.0003), p_text(0.0441), p_text(0.8)
+    ('0.0003', '0.044', '0.80')
+    """
+    return f"{p:.2g}" if p < 0.0995 else f"{p:.2f}"

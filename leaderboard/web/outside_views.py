@@ -1,0 +1,51 @@
+"""What stands elsewhere: a badge in a README, a feed in a reader; both show what everybody sees."""
+
+from uuid import UUID
+
+from django.conf import settings
+from django.contrib.auth.models import AnonymousUser
+from django.http import Http404, HttpRequest, HttpResponse
+from django.urls import reverse
+from django.views.decorators.http import require_safe
+
+from leaderboard import badges, feeds, snapshots
+from leaderboard.models import Method, Split
+from leaderboard.web.context import split_or_404, splits_of
+from leaderboard.web.views import HOME_SPLIT
+
+
+@require_safe
+def badge(request: HttpRequest, method_id: UUID) -> HttpResponse:
+    """Rank and MiD of a method on `?split=`, as a drawing for a README."""
+    split = split_or_404(request, request.GET.get("split") or HOME_SPLIT)
+    entries = snapshots.board(split=split, viewer=AnonymousUser()).entries
+    entry = next((entry for entry in entries if entry.method_id == method_id), None)
+    if entry is None and not Method.objects.shown().filter(pk=method_id).exists():
+        raise Http404("There is no such method.")
+    drawn = badges.svg(label=f"TSTTC {split.pk}", text=badges.words(entry))
+    # Browsers show it on the pages of others, which they may not do with anything else of here.
+    others = {"Cross-Origin-Resource-Policy": "cross-origin"}
+    return HttpResponse(drawn, content_type="image/svg+xml", headers=others)
+
+
+@require_safe
+def feed(request: HttpRequest, split: str = "") -> HttpResponse:
+    """New entries of one split, or of all."""
+    rows = [split_or_404(request, split)] if split else splits_of(request)
+    where = f": {rows[0].title}" if split else ""
+    text = feeds.atom(
+        _items(rows),
+        title=f"{settings.SITE_NAME}{where}, new entries",
+        address=settings.SITE_URL + request.path,
+        page=settings.SITE_URL + (reverse("board", args=[split]) if split else reverse("home")),
+    )
+    return HttpResponse(text, content_type="application/atom+xml; charset=utf-8")
+
+
+def _items(rows: list[Split]) -> list[feeds.Item]:
+    return [
+        feeds.Item(split, entry, settings.SITE_URL + reverse("method", args=[entry.method_id]))
+        for split, drawn in snapshots.shown_on(rows)
+        for entry in drawn.entries
+        if feeds.is_news(entry)
+    ]

@@ -1,0 +1,142 @@
+"""One's team: its name, its people, and the links that let people in."""
+
+from collections.abc import Callable
+from typing import Any, cast
+from uuid import UUID
+
+from django.contrib import messages
+from django.contrib.auth.decorators import login_required
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.debug import sensitive_variables
+from django.views.decorators.http import require_http_methods, require_POST
+
+from leaderboard import invitations
+from leaderboard import teams as verbs
+from leaderboard.models import Invitation, Team, User
+from leaderboard.texts import Refused
+from leaderboard.web.team_forms import NameForm, team_page
+
+
+def _own_team(request: HttpRequest) -> Team:
+    """The reader's team; somebody without one has none to act for."""
+    return get_object_or_404(Team, memberships__user=cast("User", request.user))
+
+
+def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpResponse:
+    user = cast("User", request.user)
+    page = team_page(user, now=timezone.now())
+    form = NameForm(initial={"name": page.team.name if page.team else ""})
+    return render(request, "teams/team.html", {"page": page, "form": form, **context}, status=status)
+
+
+def _done(request: HttpRequest, deed: Callable[[], object]) -> HttpResponse:
+    """Do it and show the team, or show why not."""
+    try:
+        deed()
+    except Refused as refusal:
+        return _page(request, refusal=str(refusal), status=422)
+    return redirect("team")
+
+
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def team(request: HttpRequest) -> HttpResponse:
+    """Who is in it and who may come in. A name that is sent founds the team, or renames it."""
+    if request.method != "POST":
+        return _page(request)
+    user = cast("User", request.user)
+    form = NameForm(request.POST)
+    if form.is_valid():
+        try:
+            own, name = verbs.present_team_of(user=user), form.cleaned_data["name"]
+            if own is None:
+                verbs.create(user=user, name=name, now=timezone.now())
+            else:
+                verbs.rename(team=own, name=name, actor=user)
+            return redirect("team")
+        except Refused as refusal:
+            form.refuse(refusal)
+    return _page(request, form=form, status=422)
+
+
+@login_required
+@never_cache
+@sensitive_variables("secret")
+@require_POST
+def invite(request: HttpRequest) -> HttpResponse:
+    """Make a link. It stands in this answer, and never again."""
+    own, now = _own_team(request), timezone.now()
+    try:
+        _, secret = invitations.make(team=own, actor=cast("User", request.user), now=now)
+    except Refused as refusal:
+        return _page(request, refusal=str(refusal), status=422)
+    return _page(request, link=invitations.link(secret))
+
+
+@login_required
+@never_cache
+@require_POST
+def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse:
+    """End a link that nobody has used."""
+    found = get_object_or_404(Invitation, team=_own_team(request), pk=invitation_id)
+    user = cast("User", request.user)
+    return _done(request, lambda: invitations.revoke(invitation=found, actor=user, now=timezone.now()))
+
+
+@login_required
+@never_cache
+@require_POST
+def leave(request: HttpRequest) -> HttpResponse:
+    """Go out of one's team. Whoever would leave methods to nobody says that they know."""
+    _own_team(request)
+    user = cast("User", request.user)
+    if team_page(user, now=timezone.now()).would_be_lost and not request.POST.get("confirm"):
+        sentence = "You have not confirmed that nobody will see the private methods again; expected a tick."
+        return _page(request, refusal=sentence, status=422)
+    return _done(request, lambda: verbs.leave(user=user))
+
+
+@login_required
+@never_cache
+@require_POST
+def remove(request: HttpRequest, user_id: int) -> HttpResponse:
+    """Put a member out of the team."""
+    own = _own_team(request)
+    member = get_object_or_404(User, membership__team=own, pk=user_id)
+    return _done(request, lambda: verbs.remove(team=own, member=member, actor=cast("User", request.user)))
+
+
+@login_required
+@never_cache
+@require_POST
+def hand_over(request: HttpRequest, user_id: int) -> HttpResponse:
+    """Let another member own the team."""
+    own = _own_team(request)
+    member = get_object_or_404(User, membership__team=own, pk=user_id)
+    return _done(request, lambda: verbs.hand_over(team=own, to=member, actor=cast("User", request.user)))
+
+
+@login_required
+@never_cache
+@sensitive_variables("secret")
+@require_http_methods(["GET", "HEAD", "POST"])
+def join(request: HttpRequest, secret: str) -> HttpResponse:
+    """Say what coming into the team means, and come in."""
+    user, now = cast("User", request.user), timezone.now()
+    try:
+        found = invitations.find(secret=secret, now=now)
+        if found is None:
+            raise Http404
+        if request.method == "POST":
+            own = invitations.accept(secret=secret, user=user, now=now)
+            messages.success(request, f"You are in the team {own.name} now.")
+            return redirect("team")
+    except invitations.Unusable as refusal:
+        return render(request, "teams/unusable.html", {"sentence": str(refusal)}, status=410)
+    except Refused as refusal:
+        return _page(request, refusal=str(refusal), status=422)
+    return render(request, "teams/join.html", {"meaning": invitations.meaning(invitation=found, user=user)})

@@ -1,0 +1,144 @@
+"""How sure a board's numbers are, and the ways to look at it: columns, filters, search, pages."""
+
+from pathlib import Path
+
+import pytest
+from django.test import Client
+
+from leaderboard.models import Method, Submission, User, Visibility
+from leaderboard.web import board_query
+from tests import builders, pages
+from tests.leaderboard.test_pages_board import MID, get, row_of
+
+
+@pytest.fixture
+def inferred(benchmark: None, tmp_path: Path, owner: User) -> list[Submission]:
+    """Two scored submissions with their intervals, in every column."""
+    edition = builders.import_truth(tmp_path, n=600, n_recordings=50)
+    entries = [
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
+        for factor in (1.05, 1.06)
+    ]
+    builders.score_all()
+    Method.objects.filter(pk=entries[0].method_id).update(
+        uses_nerf=False, n_frames=2, latency_ms=12.0, hardware="one GPU", code_url="https://example.org/code"
+    )
+    builders.infer_all()
+    builders.board_changed("test")
+    return entries
+
+
+def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_marked(
+    client: Client, inferred: list[Submission]
+) -> None:
+    root = get(client)
+    row = row_of(root, inferred[0].method.name)
+    (cell,) = row.all("td", class_="interval")
+    low, high = (float(end) for end in cell.one("span", class_="spoken").text.split(" to "))
+    assert low < float(row.all("td", class_="primary")[0].text.split()[0]) < high
+    assert cell.one("svg").attributes["aria-hidden"] == "true"
+    assert cell.attributes["title"] == f"95 % interval: {low:.2f} to {high:.2f}"
+    assert row.one("td", class_="rank").one("span", class_="range").text.endswith(")")
+    assert all("title" in each.attributes for each in row.all("td", class_="wide") if each.all("svg"))
+    for cell in root.one("tbody").all("td", class_="with-best"):
+        assert "not significantly worse than the best" in cell.text
+    legend = root.one("div", class_="legend").text
+    assert "Lines are 95 % intervals" in legend
+    assert "Published rows (rings) have no interval, because papers print no values per recording." in legend
+    published = row_of(root, "Deep Scale")
+    assert "quoted from a paper" in published.one("td", class_="interval").attributes["title"]
+    assert published.one("td", class_="interval").text == "no interval"
+
+
+def test_one_error_alone_has_a_whisker_in_every_column(client: Client, inferred: list[Submission]) -> None:
+    root = get(client, "/board/test/?columns=rte&sort=-rte")
+    assert len(row_of(root, inferred[0].method.name).all("svg", class_="whisker")) == 5
+    assert [len(row) for row in pages.board_rows(root)] == [MID + 5 + 1] * len(pages.board_rows(root))
+    assert [a.text for a in root.one("nav", class_="columns").all("a") if "aria-current" in a.attributes] == [
+        "RTE"
+    ]
+    hrefs = {a.attributes["href"] for a in root.one("thead").all("a")}
+    assert all("columns=rte" in href for href in hrefs)
+
+
+def test_filters_and_search_show_what_fits_and_keep_the_ranks(
+    client: Client, inferred: list[Submission]
+) -> None:
+    name = inferred[0].method.name
+    everything = {row[1]: row[0] for row in pages.board_rows(get(client))}
+    for query, expected in (
+        ("frames=2", {name}),
+        ("latency=12&q=m1", {name}),
+        ("frames=2&code=yes&latency=12.5", {name}),
+        (f"q={name.upper()}", {name}),
+        ("q=shi", {row for row in everything if "published" in row}),
+    ):
+        root = get(client, f"/board/test/?{query}")
+        found = pages.board_rows(root)
+        assert len(found) == len(expected), query
+        assert all(everything[row[1]] == row[0] for row in found)
+        assert f"{len(found)} of {len(everything)} rows fit" in root.one("main").text
+
+
+def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
+    client: Client, inferred: list[Submission]
+) -> None:
+    root = get(client, "/board/test/?q=nothing+like+it&sort=rte")
+    assert root.all("table", class_="board") == []
+    assert f"None of the {2 + 5} rows fits." in root.one("main").text
+    (back,) = [a for a in root.all("a") if a.text == "Show all"]
+    assert back.attributes["href"] == "?sort=rte"
+
+
+@pytest.mark.parametrize(
+    ("query", "said"),
+    [
+        ("columns=all", "The board has no columns 'all'; expected one of both, mid, rte."),
+        ("page=0", "The board has no page '0'; expected a number from 1 on."),
+        ("page=٣", "expected a number from 1 on"),
+        ("frames=9", "The filter 'frames' is '9'; expected one of 2, 3, 4, 5, 6."),
+        ("latency=nan", "The filter 'latency' is 'nan'; expected a number of milliseconds above 0."),
+        ("nerf=maybe", "expected one of yes, no"),
+        (f"q={'x' * 81}", "at most 80 characters, found 81"),
+    ],
+)
+def test_malformed_views_are_a_clear_400(client: Client, benchmark: None, query: str, said: str) -> None:
+    response = client.get(f"/board/test/?{query}")
+    assert response.status_code == 400
+    assert said in pages.page(response).one("main").text
+
+
+def test_long_boards_come_in_pages(
+    client: Client, inferred: list[Submission], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("leaderboard.web.tables.PER_PAGE", 3)
+    seen: list[str] = []
+    address = "/board/test/?sort=mid"
+    for _ in range(3):
+        root = get(client, address)
+        seen += [row[1] for row in pages.board_rows(root)]
+        following = [a for a in root.one("nav", class_="pages").all("a") if a.text == "Next"]
+        address = f"/board/test/{following[0].attributes['href']}" if following else ""
+    assert address == ""
+    assert len(seen) == len(set(seen)) == 7
+
+
+def test_rows_to_compare_are_ticked_in_a_form_that_needs_no_script(
+    client: Client, inferred: list[Submission]
+) -> None:
+    form = get(client).one("form", class_="board-form")
+    assert form.attributes["action"] == "/compare/"
+    boxes = form.all("input", type="checkbox")
+    assert {box.attributes["value"] for box in boxes} == {str(entry.method_id) for entry in inferred}
+    assert all(box.attributes["aria-label"].startswith("Compare ") for box in boxes)
+    assert get(client, "/board/test/?at=2030-01-01").all("form", class_="board-form") != []
+    Method.objects.exclude(pk=inferred[0].method_id).update(visibility=Visibility.PRIVATE)
+    builders.board_changed("test")
+    assert get(client).all("form", class_="board-form") == []
+
+
+def test_links_keep_the_view_and_forget_the_page() -> None:
+    query = board_query.BoardQuery(given={"sort": "mid", "at": "2026-01-01", "q": "a&b", "page": "3"})
+    assert query.href(sort="-mid") == "?at=2026-01-01&sort=-mid&q=a%26b"
+    assert query.href(page="4").endswith("page=4")
+    assert query.kept("sort", "columns") == (("sort", "mid"),)

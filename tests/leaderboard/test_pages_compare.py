@@ -1,0 +1,131 @@
+"""The page that sets two to five methods side by side."""
+
+from uuid import uuid4
+
+import pytest
+from django.test import Client
+
+from leaderboard.models import Edition, Method, Submission, User
+from tests import builders, pages
+
+
+def get(client: Client, *methods: object, split: str = "test", status: int = 200) -> pages.Element:
+    response = client.get("/compare/", {"split": split, "m": [str(pk) for pk in methods]})
+    assert response.status_code == status, response.content.decode()
+    return pages.page(response)
+
+
+def words(root: pages.Element) -> str:
+    return root.one("main").text
+
+
+def test_asked_at_once_it_says_that_it_is_being_computed_and_asks_again_by_itself(
+    client: Client, entries: list[Submission]
+) -> None:
+    ids = [entry.method_id for entry in entries[:2]]
+    root = get(client, *ids)
+    assert "being computed" in words(root)
+    assert root.one("noscript").one("meta").attributes["http-equiv"] == "refresh"
+    assert root.one("div", id="comparison").attributes["hx-trigger"] == "every 1s"
+    builders.infer_all()
+    root = get(client, *ids)
+    assert "being computed" not in words(root)
+    assert root.all("noscript") == []
+    assert "hx-trigger" not in root.one("div", id="comparison").attributes
+
+
+def test_verdict_comes_first_then_every_difference_with_interval_and_p(
+    client: Client, entries: list[Submission]
+) -> None:
+    near, far = entries[0], entries[-1]
+    get(client, near.method_id, far.method_id)
+    builders.infer_all()
+    root = get(client, near.method_id, far.method_id)
+    verdict = root.one("p", class_="verdict").text
+    assert verdict.startswith(f"{near.method.name}'s MiD is ")
+    assert f"lower than {far.method.name}'s; p = " in verdict
+    rows = [
+        row for row in root.one("table", class_="differences").all("tr") if row.all("svg", class_="whisker")
+    ]
+    assert len(rows) == 10
+    for row in rows:
+        first, second, difference = (float(cell.text.replace("−", "-")) for cell in row.all("td")[:3])
+        assert difference == pytest.approx(first - second, abs=0.011)
+        *_, interval, p = (cell.text for cell in row.all("td"))
+        assert p == "too few recordings" or (" to " in interval and 0 < float(p) <= 1)
+    assert len(root.one("figure").all("svg")) >= 2
+    assert len(root.one("figure").one("tbody").all("tr")) == 10
+
+
+def test_five_methods_are_ten_pairs_and_one_verdict(client: Client, edition: Edition, owner: User) -> None:
+    sent = [
+        builders.submit(owner, builders.predictions(edition, factor=1.05 + i / 5), method=f"M{i}")
+        for i in range(5)
+    ]
+    builders.score_all()
+    ids = [each.method_id for each in sent]
+    get(client, *ids)
+    builders.infer_all()
+    root = get(client, *ids)
+    assert len(root.all("section", class_="pair")) == 10
+    assert root.one("p", class_="verdict").text.startswith("Of these five, M0 has the lowest MiD, ")
+
+
+def test_every_bad_question_has_a_page_that_says_what_is_wrong(
+    client: Client, entries: list[Submission], owner: User
+) -> None:
+    secret = builders.submit(owner, b"{}", method="Secret", visibility="PRIVATE")
+    ids = [entry.method_id for entry in entries]
+    for methods, split, status, said in (
+        (["x", ids[0]], "test", 404, "There is no method 'x'; expected an identifier"),
+        ([ids[0], uuid4()], "test", 404, "that you may see"),
+        ([ids[0], secret.method_id], "test", 404, "that you may see"),
+        ([ids[0]], "test", 400, "1 methods were named; expected 2 to 5"),
+        ([*ids, uuid4(), uuid4()], "test", 400, "6 methods were named; expected 2 to 5"),
+        ([ids[0], ids[0]], "test", 400, "named twice"),
+        (ids[:2], "val", 400, "has no board yet"),
+        (ids[:2], "nowhere", 404, "There is no split 'nowhere'; expected one of test, val, demo."),
+        (ids[:2], "<script>", 404, "There is no split '<script>'"),
+    ):
+        root = get(client, *methods, split=split, status=status)
+        assert said in root.one("p", class_="notice").text, (said, words(root))
+        assert root.all("svg", class_="whisker") == []
+
+
+def test_without_methods_it_offers_those_of_the_board(client: Client, entries: list[Submission]) -> None:
+    root = get(client)
+    offered = [box.attributes["value"] for box in root.all("input", type="checkbox")]
+    assert offered == [str(entry.method_id) for entry in entries]
+    assert "no method was scored so far" in words(get(client, split="demo"))
+
+
+def test_too_few_recordings_are_said_and_no_p_is_shown(
+    client: Client, benchmark: None, owner: User, tmp_path: pytest.TempPathFactory
+) -> None:
+    edition = builders.import_truth(tmp_path, n_recordings=12)
+    sent = [
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
+        for factor in (1.1, 1.5)
+    ]
+    builders.score_all()
+    ids = [each.method_id for each in sent]
+    get(client, *ids)
+    builders.infer_all()
+    root = get(client, *ids)
+    assert "this ground truth has 12; expected at least 20" in words(root)
+    assert "95 % interval" not in [head.text for head in root.one("table", class_="differences").all("th")]
+    board = pages.page(client.get("/board/test/"))
+    assert "this ground truth has 12; expected at least 20" in board.one("main").text
+    assert board.all("svg", class_="whisker") == []
+
+
+def test_names_in_a_comparison_are_text_never_markup(client: Client, edition: Edition, owner: User) -> None:
+    for i, name in enumerate(("<img src=x onerror=alert(1)>", '"><script>alert(2)</script>')):
+        builders.submit(owner, builders.predictions(edition, factor=1.1 + i), method=name)
+    builders.score_all()
+    ids = Method.objects.values_list("pk", flat=True)
+    get(client, *ids)
+    builders.infer_all()
+    root = get(client, *ids)
+    assert root.all("img") == []
+    assert root.one("main").all("script") == []
