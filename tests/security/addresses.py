@@ -1,0 +1,107 @@
+"""Addresses to look at: every route, at things that are there and things that are not, asked in every way."""
+
+from collections.abc import Iterator
+from itertools import product
+from typing import Any
+from urllib.parse import urlencode
+
+from leaderboard.standings import SORTABLE
+from tests.security.people import ABSENT
+from tests.security.routes import Route, operations, routes
+from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, HIDDEN_TEAM, Scene
+
+FORMATS = ("csv", "json", "latex", "markdown", "md", "bibtex", "atom", "svg", "tex", "nonsense")
+FORMS = ("csv", "json", "tex", "md", "bib", "nonsense")
+TIMES = ("2026-03-01", "2026-03-03", "2026-03-05T12:00:00Z", "2026-03-11", "2099-01-01", "nonsense", "")
+PAGES = ("1", "2", "0", "-1", "999999", "last", "x")
+TEXTS = ("secret", "Secret Agency", "Owls", "Anonymous", "Very Secret Net", "%", "'", "")
+# What pages may be asked, beside what the schema says of the API: name and values.
+QUERIES: dict[str, tuple[str, ...]] = {
+    "sort": (*(f"{sign}{name}" for name in SORTABLE for sign in ("", "-")), "nonsense"),
+    "at": TIMES,
+    "page": PAGES,
+    "format": FORMATS,
+    "q": TEXTS,
+    "team": TEXTS,
+    "intervals": ("1", "0"),
+    "columns": ("mid", "rte", "both", "nonsense"),
+    "n_frames": ("2", "6", "7"),
+    "cameras": ("ONE", "SEVERAL", "x"),
+    "box_source": ("GIVEN", "x"),
+    "uses_nerf": ("yes", "no"),
+    "uses_extra_data": ("yes", "no"),
+    "has_code": ("1", "yes"),
+    "latency_ms": ("100", "nan"),
+}
+# They say how this machine is, which changes by the second, and nothing of what is entered.
+OF_THE_MACHINE = {"readyz", "metrics"}
+
+
+def addresses(scene: Scene) -> list[str]:
+    """Every address, without those of maintainers and of accounts beyond one each."""
+    found: dict[str, None] = {}
+    described = {path: methods.get("GET", {}) for path, methods in operations().items()}
+    for route in routes():
+        if route.name in OF_THE_MACHINE:
+            continue
+        for path in _filled(route, scene):
+            found[path] = None
+            if route.is_admin or path.startswith(("/maintain/", "/accounts/")):
+                break
+            for query in _queries(route, scene, described):
+                found[f"{path}?{query}"] = None
+    return list(found)
+
+
+def _filled(route: Route, scene: Scene) -> Iterator[str]:
+    """The route with everything that its parameters may stand for."""
+    choices: dict[str, tuple[object, ...]] = {
+        "split": ("test", "val", "nowhere"),
+        "number": (1, 2),
+        "method_id": (*scene.methods, *HIDDEN_METHODS, ABSENT),
+        "submission_id": (*scene.submissions, *HIDDEN_SUBMISSIONS, ABSENT),
+        "team_id": (*scene.teams, HIDDEN_TEAM, ABSENT),
+        "key": ("nonsense",),
+        "uidb36": ("1",),
+        "slug": ("none",),
+        "format": FORMATS,
+        "secret": ("nonsense",),
+        "user_id": (1, 2, 999),
+        "form": ("csv", "tex", "md", "bib"),
+        "id": (1,),
+        "object_id": ("1",),
+        "content_type_id": ("1",),
+        "app_label": ("leaderboard",),
+        "url": ("nowhere",),
+    }
+    names = sorted(route.parameters)
+    for values in product(*(choices.get(name, (ABSENT, "1")) for name in names)):
+        yield route.filled(dict(zip(names, values, strict=True)))
+
+
+def _queries(route: Route, scene: Scene, described: dict[str, dict[str, Any]]) -> Iterator[str]:
+    """What may stand behind the question mark."""
+    if route.parameters & {"submission_id", "team_id"}:
+        return
+    if route.name in {"compare", "api-comparison", "api-compare"}:
+        ids = [*scene.methods[:3], scene.methods[-1], *HIDDEN_METHODS[:2], ABSENT]
+        for first, second in product(ids, ids):
+            yield urlencode([("split", "test"), ("m", first), ("m", second)])
+        return
+    asked = dict(QUERIES)
+    if route.is_api:
+        operation = described.get(route.described_as, {})
+        asked = {
+            parameter["name"]: QUERIES.get(parameter["name"], ("1", "x", ""))
+            for parameter in operation.get("parameters", [])
+            if parameter["in"] == "query"
+        }
+    elif route.name not in BOARDS:
+        asked = {name: asked[name][:2] for name in ("page", "format", "q")}
+    for name, values in asked.items():
+        for value in values:
+            yield urlencode({name: value})
+
+
+# Pages that have a board in them, and take its questions.
+BOARDS = {"home", "board", "edition", "charts", "export", "edition_export"}

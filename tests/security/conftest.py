@@ -1,0 +1,20 @@
+"""People for the single claims; the matrices bring their own."""
+
+from pathlib import Path
+
+import pytest
+
+from leaderboard.models import Edition, User
+from tests import builders
+
+
+@pytest.fixture
+def owner(db: None) -> User:
+    """Somebody who submits."""
+    return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
+
+
+@pytest.fixture
+def edition(benchmark: None, tmp_path: Path) -> Edition:
+    """The test split, open, with made-up ground truth."""
+    return builders.import_truth(tmp_path)

@@ -1,0 +1,132 @@
+"""Nobody can tell from anything they are shown whether somebody else has something to hide."""
+
+import os
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from django.db import transaction
+from django.http import HttpResponse, StreamingHttpResponse
+from django.test import Client
+
+from leaderboard.models import Method, Snapshot, Submission
+from leaderboard.web import kept
+from tests.security.addresses import addresses
+from tests.security.people import ADDRESS
+from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, START, build
+
+WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
+ADDRESSES_IN_THE_SUITE = 540
+# Random in every answer by its nature: the token of a form, and the name of a request in the log.
+FORM_TOKEN = re.compile(rb'(?<=name="csrfmiddlewaretoken" value=")[^"]+|(?<=X-CSRFToken": ")[^"]+')
+RANDOM_HEADERS = {"X-Request-ID"}
+RANDOM_COOKIES = {"csrftoken"}
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Everything that an answer tells."""
+
+    status: int
+    headers: tuple[tuple[str, str], ...]
+    cookies: tuple[str, ...]
+    body: bytes
+
+
+def seen(response: HttpResponse | StreamingHttpResponse) -> Seen:
+    """An answer without what is random in it."""
+    headers = {name: value for name, value in response.headers.items() if name not in RANDOM_HEADERS}
+    cookies = [
+        str(cookie) if name not in RANDOM_COOKIES else str(cookie).replace(cookie.value, "…")
+        for name, cookie in sorted(response.cookies.items())
+    ]
+    cookies = [re.sub(r"expires=[^;]+", "expires=…", cookie) for cookie in cookies]
+    body = response.getvalue() if isinstance(response, StreamingHttpResponse) else response.content
+    return Seen(
+        response.status_code, tuple(sorted(headers.items())), tuple(cookies), FORM_TOKEN.sub(b"...", body)
+    )
+
+
+def looked_at(directory: Path, *, has_secrets: bool, limit: int | None) -> dict[tuple[str, str], Seen]:
+    """What a visitor and a stranger see in one of the worlds, which is gone afterwards."""
+    with transaction.atomic():
+        scene = build(directory, has_secrets=has_secrets)
+        paths = addresses(scene)
+        if limit is not None:
+            paths = thinned(paths, limit)
+        stranger = Client(raise_request_exception=False, REMOTE_ADDR=ADDRESS)
+        stranger.force_login(scene.stranger)
+        found = {}
+        for path in paths:
+            visitor = Client(raise_request_exception=False, REMOTE_ADDR=ADDRESS)
+            for role, client in (("anonymous", visitor), ("stranger", stranger)):
+                found[role, path] = seen(client.get(path))
+        transaction.set_rollback(True)
+    return found
+
+
+def thinned(paths: list[str], limit: int) -> list[str]:
+    """Every address without a question, few of the administration, and of the others what fits, evenly."""
+    of_admin = [path for path in paths if path.startswith("/admin/")]
+    plain = [path for path in paths if "?" not in path and path not in of_admin[10:]]
+    asked = [path for path in paths if "?" in path]
+    step = max(1.0, len(asked) / max(1, limit - len(plain)))
+    return plain + [asked[int(n * step)] for n in range(int(len(asked) / step))]
+
+
+def differences(directory: Path, *, limit: int | None) -> tuple[list[str], int, dict[int, int]]:
+    """What differs between the worlds, how many addresses were looked at, and the statuses there were."""
+    without = looked_at(directory / "without", has_secrets=False, limit=limit)
+    with_them = looked_at(directory / "with", has_secrets=True, limit=limit)
+    assert without.keys() == with_them.keys()
+    told = []
+    for key, one in without.items():
+        other = with_them[key]
+        if one != other:
+            told.append(f"{key}: {first_difference(one, other)}")
+    statuses: dict[int, int] = {}
+    for one in without.values():
+        statuses[one.status] = statuses.get(one.status, 0) + 1
+    return told, len(without) // 2, statuses
+
+
+def first_difference(one: Seen, other: Seen) -> str:
+    if one.status != other.status:
+        return f"status {one.status} and {other.status}"
+    if one.headers != other.headers:
+        return f"headers {set(one.headers) ^ set(other.headers)}"
+    if one.cookies != other.cookies:
+        return f"cookies {one.cookies} and {other.cookies}"
+    pairs = zip(one.body, other.body, strict=False)
+    at = next((n for n, pair in enumerate(pairs) if pair[0] != pair[1]), 0)
+    found = [seen.body[max(0, at - 60) : at + 60] for seen in (one, other)]
+    return f"bytes {at}: {found[0]!r} and {found[1]!r}"
+
+
+def test_nobody_sees_what_is_hidden_at_any_address(db: None, tmp_path: Path) -> None:
+    told, n_addresses, statuses = differences(tmp_path, limit=None if WHOLE else ADDRESSES_IN_THE_SUITE)
+    assert not told, f"{len(told)} differ:\n" + "\n".join(told[:20])
+    assert n_addresses >= 500
+    assert {200, 302, 400, 401, 404} <= set(statuses)
+    assert not [status for status in statuses if status >= 500]
+
+
+def test_what_is_hidden_is_there_and_would_be_noticed(db: None, tmp_path: Path) -> None:
+    scene = build(tmp_path / "world", has_secrets=True)
+    assert set(HIDDEN_METHODS) & set(Method.objects.values_list("pk", flat=True))
+    assert Submission.objects.filter(pk__in=HIDDEN_SUBMISSIONS).count() >= 5
+    paths = ["/", f"/methods/{HIDDEN_METHODS[0]}/", "/board/test/?sort=team"]
+
+    def look() -> list[Seen]:
+        kept.memory.clear()
+        return [seen(Client(REMOTE_ADDR=ADDRESS).get(path)) for path in paths]
+
+    before = look()
+    Method.objects.filter(pk=HIDDEN_METHODS[0]).update(visibility="ANONYMOUS", shown_at=START)
+    Snapshot.objects.all().delete()
+    assert all(one != other for one, other in zip(before, look(), strict=True))
+    before = look()
+    Method.objects.filter(pk=scene.methods[-1]).update(visibility="PUBLIC")
+    Snapshot.objects.all().delete()
+    assert b"Very Secret Net" not in before[0].body
+    assert b"Very Secret Net" in look()[0].body

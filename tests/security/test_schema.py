@@ -1,0 +1,102 @@
+"""schemathesis: requests that the OpenAPI schema allows, and requests that it does not, as each role."""
+
+import gc
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import schemathesis
+from django.db import transaction
+from hypothesis import HealthCheck, Phase, given, strategies
+from hypothesis import settings as with_settings
+from hypothesis.errors import Unsatisfiable
+from pytest_django.fixtures import Settings
+from schemathesis.core.result import Ok
+from schemathesis.generation import GenerationMode
+
+from leaderboard.wsgi import application
+from tests import builders
+from tests.security import people
+from tests.security.people import ADDRESS, World
+
+WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
+EXAMPLES = 60 if WHOLE else 2
+ROLES = ("anonymous", "stranger", "owner", "maintainer", "token without scope", "expired token")
+
+
+def operations() -> Iterator[Any]:
+    """Every operation of the schema, by its own account of itself."""
+    schema = schemathesis.openapi.from_wsgi("/api/v1/schema", application)
+    for found in schema.get_all_operations():
+        assert isinstance(found, Ok), found
+        yield found.ok()
+
+
+@pytest.fixture
+def world(benchmark: None, tmp_path: Path, settings: Settings) -> World:
+    settings.QUOTAS = False
+    return people.populate(builders.import_truth(tmp_path))
+
+
+def headers_of(world: World, role: str, method: str) -> dict[str, str]:
+    token = world.tokens.get(f"{role} {method}") or world.tokens.get(role)
+    return {"Authorization": f"Bearer {token}"} if token else {}
+
+
+def ask(operation: Any, world: World, role: str, mode: GenerationMode) -> list[str]:
+    """Requests of one role to one operation. Returns what is wrong with the answers."""
+    wrong: list[str] = []
+    known = {name: world.parameters()[name] for name in ("split", "number", "submission_id", "method_id")}
+    there = {p.name: str(known[p.name]) for p in operation.path_parameters if p.name in known}
+    headers = headers_of(world, role, operation.method.upper())
+
+    @with_settings(
+        max_examples=EXAMPLES,
+        deadline=None,
+        derandomize=True,
+        database=None,
+        phases=[Phase.generate],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(case=operation.as_strategy(generation_mode=mode), is_there=strategies.booleans())
+    def each(case: Any, is_there: bool) -> None:
+        if is_there and mode is GenerationMode.POSITIVE:
+            case.path_parameters = {**(case.path_parameters or {}), **there}
+        with transaction.atomic():
+            response = case.call(headers=headers, environ_overrides={"REMOTE_ADDR": ADDRESS})
+            transaction.set_rollback(True)
+        if not is_sound(response):
+            curl = case.as_curl_command()[:300]
+            wrong.append(f"{role} {operation.label} {response.status_code}: {curl}")
+
+    each()
+    return wrong
+
+
+def is_sound(response: Any) -> bool:
+    """No failure of ours; and what is refused is a problem that says why."""
+    if response.status_code < 400:
+        return True
+    kind = response.headers.get("content-type", [""])[0]
+    is_problem = kind.startswith("application/problem+json")
+    return response.status_code < 500 and is_problem and bool(response.json()["problems"][0]["message"])
+
+
+# The server that schemathesis brings leaves it to the garbage collector to close what was uploaded.
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+@pytest.mark.parametrize("mode", [GenerationMode.POSITIVE, GenerationMode.NEGATIVE])
+def test_no_request_that_the_schema_describes_fails(world: World, mode: GenerationMode) -> None:
+    wrong, n_operations = [], 0
+    for operation in operations():
+        n_operations += 1
+        # Who may do nothing is refused before anything is read: nonsense is for those who may.
+        for role in ROLES if WHOLE or mode is GenerationMode.POSITIVE else ("owner",):
+            try:
+                wrong += ask(operation, world, role, mode)
+            except Unsatisfiable:
+                continue  # an operation without parameters has no request that breaks its rules
+    gc.collect()  # here, and not in the middle of another test
+    assert not wrong, "\n".join(wrong[:20])
+    assert n_operations >= 15

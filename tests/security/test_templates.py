@@ -1,0 +1,108 @@
+"""What templates and the code that draws must not do, whatever they are given."""
+
+import re
+from pathlib import Path
+
+import pytest
+from django.contrib.auth.password_validation import validate_password
+from django.core.exceptions import ValidationError
+from django.core.files.uploadedfile import SimpleUploadedFile
+from django.test import Client
+
+from leaderboard.models import Edition, User
+from tests import builders, pages
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+TEMPLATES = sorted((REPOSITORY / "templates").rglob("*.html"))
+CODE = sorted((REPOSITORY / "leaderboard").rglob("*.py"))
+# Texts from people that become addresses of links.
+PEOPLES_LINKS = re.compile(r'<a\b[^>]*href="\{\{\s*[\w.]*(?:paper_url|code_url)\b[^>]*>')
+
+
+def test_no_template_takes_text_for_markup() -> None:
+    assert len(TEMPLATES) > 40
+    trusting = re.compile(r"\|\s*safe\b|\|\s*safeseq\b|autoescape\s+off|<script(?![^>]*\bsrc=)|javascript:")
+    found = {
+        str(path.relative_to(REPOSITORY)): trusting.findall(path.read_text())
+        for path in TEMPLATES
+        if trusting.search(path.read_text())
+    }
+    assert found == {}
+
+
+# They join pieces that `format_html` has made; what becomes of hostile names there is looked at as well, in
+# test_hostile_names.py.
+JOINING = {
+    f"leaderboard/web/{name}.py" for name in ("charts", "chart_frames", "drawing", "result_tables", "tables")
+}
+
+
+def test_no_code_takes_text_for_markup() -> None:
+    trusting = re.compile(r"\bmark_safe\(|\bSafeText\(|__html__|autoescape=False")
+    joining = re.compile(r"\bSafeString\((?!\"\"(?:\)|\.join\())")
+    joined = re.compile(r"\bSafeString\(")
+    texts = {str(path.relative_to(REPOSITORY)): path.read_text() for path in CODE}
+    assert [path for path, text in texts.items() if trusting.search(text)] == []
+    assert {path for path, text in texts.items() if joined.search(text)} <= JOINING
+    assert [path for path, text in texts.items() if joining.search(text)] == ["leaderboard/web/drawing.py"]
+
+
+def test_every_attribute_that_a_template_fills_in_is_quoted() -> None:
+    bare = re.compile(r"<[a-zA-Z][^<>]*\s[\w-]+=\{\{")
+    assert [str(path) for path in TEMPLATES if bare.search(path.read_text())] == []
+
+
+def test_links_that_people_gave_are_marked_in_every_template() -> None:
+    links = [link for path in TEMPLATES for link in PEOPLES_LINKS.findall(path.read_text())]
+    assert links
+    assert [link for link in links if 'rel="nofollow ugc"' not in link] == []
+
+
+def test_links_that_people_gave_are_marked_on_every_page(edition: Edition, owner: User) -> None:
+    sent = builders.submit(
+        owner,
+        builders.predictions(edition),
+        paper_url="https://elsewhere.example/paper",
+        code_url="http://elsewhere.example/code?a=1&b=<2>".replace("<2>", "2"),
+    )
+    builders.score_all()
+    n_links = 0
+    for path in ("/", "/board/test/", f"/methods/{sent.method_id}/", "/board/test/editions/1/"):
+        for link in pages.page(Client().get(path)).all("a"):
+            if "elsewhere.example" in link.attributes["href"]:
+                n_links += 1
+                assert link.attributes.get("rel") == "nofollow ugc", path
+    assert n_links >= 4
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "javascript:alert(1)",
+        "JaVaScRiPt:alert(1)",
+        "data:text/html,<script>alert(1)</script>",
+        "vbscript:x",
+        "file:///etc/passwd",
+        "//elsewhere.example/x",
+        "ftp://elsewhere.example/",
+        "https:elsewhere",
+        "http://",
+        "https://user@",
+        "\u202ehttps://x.example/",
+        "https://x.example/\r\nSet-Cookie: a=b",
+        "java\nscript:alert(1)",
+    ],
+)
+def test_no_other_scheme_becomes_a_link(edition: Edition, owner: User, address: str) -> None:
+    client = Client(headers={"Authorization": f"Bearer {builders.token(owner)}"})
+    file = SimpleUploadedFile("p.json", builders.predictions(edition))
+    form = {"split": "test", "method": "Foo", "paper_url": address, "file": file}
+    response = client.post("/api/v1/submissions", form)
+    assert response.status_code == 422
+    assert response.json()["code"] in {"bad-address", "bad-character"}
+
+
+@pytest.mark.parametrize("password", ["short", "password123", "12345678901", "owner@example.org"])
+def test_passwords_that_anybody_would_guess_are_refused(owner: User, password: str) -> None:
+    with pytest.raises(ValidationError):
+        validate_password(password, owner)
