@@ -106,9 +106,13 @@ LOW_CONTRAST = """() => {
   while (walker.nextNode()) {
     const e = walker.currentNode.parentElement, text = walker.currentNode.textContent.trim();
     if (!text || !e.checkVisibility() || e.closest(".spoken, noscript, :disabled")) continue;
-    const [a, b] = [light(parse(getComputedStyle(e).color)), light(ground(e))];
+    const style = getComputedStyle(e);
+    // Text in a drawing is filled; without a fill it is not there.
+    const ink = e instanceof SVGElement ? style.fill.replace("none", "rgb(255, 255, 255)") : style.color;
+    const [a, b] = [light(parse(ink)), light(ground(e))];
     const ratio = (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05);
-    if (ratio < 4.5) found.push(`${ratio.toFixed(2)} ${e.tagName}.${e.className}: ${text.slice(0, 40)}`);
+    const name = `${e.tagName}.${e.getAttribute("class")}`;
+    if (ratio < 4.5) found.push(`${ratio.toFixed(2)} ${name}: ${text.slice(0, 40)}`);
   }
   return found;
 }"""

@@ -28,6 +28,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     except services.ServiceMissing as missing:
         services.skip_or_fail(missing)
     limits = {"TSTTC_MAX_PREDICTIONS_BYTES": str(MAX_PREDICTIONS_BYTES), "TSTTC_QUOTAS": "0"}
+    limits |= {"TSTTC_THROTTLES": "0"}
     with web_alone(tmp_path_factory.mktemp("site"), **limits) as running:
         yield running
 
@@ -90,3 +91,16 @@ def submit(page: Page, data: bytes, *, method: str, split: str = "test") -> None
     )
     page.get_by_role("button", name="Submit").click()
     page.wait_for_url("**/submissions/*/")
+
+
+def show(page: Page) -> None:
+    """Make the method of the submission that the page shows public, as its team does; then go back to it."""
+    submission = page.url
+    page.locator(".facts-list a").click()
+    page.get_by_role("link", name="Show it to everybody…").click()
+    page.locator("input[value=PUBLIC]").check()
+    page.get_by_role("button", name="See what others will see").click()
+    page.get_by_role("checkbox").check()
+    page.get_by_role("button", name="Show it, public").click()
+    page.wait_for_url("**/methods/*/")
+    page.goto(submission)

@@ -10,7 +10,7 @@ from playwright.sync_api import Page, expect
 import evaluator
 from tests import services
 from tests.browser.chromium import NARROW, WIDE
-from tests.browser.conftest import PASSWORD, NewPage, sign_up, submit
+from tests.browser.conftest import PASSWORD, NewPage, show, sign_up, submit
 from tests.browser.site import open_split, predictions, web_alone, worker
 from tests.browser.test_looks import SCREENS, look_at
 from tests.journeys.production import Site
@@ -84,6 +84,7 @@ def test_from_opening_to_the_board_and_back(
     sign_up(team, email="corrected@example.org", name="Corrected")
     for method, factor in (("Near", 1.02), ("Far", 1.3)):
         submit(team, predictions(val_truth, factor=factor), method=method, split=SPLIT)
+        show(team)
     with worker(site):
         expect(team.locator("[aria-current=step] .label")).to_have_text("Scored")
     submission, before = team.url, rows(keeper)
@@ -131,6 +132,7 @@ def test_from_opening_to_the_board_and_back(
 def test_team_withdraws_its_entry_for_good(page: Page, site: Site, val_truth: evaluator.GroundTruth) -> None:
     sign_up(page, email="withdraws@example.org", name="Withdraws")
     submit(page, predictions(val_truth, factor=1.7), method="Regretted", split=SPLIT)
+    show(page)
     with worker(site):
         expect(page.locator("[aria-current=step] .label")).to_have_text("Scored")
     page.get_by_role("link", name="Withdraw this submission…").click()
@@ -139,7 +141,7 @@ def test_team_withdraws_its_entry_for_good(page: Page, site: Site, val_truth: ev
     page.goto(BOARD)
     row = page.locator("tr.withdrawn")
     expect(row).to_contain_text("Regretted")
-    expect(row.locator("td.primary")).to_have_text("–")
+    expect(row.locator("td.primary").first).to_have_text("–")
 
 
 @pytest.mark.parametrize(("size", "scheme"), SCREENS)

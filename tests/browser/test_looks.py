@@ -12,7 +12,10 @@ pytestmark = pytest.mark.browser
 PUBLIC = (
     "/",
     "/board/test/?sort=-rte_negative",
+    "/board/test/?columns=mid&q=deep",
+    "/board/test/charts/",
     "/board/val/",
+    "/compare/",
     "/docs/",
     "/docs/api/",
     "/accounts/login/",
@@ -106,7 +109,7 @@ def test_print_has_the_whole_table_and_no_navigation(page: Page, truth: evaluato
     page.emulate_media(media="print")
     page.goto("/")
     expect(page.locator(".site-nav")).to_be_hidden()
-    expect(page.locator("table.board thead tr").last.locator("th:visible")).to_have_count(14)
+    expect(page.locator("table.board thead tr").last.locator("th:visible")).to_have_count(15)
 
 
 def test_site_has_an_icon_of_its_own(page: Page, truth: evaluator.GroundTruth) -> None:

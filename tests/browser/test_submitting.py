@@ -20,7 +20,16 @@ def await_step(page: Page, label: str) -> None:
     expect(page.locator("[aria-current=step] .label")).to_have_text(label)
 
 
-def test_by_keyboard_alone_from_signing_up_to_the_board(
+RIVAL = """
+from leaderboard.models import Edition, User
+from tests import builders
+user = User.objects.create_user("somebody-else@example.org", name="Somebody else")
+edition = Edition.objects.get(split="test", number=1)
+builders.submit(user, builders.predictions(edition, factor=1.6), method="By somebody else")
+"""
+
+
+def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     page: Page, site: Site, truth: evaluator.GroundTruth, tmp_path: Path
 ) -> None:
     path = tmp_path / "predictions.json"
@@ -53,14 +62,45 @@ def test_by_keyboard_alone_from_signing_up_to_the_board(
     press("Enter")
     page.wait_for_url("**/submissions/*/")
     await_step(page, "Queued")
+    site.manage("shell", "-v0", "-c", RIVAL)
     with worker(site):
         await_step(page, "Scored")
-    tab_to(page, "See it on the test board")
+    tab_to(page, "Make it public…")
+    press("Enter")
+    page.wait_for_url("**/visibility/")
+    tab_to(page, "anonymous")
+    press("ArrowDown")
+    tab_to(page, "See what others will see")
+    press("Enter")
+    page.wait_for_url("**/visibility/?visibility=PUBLIC*")
+    tab_to(page, "Show it like this. I know that it cannot be taken back.")
+    press("Space")
+    tab_to(page, "Show it, public")
+    press("Enter")
+    page.wait_for_url("**/methods/*/")
+    tab_to(page, "Board")
     press("Enter")
     row = page.locator("tr.mine")
     expect(row).to_contain_text("By keyboard")
     expect(row).to_contain_text("Keyboard team")
-    expect(row.locator(".rank")).to_have_text("1")
+    expect(row.locator(".rank")).to_contain_text("1")
+    for method in ("By keyboard", "By somebody else"):
+        tab_to(page, f"Compare {method}")
+        press("Space")
+    tab_to(page, "Compare the chosen")
+    press("Enter")
+    page.wait_for_url("**/compare/?*")
+    expect(page.locator(".verdict")).to_contain_text("being computed")
+    with worker(site):
+        expect(page.locator(".verdict")).to_contain_text("By keyboard's MiD is ")
+    expect(page.locator(".verdict")).to_contain_text("lower than By somebody else's; p = 0.000")
+    tab_to(page, "Test", backwards=True)
+    press("Enter")
+    page.wait_for_url("**/board/test/")
+    tab_to(page, "CSV", backwards=True)
+    with page.expect_download() as taken:
+        press("Enter")
+    assert "By keyboard" in taken.value.path().read_text()
 
 
 def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
@@ -139,7 +179,7 @@ def test_everything_works_without_script(new_page: NewPage, site: Site, truth: e
             with page.expect_navigation():
                 link.click()
     await_step(page, "Scored")
-    page.get_by_role("link", name="See it on the test board").click()
+    page.get_by_role("link", name="test board").click()
     page.get_by_role("link", name="RTE, overall, %").click()
     expect(page.locator("th[aria-sort=ascending]")).to_contain_text("RTE")
     page.get_by_role("button", name="Sign out").click()

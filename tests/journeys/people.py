@@ -65,6 +65,16 @@ class Visitor:
         assert found, answer.text
         return found[1]
 
+    def show(self, submission: str) -> None:
+        """Make a submission's method public: look at what others will see, say that one knows, confirm."""
+        link = re.search(r"/methods/[0-9a-f-]{36}/", self.get(f"/submissions/{submission}/").text)
+        assert link
+        path = f"{link[0]}visibility/"
+        preview = self.get(f"{path}?visibility=PUBLIC")
+        assert "What everybody will see" in preview.text
+        answer = self.post_form(path, {"visibility": "PUBLIC", "confirm": "on"})
+        assert answer.url.path == link[0], answer.text
+
     def text_of(self, path: str) -> str:
         """A page's words, without its markup."""
         text = re.sub(r"<(script|style).*?</\1>|<[^>]+>", " ", self.get(path).text, flags=re.DOTALL)
@@ -95,6 +105,14 @@ class Program:
         )
         assert answer.status_code == 201, answer.text
         return str(answer.json()["id"])
+
+    def show(self, submission_id: str) -> None:
+        """Make a submission's method public."""
+        method_id = self.http.get(f"/api/v1/submissions/{submission_id}").json()["method_id"]
+        answer = self.http.post(
+            f"/api/v1/methods/{method_id}/visibility", json={"visibility": "PUBLIC", "confirm": True}
+        )
+        assert answer.status_code == 200, answer.text
 
     def outcome(self, submission_id: str) -> dict[str, Any]:
         """The submission as the API tells of it, once nothing changes any more."""

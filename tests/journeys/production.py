@@ -10,7 +10,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import httpx
@@ -50,6 +50,7 @@ class Site:
     url: str
     directory: Path
     environment: dict[str, str]
+    processes: dict[str, subprocess.Popen[bytes]] = field(default_factory=dict)
 
     def manage(self, *arguments: str) -> str:
         """Run a management command, as a maintainer would; returns what it printed."""
@@ -77,6 +78,7 @@ def settings_for(directory: Path, *, url: str, postgres_url: str, redis_url: str
         "TSTTC_PROFILE": "production",
         "TSTTC_HTTPS": "0",  # there is no proxy with a certificate in front
         "TSTTC_SECRET_KEY": "a-key-of-this-journey-alone-" + "0123456789" * 3,
+        "TSTTC_RECEIPT_KEY": "A" * 43,
         "TSTTC_ALLOWED_HOSTS": "127.0.0.1",
         "TSTTC_SITE_URL": url,
         "TSTTC_DATABASE_URL": postgres_url,
@@ -106,6 +108,7 @@ def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[b
             stdin=subprocess.DEVNULL,
             start_new_session=True,
         )
+    site.processes[name] = process
     try:
         yield process
     finally:
@@ -117,8 +120,17 @@ def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[b
             process.wait()
 
 
-def _answers(site: Site, process: subprocess.Popen[bytes]) -> bool:
-    assert process.poll() is None, (site.directory / "web.log").read_text()
+@contextmanager
+def web_process(site: Site, name: str = "web") -> Iterator[subprocess.Popen[bytes]]:
+    """The web server of a site, once it answers."""
+    gunicorn = (str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application")
+    with running(site, name, *gunicorn) as process:
+        await_that(lambda: _answers(site, name), what="the web server answers")
+        yield process
+
+
+def _answers(site: Site, name: str) -> bool:
+    assert site.processes[name].poll() is None, (site.directory / f"{name}.log").read_text()
     try:
         return httpx.get(f"{site.url}/api/v1/splits", trust_env=False).status_code == 200
     except httpx.TransportError:
@@ -138,11 +150,9 @@ def production_site(
     site.manage("collectstatic", "--no-input")
     site.manage("import_truth", split, str(truth), "--protocol", protocol)
     celery = str(BIN / "celery")
-    gunicorn = (str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application")
     worker = ("worker", "--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info")
     with ExitStack() as processes:
         processes.enter_context(running(site, "beat", celery, "--app=leaderboard", "beat", "--loglevel=info"))
         processes.enter_context(running(site, "worker", celery, "--app=leaderboard", *worker))
-        web = processes.enter_context(running(site, "web", *gunicorn))
-        await_that(lambda: _answers(site, web), what="the web server answers")
+        processes.enter_context(web_process(site))
         yield site

@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,32 +14,7 @@ from evaluator.protocol import SCORE_NAMES
 from leaderboard import ground_truth
 from leaderboard.models import Submission, User
 from tests import builders
-from tests.journeys.people import Visitor
-from tests.journeys.production import REPOSITORY, Site
-
-EXAMPLES = REPOSITORY / "examples"
-
-Done = subprocess.CompletedProcess[str]
-Tsttc = Callable[..., Done]
-
-
-def command(url: str, token: str) -> Tsttc:
-    """The command as a process of its own, with that token for that address."""
-    environment = os.environ | {"TSTTC_URL": url, "TSTTC_TOKEN": token, "PYTHONPATH": str(REPOSITORY)}
-
-    def run(*arguments: str) -> Done:
-        return subprocess.run(
-            [sys.executable, "-m", "evaluator", *arguments],
-            stdin=subprocess.DEVNULL,
-            capture_output=True,
-            text=True,
-            check=False,
-            cwd=EXAMPLES,
-            env=environment,
-            timeout=90,
-        )
-
-    return run
+from tests.journeys.programs import EXAMPLES, Done, Tsttc, command
 
 
 @pytest.fixture
@@ -53,10 +24,10 @@ def owner(transactional_db: None) -> User:
 
 
 @pytest.fixture
-def tsttc(live_server: LiveServer, owner: User, benchmark: None) -> Tsttc:
+def tsttc(live_server: LiveServer, owner: User, benchmark: None, tmp_path: Path) -> Tsttc:
     """The owner's command; the split `val` has the truth of the examples."""
     ground_truth.import_truth(split_name="val", path=EXAMPLES / "truth.csv", now=timezone.now())
-    return command(live_server.url, builders.token(owner))
+    return command(live_server.url, builders.token(owner), home=tmp_path)
 
 
 def submit(tsttc: Tsttc, predictions: str, *more: str, method: str = "Foo++") -> Done:
@@ -84,7 +55,10 @@ def test_submission_scores_what_score_says_offline(tsttc: Tsttc, predictions: st
 
 def test_rejection_has_the_words_of_check(tsttc: Tsttc) -> None:
     offline = tsttc("check", "broken.json", "--manifest", "manifest.csv")
-    identity = submitted(tsttc, "broken.json")
+    here = submit(tsttc, "broken.json")
+    assert (here.returncode, here.stdout, Submission.objects.count()) == (1, "", 0)
+    assert here.stderr == offline.stderr + "Nothing was sent, so it costs nothing.\n"
+    identity = submitted(tsttc, "broken.json", "--no-check")
     builders.score_all()
     done = tsttc("status", identity)
     assert (offline.returncode, done.returncode) == (1, 1)
@@ -121,16 +95,18 @@ def test_what_is_said_of_a_method_arrives(tsttc: Tsttc) -> None:
 def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     submitted(tsttc, "predictions.json")
     builders.score_all()
+    assert "Foo++" not in tsttc("board", "val").stdout, "a new method is private"
     offline = json.loads(tsttc("score", "predictions.json", "--truth", "truth.csv", "--json").stdout)
-    done = tsttc("board", "val")
+    done = tsttc("board", "val", "--mine")
     assert done.returncode == 0, done.stderr
     lines = done.stdout.splitlines()
     assert lines[0].startswith("val · edition 1 · updated ")
-    first = lines[4].split()
-    assert first[:3] == ["1", "Foo++", "Owls"]
-    assert first[4] == f"{offline['scores']['overall']['mid']:.2f}"
+    own = next(line.split() for line in lines if "Foo++" in line)
+    assert own[:3] == ["1", "Foo++", "Owls"]
+    assert any(line.startswith("   1  Deep Scale") for line in lines), "a private method takes nobody's rank"
+    assert own[4] == f"{offline['scores']['overall']['mid']:.2f}"
     assert "Shi et al. (published)  2023" in done.stdout
-    document = json.loads(tsttc("board", "val", "--sort", "-rte", "--json").stdout)
+    document = json.loads(tsttc("board", "val", "--mine", "--sort", "-rte", "--json").stdout)
     assert document["sort"] == "-rte"
     errors = [entry["scores"]["rte"] for entry in document["entries"]]
     assert errors == sorted(errors, reverse=True)
@@ -144,12 +120,12 @@ def test_manifest_of_the_server_checks_files_like_the_local_one(
         assert client.manifest("val") == (EXAMPLES / "manifest.csv").read_bytes()
 
 
-def test_stranger_s_submission_does_not_exist(live_server: LiveServer, tsttc: Tsttc) -> None:
+def test_stranger_s_submission_does_not_exist(live_server: LiveServer, tsttc: Tsttc, tmp_path: Path) -> None:
     identity = submitted(tsttc, "predictions.json")
     stranger = User.objects.create_user("stranger@example.org", "correct horse", name="Strangers")
-    done = command(live_server.url, builders.token(stranger))("status", identity)
-    assert (done.returncode, done.stdout) == (3, "")
-    assert "The server knows no such thing" in done.stderr
+    done = command(live_server.url, builders.token(stranger), home=tmp_path)("status", identity)
+    assert (done.returncode, done.stdout) == (8, "")
+    assert "There is nothing at this address that you may see." in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -160,12 +136,12 @@ def test_stranger_s_submission_does_not_exist(live_server: LiveServer, tsttc: Ts
             2,
             "There is no split 'trial'",
         ),
-        (["submit", "predictions.json", "--split", "test", "--method", "Foo"], 3, "are not open yet"),
+        (["submit", "predictions.json", "--split", "test", "--method", "Foo"], 8, "are not open yet"),
         (["submit", "predictions.json", "--split", "val", "--method", " "], 2, "method"),
         (["submit", "predictions.json", "--split", "val", "--method", "F", "--code-url", "x"], 2, "code_url"),
         (["board", "val", "--sort", "x"], 2, "cannot be sorted by 'x'"),
-        (["board", "trial"], 3, "The server knows no such thing"),
-        (["status", "00000000-0000-4000-8000-000000000000"], 3, "The server knows no such thing"),
+        (["board", "trial"], 8, "There is nothing at this address"),
+        (["status", "00000000-0000-4000-8000-000000000000"], 8, "There is nothing at this address"),
     ],
 )
 def test_refusal_of_the_server_is_told_by_whose_fault_it_is(
@@ -177,49 +153,9 @@ def test_refusal_of_the_server_is_told_by_whose_fault_it_is(
     assert "Traceback" not in done.stderr
 
 
-def test_token_that_the_server_does_not_know_is_told(live_server: LiveServer, tsttc: Tsttc) -> None:
-    done = submit(command(live_server.url, "tsttc_" + "0" * 64), "predictions.json")
-    assert done.returncode == 3
-    assert "The server does not accept the token" in done.stderr
-
-
-@pytest.mark.services
-@pytest.mark.slow
-def test_ci_job_waits_for_its_scores_on_the_real_thing(
-    site: Site, people: Callable[[Site], Visitor], tmp_path: Path
+def test_token_that_the_server_does_not_know_is_told(
+    live_server: LiveServer, tsttc: Tsttc, tmp_path: Path
 ) -> None:
-    """Real web server, worker, PostgreSQL and Redis; the job checks, submits, waits and reads the board."""
-    people(site).sign_up(email="ci@example.org", name="Team CI")
-    tsttc = command(site.url, site.manage("create_token", "ci@example.org", "--name", "CI").strip())
-    truth = site.directory / "truth.csv"
-    guess = tmp_path / "guess.json"
-    rows = truth.read_text().splitlines()[1:]
-    guess.write_text(json.dumps({row.split(",")[0]: float(row.split(",")[-1]) * 1.02 for row in rows}))
-
-    waited = tsttc("submit", str(guess), "--split", "test", "--method", "Job", "--wait", "--json")
-    assert waited.returncode == 0, waited.stderr
-    scored = json.loads(waited.stdout)
-    offline = json.loads(tsttc("score", str(guess), "--truth", str(truth), "--json").stdout)
-    assert scored["state"] == "SCORED"
-    assert scored["scores"]["mid"] == round(offline["scores"]["overall"]["mid"], 2)
-
-    rejected = tsttc("submit", "predictions.json", "--split", "test", "--method", "Job", "--wait")
-    assert rejected.returncode == 1
-    assert "The file is rejected" in rejected.stderr
-    assert "  1. " in rejected.stderr
-    entries = json.loads(tsttc("board", "--json").stdout)["entries"]
-    assert [entry["method"] for entry in entries if entry["team"] == "Team CI"] == ["Job"]
-
-
-@pytest.mark.services
-@pytest.mark.slow
-def test_file_over_the_limit_is_the_file_s_fault_and_told_while_it_is_sent(
-    site: Site, people: Callable[[Site], Visitor], tmp_path: Path
-) -> None:
-    people(site).sign_up(email="large@example.org", name="Team Large")
-    tsttc = command(site.url, site.manage("create_token", "large@example.org", "--name", "CI").strip())
-    large = tmp_path / "large.json"
-    large.write_bytes(b" " * 30_000_000)
-    done = tsttc("submit", str(large), "--split", "test", "--method", "Large")
-    assert done.returncode == 1, done.stderr
-    assert "The file is too large" in done.stderr
+    done = submit(command(live_server.url, "tsttc_" + "0" * 64, home=tmp_path), "predictions.json")
+    assert done.returncode == 4
+    assert f"Make a new one at {live_server.url}/tokens/" in done.stderr

@@ -49,6 +49,8 @@ def test_a_person_signs_up_uploads_is_scored_and_sees_the_rank(
 
     assert outcome["state"] == "SCORED"
     assert outcome["scores"] == offline(data, truth)
+    assert "Counting frames" not in people(site).text_of("/board/test/")
+    ada.show(submission)
     entries = program.board("test")
     mine = next(entry for entry in entries if entry["method"] == "Counting frames")
     assert (mine["rank"], mine["team"], mine["kind"]) == (1, "Team Ada", "submission")

@@ -107,6 +107,7 @@ def test_four_estimators_in_both_forms_through_both_doors_score_as_in_the_toolki
     for (estimator, form), submission in sent.items():
         outcome = program.outcome(submission)
         assert outcome["state"] == "SCORED", outcome
+        program.show(submission)
         assert outcome["counts"]["overall"] == 10_517
         if estimator in TRUNCATED_NEAR_ZERO[protocol]:
             data = (kitti / "predictions" / f"{estimator}.{form}.json").read_bytes()

@@ -1,0 +1,25 @@
+"""Two people become one team, each in a browser of their own."""
+
+import pytest
+from playwright.sync_api import expect
+
+from tests.browser.conftest import NewPage, sign_up
+
+pytestmark = pytest.mark.browser
+
+
+def test_link_lets_a_second_person_in(new_page: NewPage) -> None:
+    owner, guest = new_page(), new_page()
+    sign_up(owner, email="first-of-two@example.org", name="Two of them")
+    owner.goto("/team/")
+    owner.get_by_label("Name").fill("Two of them")
+    owner.get_by_role("button", name="Found the team").click()
+    owner.get_by_role("button", name="Make an invitation").click()
+    link = owner.locator(".secret").inner_text()
+    sign_up(guest, email="second-of-two@example.org", name="The second")
+    guest.goto(link)
+    # A browser names the origin of the form only where the page does not forbid it to.
+    guest.get_by_role("button", name="Join Two of them").click()
+    guest.wait_for_url("**/team/")
+    expect(guest.get_by_role("heading", level=1)).to_have_text("Two of them")
+    expect(guest.get_by_role("cell", name="first-of-two@example.org")).to_be_visible()

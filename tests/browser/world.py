@@ -1,0 +1,132 @@
+"""A board worth looking at: methods of two teams on `val`, scored and public, one private, one withdrawn.
+
+`populate` runs in a process of the site (`manage.py shell`), because the site's database is its own.
+"""
+
+import json
+import tempfile
+from datetime import timedelta
+from pathlib import Path
+
+import numpy as np
+from allauth.account.models import EmailAddress
+from django.contrib.auth.models import AnonymousUser
+from django.db import transaction
+from django.utils import timezone
+
+import evaluator
+from leaderboard import boards, comparisons, ground_truth, submissions
+from leaderboard.demo.estimators import Estimator
+from leaderboard.demo.truth import simulate
+from leaderboard.models import BoxSource, Edition, Evaluation, Method, Split, Submission, User, Visibility
+from tests import builders
+from tests.journeys.production import Site
+
+SPLIT = "val"
+OWNER, RIVAL, MAINTAINER = "owner@example.org", "rival@example.org", "maintainer@example.org"
+PASSWORD = "kestrel-altimeter-9"
+N_SEQUENCES, N_RECORDINGS = 1_500, 60
+LONG_NAME = "A method with a rather long name, of the kind that papers like: cross-attention"
+# Whose it is, its noise, its latency in ms; the last sent is the best.
+METHODS: dict[str, tuple[str, float, float | None]] = {
+    LONG_NAME: (OWNER, 50.0, None),
+    "Optical flow expansion": (RIVAL, 36.0, 31.0),
+    "Box height, smoothed": (OWNER, 28.0, 1.2),
+    "Feature pyramid, two frames": (OWNER, 9.6, 12.5),
+    "Dense scale matching": (RIVAL, 9.0, 41.0),
+}
+
+
+def populated(site: Site) -> dict[str, str]:
+    """Make the board on a running site; one identifier of each kind of thing."""
+    said = site.manage("shell", "-v0", "-c", "from tests.browser import world; print(world.populate())")
+    return dict(json.loads(said.splitlines()[-1]))
+
+
+def populate() -> str:
+    """Make the board in this process' database."""
+    owner, rival, maintainer = (_person(email) for email in (OWNER, RIVAL, MAINTAINER))
+    User.objects.filter(pk=maintainer.pk).update(is_staff=True)
+    truth = _truth()
+    for name, (email, noise, latency_ms) in METHODS.items():
+        person = owner if email == OWNER else rival
+        sent = builders.submit(person, _file(truth, noise=noise), split=SPLIT, method=name)
+        _describe(sent.method, latency_ms=latency_ms)
+    secret = builders.submit(
+        owner, _file(truth, noise=20.0), split=SPLIT, method="Not shown yet", visibility=Visibility.PRIVATE
+    )
+    builders.submit(
+        rival, _file(truth, noise=14.0), split=SPLIT, method="Under review", visibility=Visibility.ANONYMOUS
+    )
+    gone = builders.submit(rival, _file(truth, noise=70.0), split=SPLIT, method="Given up")
+    _describe(gone.method, latency_ms=None)
+    broken = builders.submit(owner, b'{"0": 0}', split=SPLIT, method="Broken")
+    builders.score_all()
+    submissions.withdraw(submission=gone, actor=rival, now=timezone.now())
+    _spread_over_months()
+    with transaction.atomic():
+        boards.changed(SPLIT)
+    shown = Submission.objects.get(method__name="Feature pyramid, two frames")
+    second = Submission.objects.get(method__name="Dense scale matching")
+    comparisons.of(
+        methods=[shown.method_id, second.method_id],
+        split=Split.objects.get(pk=SPLIT),
+        viewer=AnonymousUser(),
+        now=timezone.now(),
+    )
+    builders.infer_all()
+    return json.dumps(
+        {
+            "method_id": str(shown.method_id),
+            "second_method_id": str(second.method_id),
+            "private_method_id": str(secret.method_id),
+            "submission_id": str(shown.pk),
+            "rejected_id": str(broken.pk),
+        }
+    )
+
+
+def _person(email: str) -> User:
+    name = {OWNER: "Owls of the North", RIVAL: "Rivals", MAINTAINER: "Maintainer"}[email]
+    user = User.objects.create_user(email, PASSWORD, name=name)
+    EmailAddress.objects.create(user=user, email=email, verified=True, primary=True)
+    return user
+
+
+def _truth() -> evaluator.GroundTruth:
+    truth = simulate(rng=np.random.default_rng(5), n_sequences=N_SEQUENCES, n_recordings=N_RECORDINGS)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "simulated.csv"
+        path.write_bytes(truth.to_csv())
+        ground_truth.import_truth(split_name=SPLIT, path=path, now=timezone.now())
+    return truth
+
+
+def _file(truth: evaluator.GroundTruth, *, noise: float) -> bytes:
+    estimator = Estimator(noise=noise, recording_noise=noise / 3)
+    ttc_s = estimator.predict(truth=truth, rng=np.random.default_rng(round(10 * noise)))
+    return evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s)
+
+
+def _describe(method: Method, *, latency_ms: float | None) -> None:
+    """What its team would say of it."""
+    Method.objects.filter(pk=method.pk).update(
+        description="Simulated. What it would do, in two sentences, so that the page has text.",
+        paper_url="https://example.org/paper",
+        code_url="https://example.org/code",
+        n_frames=6 if latency_ms else None,
+        box_source=BoxSource.GIVEN,
+        uses_nerf=False if latency_ms else None,
+        latency_ms=latency_ms,
+        hardware="one GPU" if latency_ms else "",
+    )
+
+
+def _spread_over_months() -> None:
+    """As if the submissions had come one a month, so that there is a progress to be drawn."""
+    opened = timezone.now() - timedelta(days=300)
+    Edition.objects.filter(split=SPLIT).update(opened_at=opened, published_at=opened)
+    for i, submission in enumerate(Submission.objects.filter(split=SPLIT).order_by("submitted_at"), 1):
+        at = opened + timedelta(days=35 * i)
+        Submission.objects.filter(pk=submission.pk).update(submitted_at=at)
+        Evaluation.objects.filter(submission=submission, finished_at__isnull=False).update(finished_at=at)
