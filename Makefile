@@ -18,7 +18,10 @@ DEV_STAMP := $(VENV)/.installed-dev-$(call checksum,requirements-dev.lock)
 # The development environment has everything that the server needs, in the same versions.
 READY := $(or $(wildcard $(DEV_STAMP)),$(SERVER_STAMP))
 
-.PHONY: help demo test test-fast chaos sabotage bench lint format screenshots lock clean
+# A process of the test run for each processor; the tests of one file stay together, with what they share.
+SPREAD := -n auto --dist loadfile
+
+.PHONY: help demo test test-fast chaos sabotage bench docs lint format screenshots lock clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -29,11 +32,11 @@ demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (
 test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
 	@status=0; \
 	$(PY) -m tests.on_postgresql || status=1; \
-	$(PY) -m pytest || status=1; \
+	$(PY) -m pytest $(SPREAD) || status=1; \
 	exit $$status
 
 test-fast: $(DEV_STAMP) ## what takes less than a minute: no services, no browser, nothing slow
-	$(PY) -m pytest -q -m "not slow and not services and not browser"
+	$(PY) -m pytest -q $(SPREAD) -m "not slow and not services and not browser"
 
 chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
 	@$(PY) -m tests.chaos
@@ -43,6 +46,9 @@ sabotage: $(DEV_STAMP) ## break one line of the code at a time; a named test mus
 
 bench: $(DEV_STAMP) ## measure; one line per figure, `name = value unit`
 	@$(PY) -m benchmarks
+
+docs: $(DEV_STAMP) ## build the documentation as a site into build/site/
+	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
 
 lint: $(DEV_STAMP) ## style, types and the direction of imports
 	$(PY) -m ruff check .

@@ -9,6 +9,7 @@ from pytest_django import DjangoDbBlocker
 from pytest_django.fixtures import Settings
 
 from leaderboard import benchmark as benchmark_verbs
+from leaderboard.web.kept import memory
 
 # Playwright's own loop makes Django's guard against blocking calls in async code misfire.
 os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
@@ -17,23 +18,49 @@ os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 # Files whose tests score many predictions, each in a child process as a worker does, or make whole worlds.
 SLOW_FILES = {
     "test_admin_retry.py",
+    "test_api_compare.py",
+    "test_attempts.py",
+    "test_broker.py",
+    "test_inference.py",
+    "test_comparisons.py",
+    "test_analyses.py",
+    "test_conformance.py",
+    "test_canaries.py",
+    "test_badges_and_feeds.py",
     "test_clean_files.py",
     "test_cli_against_server.py",
     "test_demo.py",
+    "test_exports.py",
     "test_files_s3.py",
+    "test_headers.py",
+    "test_hostile_files.py",
+    "test_hostile_names.py",
     "test_lifecycle_states.py",
     "test_pages_board.py",
+    "test_pages_board_views.py",
+    "test_pages_charts.py",
+    "test_pages_compare.py",
     "test_pages_editions.py",
     "test_pages_maintainers.py",
     "test_pages_method.py",
     "test_pages_publishing.py",
     "test_pages_submission.py",
     "test_pages_withdrawing.py",
+    "test_non_interference.py",
+    "test_permissions.py",
     "test_preview.py",
     "test_quarantine.py",
     "test_quotas.py",
+    "test_quarantine_runs.py",
     "test_rescoring.py",
+    "test_rescoring_batches.py",
+    "test_schema.py",
     "test_scoring.py",
+    "test_invitations.py",
+    "test_method_details.py",
+    "test_quota_follows_people.py",
+    "test_visibility.py",
+    "test_snapshots.py",
 }
 
 
@@ -70,6 +97,12 @@ def private_directories(tmp_path: Path, settings: Settings) -> None:
             "OPTIONS": {"location": str(settings.FILES_DIR)},
         },
     }
+
+
+@pytest.fixture(autouse=True)
+def nothing_remembered() -> None:
+    """Each test has a database of its own; what was answered from another one holds no more."""
+    memory.clear()
 
 
 @pytest.fixture(autouse=True)

@@ -11,6 +11,7 @@ def production(tmp_path: Path) -> dict[str, str]:
     return {
         "TSTTC_PROFILE": "production",
         "TSTTC_SECRET_KEY": "k" * 30 + "0123456789" * 3,
+        "TSTTC_RECEIPT_KEY": "A" * 43,
         "TSTTC_ALLOWED_HOSTS": "board.example.org",
         "TSTTC_SITE_URL": "https://board.example.org",
         "TSTTC_DATABASE_URL": "postgres://tsttc:secret@127.0.0.1:1/tsttc",

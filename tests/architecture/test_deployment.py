@@ -86,11 +86,11 @@ def test_every_variable_of_the_deployment_is_read_by_something() -> None:
 
 def test_no_secret_has_a_default() -> None:
     text = (REPOSITORY / "docker-compose.yml").read_text()
-    for name in ("TSTTC_SECRET_KEY", "POSTGRES_PASSWORD", "REDIS_PASSWORD"):
+    for name in ("TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY", "POSTGRES_PASSWORD", "REDIS_PASSWORD"):
         assert f"${{{name}:?" in text
         assert f"${{{name}:-" not in text
     example = (REPOSITORY / "deploy/env.example").read_text()
-    for name in ("TSTTC_SECRET_KEY", "POSTGRES_PASSWORD", "REDIS_PASSWORD"):
+    for name in ("TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY", "POSTGRES_PASSWORD", "REDIS_PASSWORD"):
         assert f"\n{name}=\n" in example
 
 

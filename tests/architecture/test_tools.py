@@ -60,6 +60,7 @@ def test_the_production_profile_passes_the_deployment_checks(production: dict[st
     "name",
     [
         "TSTTC_SECRET_KEY",
+        "TSTTC_RECEIPT_KEY",
         "TSTTC_ALLOWED_HOSTS",
         "TSTTC_SITE_URL",
         "TSTTC_DATABASE_URL",

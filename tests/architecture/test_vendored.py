@@ -1,0 +1,31 @@
+"""Files of others that stand in the repository: unchanged, and said where they are from."""
+
+import hashlib
+import re
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+FOLDERS = ("static/vendored", "tests/browser/vendored")
+ROW = re.compile(r"^\| `([^`]+)` \| (\S.*) \|.*\| `([0-9a-f]{64})` \|$", re.MULTILINE)
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_every_file_of_others_is_the_one_that_its_list_names(folder: str) -> None:
+    root = REPOSITORY / folder
+    listed = {name: digest for name, _, digest in ROW.findall((root / "README.md").read_text())}
+    found = {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in root.iterdir()
+        if path.name != "README.md"
+    }
+    assert found == listed
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_every_file_of_others_has_its_version_and_its_licence(folder: str) -> None:
+    root = REPOSITORY / folder
+    for name, origin, _ in ROW.findall((root / "README.md").read_text()):
+        assert re.search(r"\d+\.\d+\.\d+", origin), name
+        assert name.endswith(".LICENSE") or (root / f"{name.partition('.')[0]}.LICENSE").exists(), name
