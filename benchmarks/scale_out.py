@@ -34,6 +34,7 @@ def main() -> None:
             "DJANGO_SETTINGS_MODULE": "leaderboard.settings",
             "TSTTC_LOG_LEVEL": "WARNING",
             "TSTTC_QUOTAS": "0",
+            "TSTTC_THROTTLES": "0",
         }
         print(f"scale_out_processors = {os.cpu_count()} processors")
         sys.stdout.flush()

@@ -4,13 +4,16 @@ It stands behind a proxy that buffers requests, so a slow upload never occupies 
 """
 
 import os
+import signal
+from typing import Any
 
 from leaderboard.logs import logging_settings
 
 bind = os.environ.get("TSTTC_WEB_BIND", "0.0.0.0:8000")
 # The number of processes is gunicorn's own variable, WEB_CONCURRENCY.
 worker_class = "gthread"
-threads = int(os.environ.get("TSTTC_WEB_THREADS", "8"))
+# Those who wait for a submission have threads beside the ones that serve everybody else.
+threads = int(os.environ.get("TSTTC_WEB_THREADS", "8")) + int(os.environ.get("TSTTC_WAITERS", "16"))
 # Each process has its own listening socket. With a shared one, kept-alive connections pile up on one process.
 reuse_port = True
 keepalive = 30
@@ -20,3 +23,17 @@ graceful_timeout = 30
 # would have the keys of mailed links in it.
 accesslog = None
 logconfig_dict = logging_settings(as_json=True, level="INFO")
+
+
+def post_worker_init(worker: Any) -> None:
+    """Asked to end, a process first lets its waiters go, with the state as it is; they ask the next one."""
+    from leaderboard import waiting  # noqa: PLC0415 - needs the application, which is loaded only now
+
+    end = signal.getsignal(signal.SIGTERM)
+
+    def let_go(number: int, frame: Any) -> None:
+        waiting.THE_WATCHER.close()
+        if callable(end):
+            end(number, frame)
+
+    signal.signal(signal.SIGTERM, let_go)
