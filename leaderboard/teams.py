@@ -4,6 +4,7 @@ What changes who is in a team locks, in this order: the person, the teams by the
 submission locks its team as well, so nobody leaves while a slot of the quota is being counted.
 """
 
+import secrets
 from datetime import datetime
 
 from django.db import IntegrityError, transaction
@@ -28,10 +29,10 @@ def team_of(*, user: User) -> Team:
     if present is not None:
         return present
     try:
-        # An address is nobody's business: somebody who gave no name gets one that reveals nothing.
+        # An address is nobody's business, nor is how many have signed up: the name reveals neither.
         wanted = clean_name("name", user.name)
     except Refused:
-        wanted = f"Team {user.pk}"
+        wanted = f"Team {secrets.token_hex(3)}"
     return _founded(_named(wanted), user)
 
 
@@ -120,6 +121,18 @@ def hand_over(*, team: Team, to: User, actor: User) -> None:
         audit.record(verb="handed_over", noun="Team", noun_id=row.pk, actor=actor, details={"user": to.pk})
 
 
+def appoint(*, team: Team, to: User, reason: str, actor: User | None = None) -> None:
+    """Make a member the owner, as a maintainer does where the owner is gone. Raises `Refused`."""
+    with transaction.atomic():
+        row = locked(team)[0]
+        heir = _membership_in(row, to)
+        before = list(row.memberships.filter(is_owner=True).values_list("user", flat=True))
+        row.memberships.exclude(pk=heir.pk).update(is_owner=False)
+        row.memberships.filter(pk=heir.pk).update(is_owner=True)
+        details = {"user": to.pk, "from": before, "reason": reason}
+        audit.record(verb="appointed_owner", noun="Team", noun_id=row.pk, actor=actor, details=details)
+
+
 # --- what several of these need --------------------------------------------------------------------------
 
 
@@ -174,7 +187,9 @@ def end_invitations(team: Team, *, of: User) -> None:
 def _membership_in(team: Team, user: User) -> Membership:
     found = team.memberships.filter(user=user).first()
     if found is None:
-        raise Refused("not-a-member", "That person is not in your team; expected one of its members.")
+        raise Refused(
+            "not-a-member", f"That person is not in the team {team.name!r}; expected one of its members."
+        )
     return found
 
 

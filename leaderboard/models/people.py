@@ -65,6 +65,8 @@ class Team(models.Model):
 class Membership(models.Model):
     """That a person belongs to a team. A person belongs to at most one."""
 
+    # What stands in addresses: the accounts' own numbers would tell how many there are.
+    handle = models.UUIDField(default=uuid.uuid4, editable=False, unique=True)
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="memberships")
     user = models.OneToOneField(User, on_delete=models.CASCADE, related_name="membership")
     is_owner = models.BooleanField(default=False)

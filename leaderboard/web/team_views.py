@@ -103,20 +103,20 @@ def leave(request: HttpRequest) -> HttpResponse:
 @login_required
 @never_cache
 @require_POST
-def remove(request: HttpRequest, user_id: int) -> HttpResponse:
+def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Put a member out of the team."""
     own = _own_team(request)
-    member = get_object_or_404(User, membership__team=own, pk=user_id)
+    member = get_object_or_404(User, membership__team=own, membership__handle=handle)
     return _done(request, lambda: verbs.remove(team=own, member=member, actor=cast("User", request.user)))
 
 
 @login_required
 @never_cache
 @require_POST
-def hand_over(request: HttpRequest, user_id: int) -> HttpResponse:
+def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Let another member own the team."""
     own = _own_team(request)
-    member = get_object_or_404(User, membership__team=own, pk=user_id)
+    member = get_object_or_404(User, membership__team=own, membership__handle=handle)
     return _done(request, lambda: verbs.hand_over(team=own, to=member, actor=cast("User", request.user)))
 
 

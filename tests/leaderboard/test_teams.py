@@ -1,6 +1,10 @@
 """Teams: founding, renaming, handing over, removing, leaving; and the page for it."""
 
+from io import StringIO
+from uuid import UUID
+
 import pytest
+from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
 
@@ -8,6 +12,8 @@ from leaderboard import invitations, quotas, teams
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Membership, Method, Team, User
 from leaderboard.texts import Refused
 from tests import builders, pages
+
+NOBODY = UUID(int=0)
 
 
 def owners(team: Team) -> list[User]:
@@ -137,6 +143,42 @@ def test_who_left_sees_nothing_private_of_the_team_any_more(
     assert [client.get(address).status_code for address in addresses] == [404] * 3
 
 
+# --- the maintainers' command ------------------------------------------------------------------------------
+
+
+def appoint_owner(team: str, email: str, reason: str = "Her account is closed.") -> str:
+    out = StringIO()
+    call_command("appoint_owner", team, email, "--reason", reason, stdout=out)
+    return out.getvalue()
+
+
+def test_a_maintainer_appoints_an_owner_where_the_owner_is_gone(
+    owner: User, teammate: User, team: Team
+) -> None:
+    User.objects.filter(pk=owner.pk).update(is_active=False)
+    assert appoint_owner("Owls", "Teammate@example.org") == "teammate@example.org owns the team Owls.\n"
+    assert owners(team) == [teammate]
+    (event,) = AuditEvent.objects.filter(verb="appointed_owner")
+    assert event.details == {"user": teammate.pk, "from": [owner.pk], "reason": "Her account is closed."}
+
+
+@pytest.mark.parametrize(
+    ("team_name", "email", "reason", "said"),
+    [
+        ("Nobody", "teammate@example.org", "Gone.", "No team is called 'Nobody'."),
+        ("Owls", "nobody@example.org", "Gone.", "There is no account for 'nobody@example.org'."),
+        ("Owls", "stranger@example.org", "Gone.", "That person is not in the team 'Owls'"),
+        ("Owls", "teammate@example.org", " ", "No reason was given"),
+    ],
+)
+def test_an_appointment_that_cannot_be_changes_nothing(
+    owner: User, stranger: User, team: Team, team_name: str, email: str, reason: str, said: str
+) -> None:
+    with pytest.raises(CommandError, match=said):
+        appoint_owner(team_name, email, reason)
+    assert owners(team) == [owner]
+
+
 # --- the page ----------------------------------------------------------------------------------------------
 
 
@@ -155,13 +197,13 @@ def test_page_founds_renames_hands_over_removes_and_leaves(
     main = pages.page(client.get("/team/")).one("main")
     assert "owner@example.org" in main.text
     assert [button.text for button in main.all("button")] == ["Leave Owls"]
-    assert client.post(f"/team/members/{owner.pk}/remove/").status_code == 422
+    assert client.post(f"/team/members/{owner.membership.handle}/remove/").status_code == 422
 
     client.force_login(owner)
     assert client.post("/team/leave/").status_code == 422
     assert client.post("/team/", {"name": "Barn Owls"}).status_code == 302
-    assert client.post(f"/team/members/{stranger.pk}/remove/").status_code == 404
-    assert client.post(f"/team/members/{teammate.pk}/hand-over/").status_code == 302
+    assert client.post(f"/team/members/{stranger.membership.handle}/remove/").status_code == 404
+    assert client.post(f"/team/members/{teammate.membership.handle}/hand-over/").status_code == 302
     assert owners(team) == [teammate]
     assert client.post("/team/leave/").status_code == 302
     assert "No team yet" in pages.page(client.get("/team/")).one("main").text
@@ -185,9 +227,8 @@ def test_who_would_leave_methods_to_nobody_says_that_they_know(
     [
         "leave/",
         "invite/",
-        "members/1/remove/",
-        "members/1/hand-over/",
-        "members/999999999999999999999/remove/",
+        f"members/{NOBODY}/remove/",
+        f"members/{NOBODY}/hand-over/",
     ],
 )
 def test_deeds_are_posts_of_those_who_are_signed_in(client: Client, owner: User, path: str) -> None:

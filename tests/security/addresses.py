@@ -66,7 +66,7 @@ def _filled(route: Route, scene: Scene) -> Iterator[str]:
         "slug": ("none",),
         "format": FORMATS,
         "secret": ("nonsense",),
-        "user_id": (1, 2, 999),
+        "handle": (ABSENT,),
         "form": ("csv", "tex", "md", "bib"),
         "id": (1,),
         "object_id": ("1",),

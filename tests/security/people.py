@@ -48,7 +48,7 @@ class World:
             "submission_id": self.submission.pk,
             "method_id": self.method.pk,
             "team_id": self.method.team_id,
-            "user_id": self.users["teammate"].pk,
+            "handle": self.users["teammate"].membership.handle,
             "invitation_id": self.invitation.pk,
             "secret": self.secret,
             "key": "nonsense",
