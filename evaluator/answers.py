@@ -5,6 +5,7 @@ The shapes are lenient about what they do not use: a newer server may say more, 
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import msgspec
@@ -73,6 +74,7 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     team: str | None = None
     date: str | None = None
     kind: str = "submission"
+    visibility: str = "PUBLIC"
     withdrawn_at: str | None = None
 
 
@@ -84,6 +86,11 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     document: JSON
     edition: Any = None
     updated_at: str | None = None
+
+    @property
+    def updated(self) -> str:
+        """When it last changed, to the second; empty where nothing is known."""
+        return re.sub(r"\.\d+", "", self.updated_at or "")
 
 
 class Difference(msgspec.Struct, frozen=True, kw_only=True):

@@ -27,6 +27,8 @@ SPECTACULAR_SETTINGS: Final[dict[str, Any]] = {
     # What a request may hold differs from what an answer holds; a file is bytes in the one alone.
     "COMPONENT_SPLIT_REQUEST": True,
     "SCHEMA_PATH_PREFIX": "/api/v1",
+    # One set of choices that several answers have is one thing, under one name.
+    "ENUM_NAME_OVERRIDES": {"MethodVisibilityEnum": "leaderboard.models.methods.Visibility"},
     "POSTPROCESSING_HOOKS": [
         "drf_spectacular.hooks.postprocess_schema_enums",
         "leaderboard.api.schema.complete",

@@ -71,5 +71,5 @@ def _rows(board: Board) -> list[layouts.Row]:
 
 def _about(board: Board) -> list[str]:
     edition = f", edition {board.edition}" if board.edition is not None else ""
-    updated = f", updated {board.updated_at}" if board.updated_at else ""
+    updated = f", updated {board.updated}" if board.updated else ""
     return [f"TSTTC leaderboard, {board.split}{edition}{updated}"]

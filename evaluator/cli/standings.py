@@ -76,8 +76,8 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
     facts = [found.split]
     if found.edition is not None:
         facts.append(f"edition {found.edition}")
-    if found.updated_at:
-        facts.append(f"updated {found.updated_at}")
+    if found.updated:
+        facts.append(f"updated {found.updated}")
     yield printable(" · ".join(facts))
     if not found.entries:
         yield "No results yet. Be the first: tsttc submit --help"
@@ -98,7 +98,10 @@ def _table(entries: Sequence[BoardEntry], *, texts: Sequence[str], scores: Seque
     rows = [[Cell(text, is_bold=True) for text in headings]]
     marks = {name: best_and_second([entry.scores.get(name) for entry in entries]) for name in scores}
     for i, entry in enumerate(entries):
-        row = [Cell(NO_VALUE if entry.rank is None else str(entry.rank)), Cell(printable(entry.method))]
+        row = [
+            Cell(NO_VALUE if entry.rank is None else str(entry.rank)),
+            Cell(printable(entry.method) + (" (private)" if entry.visibility == "PRIVATE" else "")),
+        ]
         row += [
             Cell(printable(authors_or_team(entry)) if name == "team" else printable(entry.date or ""))
             for name in texts

@@ -10,7 +10,7 @@ from rest_framework import serializers
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
 from leaderboard import preview, rescoring, submissions
 from leaderboard.entries import Details, Entry, Interval
-from leaderboard.models import Edition, Publication, Split, Status, Submission
+from leaderboard.models import Edition, Publication, Split, Status, Submission, Visibility
 from leaderboard.quotas import Quota
 from leaderboard.standings import Board
 
@@ -240,6 +240,9 @@ class EntrySerializer(serializers.Serializer[Entry]):
     method_id = serializers.UUIDField(allow_null=True)
     team = serializers.CharField()
     kind = serializers.ChoiceField(choices=["submission", "published"])
+    visibility = serializers.ChoiceField(
+        choices=Visibility.choices, help_text="PRIVATE rows are your team's: nobody else's board has them."
+    )
     date = serializers.CharField(source="date_text")
     description = serializers.CharField(allow_blank=True)
     paper_url = serializers.CharField(allow_blank=True)

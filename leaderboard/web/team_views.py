@@ -28,7 +28,7 @@ def _own_team(request: HttpRequest) -> Team:
 def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpResponse:
     user = cast("User", request.user)
     page = team_page(user, now=timezone.now())
-    form = NameForm(initial={"name": page.team.name if page.team else ""})
+    form = NameForm(initial={"name": page.team.name if page.team else user.name})
     return render(request, "teams/team.html", {"page": page, "form": form, **context}, status=status)
 
 

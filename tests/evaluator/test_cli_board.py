@@ -41,7 +41,7 @@ def published(method: str, values: list[float], *, rank: int) -> dict[str, objec
 BOARD_DOCUMENT: dict[str, Any] = {
     "split": "test",
     "edition": 2,
-    "updated_at": "2026-11-20T12:00:00Z",
+    "updated_at": "2026-11-20T12:00:00.123456Z",
     "entries": [
         published("Deep Scale", [14.8, 27.6, 15.6, 11.5, 13.7, 12.3, 6.5, 8.8, 13.1, 15.0], rank=1),
         {
@@ -162,6 +162,12 @@ def test_names_of_strangers_cannot_steer_the_terminal(tsttc: Tsttc, site: Record
     shown = tsttc("board").stdout
     assert r"\x1b[31m\u202eevil" in shown
     assert r"a\nb\x07" in shown
+
+
+def test_private_rows_of_one_s_own_team_are_marked(tsttc: Tsttc, site: RecordedSite) -> None:
+    entries = [row | {"visibility": "PRIVATE"} for row in BOARD_DOCUMENT["entries"][1:2]]
+    site.put(BOARD, Reply(BOARD_DOCUMENT | {"entries": entries}))
+    assert "Foo++ (private)" in tsttc("board", "--mine").stdout
 
 
 def found(document: dict[str, Any]) -> Board:

@@ -92,6 +92,10 @@ def test_a_new_method_is_private_and_seen_by_its_team_alone(
         assert (entry.rank, entry.is_mine, entry.is_visible_to_all) == (1, True, False)
         client.force_login(member)
         assert "only your team" in pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
+        entries = client.get("/api/v1/splits/test/board").json()["entries"]
+        marked = {row["method"]: row["visibility"] for row in entries}
+        assert [name for name, visibility in marked.items() if visibility == "PRIVATE"] == ["Secret sauce"]
+        assert "Secret sauce private" in pages.page(client.get("/submissions/")).one("tbody").text
 
 
 def test_a_private_method_moves_no_number_that_counts_changes(sent: Submission) -> None:
