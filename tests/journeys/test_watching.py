@@ -18,13 +18,26 @@ Programs = Callable[[Site, str], Program]
 
 
 def lines(site: Site, name: str) -> list[dict[str, Any]]:
-    """A process's log. A line that is no JSON fails the test, but for Celery's greeting at a terminal."""
-    text = (site.directory / f"{name}.log").read_text().splitlines()
+    """A process's log as far as it is written.
+
+    A line that is no JSON fails the test, but for Celery's greeting at a terminal.
+    """
+    text = (site.directory / f"{name}.log").read_text().rpartition("\n")[0].splitlines()
     return [json.loads(line) for line in text if name == "web" or line.startswith("{")]
 
 
-def about(site: Site, name: str, submission: str) -> list[dict[str, Any]]:
-    return [line for line in lines(site, name) if line.get("submission_id") == submission]
+def said(site: Site, name: str, event: str, submission: str) -> dict[str, Any]:
+    """The one line in which a process says that of a submission, which it may do after it was seen."""
+    found: list[dict[str, Any]] = []
+
+    def is_written() -> bool:
+        found[:] = [line for line in lines(site, name) if line.get("submission_id") == submission]
+        found[:] = [line for line in found if line["event"] == event]
+        return bool(found)
+
+    await_that(is_written, what=f"{name} says {event}")
+    [line] = found
+    return line
 
 
 def is_ready(site: Site) -> bool:
@@ -50,10 +63,8 @@ def test_a_submission_can_be_followed_through_every_process_and_nothing_secret_i
     submission = program.submit(split="test", method="Followed", data=data)
     assert program.outcome(submission)["state"] == "SCORED"
 
-    [queued] = [line for line in about(site, "web", submission) if line["event"] == "evaluation_queued"]
-    [finished] = [
-        line for line in about(site, "worker", submission) if line["event"] == "evaluation_finished"
-    ]
+    queued = said(site, "web", "evaluation_queued", submission)
+    finished = said(site, "worker", "evaluation_finished", submission)
     assert finished["evaluation_id"] == queued["evaluation_id"]
     assert finished["status"] == "SCORED"
     if "task_id" in finished:  # found by the message, and not by the worker's own look
@@ -65,7 +76,7 @@ def test_a_submission_can_be_followed_through_every_process_and_nothing_secret_i
     assert [secret for secret in secrets if secret in text] == []
     true_values = [repr(value)[:10] for value in truth.ttc_s.tolist() if len(repr(value)) > 12]
     assert [value for value in true_values if value in text] == []
-    assert len(lines(site, "beat")) > 0
+    await_that(lambda: len(lines(site, "beat")) > 0, what="beat says something")
 
 
 def test_a_working_site_says_so(site: Site) -> None:

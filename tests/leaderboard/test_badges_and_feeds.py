@@ -90,7 +90,9 @@ def test_badge_follows_the_board_and_is_kept_as_long_as_it_stands(
     first = client.get(address)
     assert first["Cache-Control"] == "public, no-cache"
     assert first["Cross-Origin-Resource-Policy"] == "cross-origin"
-    assert client.get(address, headers={"If-None-Match": first["ETag"]}).status_code == 304
+    known = client.get(address, headers={"If-None-Match": first["ETag"]})
+    assert known.status_code == 304
+    assert known["Cross-Origin-Resource-Policy"] == "cross-origin"
     with transaction.atomic():
         Score.objects.filter(evaluation__submission__method=methods[0]).update(value=0.5)
         boards.changed("test")

@@ -193,13 +193,24 @@ def test_program_says_and_reads_the_same(client: Client, method: Method, owner: 
         ('{"description": "\\u0000"}', "bad-character"),
         ("{", "parse-error"),
         ('{"n_frames": ' + "9" * 6000 + "}", "parse-error"),
+        (f"[{'{},' * 50_000}{{}}]", "too-large"),
     ],
 )
 def test_nonsense_is_refused_in_words(
     client: Client, method: Method, owner: User, body: Any, code: str
 ) -> None:
     status, told = patch(client, method, owner, body)
-    assert (status, told["code"]) == (400 if code == "parse-error" else 422, code)
+    assert (status, told["code"]) == ({"parse-error": 400, "too-large": 413}.get(code, 422), code)
+
+
+def test_all_that_can_be_said_fits_into_a_document(client: Client, method: Method, owner: User) -> None:
+    whole = {
+        "description": "\N{GRINNING FACE}" * 2000,
+        **{name: "https://example.org/" + "x" * 480 for name in ("paper_url", "code_url")},
+        **{name: "ü" * 120 for name in ("pretraining", "hardware")},
+    }
+    body = json.dumps(whole, indent=8)
+    assert (patch(client, method, owner, body)[0], len(body) > 20_000) == (200, True)
 
 
 # --- filters -----------------------------------------------------------------------------------------------

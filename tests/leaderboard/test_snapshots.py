@@ -348,3 +348,20 @@ def test_what_is_remembered_is_bounded(edition: Edition, filled: list[Method], c
         small.put(f"/{i}", *found)
     assert small.get("/0") is None
     assert small.get("/49") is not None
+
+
+def test_a_long_address_counts_as_well_as_its_answer(
+    edition: Edition, filled: list[Method], client: Client
+) -> None:
+    badge = f"/methods/{filled[0].pk}/badge.svg"
+    client.get(badge)
+    found = memory.get(badge)
+    assert found is not None
+    small = type(memory)(limit_bytes=1_000_000)
+    addresses = [f"{badge}?{i:04000}" for i in range(1000)]
+    for address in addresses:
+        small.put(address, *found)
+    assert sum(len(address) for address in addresses if small.get(address)) < 1_000_000
+    for address in addresses:
+        small.put(address, *found)  # the same again takes no room of its own
+    assert small.get(addresses[-100]) is not None
