@@ -12,6 +12,7 @@ secret of the reader in them, so that their compressed length betrays none.
 import gzip
 import hashlib
 import re
+import sys
 import threading
 from collections import OrderedDict
 from collections.abc import Callable
@@ -30,6 +31,8 @@ from leaderboard.web.context import splits_of
 Next = Callable[[HttpRequest], HttpResponse]
 
 MAX_REMEMBERED_BYTES: Final = 48_000_000
+# What an answer costs beside its bytes: its headers, and its place in memory.
+OVERHEAD_BYTES: Final = 2000
 MIN_COMPRESSED_BYTES: Final = 1000
 # "gzip;q=0" asks for anything but that.
 _GZIP = re.compile(r"\bgzip\b(?!\s*;\s*q=0(?:\.0*)?\s*(?:,|$))")
@@ -41,6 +44,8 @@ SHARED_HEADERS: Final = (
     *("Content-Type", "Content-Disposition", "Content-Language", "Link", "Allow"),
     "Cross-Origin-Resource-Policy",
 )
+# A browser lets these of a 304 replace what it has kept: left out, a badge would be forbidden elsewhere.
+HEADERS_OF_304: Final = frozenset({"Cross-Origin-Resource-Policy"})
 
 
 def is_anybodys(request: HttpRequest) -> bool:
@@ -65,8 +70,8 @@ class Answer:
 
     @property
     def n_bytes(self) -> int:
-        """What remembering it costs."""
-        return len(self.body) + len(self.compressed)
+        """What remembering it costs, but for its address."""
+        return OVERHEAD_BYTES + len(self.body) + len(self.compressed)
 
     @classmethod
     def of(cls, response: HttpResponse) -> "Answer":
@@ -88,12 +93,14 @@ class Answer:
         etag = f'"{self.etag}-gz"' if takes_gzip else f'"{self.etag}"'
         body = self.compressed if takes_gzip else self.body
         response = HttpResponse(b"" if request.method == "HEAD" else body)
-        if _is_known(request, etag):
+        is_known = _is_known(request, etag)
+        if is_known:
             response = HttpResponseNotModified()
-        else:
-            response["Content-Length"] = str(len(body))
-            for name, value in self.headers:
+        for name, value in self.headers:
+            if not is_known or name in HEADERS_OF_304:
                 response[name] = value
+        if not is_known:
+            response["Content-Length"] = str(len(body))
             if takes_gzip:
                 response["Content-Encoding"] = "gzip"
         response["ETag"] = etag
@@ -132,7 +139,7 @@ class Memory:
         with self._lock:
             self._forget(address)
             self._answers[address] = (state, answer)
-            self._n_bytes += answer.n_bytes
+            self._n_bytes += self._cost(address, answer)
             while self._n_bytes > self._limit_bytes:
                 self._forget(next(iter(self._answers)))
 
@@ -145,7 +152,12 @@ class Memory:
     def _forget(self, address: str) -> None:
         old = self._answers.pop(address, None)
         if old is not None:
-            self._n_bytes -= old[1].n_bytes
+            self._n_bytes -= self._cost(address, old[1])
+
+    @staticmethod
+    def _cost(address: str, answer: Answer) -> int:
+        # Whoever asks chooses the address, and may make it longer than what is answered.
+        return sys.getsizeof(address) + answer.n_bytes
 
 
 memory = Memory(limit_bytes=MAX_REMEMBERED_BYTES)

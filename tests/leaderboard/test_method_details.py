@@ -206,8 +206,8 @@ def test_nonsense_is_refused_in_words(
 def test_all_that_can_be_said_fits_into_a_document(client: Client, method: Method, owner: User) -> None:
     whole = {
         "description": "\N{GRINNING FACE}" * 2000,
-        **{name: "https://example.org/" + "x" * 480 for name in ("paper_url", "code_url")},
-        **{name: "ü" * 120 for name in ("pretraining", "hardware")},
+        **dict.fromkeys(("paper_url", "code_url"), "https://example.org/" + "x" * 480),
+        **dict.fromkeys(("pretraining", "hardware"), "ü" * 120),
     }
     body = json.dumps(whole, indent=8)
     assert (patch(client, method, owner, body)[0], len(body) > 20_000) == (200, True)
