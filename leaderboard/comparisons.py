@@ -241,13 +241,18 @@ def compute(row: Comparison, *, now: datetime) -> None:
 def _rounded(
     gap: uncertainty.Difference, first: float | None, second: float | None, decimals: int
 ) -> dict[str, float | None]:
-    """As it is shown: the difference of the two published values, whatever lies behind their last digits."""
+    """As it is shown: the difference of the two published values, whatever lies behind their last digits.
+
+    The test knows no unit, and would tell of differences of any size: what is published alike is not told
+    apart by its p either.
+    """
     value = gap.difference if first is None or second is None else first - second
+    shown = published(value, decimals=decimals)
     return {
-        "difference": published(value, decimals=decimals),
+        "difference": shown,
         "low": published(gap.low, decimals=decimals),
         "high": published(gap.high, decimals=decimals),
-        "p": None if gap.p is None else float(f"{gap.p:.2g}"),
+        "p": None if gap.p is None else 1.0 if shown == 0 else float(f"{gap.p:.2g}"),
     }
 
 

@@ -218,6 +218,20 @@ def test_an_equal_file_makes_no_difference(
     assert pair.sentence() == "M1.05 and Same have the same MiD."
 
 
+def test_what_is_published_alike_is_not_told_apart_by_its_p(
+    entries: list[Submission], edition: Edition, stranger: User
+) -> None:
+    nearly = builders.submit(stranger, builders.predictions(edition, factor=1.05 + 1e-7), method="Nearly")
+    builders.score_all()
+    ask(entries[0], nearly)
+    builders.infer_all()
+    (pair,) = ask(entries[0], nearly).pairs
+    assert nearly.digest != entries[0].digest
+    assert all(found == Difference(0.0, 0.0, 0.0, 1.0) for found in known(pair).values() if found.p)
+    assert known(pair)["mid"].p == 1.0
+    assert pair.sentence() == "M1.05 and Nearly have the same MiD."
+
+
 @pytest.mark.parametrize(
     ("found", "said"),
     [
