@@ -2,7 +2,8 @@
 
 Nothing is counted up or down. What is spent follows from the submissions and what came of them, so no counter
 can drift: a submission costs a slot while it waits or runs, and for good once it is scored. Rejected,
-cancelled or failed by our fault it costs none; rejected files have a limit of their own.
+cancelled or failed by our fault it costs none. Rejected and cancelled files have a limit of their own: all of
+them are kept, and whoever could send any number of them would fill the disk.
 
 Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
 have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people.
@@ -146,7 +147,7 @@ def _state(*, team: Team | None, user: User, split: Split, rules: Rules, now: da
 def _spent(
     *, team: Team | None, user: User, split: Split, rules: Rules, now: datetime
 ) -> tuple[list[datetime], list[datetime]]:
-    """When the team and its people sent what costs a slot, and what was rejected, oldest first."""
+    """When the team and its people sent what costs a slot, and what was rejected or cancelled, in order."""
     theirs = Q(submitted_by=user)
     if team is not None:
         people = Membership.objects.filter(team=team).values("user")
@@ -161,15 +162,17 @@ def _spent(
             is_scored=Exists(evaluations.filter(status=Status.SCORED)),
             is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),
             is_rejected=Exists(live.filter(status=Status.REJECTED)),
+            # By its team: those of an edition that was given up are cancelled as well.
+            is_cancelled=Exists(live.filter(status=Status.CANCELLED, submission__withdrawn_at__isnull=False)),
         )
         .order_by("submitted_at")
-        .values_list("submitted_at", "is_scored", "is_pending", "is_rejected")
+        .values_list("submitted_at", "is_scored", "is_pending", "is_rejected", "is_cancelled")
     )
     spent, rejected = [], []
-    for submitted_at, is_scored, is_pending, is_rejected in rows:
+    for submitted_at, is_scored, is_pending, is_rejected, is_cancelled in rows:
         if is_scored or is_pending:
             spent.append(submitted_at)
-        elif is_rejected:
+        elif is_rejected or is_cancelled:
             rejected.append(submitted_at)
     return spent, rejected
 
@@ -177,7 +180,10 @@ def _spent(
 def weigh(
     *, split: Split, rules: Rules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
 ) -> Quota:
-    """The quota of a team that sent at these times, oldest first, what costs a slot and what was rejected."""
+    """The quota of a team that sent at these times, oldest first, what costs a slot and what was `rejected`.
+
+    Among these are those that the team cancelled before they were scored.
+    """
     in_window = [at for at in spent if at > now - rules.window]
     rejected = [at for at in rejected if at > now - REJECTED_WINDOW]
     full_until = _until(in_window, limit=rules.limit, window=rules.window)
@@ -195,7 +201,7 @@ def weigh(
             f"{span(rules.window)}",
             gap_until: f"Submissions of a team to {split.pk} are at least {span(rules.min_gap)} apart",
             rejected_until: f"{len(rejected)} files that your team sent to {split.pk} within 24 hours were "
-            f"rejected, and no more are taken",
+            f"rejected or cancelled, and no more are taken",
         }
         sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
     return Quota(

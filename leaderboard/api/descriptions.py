@@ -139,7 +139,9 @@ BY_SHAPE: Final[dict[str, dict[str, Said]]] = {
         "estimate_s": Said("Seconds until it is scored, from recent runs; null: unknown.", 12.5),
     },
     "Quota": {
-        "rejected_limit": Said("Rejected files that are taken within 24 hours; null: any number.", 20),
+        "rejected_limit": Said(
+            "Rejected and cancelled files that are taken within 24 hours; null: any number.", 20
+        ),
     },
     "Rescoring": {
         "n_total": Said("Submissions that it has to score.", 1000),

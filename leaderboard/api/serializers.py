@@ -168,7 +168,10 @@ class QuotaSerializer(SlotsSerializer):
     min_gap_s = serializers.FloatField(
         source="rules.min_gap_s", help_text="Least time between two submissions."
     )
-    rejected_used = serializers.IntegerField(source="n_rejected", help_text="Rejected files within 24 hours.")
+    rejected_used = serializers.IntegerField(
+        source="n_rejected",
+        help_text="Files of the last 24 hours that were rejected, or cancelled by the team.",
+    )
     rejected_limit = serializers.IntegerField(source="rules.rejected_limit", allow_null=True)
     sentence = serializers.CharField(help_text="The same in words.")
 

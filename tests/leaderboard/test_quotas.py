@@ -192,6 +192,27 @@ def test_a_submission_cancelled_before_it_was_scored_costs_nothing(edition: Edit
     assert state(owner).left == 1
 
 
+def test_cancelling_gives_no_end_of_files_that_are_kept(edition: Edition, owner: User) -> None:
+    limit(limit=1, rejected_limit=3)
+    for number in range(3):
+        submission = send(owner, other(edition, number)).submission
+        submissions.withdraw(submission=submission, actor=owner, now=NOW)
+    with pytest.raises(QuotaExceeded, match="3 files that your team sent"):
+        send(owner, other(edition, 3))
+    assert (state(owner).left, state(owner).n_rejected, state(owner).next_slot_at) == (1, 3, NOW + DAY)
+    assert send(owner, other(edition, 3), at=NOW + DAY).is_new
+
+
+def test_an_edition_that_is_given_up_costs_its_submissions_nothing(edition: Edition, owner: User) -> None:
+    limit(rejected_limit=1)
+    second = rescoring.open_edition(split_name="test", protocol="toolkit", now=timezone.now(), actor=None)
+    send(owner, other(edition, 1))
+    rescoring.discard(edition=second, reason="Not needed.", now=timezone.now(), actor=None)
+    builders.score_all()
+    assert sorted(Evaluation.objects.values_list("status", flat=True)) == [Status.CANCELLED, Status.SCORED]
+    assert (state(owner).used, state(owner).n_rejected) == (1, 0)
+
+
 def test_our_fault_costs_nothing_until_a_maintainer_has_it_scored_after_all(
     edition: Edition, owner: User, maintainer: User
 ) -> None:
@@ -229,7 +250,8 @@ def test_rejected_files_have_a_limit_of_their_own(edition: Edition, owner: User)
     with pytest.raises(QuotaExceeded) as caught:
         send(owner, other(edition, 1), at=NOW + 2 * HOUR)
     assert str(caught.value) == (
-        "2 files that your team sent to test within 24 hours were rejected, and no more are taken; "
+        "2 files that your team sent to test within 24 hours were rejected or cancelled, and no more are "
+        "taken; "
         "the next slot opens at 2026-11-21 12:00 UTC."
     )
     assert caught.value.quota.left == 50
