@@ -6,6 +6,7 @@ It is raised inside the transaction that makes the change, so nobody ever sees t
 
 import uuid
 from collections.abc import Iterable
+from datetime import datetime
 from functools import partial
 from typing import Any
 
@@ -82,6 +83,20 @@ def changed_everywhere() -> None:
     _hold()
     for split_id in Split.objects.order_by("name").values_list("name", flat=True):
         _count(split_id)
+
+
+def times_passed(*, now: datetime) -> int:
+    """Count for each split that it has opened or closed since, as its boards say. Returns how many had."""
+    n_told = 0
+    for split in Split.objects.exclude(opens_at=None, closes_at=None):
+        n_passed = sum(at is not None and at <= now for at in (split.opens_at, split.closes_at))
+        known = BoardVersion.objects.filter(split=split).values_list("n_times_passed", flat=True).first()
+        if n_passed != (known or 0):
+            with transaction.atomic():
+                changed(split.pk)
+                BoardVersion.objects.filter(split=split).update(n_times_passed=n_passed)
+            n_told += 1
+    return n_told
 
 
 def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:

@@ -84,6 +84,7 @@ class Entry:
     is_mine: bool = False
     visibility: str = Visibility.PUBLIC
     pseudonym: str = ""  # of one's own anonymous row: under which everybody else sees it
+    shown_at: datetime | None = None  # since when everybody sees its method
     withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
     is_unscorable: bool = False  # of a former edition, whose successor cannot score the file
 
@@ -91,6 +92,11 @@ class Entry:
     def is_visible_to_all(self) -> bool:
         """Whether everybody sees this row, be it under a pseudonym."""
         return self.visibility != Visibility.PRIVATE
+
+    @property
+    def listed_at(self) -> datetime | None:
+        """Since when the row can stand on the board: sent, and its method shown."""
+        return max((at for at in (self.date, self.shown_at) if at), default=None)
 
     @property
     def date_text(self) -> str:
@@ -164,6 +170,7 @@ def submitted_entry(
         submission_id=submission.pk,
         evaluation_id=evaluation.pk,
         visibility=submission.method.visibility,
+        shown_at=submission.method.shown_at,
         withdrawn_at=withdrawn_at,
         is_unscorable=is_unscorable,
     )

@@ -14,6 +14,7 @@ from django.db import Error, connections
 
 from leaderboard import (
     backlog,
+    boards,
     broker,
     clock,
     ground_truth,
@@ -38,6 +39,7 @@ def sweep(*, rng: random.Random) -> int:
     """
     lifecycle.release_expired(rng=rng)
     visibility.reveal_due(now=clock.database_now())
+    boards.times_passed(now=clock.database_now())
     snapshots.check(now=clock.database_now())
     n_sent = 0
     for evaluation_id in lifecycle.waiting_ids(limit=MAX_NUDGES_PER_SWEEP):

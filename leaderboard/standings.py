@@ -7,10 +7,12 @@ from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
 from django.db.models import Count, Exists, OuterRef
+from django.utils import timezone
 from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator import ranking
 from evaluator.protocol import SCORE_NAMES
+from leaderboard import deadlines
 from leaderboard.entries import (
     Entry,
     Scored,
@@ -64,13 +66,10 @@ class Board:
     at: datetime | None = None
     updated_at: datetime | None = None
     is_open: bool = field(default=False)
+    deadline: str = ""  # in a sentence, where there is one
     filters: Filters = field(default_factory=Filters)
     n_in_all: int = 0  # rows before the filters
-
-    @property
-    def n_submissions(self) -> int:
-        """How many rows are submissions."""
-        return sum(entry.kind == "submission" for entry in self.entries)
+    n_submissions: int = 0  # those of them that are submissions
 
 
 def parse_moment(text: str) -> datetime:
@@ -134,8 +133,8 @@ def arranged(
     filters: Filters | None = None,
 ) -> Board:
     """A board of ranked rows: those that fit the filters, in the order of one column."""
-    filters = filters or Filters()
-    dates = [entry.date for entry in entries if entry.date]
+    filters, now = filters or Filters(), timezone.now()
+    dates = [entry.listed_at for entry in entries if entry.listed_at]
     if edition and edition.published_at:
         dates.append(edition.published_at)
     return Board(
@@ -145,9 +144,11 @@ def arranged(
         sort=sort,
         at=at,
         updated_at=max(dates, default=None),
-        is_open=split.accepts_submissions(),
+        is_open=deadlines.is_open(split, now=now),
+        deadline=deadlines.sentence_of(split, now=now),
         filters=filters,
         n_in_all=len(entries),
+        n_submissions=sum(entry.kind == "submission" for entry in entries),
     )
 
 

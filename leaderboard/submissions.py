@@ -10,7 +10,7 @@ from django.core.files.base import File
 from django.db import IntegrityError, transaction
 from django.db.models import Q
 
-from leaderboard import audit, boards, estimates, files, lifecycle, methods, quotas, teams
+from leaderboard import audit, boards, deadlines, estimates, files, lifecycle, methods, quotas, teams
 from leaderboard.entries import Interval, scored_of
 from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
 from leaderboard.names import clean_name
@@ -133,22 +133,10 @@ def _open_split(name: str, *, now: datetime) -> Split:
         raise Refused(
             "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
         )
-    refusal = refusal_of(split, now=now)
+    refusal = deadlines.refusal_of(split, now=now)
     if refusal is not None:
         raise refusal
     return split
-
-
-def refusal_of(split: Split, *, now: datetime) -> Refused | None:
-    """Why a split takes nothing from anybody now; None if it does."""
-    code, sentence = "", ""
-    if not split.accepts_submissions():
-        code, sentence = "split-not-open", "are not open yet: it has no ground truth."
-    elif split.opens_at and now < split.opens_at:
-        code, sentence = "split-not-open", f"open at {split.opens_at:%Y-%m-%d %H:%M} UTC."
-    elif split.closes_at and now >= split.closes_at:
-        code, sentence = "split-closed", f"closed at {split.closes_at:%Y-%m-%d %H:%M} UTC."
-    return Refused(code, f"Submissions to {split.pk} {sentence}", field="split") if code else None
 
 
 def _before_the_quota(
@@ -156,18 +144,20 @@ def _before_the_quota(
 ) -> Submission | None:
     """Where no slot is open, the submission that had these bytes before. None: go on, and ask again.
 
-    So that a file that cannot be taken is not written first. Raises `quotas.QuotaExceeded`.
+    So that a file that cannot be taken is not written first. Raises `Refused` or `quotas.QuotaExceeded`.
     """
     team = teams.present_team_of(user=user)
+    named = Method.objects.filter(team=team, name=method_name)
     try:
         quotas.require(team=team, user=user, split=split, now=now)
     except quotas.QuotaExceeded:
-        named = Method.objects.filter(team=team, name=method_name)
         same = {"split": split, "method__in": named, "digest": files.measure(upload).digest}
         first = Submission.objects.standing().filter(**same).first()
         if first is None:
             raise
         return first
+    if team is not None and not named.exists():
+        methods.require_own_look(method_name, team=team, field="method")
     return None
 
 

@@ -9,7 +9,7 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import quotas, teams, tokens
+from leaderboard import deadlines, teams, tokens
 from leaderboard.api.authentication import split_of
 from leaderboard.api.bodies import DocumentParser
 from leaderboard.api.problems import problem
@@ -37,7 +37,7 @@ class QuotaView(APIView):
         team = teams.present_team_of(user=user)
         only = split_of(request.auth)
         splits = Split.objects.filter(pk=only) if only is not None else Split.objects.all()
-        rows = [quotas.state(team=team, user=user, split=split, now=now) for split in splits]
+        rows = [deadlines.left(team=team, user=user, split=split, now=now) for split in splits]
         return Response(QuotaSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 

@@ -58,6 +58,8 @@ EVERYWHERE: Final[dict[str, Said]] = {
     "counts": Said("Sequences that the numbers are the means over; null before it is scored."),
     "sort": Said("The column that the rows are sorted by; `-` before it reverses.", "rank"),
     "is_open": Said("Whether it takes submissions.", True),
+    "opens_at": Said("Since when submissions are taken; null: since there is ground truth.", TIME_EXAMPLE),
+    "closes_at": Said("Until when submissions are taken; null: without an end.", TIME_EXAMPLE),
     "title": Said("Its title, for people.", "Test"),
     "reason": Said("Why, in the words of whoever did it.", "Corrected labels of three recordings."),
     "detail": Said("What is wrong, what was found and what is expected, for people.", "The file has …"),

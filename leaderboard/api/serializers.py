@@ -5,10 +5,11 @@ from typing import Any
 
 from django.conf import settings
 from django.urls import reverse
+from django.utils import timezone
 from rest_framework import serializers
 
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
-from leaderboard import preview, rescoring, submissions
+from leaderboard import deadlines, preview, rescoring, submissions
 from leaderboard.entries import Details, Entry, Interval
 from leaderboard.models import Edition, Publication, Split, Status, Submission, Visibility
 from leaderboard.quotas import Quota
@@ -163,7 +164,7 @@ class QuotaSerializer(SlotsSerializer):
     """What the team has left on one of the splits, with the rules."""
 
     split = serializers.CharField()
-    is_open = serializers.BooleanField(help_text="Whether the quota lets a submission in now.")
+    is_open = serializers.BooleanField(help_text="Whether the split and the quota let a submission in now.")
     window_s = serializers.FloatField(source="rules.window_s", help_text="The rolling window.")
     min_gap_s = serializers.FloatField(
         source="rules.min_gap_s", help_text="Least time between two submissions."
@@ -194,7 +195,9 @@ class SplitSerializer(serializers.Serializer[Split]):
     split = serializers.CharField(source="name")
     title = serializers.CharField()
     description = serializers.CharField()
-    is_open = serializers.BooleanField(source="accepts_submissions")
+    is_open = serializers.SerializerMethodField(help_text="Whether it takes submissions.")
+    opens_at = serializers.DateTimeField(allow_null=True)
+    closes_at = serializers.DateTimeField(allow_null=True)
     is_hidden = serializers.BooleanField()
     is_simulated = serializers.BooleanField()
     edition = serializers.IntegerField(source="published_edition.number", default=None, allow_null=True)
@@ -205,6 +208,10 @@ class SplitSerializer(serializers.Serializer[Split]):
     n_sequences = serializers.IntegerField(
         source="published_edition.ground_truth.n_sequences", default=None, allow_null=True
     )
+
+    def get_is_open(self, split: Split) -> bool:
+        """Whether there is ground truth, and this is the time."""
+        return deadlines.is_open(split, now=timezone.now())
 
 
 class DetailsSerializer(serializers.Serializer[Details]):
@@ -284,7 +291,9 @@ class BoardSerializer(serializers.Serializer[Board]):
     ground_truth = serializers.CharField(source="edition.ground_truth_id", default=None, allow_null=True)
     at = serializers.DateTimeField(allow_null=True, help_text="The time that was asked for, if any.")
     updated_at = serializers.DateTimeField(allow_null=True)
-    is_open = serializers.BooleanField()
+    is_open = serializers.BooleanField(help_text="Whether its split takes submissions.")
+    opens_at = serializers.DateTimeField(source="split.opens_at", allow_null=True)
+    closes_at = serializers.DateTimeField(source="split.closes_at", allow_null=True)
     sort = serializers.CharField()
     entries = EntrySerializer(many=True)
 

@@ -140,7 +140,7 @@ def seed(*, now: datetime, login_path: Path) -> Login:
     users = {entry.email: _user(entry) for entry in ENTRIES}
     _let_in(users[DEMO_EMAIL], password=login.password)
     missing = [entry for entry in ENTRIES if not _has_submitted(entry)]
-    if missing or not Split.objects.get(name=SPLIT).accepts_submissions():
+    if missing or not Split.objects.get(name=SPLIT).has_ground_truth:
         truth = simulate(rng=np.random.default_rng(SEED))
         _open_split(truth, now=now)
         for entry in missing:

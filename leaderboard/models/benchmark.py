@@ -50,8 +50,9 @@ class Split(QuotaRules):
     def __str__(self) -> str:
         return self.name
 
-    def accepts_submissions(self) -> bool:
-        """Whether there is ground truth to score against."""
+    @property
+    def has_ground_truth(self) -> bool:
+        """Whether there is something to score against; `leaderboard.deadlines` says when files are taken."""
         return self.published_edition_id is not None
 
 

@@ -10,7 +10,7 @@ from django.conf import settings
 from django.http import HttpRequest
 from django.utils import timezone
 
-from leaderboard import names, quotas, submissions, teams
+from leaderboard import deadlines, names, teams
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.quotas import QuotaExceeded
 from leaderboard.submissions import Refused
@@ -61,9 +61,11 @@ def offers_for(user: User, *, now: datetime) -> list[Offer]:
     team = teams.present_team_of(user=user)
     found = []
     for split in Split.objects.select_related("published_edition"):
-        refusal = submissions.refusal_of(split, now=now)
-        sentence = str(refusal or quotas.state(team=team, user=user, split=split, now=now).sentence)
-        found.append(Offer(split=split, is_open=refusal is None, sentence=sentence))
+        quota = deadlines.left(team=team, user=user, split=split, now=now)
+        is_open = deadlines.is_open(split, now=now)
+        until = deadlines.sentence_of(split, now=now) if is_open else ""
+        sentence = f"{quota.sentence} {until}".strip()
+        found.append(Offer(split=split, is_open=is_open, sentence=sentence))
     return found
 
 

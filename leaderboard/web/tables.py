@@ -17,7 +17,7 @@ from evaluator.report import format_published
 from leaderboard import inference
 from leaderboard.entries import Interval
 from leaderboard.exports import printed_decimals, short_authors
-from leaderboard.standings import Board, Entry
+from leaderboard.standings import PRIMARY, Board, Entry
 from leaderboard.web import drawing
 from leaderboard.web.board_query import PER_PAGE, BoardQuery
 from leaderboard.web.drawing import Scale
@@ -184,9 +184,13 @@ def _is_present(board: Board) -> bool:
     return board.edition is not None and board.edition.pk == board.split.published_edition_id and not board.at
 
 
+def _is_scored(entry: Entry) -> bool:
+    return entry.kind == "submission" and entry.scores.get(PRIMARY) is not None
+
+
 def _reason(board: Board, *, has_intervals: bool) -> str:
     """Why no value has an interval, where something was scored at all."""
-    if has_intervals or board.edition is None or not board.n_submissions:
+    if has_intervals or board.edition is None or not any(map(_is_scored, board.entries)):
         return ""
     return inference.why_no_interval(board.edition) or (
         "The intervals are being computed; until then the values stand without them."

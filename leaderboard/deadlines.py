@@ -1,0 +1,43 @@
+"""When a split takes submissions, in the words that every door says it in."""
+
+from dataclasses import replace
+from datetime import datetime
+
+from leaderboard import quotas
+from leaderboard.models import Split, Team, User
+from leaderboard.texts import Refused
+
+
+def refusal_of(split: Split, *, now: datetime) -> Refused | None:
+    """Why a split takes nothing from anybody now; None if it does."""
+    code, sentence = "", ""
+    if not split.has_ground_truth:
+        code, sentence = "split-not-open", "are not open yet: it has no ground truth."
+    elif split.opens_at and now < split.opens_at:
+        code, sentence = "split-not-open", f"open at {split.opens_at:%Y-%m-%d %H:%M} UTC."
+    elif split.closes_at and now >= split.closes_at:
+        code, sentence = "split-closed", f"closed at {split.closes_at:%Y-%m-%d %H:%M} UTC."
+    return Refused(code, f"Submissions to {split.pk} {sentence}", field="split") if code else None
+
+
+def is_open(split: Split, *, now: datetime) -> bool:
+    """Whether the split takes submissions, from whoever has a slot left."""
+    return refusal_of(split, now=now) is None
+
+
+def sentence_of(split: Split, *, now: datetime) -> str:
+    """Since when, until when or why not the split takes submissions; empty where nothing limits it."""
+    refusal = refusal_of(split, now=now)
+    if refusal is None and split.closes_at:
+        return f"Submissions to {split.pk} close at {split.closes_at:%Y-%m-%d %H:%M} UTC."
+    return str(refusal or "")
+
+
+def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quotas.Quota:
+    """What the team has left on the split; none of it can be had while the split takes nothing."""
+    quota = quotas.state(team=team, user=user, split=split, now=now)
+    refusal = refusal_of(split, now=now)
+    if refusal is None:
+        return quota
+    opens_at = split.opens_at if split.opens_at and split.opens_at > now and split.has_ground_truth else None
+    return replace(quota, is_open=False, next_slot_at=opens_at, sentence=str(refusal))

@@ -1,0 +1,106 @@
+"""Late, closed and future splits: every door says so, with a time and its zone, and soon after it comes."""
+
+import random
+from datetime import datetime, timedelta
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+from rest_framework.test import APIClient
+
+from leaderboard import boards, deadlines, queue
+from leaderboard.models import BoardVersion, Edition, Split, User
+from tests import builders, pages
+from tests.leaderboard.test_api_submissions import client_of
+
+HOUR = timedelta(hours=1)
+LATE, FUTURE, ENDING = "late", "future", "ending"
+
+
+def set_times(kind: str) -> str:
+    """Give the split `test` these times; what is said of them."""
+    now = timezone.now()
+    times: dict[str, dict[str, datetime]] = {
+        LATE: {"closes_at": now - HOUR},
+        FUTURE: {"opens_at": now + HOUR},
+        ENDING: {"opens_at": now - HOUR, "closes_at": now + HOUR},
+    }
+    Split.objects.filter(pk="test").update(**times[kind])
+    at = list(times[kind].values())[-1]
+    verb = {LATE: "closed", FUTURE: "open", ENDING: "close"}[kind]
+    return f"Submissions to test {verb} at {at:%Y-%m-%d %H:%M} UTC."
+
+
+@pytest.mark.parametrize("kind", [LATE, FUTURE, ENDING])
+def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client: Client, kind: str) -> None:
+    sentence = set_times(kind)
+    assert sentence in pages.page(client.get("/board/test/")).one("main").text
+    client.force_login(owner)
+    assert sentence in pages.page(client.get("/submit/")).one("main").text
+    [quota] = [row for row in client_of(owner).get("/api/v1/quota").json() if row["split"] == "test"]
+    split = Split.objects.get(pk="test")
+    for answer in (
+        client.get("/api/v1/splits/test/board").json(),
+        next(row for row in APIClient().get("/api/v1/splits").json() if row["split"] == "test"),
+    ):
+        assert answer["is_open"] is (kind == ENDING)
+        for name in ("opens_at", "closes_at"):
+            at = getattr(split, name)
+            assert answer[name] == (at and at.isoformat().replace("+00:00", "Z"))
+    assert quota["is_open"] is (kind == ENDING)
+    if kind != ENDING:
+        assert quota["sentence"] == sentence
+    assert (quota["next_slot_at"] is not None) is (kind == FUTURE)
+
+
+def test_nobody_is_asked_to_be_the_first_where_nothing_is_taken(edition: Edition, client: Client) -> None:
+    notice = "to be the first"
+    assert notice in pages.page(client.get("/board/test/")).one("main").text
+    set_times(LATE)
+    client.cookies["sessionid"] = "drawn anew"
+    assert notice not in pages.page(client.get("/board/test/")).one("main").text
+
+
+def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
+    opens_at = timezone.now() + HOUR
+    Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
+    boards.times_passed(now=timezone.now())
+    before = boards.state()
+    assert "open at" in client.get("/board/test/").text
+    # It has opened; then it has closed; then a maintainer gives more time.
+    for shift, said in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
+        moment = timezone.now() + shift
+        Split.objects.filter(pk="test").update(opens_at=moment, closes_at=moment + HOUR)
+        queue.sweep(rng=random.Random(0))
+        assert boards.state() > before
+        before = boards.state()
+        assert said in client.get("/board/test/").text
+        assert boards.times_passed(now=timezone.now()) == 0
+    assert BoardVersion.objects.get(split="test").n_times_passed == 1
+
+
+def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> None:
+    before = boards.state()
+    assert boards.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
+    assert boards.state() == before
+    assert deadlines.sentence_of(Split.objects.get(pk="test"), now=timezone.now()) == ""
+
+
+# --- what filters leave -----------------------------------------------------------------------------------
+
+
+def test_a_filter_does_not_make_the_board_say_that_nobody_has_submitted(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    submission = builders.submit(owner, builders.predictions(edition), method="Foo")
+    builders.score_all()
+    for query in ("?q=shi", "?q=nothing-like-it"):
+        text = pages.page(client.get(f"/board/test/{query}")).one("main").text
+        assert "Nobody has submitted" not in text
+        assert "being computed" not in text
+    submission.refresh_from_db()
+    client.force_login(owner)
+    assert client.post(f"/submissions/{submission.pk}/withdraw/", {"confirm": "on"}).status_code == 302
+    text = pages.page(client.get("/board/test/?q=Foo")).one("main").text
+    assert "withdrawn" in text
+    assert "being computed" not in text
