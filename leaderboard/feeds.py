@@ -28,8 +28,8 @@ class Item:
 
     @property
     def at(self) -> datetime:
-        """When what stands there was submitted."""
-        return self.entry.date or _BEGINNING
+        """When it came: a method that was private has been tried long before anybody could see it."""
+        return self.entry.listed_at or _BEGINNING
 
     @property
     def id(self) -> UUID:

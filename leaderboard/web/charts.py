@@ -196,7 +196,7 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         points.append(
             Point(
                 (
-                    entry.date_text,
+                    _day_text(day, entry),
                     entry.method,
                     _team(entry),
                     format_published(value),

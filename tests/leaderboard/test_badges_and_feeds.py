@@ -141,6 +141,18 @@ def test_newest_entry_comes_first_and_dates_the_feed(methods: list[Method], clie
     assert root.findtext(f"{ATOM}updated") == dates[0]
 
 
+def test_what_was_shown_long_after_it_was_sent_is_news_from_then_on(
+    methods: list[Method], client: Client
+) -> None:
+    shown_at = timezone.now() + timedelta(days=1)
+    by_hand(methods[0], shown_at=shown_at)
+    root = feed(client)
+    assert titles(root)[0].startswith(methods[0].name)
+    assert root.findtext(f"{ATOM}updated") == f"{shown_at:%Y-%m-%dT%H:%M:%SZ}"
+    updated = parse_datetime(client.get("/api/v1/splits/test/board").json()["updated_at"])
+    assert updated == shown_at
+
+
 def test_an_entry_is_the_same_one_whatever_it_is_called_and_has_scored(
     methods: list[Method], client: Client
 ) -> None:

@@ -1,11 +1,12 @@
 """The page of a board's charts, and the closer look at a submission to an open split."""
 
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from django.test import Client
 
-from leaderboard.models import Method, Split, Submission, User
+from leaderboard.models import Edition, Method, Split, Submission, User
 from tests import builders, pages
 
 
@@ -42,6 +43,21 @@ def test_the_best_so_far_only_falls(client: Client, entries: list[Submission]) -
     assert marked == sorted(set(marked), reverse=True)
     assert marked[-1] == min(values)
     assert [row.attributes["data-x"] for row in rows] == sorted(row.attributes["data-x"] for row in rows)
+
+
+def test_every_attempt_has_its_own_day_in_the_table(
+    client: Client, edition: Edition, entries: list[Submission], owner: User
+) -> None:
+    first, method = entries[0], entries[0].method
+    first.submitted_at -= timedelta(days=40)
+    first.save(update_fields=["submitted_at"])
+    later = builders.submit(owner, builders.predictions(edition, factor=1.9), method=method.name)
+    builders.score_all()
+    rows = (
+        get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"}).one("tbody").all("tr")
+    )
+    days = [row.all("td")[0].text for row in rows if row.all("td")[1].text == method.name]
+    assert days == [f"{attempt.submitted_at:%Y-%m-%d}" for attempt in (first, later)]
 
 
 def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[Submission]) -> None:
