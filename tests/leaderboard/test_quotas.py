@@ -150,6 +150,14 @@ def test_a_refused_file_is_not_kept_and_leaves_nothing(edition: Edition, owner: 
     with pytest.raises(QuotaExceeded):
         send(owner, other(edition, 2), method="Bar")
     assert len(list(Path(site.FILES_DIR).rglob("*.json"))) == n_files
+
+
+def test_a_file_whose_method_has_no_name_of_its_own_is_not_kept_either(edition: Edition, owner: User) -> None:
+    send(owner, other(edition, 1), method="Owls")
+    n_files = len(list(Path(site.FILES_DIR).rglob("*.json")))
+    with pytest.raises(submissions.Refused, match="looks like"):
+        send(owner, other(edition, 2), method="0wls")
+    assert len(list(Path(site.FILES_DIR).rglob("*.json"))) == n_files
     assert Submission.objects.count() == 1
 
 
