@@ -1,4 +1,5 @@
-// Says how large the chosen file is, and stops one over the limit before it is sent in vain.
+// Says how large the chosen file is, stops one over the limit before it is sent in vain, and takes a file that
+// is dropped anywhere on the form.
 "use strict";
 
 const form = document.querySelector("form[data-max-bytes]");
@@ -23,6 +24,29 @@ function judge() {
 
 input.addEventListener("change", judge);
 judge();
+
+// Beside the field a browser would open the file, and what was written on the page would be gone.
+const hasFile = (event) => event.dataTransfer.types.includes("Files");
+const mark = (isOver) => form.classList.toggle("dropping", isOver);
+
+document.addEventListener("dragover", (event) => {
+  if (!hasFile(event)) return;
+  event.preventDefault();
+  mark(form.contains(event.target));
+});
+document.addEventListener("dragleave", (event) => {
+  if (!event.relatedTarget) mark(false);
+});
+document.addEventListener("drop", (event) => {
+  if (!hasFile(event)) return;
+  event.preventDefault();
+  mark(false);
+  if (!form.contains(event.target)) return;
+  const taken = new DataTransfer();
+  taken.items.add(event.dataTransfer.files[0]);
+  input.files = taken.files;
+  input.dispatchEvent(new Event("change"));
+});
 
 // A second press while the file is on its way would only send it twice.
 form.addEventListener("submit", () => {

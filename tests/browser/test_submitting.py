@@ -103,6 +103,28 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     assert "By keyboard" in taken.value.path().read_text()
 
 
+DROP = """([selector, type]) => {
+  const dataTransfer = new DataTransfer();
+  dataTransfer.items.add(new File(["{}"], "mine.json"));
+  const target = document.querySelector(selector);
+  return target.dispatchEvent(new DragEvent(type, {bubbles: true, cancelable: true, dataTransfer}));
+}"""
+
+
+def test_a_file_dropped_on_the_form_is_chosen_and_beside_it_is_not_opened(page: Page, site: Site) -> None:
+    sign_up(page, email="drops@example.org", name="Drops")
+    page.goto("/submit/")
+    is_left_to_the_browser = page.evaluate(DROP, ["header", "drop"])
+    assert not is_left_to_the_browser
+    expect(page.locator("#chosen")).to_have_text("")
+    page.evaluate(DROP, ["legend", "dragover"])
+    expect(page.locator("form.dropping")).to_be_visible()
+    page.evaluate(DROP, ["legend", "drop"])
+    expect(page.locator("#chosen")).to_have_text("2 bytes")
+    assert page.evaluate("document.querySelector('input[type=file]').files[0].name") == "mine.json"
+    expect(page.locator("form.dropping")).to_have_count(0)
+
+
 def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
     sign_up(page, email="moves@example.org", name="Moves")
     submit(page, predictions(truth, factor=1.1), method="Moving")
