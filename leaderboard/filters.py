@@ -1,15 +1,20 @@
 """Which rows of a board to show: by what a row says of its method. Ranks stay those of the whole board."""
 
 import math
+import re
 import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
 from typing import TypeVar
 
 from leaderboard.entries import Entry
 from leaderboard.models import BoxSource, Cameras
 
-NAMES = ("frames", "cameras", "boxes", "nerf", "extra", "code", "paper", "latency", "q")
+NAMES = (
+    *("frames", "cameras", "boxes", "nerf", "extra", "code", "paper"),
+    *("pretraining", "parameters", "latency", "hardware", "q"),
+)
 """What filters are called in addresses, in the order in which pages offer them."""
 
 MAX_TEXT = 80
@@ -18,6 +23,9 @@ _YES_NO = {"yes": True, "no": False}
 _CAMERAS = {choice.value.lower(): choice.value for choice in Cameras}
 _BOXES = {choice.value.lower(): choice.value for choice in BoxSource}
 _FRAMES = {str(n): n for n in range(2, 7)}
+# Nobody writes "25000000" by hand; without a letter it is the number itself.
+_COUNT = re.compile(r"([0-9]{1,16}(?:\.[0-9]{1,6})?) ?([kmb]?)", re.ASCII | re.IGNORECASE)
+_TIMES = {"": 1, "k": 10**3, "m": 10**6, "b": 10**9}
 
 
 class BadFilter(ValueError):
@@ -42,7 +50,10 @@ class Filters:
     extra: bool | None = None
     code: bool | None = None
     paper: bool | None = None
+    pretraining: str = ""  # in what it says of it
+    n_parameters: int | None = None  # at most
     latency_ms: float | None = None  # at most
+    hardware: str = ""  # in what it says of it
     text: str = ""  # in the names of method and team
 
     @property
@@ -64,11 +75,15 @@ class Filters:
         )
         if any(value is not None and value != said for value, said in wanted):
             return False
-        if self.latency_ms is not None and (
-            details.latency_ms is None or details.latency_ms > self.latency_ms
-        ):
+        limits = ((self.n_parameters, details.n_parameters), (self.latency_ms, details.latency_ms))
+        if any(most is not None and (said is None or said > most) for most, said in limits):
             return False
-        return _folded(self.text) in _folded(f"{entry.method}\n{entry.team}")
+        texts = (
+            (self.pretraining, details.pretraining),
+            (self.hardware, details.hardware),
+            (self.text, f"{entry.method}\n{entry.team}"),
+        )
+        return all(_folded(text) in _folded(said) for text, said in texts if text)
 
 
 def parse(query: Mapping[str, str]) -> Filters:
@@ -85,8 +100,11 @@ def parse(query: Mapping[str, str]) -> Filters:
         extra=_choice(given, "extra", _YES_NO),
         code=_choice(given, "code", _YES_NO),
         paper=_choice(given, "paper", _YES_NO),
+        pretraining=_text(given, "pretraining"),
+        n_parameters=_count(given, "parameters"),
         latency_ms=_latency(given),
-        text=_text(given),
+        hardware=_text(given, "hardware"),
+        text=_text(given, "q"),
     )
 
 
@@ -112,10 +130,20 @@ def _latency(given: Mapping[str, str]) -> float | None:
     return value
 
 
-def _text(given: Mapping[str, str]) -> str:
-    text = given.get("q", "")
+def _count(given: Mapping[str, str], name: str) -> int | None:
+    if name not in given:
+        return None
+    found = _COUNT.fullmatch(given[name])
+    value = int(Decimal(found[1]) * _TIMES[found[2].lower()]) if found else 0
+    if not value:
+        raise BadFilter(name, given[name], "a number above 0, such as 25M (million), 400k or 25000000")
+    return value
+
+
+def _text(given: Mapping[str, str], name: str) -> str:
+    text = given.get(name, "")
     if len(text) > MAX_TEXT:
-        raise BadFilter("q", text, f"at most {MAX_TEXT} characters, found {len(text)}")
+        raise BadFilter(name, text, f"at most {MAX_TEXT} characters, found {len(text)}")
     return text
 
 

@@ -26,7 +26,10 @@ _MEANINGS = {
     "extra": "Only methods that use extra data (`yes`) or do not (`no`).",
     "code": "Only methods with code (`yes`) or without (`no`).",
     "paper": "Only methods with a paper (`yes`) or without (`no`).",
+    "pretraining": "Only methods with this text in what is said of their pretraining; case is ignored.",
+    "parameters": "Only methods with at most so many parameters: a number, or as `25M` with k, M or B (10⁹).",
     "latency": "Only methods that take at most so many milliseconds.",
+    "hardware": "Only methods with this text in what their latency was measured on; case is ignored.",
     "q": "Only rows with this text in the name of the method or the team.",
 }
 INTERVALS = OpenApiParameter(

@@ -10,7 +10,7 @@ from leaderboard.templatetags.board import grouped
 from leaderboard.web.board_query import BoardQuery
 
 _YES_NO: Final = {"yes": "yes", "no": "no"}
-# In the order and under the names of `leaderboard.filters`; latency and search are typed, not chosen.
+# In the order and under the names of `leaderboard.filters`: first what is chosen, then what is typed.
 _CHOICES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "frames": ("Frames", {str(n): str(n) for n in range(2, 7)}),
     "cameras": ("Cameras", {choice.value.lower(): choice.label for choice in Cameras}),
@@ -19,6 +19,13 @@ _CHOICES: Final[Mapping[str, tuple[str, Mapping[str, str]]]] = {
     "extra": ("Extra data", _YES_NO),
     "code": ("Has code", _YES_NO),
     "paper": ("Has paper", _YES_NO),
+}
+# Label, an example, and how many characters are seen.
+_TYPED: Final[Mapping[str, tuple[str, str, int]]] = {
+    "pretraining": ("Pretraining has", "ImageNet", 12),
+    "parameters": ("Parameters, at most", "25M", 8),
+    "latency": ("Latency, at most ms", "50", 6),
+    "hardware": ("Hardware has", "RTX 4090", 12),
 }
 
 
@@ -41,12 +48,23 @@ class Chooser:
 
 
 @dataclass(frozen=True)
+class Typed:
+    """One filter to type: a number or a text."""
+
+    name: str
+    label: str
+    example: str
+    size: int
+    value: str
+
+
+@dataclass(frozen=True)
 class Tools:
     """Everything that stands above the table."""
 
     columns: tuple[Choice, ...]
     choosers: tuple[Chooser, ...]
-    latency: str
+    typed: tuple[Typed, ...]
     text: str
     kept: tuple[tuple[str, str], ...]
     is_filtered: bool
@@ -72,14 +90,17 @@ def tools(board: Board, query: BoardQuery) -> Tools:
             )
             for name, (label, options) in _CHOICES.items()
         ),
-        latency=query.given.get("latency", ""),
+        typed=tuple(
+            Typed(name, label, example, size, query.given.get(name, ""))
+            for name, (label, example, size) in _TYPED.items()
+        ),
         text=query.filters.text,
         kept=query.kept("sort", "at", "columns"),
         is_filtered=query.filters.is_set,
         sentence=sentence(n_shown=len(board.entries), n_in_all=board.n_in_all)
         if query.filters.is_set
         else "",
-        clear_href=query.href(**dict.fromkeys((*_CHOICES, "latency", "q"), "")),
+        clear_href=query.href(**dict.fromkeys((*_CHOICES, *_TYPED, "q"), "")),
     )
 
 

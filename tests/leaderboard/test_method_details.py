@@ -222,7 +222,8 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     methods.edit(method=method, changes=WHOLE, actor=owner)
     data = builders.predictions(edition, factor=1.3)
     veiled = builders.submit(owner, data, method="Veiled", visibility="ANONYMOUS").method
-    methods.edit(method=veiled, changes={"n_frames": 6, "code_url": "https://example.org"}, actor=owner)
+    hidden = {"pretraining": "Larknet's own", "hardware": "the larks' GPU", "code_url": "https://example.org"}
+    methods.edit(method=veiled, changes={"n_frames": 6, "n_parameters": 9_000, **hidden}, actor=owner)
     builders.score_all()
     split = Split.objects.select_related("published_edition").get(pk="test")
 
@@ -248,6 +249,16 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
         ({"paper": "yes"}, ["Foo"]),
         ({"latency": "41.5"}, ["Foo"]),
         ({"latency": "41"}, []),
+        ({"pretraining": "IMAGEnet"}, ["Foo"]),
+        ({"pretraining": "lark"}, []),
+        ({"hardware": "gpu"}, ["Foo"]),
+        ({"hardware": "the"}, []),
+        ({"parameters": "31M"}, both),
+        ({"parameters": "31 m"}, both),
+        ({"parameters": "0.031b"}, both),
+        ({"parameters": "30999999"}, [veiled.pseudonym]),
+        ({"parameters": "9k"}, [veiled.pseudonym]),
+        ({"parameters": "8999"}, []),
         ({"q": "OWL"}, ["Foo"]),
         ({"q": "veiled"}, []),
         ({"q": "anonymous"}, [veiled.pseudonym]),
@@ -256,13 +267,39 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
         assert sorted(names(**query)) == sorted(expected), query
 
 
+def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
+    client: Client, edition: Edition, method: Method, owner: User
+) -> None:
+    data = builders.predictions(edition, factor=1.3)
+    veiled = builders.submit(owner, data, method="Veiled", visibility="ANONYMOUS").method
+    builders.score_all()
+    addresses = [
+        f"{place}?{name}={text}"
+        for place in ("/board/test/", "/api/v1/splits/test/board", "/board/test.csv")
+        for name in ("pretraining", "hardware")
+        for text in ("Larks", "arks", "l")
+    ]
+
+    def seen() -> list[bytes]:
+        return [client.get(address).content for address in addresses]
+
+    before = seen()
+    hidden = {"pretraining": "Larks' corpus", "hardware": "The Larks' GPU"}
+    methods.edit(method=veiled, changes=hidden, actor=owner)
+    assert seen() == before
+    assert not any(veiled.pseudonym.encode() in answer for answer in before)
+    client.force_login(owner)
+    assert all(b"Veiled" in answer for answer in seen())
+
+
 @pytest.mark.parametrize(
     ("name", "value"),
     [
         *(("frames", value) for value in ("1", "7", "x", "²")),
         *(("cameras", "three"), ("boxes", "x"), ("nerf", "maybe"), ("code", "1"), ("paper", "\x00")),
         *(("latency", value) for value in ("fast", "nan", "inf", "0", "-1", "1e999")),
-        ("q", "x" * 81),
+        *(("parameters", value) for value in ("many", "0", "0.0001", "-5", "1e6", "25 GB", "٢٥M", "9" * 17)),
+        *((name, "x" * 81) for name in ("q", "pretraining", "hardware")),
     ],
 )
 def test_a_filter_that_is_none_is_named(client: Client, benchmark: None, name: str, value: str) -> None:

@@ -98,6 +98,7 @@ def test_filters_that_nothing_fits_leave_a_sentence_and_a_way_back(
         ("page=٣", "expected a number from 1 on"),
         ("frames=9", "The filter 'frames' is '9'; expected one of 2, 3, 4, 5, 6."),
         ("latency=nan", "The filter 'latency' is 'nan'; expected a number of milliseconds above 0."),
+        ("parameters=many", "expected a number above 0, such as 25M (million), 400k or 25000000"),
         ("nerf=maybe", "expected one of yes, no"),
         (f"q={'x' * 81}", "at most 80 characters, found 81"),
     ],
