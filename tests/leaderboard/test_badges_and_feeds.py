@@ -203,7 +203,14 @@ def test_unknown_split_has_no_feed(edition: Edition, client: Client) -> None:
 
 
 def test_links_to_boards_and_methods_show_what_they_are(methods: list[Method], client: Client) -> None:
-    for address, title in (("/board/test/", "Test"), (f"/methods/{methods[0].pk}/", methods[0].name)):
+    first, second = methods[:2]
+    for address, title in (
+        ("/board/test/", "Test"),
+        ("/board/test/charts/", "Charts of Test"),
+        ("/board/test/editions/", "Test, editions"),
+        (f"/methods/{first.pk}/", first.name),
+        (f"/compare/?m={first.pk}&m={second.pk}", "Comparison on test"),
+    ):
         head = pages.page(client.get(address)).one("head")
         said = {
             m.attributes["property"]: m.attributes["content"]
