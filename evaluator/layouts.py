@@ -68,7 +68,7 @@ def as_latex(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str
             " ".join(rules),
             rf"Rank & Method & Team & {' & '.join(list(INTERVAL_NAMES) * len(metrics))} \\",
             r"\midrule",
-            *(_latex_row(row) for row in rows),
+            *map(latex_row, rows),
             r"\bottomrule",
             r"\end{tabular}",
             "",
@@ -76,7 +76,8 @@ def as_latex(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str
     )
 
 
-def _latex_row(row: Row) -> str:
+def latex_row(row: Row) -> str:
+    """One line of such a table, for one that is there already."""
     # The rank comes first: a row that began with a bracket or a star would speak to the \\ before it.
     texts = [_latex_number(row.rank), latex(row.method), latex(row.team), *map(_latex_cell, row.cells)]
     return rf"{' & '.join(texts)} \\"

@@ -152,15 +152,24 @@ def about(board: Board, *, address: str) -> tuple[str, ...]:
 def _layout(board: Board, *, metrics: Sequence[str], has_intervals: bool) -> list[layouts.Row]:
     columns = layouts.columns(metrics)
     return [
-        layouts.Row(
-            rank=_rank(entry, has_range=has_intervals),
-            method=entry.method,
-            team=short_authors(entry.team) if entry.kind == "published" else entry.team,
-            cells=tuple(_cell(entry, name, has_interval=has_intervals) for name in columns),
-        )
+        _layout_row(entry, columns=columns, has_intervals=has_intervals)
         for entry in board.entries
         if entry.withdrawn_at is None
     ]
+
+
+def latex_row(entry: Entry) -> str:
+    """One row as it stands in the LaTeX table of its board: both errors, without intervals."""
+    return layouts.latex_row(_layout_row(entry, columns=layouts.columns(), has_intervals=False))
+
+
+def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) -> layouts.Row:
+    return layouts.Row(
+        rank=_rank(entry, has_range=has_intervals),
+        method=entry.method,
+        team=short_authors(entry.team) if entry.kind == "published" else entry.team,
+        cells=tuple(_cell(entry, name, has_interval=has_intervals) for name in columns),
+    )
 
 
 def _rank(entry: Entry, *, has_range: bool) -> str:

@@ -43,6 +43,7 @@ SLOW_FILES = {
     "test_pages_editions.py",
     "test_pages_maintainers.py",
     "test_pages_method.py",
+    "test_pages_outcome.py",
     "test_pages_publishing.py",
     "test_pages_submission.py",
     "test_pages_withdrawing.py",

@@ -1,4 +1,4 @@
-"""A submission's progress in words: the line of state, the result, and what was truncated."""
+"""A submission's progress in words: the line of state, what was truncated, and which problems are listed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from typing import Final
 from leaderboard.models import Status
 from leaderboard.submissions import Progress
 from leaderboard.templatetags.board import duration, grouped
-from leaderboard.web.result_tables import ResultGroup, result_groups
 
 MAX_POINTS: Final = 20
+INTERVALS_FOLLOW: Final = "intervals follow"
 _ENDS: Final = {
     Status.SCORED: "Scored",
     Status.REJECTED: "Rejected",
@@ -31,31 +31,33 @@ class Step:
 
 @dataclass(frozen=True)
 class Shown:
-    """What the template places. `seen` changes exactly when the line of state does."""
+    """What the template places. `seen` changes exactly when the line of state does.
+
+    `is_moving`: there is more to come, and the page asks for it by itself.
+    """
 
     steps: tuple[Step, ...]
     seen: str
-    groups: tuple[ResultGroup, ...]
+    is_moving: bool
     truncation: str
     problems: tuple[Mapping[str, str], ...]
     listing: str
 
 
-def shown(progress: Progress) -> Shown:
-    """A progress, ready to be drawn."""
+def shown(progress: Progress, *, awaits_intervals: bool = False) -> Shown:
+    """A progress, ready to be drawn. `awaits_intervals`: scored, and its intervals are about to come."""
+    more = "-intervals" if awaits_intervals else ""
     return Shown(
-        steps=steps(progress),
-        seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}",
-        groups=result_groups(progress.scores, progress.counts, intervals=progress.intervals)
-        if progress.scores
-        else (),
+        steps=steps(progress, awaits_intervals=awaits_intervals),
+        seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}{more}",
+        is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
         problems=tuple(progress.problems[:MAX_POINTS]),
         listing=listing(n_problems=progress.n_problems, n_points=len(progress.problems)),
     )
 
 
-def steps(progress: Progress) -> tuple[Step, ...]:
+def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, ...]:
     """Received → queued → running → how it ended (or is going to)."""
     is_queued, is_running = progress.state == Status.QUEUED, progress.state == Status.RUNNING
     received = Step("Received", "done", progress.received_at)
@@ -66,7 +68,12 @@ def steps(progress: Progress) -> tuple[Step, ...]:
     running = Step("Running", "now" if is_running else "done", progress.started_at)
     if is_running:
         return received, queued, running, Step("Scored", "ahead")
-    end = Step(_ENDS[Status(progress.state)], "now", progress.finished_at)
+    end = Step(
+        _ENDS[Status(progress.state)],
+        "now",
+        progress.finished_at,
+        INTERVALS_FOLLOW if awaits_intervals else "",
+    )
     return (received, queued, running, end) if progress.started_at else (received, queued, end)
 
 

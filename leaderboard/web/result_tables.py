@@ -52,6 +52,11 @@ class ResultGroup:
         """Whether any of the values has one: else the row for them is left out."""
         return any(column.cell.interval for column in self.columns)
 
+    @property
+    def has_with_best(self) -> bool:
+        """Whether any is marked as not significantly worse than the best: else that needs no explanation."""
+        return any(column.cell.is_with_best for column in self.columns)
+
 
 @dataclass(frozen=True)
 class AttemptRow:

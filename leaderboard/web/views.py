@@ -13,15 +13,17 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import editions, methods, quotas, snapshots
+from leaderboard import editions, methods, outcomes, quotas, snapshots
 from leaderboard import submissions as verbs
-from leaderboard.models import Edition, Evaluation, Method, Split, Submission, User
+from leaderboard.models import Edition, Evaluation, Method, Split, Status, Submission, User
+from leaderboard.submissions import Progress
 from leaderboard.web import api_reference as api
 from leaderboard.web import (
     board_query,
     edition_tables,
     export_views,
     method_tables,
+    outcome_tables,
     reference,
     result_tables,
     tables,
@@ -29,7 +31,7 @@ from leaderboard.web import (
 from leaderboard.web.board_tools import tools
 from leaderboard.web.context import split_or_404, splits_of
 from leaderboard.web.forms import SubmissionForm
-from leaderboard.web.progress import shown
+from leaderboard.web.progress import Shown, shown
 
 HOME_SPLIT = "test"
 PER_PAGE = 50
@@ -115,19 +117,24 @@ def submissions(request: HttpRequest) -> HttpResponse:
 @require_safe
 def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """One submission: its state, then its result or its problems."""
-    return render(request, "submission.html", _evaluation(request, submission_id))
+    found, progress, now_shown = _looked_at(request, submission_id)
+    return render(request, "submission.html", _outcome(request, found, progress) | {"shown": now_shown})
 
 
 @login_required
 @never_cache
 @require_safe
 def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more."""
-    context = _evaluation(request, submission_id)
-    if request.GET.get("seen") == context["shown"].seen:
+    """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more.
+
+    The end is the result with its intervals, or without them where none are about to come.
+    """
+    found, progress, now_shown = _looked_at(request, submission_id)
+    if request.GET.get("seen") == now_shown.seen:
         return HttpResponse(status=204)
-    status = STOP_POLLING if context["progress"].is_final else 200
-    return render(request, "submission_state.html", context | {"is_fragment": True}, status=status)
+    context = _outcome(request, found, progress) | {"shown": now_shown, "is_fragment": True}
+    status = 200 if now_shown.is_moving else STOP_POLLING
+    return render(request, "submission_state.html", context, status=status)
 
 
 @login_required
@@ -177,14 +184,39 @@ def api_reference(request: HttpRequest) -> HttpResponse:
     return render(request, "api_reference.html", {"api": api.reference()})
 
 
-def _evaluation(request: HttpRequest, submission_id: UUID) -> dict[str, Any]:
-    rows = Submission.objects.visible_to(request.user).select_related("method__team", "split", "submitted_by")
+def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, Shown]:
+    """A submission that the reader may see and its line of state: all that a page asks for while it waits."""
+    evaluations = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
+    rows = (
+        Submission.objects.visible_to(request.user)
+        .select_related("method__team", "split", "submitted_by")
+        .prefetch_related(Prefetch("evaluations", evaluations))
+    )
     found = get_object_or_404(rows, pk=submission_id)
     progress = verbs.progress(found)
+    awaits = outcomes.awaits_intervals(found, progress, now=timezone.now())
+    return found, progress, shown(progress, awaits_intervals=awaits)
+
+
+def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dict[str, Any]:
+    """What came of it, for the templates."""
+    now = timezone.now()
+    is_mine = found.method.team.memberships.filter(user=cast("User", request.user)).exists()
+    rescored = edition_tables.rescored_notice(editions.rescored(found))
+    quota = None
+    if progress.state == Status.REJECTED and rescored is None:
+        quota = quotas.state(team=found.method.team, user=found.submitted_by, split=found.split, now=now)
     return {
         "submission": found,
         "progress": progress,
-        "shown": shown(progress),
-        "rescored": edition_tables.rescored_notice(editions.rescored(found)),
-        "is_mine": found.method.team.memberships.filter(user=cast("User", request.user)).exists(),
+        "result": outcome_tables.outcome_table(
+            found,
+            progress,
+            place=outcomes.place_of(found, progress),
+            interval_note=outcomes.why_no_intervals(found, progress, now=now),
+            is_mine=is_mine,
+        ),
+        "cost": outcome_tables.rejected_sentence(quota),
+        "rescored": rescored,
+        "is_mine": is_mine,
     }

@@ -1,13 +1,16 @@
 """A submission's page: its line of state, its result, its problems, and who may see it."""
 
 import random
+from pathlib import Path
 from uuid import uuid4
 
 import pytest
+from django.db.models import F
 from django.test import Client
+from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
-from leaderboard import lifecycle
+from leaderboard import lifecycle, outcomes, submissions
 from leaderboard.models import Edition, Evaluation, Submission, User
 from tests import builders, pages
 
@@ -87,23 +90,94 @@ def test_nothing_is_sent_while_nothing_moved(signed_in: Client, submission: Subm
     assert current_step(pages.page(moved)).startswith("Running")
 
 
-def test_polling_stops_with_the_result(signed_in: Client, submission: Submission) -> None:
+def test_polling_goes_on_from_the_result_to_its_intervals_and_stops_there(
+    signed_in: Client, submission: Submission
+) -> None:
     seen = get(signed_in, PAGE, submission).one("input", name="seen").attributes["value"]
     builders.score_all()
-    response = signed_in.get(STATE.format(submission.pk), {"seen": seen})
-    assert response.status_code == 286
-    fragment = pages.page(response)
+    scored = signed_in.get(STATE.format(submission.pk), {"seen": seen})
+    assert scored.status_code == 200
+    fragment = pages.page(scored)
     assert current_step(fragment).startswith("Scored")
+    assert current_step(fragment).endswith("intervals follow")
     outcome = fragment.one("div", id="outcome")
     assert outcome.attributes["hx-swap-oob"] == "innerHTML"
-    assert len(outcome.all("table")) == 2
+    assert len(outcome.one("div", class_="result").all("table")) == 2
+    assert "Intervals are being computed." in outcome.text
+    seen = fragment.one("input", name="seen").attributes["value"]
+    assert signed_in.get(STATE.format(submission.pk), {"seen": seen}).status_code == 204
+    builders.infer_all()
+    last = signed_in.get(STATE.format(submission.pk), {"seen": seen})
+    assert last.status_code == 286
+    fragment = pages.page(last)
+    assert "follow" not in current_step(fragment)
+    assert "being computed" not in fragment.text
+    assert intervals(fragment)
+
+
+def intervals(root: pages.Element) -> list[str]:
+    """What stands below those of the ten values that have enough recordings."""
+    return [cell.text for cell in root.all("td", class_="span") if cell.text != "–"]
+
+
+def test_page_of_a_result_without_intervals_yet_keeps_asking(
+    signed_in: Client, submission: Submission
+) -> None:
+    builders.score_all()
+    root = get(signed_in, PAGE, submission)
+    assert root.one("div", id="state").attributes["hx-get"] == STATE.format(submission.pk)
+    assert root.one("noscript").one("a").text == "look again"
+    assert "moving" in root.one("li", **{"aria-current": "step"}).classes
+
+
+def stops(client: Client, submission: Submission) -> str:
+    """What a page says whose polling has come to its end, from whatever state it was in."""
+    assert client.get(STATE.format(submission.pk), {"seen": "SCORED"}).status_code == 286
+    root = get(client, PAGE, submission)
+    assert "hx-get" not in root.one("div", id="state").attributes
+    assert root.all("script") == []
+    return root.one("main").text
 
 
 def test_final_page_asks_for_nothing_more(signed_in: Client, submission: Submission) -> None:
     builders.score_all()
-    root = get(signed_in, PAGE, submission)
-    assert "hx-get" not in root.one("div", id="state").attributes
-    assert root.all("script") == []
+    builders.infer_all()
+    assert "no intervals" not in stops(signed_in, submission)
+
+
+def test_polling_ends_though_no_worker_ever_makes_intervals(
+    signed_in: Client, submission: Submission
+) -> None:
+    builders.score_all()
+    seen = get(signed_in, PAGE, submission).one("input", name="seen").attributes["value"]
+    Evaluation.objects.update(finished_at=F("finished_at") - outcomes.AWAITED_FOR)
+    assert signed_in.get(STATE.format(submission.pk), {"seen": seen}).status_code == 286
+    assert "There are no intervals yet" in stops(signed_in, submission)
+
+
+def test_polling_ends_at_once_where_there_are_too_few_recordings(
+    signed_in: Client, benchmark: None, owner: User, tmp_path: Path
+) -> None:
+    few = builders.import_truth(tmp_path, n_recordings=6)
+    sent = builders.submit(owner, builders.predictions(few))
+    builders.score_all()
+    assert "this ground truth has 6; expected at least 20" in stops(signed_in, sent)
+
+
+def test_polling_ends_at_once_for_what_was_withdrawn(
+    signed_in: Client, submission: Submission, owner: User
+) -> None:
+    builders.score_all()
+    submissions.withdraw(submission=submission, actor=owner, now=timezone.now())
+    assert "intervals" not in stops(signed_in, submission)
+
+
+def test_a_private_result_gets_intervals_as_well(signed_in: Client, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
+    builders.score_all()
+    builders.infer_all()
+    stops(signed_in, sent)
+    assert intervals(get(signed_in, PAGE, sent))
 
 
 def test_result_has_the_papers_columns_the_counts_and_the_truncations(
@@ -117,7 +191,9 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
         assert heads == [symbol, *(f"{symbol}{letter}" for letter in "csln")]
     scores = {f"{s.metric}-{s.interval}": f"{s.value:.2f}" for s in submission.evaluations.get().scores.all()}
     values, counts = ([cell.text for cell in row.all("td")] for row in mid.one("tbody").all("tr"))
-    assert values == [scores[f"mid-{i}"] for i in ("overall", "crucial", "small", "large", "negative")]
+    names = ("overall", "crucial", "small", "large", "negative")
+    # A value may be followed by its mark.
+    assert [value.split()[0] for value in values] == [scores[f"mid-{i}"] for i in names]
     assert counts[0] == str(builders.N_SEQUENCES)
     assert "truncated" in root.one("main").text
     assert "1 sequence with |τ| > 20 s counts in the overall means only" in root.one("main").text
@@ -170,6 +246,7 @@ def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submissio
     assert "by our fault" in current_step(root)
     assert "It was our fault" in root.one("main").text
     assert "You need not send it again" in root.one("main").text
+    assert "this run costs no quota" in root.one("main").text
 
 
 def test_cancelled_submission_says_so(signed_in: Client, submission: Submission, owner: User) -> None:

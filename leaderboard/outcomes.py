@@ -1,0 +1,230 @@
+"""What came of submissions, for whoever may see them: progress, place on the present board, what is beside.
+
+A place is read from what is kept of the boards, so it is the one that everybody sees at that moment. A
+private method takes nobody's place; its own people are told the rank that it would have.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from uuid import UUID
+
+from django.db.models import QuerySet
+
+from evaluator import ranking
+from leaderboard import inference, snapshots, submissions
+from leaderboard.entries import Entry, Interval, profile_of, scored_of, submitted_entry
+from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
+from leaderboard.snapshots import Drawn
+from leaderboard.standings import PRIMARY
+from leaderboard.submissions import Progress
+
+# For so long somebody is told to wait for intervals. They take a second or two where no submission waits, and
+# a minute more while a board is re-scored; what lasts longer is not worth watching.
+AWAITED_FOR = 5 * inference.PATIENCE
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a standing, scored submission is on the present board.
+
+    `rank` is None where another submission of its method stands there. `is_supposed`: the method is private,
+    and this is the rank that it would have among the `n_ranked`.
+    """
+
+    edition: Edition
+    rows: tuple[Entry, ...]  # everybody's
+    rank: int | None = None
+    n_ranked: int = 0
+    is_supposed: bool = False
+    intervals: Mapping[str, Interval] = field(default_factory=dict)
+    best: frozenset[str] = frozenset()
+    second: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A submission, how far it is, and where it stands, if it does."""
+
+    submission: Submission
+    progress: Progress
+    place: Place | None
+    awaits_intervals: bool  # scored a moment ago, and they are about to come
+
+    @property
+    def intervals(self) -> Mapping[str, Interval]:
+        """How sure its values are."""
+        return shown_intervals(self.progress, self.place)
+
+
+def of(rows: Iterable[Submission], *, now: datetime) -> tuple[Outcome, ...]:
+    """What came of each of these submissions. Boards are read once for all of them, and only if one needs it.
+
+    Their evaluations with editions and scores are best fetched with them.
+    """
+    told = [(submission, submissions.progress(submission)) for submission in rows]
+    places = _places([each for each in told if _stands(*each)])
+    return tuple(
+        Outcome(
+            submission=submission,
+            progress=progress,
+            place=places.get(submission.pk),
+            awaits_intervals=awaits_intervals(submission, progress, now=now),
+        )
+        for submission, progress in told
+    )
+
+
+def place_of(submission: Submission, progress: Progress) -> Place | None:
+    """Where one submission is; None unless it stands in the published edition."""
+    return _places([(submission, progress)]).get(submission.pk) if _stands(submission, progress) else None
+
+
+# --- intervals -------------------------------------------------------------------------------------------
+
+
+def has_intervals(progress: Progress) -> bool:
+    """Whether any value has one."""
+    return any(found.low is not None for found in progress.intervals.values())
+
+
+def awaits_intervals(submission: Submission, progress: Progress, *, now: datetime) -> bool:
+    """Whether the intervals of a scored submission are about to come. Always False `AWAITED_FOR` later."""
+    if not _stands(submission, progress) or has_intervals(progress) or progress.finished_at is None:
+        return False
+    if now - progress.finished_at >= AWAITED_FOR:
+        return False
+    edition = submissions.evaluation_of(submission).edition
+    return edition.discarded_at is None and not inference.why_no_interval(edition)
+
+
+def why_no_intervals(submission: Submission, progress: Progress, *, now: datetime) -> str:
+    """Why a scored submission's values stand without intervals, in a sentence; empty where they do not."""
+    if not _stands(submission, progress) or has_intervals(progress):
+        return ""
+    if awaits_intervals(submission, progress, now=now):
+        return "Intervals are being computed."
+    return inference.why_no_interval(submissions.evaluation_of(submission).edition) or (
+        "There are no intervals yet: workers make them when no submission waits. Look again later."
+    )
+
+
+def shown_intervals(progress: Progress, place: Place | None) -> Mapping[str, Interval]:
+    """How sure the values are. Ranges are of rows of the present board, and of nothing else."""
+    return place.intervals if place else _without_ranges(progress.intervals)
+
+
+def _without_ranges(intervals: Mapping[str, Interval]) -> dict[str, Interval]:
+    return {
+        name: Interval(low=found.low, high=found.high)
+        for name, found in intervals.items()
+        if found.low is not None
+    }
+
+
+# --- places ----------------------------------------------------------------------------------------------
+
+
+def _stands(submission: Submission, progress: Progress) -> bool:
+    return progress.state == Status.SCORED and submission.withdrawn_at is None
+
+
+def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, Place]:
+    """The places of standing, scored submissions, by their ids."""
+    if not told:
+        return {}
+    wanted = {submission.split_id for submission, _ in told}
+    boards = {
+        split.pk: (split.published_edition, drawn)
+        for split, drawn in snapshots.shown_on([each for each in snapshots.splits() if each.pk in wanted])
+        if split.published_edition is not None
+    }
+    # In another edition than the present board's it stands nowhere.
+    told = [
+        (submission, progress)
+        for submission, progress in told
+        if submission.split_id in boards and boards[submission.split_id][0].number == progress.edition_number
+    ]
+    private = {s.method_id for s, _ in told if s.method.visibility == Visibility.PRIVATE}
+    best = _best_of(private, [edition for edition, _ in boards.values()]) if private else set()
+    return {
+        submission.pk: _place(submission, progress, *boards[submission.split_id], best=best)
+        for submission, progress in told
+    }
+
+
+def _place(
+    submission: Submission, progress: Progress, edition: Edition, drawn: Drawn, *, best: set[UUID]
+) -> Place:
+    n_ranked = sum(row.rank is not None for row in drawn.entries)
+    row = next((row for row in drawn.entries if row.submission_id == submission.pk), None)
+    if row is not None:
+        return Place(
+            edition=edition,
+            rows=drawn.entries,
+            rank=row.rank,
+            n_ranked=n_ranked,
+            intervals=row.intervals,
+            best=row.best,
+            second=row.second,
+        )
+    place = Place(
+        edition=edition, rows=drawn.entries, n_ranked=n_ranked, intervals=_without_ranges(progress.intervals)
+    )
+    if submission.pk not in best:
+        return place
+    values = [row.scores[PRIMARY] for row in drawn.entries]
+    rank = ranking.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
+    return replace(place, rank=rank, n_ranked=n_ranked + 1, is_supposed=True)
+
+
+def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
+    """The submission that stands for each of these methods in each of these editions: one query."""
+    best: dict[tuple[int, UUID], UUID] = {}
+    rows = _standing_in(editions).filter(evaluation__submission__method__in=methods)
+    for edition, method, submission in rows.values_list(
+        "evaluation__edition", "evaluation__submission__method", "evaluation__submission"
+    ):
+        best.setdefault((edition, method), submission)
+    return set(best.values())
+
+
+def _standing_in(editions: Iterable[Edition]) -> QuerySet[Score]:
+    """The MiD of everything that stands in these editions, the best first, of two alike the earlier."""
+    return Score.objects.filter(
+        evaluation__edition__in=list(editions),
+        evaluation__status=Status.SCORED,
+        evaluation__submission__withdrawn_at=None,
+        metric=PRIMARY,
+        interval="overall",
+    ).order_by("value", "evaluation__submission__submitted_at")
+
+
+# --- what is beside it -----------------------------------------------------------------------------------
+
+
+def teams_best_other(submission: Submission, place: Place) -> Entry | None:
+    """The best that the same team has on the same board besides, private or not, as the team reads it."""
+    others = _standing_in([place.edition]).filter(
+        evaluation__submission__method__team=submission.method.team_id
+    )
+    found = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
+    if found is None:
+        return None
+    evaluation = (
+        Evaluation.objects.select_related("submission__method__team").prefetch_related("scores").get(pk=found)
+    )
+    return submitted_entry(
+        evaluation, scored_of(evaluation.scores.all()), profile=profile_of(evaluation.submission.method)
+    )
+
+
+def nearest_published(progress: Progress, place: Place) -> Entry | None:
+    """The row printed in a paper whose MiD is nearest; of two as near the better one."""
+    mid = (progress.scores or {}).get(PRIMARY)
+    near = [
+        (abs(value - mid), value, row)
+        for row in place.rows
+        if row.kind == "published" and mid is not None and (value := row.scores[PRIMARY]) is not None
+    ]
+    return min(near, key=lambda each: each[:2])[2] if near else None

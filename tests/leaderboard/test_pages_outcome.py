@@ -1,0 +1,304 @@
+"""What a submission's page says beyond the numbers: rank, what is beside it, a row for a paper, its cost."""
+
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from django.db import connection
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.utils import timezone
+
+from leaderboard import submissions
+from leaderboard.models import Edition, Method, PublishedResult, QuotaOverride, Score, Split, Submission, User
+from tests import board_rows, builders, pages
+from tests.editions import board_now, corrected, open_edition, publish
+
+PAGE = "/submissions/{}/"
+STATE = "/submissions/{}/state/"
+
+
+@pytest.fixture
+def signed_in(client: Client, owner: User) -> Client:
+    client.force_login(owner)
+    return client
+
+
+@pytest.fixture
+def inferred(entries: list[Submission]) -> list[Submission]:
+    builders.infer_all()
+    return entries
+
+
+def look(client: Client, submission: Submission) -> pages.Element:
+    return pages.page(client.get(PAGE.format(submission.pk)))
+
+
+def standing(root: pages.Element) -> str:
+    return root.one("p", class_="standing").text
+
+
+def beside(root: pages.Element) -> list[list[str]]:
+    """The rows that it is compared with: name and what it is, then values and differences."""
+    return [
+        [row.one("th").text, *(cell.text for cell in row.all("td"))]
+        for row in root.one("table", class_="beside").one("tbody").all("tr")
+    ]
+
+
+def mid(submission: Submission) -> float:
+    return Score.objects.get(evaluation__submission=submission, metric="mid", interval="overall").value
+
+
+# --- rank ------------------------------------------------------------------------------------------------
+
+
+def test_rank_is_the_boards_with_its_range(signed_in: Client, inferred: list[Submission]) -> None:
+    [row] = [row for row in board_now().entries if row.submission_id == inferred[1].pk]
+    found = row.intervals["mid"]
+    n_ranked = sum(row.rank is not None for row in board_now().entries)
+    ends = {found.rank_low, found.rank_high}
+    within = "–".join(str(end) for end in sorted(end for end in ends if end is not None))
+    assert standing(look(signed_in, inferred[1])).startswith(
+        f"Rank {row.rank} ({within}) of {n_ranked} on test. In brackets: where it may stand at 95 %."
+    )
+
+
+def test_private_one_is_told_the_rank_that_it_would_have(
+    signed_in: Client, inferred: list[Submission], edition: Edition, owner: User
+) -> None:
+    n_ranked = sum(row.rank is not None for row in board_now().entries)
+    sent = builders.submit(
+        owner, builders.predictions(edition, factor=1.01), method="Hidden", visibility="PRIVATE"
+    )
+    builders.score_all()
+    builders.infer_all()
+    assert (
+        standing(look(signed_in, sent)) == f"Shown to everybody it would be rank 1 of {n_ranked + 1} on test."
+    )
+
+
+def test_maintainer_reads_the_same_rank_of_a_private_one(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
+    builders.score_all()
+    assert "it would be rank 1 of" in standing(look(keeper, sent))
+
+
+@pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
+def test_what_another_submission_of_the_method_surpasses_has_no_rank(
+    signed_in: Client, edition: Edition, owner: User, visibility: str
+) -> None:
+    worse, better = (
+        builders.submit(owner, builders.predictions(edition, factor=factor), visibility=visibility)
+        for factor in (1.2, 1.1)
+    )
+    builders.score_all()
+    assert standing(look(signed_in, worse)).startswith("Another submission of Foo is better")
+    assert "rank" in standing(look(signed_in, better)).lower()
+
+
+def test_withdrawn_one_stands_nowhere(signed_in: Client, inferred: list[Submission], owner: User) -> None:
+    submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
+    root = look(signed_in, inferred[0])
+    assert root.all("p", class_="standing") == []
+    assert root.all("table", class_="beside") == []
+
+
+def test_what_the_present_edition_left_out_stands_nowhere(
+    signed_in: Client, inferred: list[Submission], tmp_path: Path
+) -> None:
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    second.evaluations.all().delete()
+    publish(second, leave_out=True)
+    assert look(signed_in, inferred[0]).all("p", class_="standing") == []
+
+
+def test_what_is_not_worse_than_the_best_is_marked_as_on_the_board(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    Score.objects.filter(evaluation__submission=inferred[1], metric="mid", interval="overall").update(
+        is_with_best=True
+    )
+    builders.board_changed("test")
+    for address in (PAGE.format(inferred[1].pk), f"/methods/{inferred[1].method_id}/"):
+        root = pages.page(signed_in.get(address))
+        cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
+        assert "with-best" in cell.classes
+        assert cell.text.endswith("not significantly worse than the best")
+        assert "≈ and tinted" in root.one("main").text
+
+
+def test_no_mark_and_no_word_of_it_where_nothing_is_with_the_best(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    Score.objects.update(is_with_best=False)
+    builders.board_changed("test")
+    root = look(signed_in, inferred[3])
+    assert root.all("td", class_="with-best") == []
+    assert "tinted" not in root.one("main").text
+
+
+# --- beside others ---------------------------------------------------------------------------------------
+
+
+def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    printed = [row for row in board_now().entries if row.kind == "published"]
+    nearest = min(printed, key=lambda row: abs((row.scores["mid"] or 0) - mid(inferred[1])))
+    root = look(signed_in, inferred[1])
+    own, published = beside(root)
+    assert own[0].startswith("M1.05 your team’s best other, 20")
+    gap = round(mid(inferred[1]) - mid(inferred[0]), 2)
+    assert gap > 0
+    assert own[1:3] == [f"{mid(inferred[0]):.2f}", f"+{gap:.2f}"]
+    assert published[0].startswith(f"{nearest.method} nearest published, Shi et al.")
+    assert nearest.scores["mid"] is not None
+    gap = round(mid(inferred[1]) - nearest.scores["mid"], 2)
+    assert published[2] == (f"+{gap:.2f}" if gap > 0 else f"−{-gap:.2f}")
+    assert PAGE.format(inferred[0].pk) in [a.attributes["href"] for a in root.all("a")]
+
+
+def test_the_best_is_beside_the_second_best_of_its_team(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    assert beside(look(signed_in, inferred[0]))[0][0].startswith("M1.1 ")
+
+
+def test_another_method_of_the_team_can_be_compared_with(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    [link] = [
+        a.attributes["href"]
+        for a in look(signed_in, inferred[1]).all("a")
+        if a.attributes["href"].startswith("/compare/")
+    ]
+    assert signed_in.get(link.replace("&amp;", "&")).status_code == 200
+
+
+def test_another_submission_of_the_same_method_is_not_compared_with_itself(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    made = [builders.submit(owner, builders.predictions(edition, factor=f)) for f in (1.2, 1.1)]
+    builders.score_all()
+    root = look(signed_in, made[1])
+    assert beside(root)[0][0].startswith("Foo your team’s best other")
+    assert [a for a in root.all("a") if a.attributes["href"].startswith("/compare/")] == []
+
+
+def test_nothing_of_another_team_and_nothing_withdrawn_is_beside_it(
+    signed_in: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition, factor=1.2))
+    builders.submit(stranger, builders.predictions(edition, factor=1.01), method="Foreign")
+    gone = builders.submit(owner, builders.predictions(edition, factor=1.05), method="Gone")
+    builders.score_all()
+    submissions.withdraw(submission=gone, actor=owner, now=timezone.now())
+    rows = beside(look(signed_in, sent))
+    assert len(rows) == 1
+    assert "nearest published" in rows[0][0]
+
+
+def test_without_anything_beside_it_nothing_is_said_of_that(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    PublishedResult.objects.all().delete()
+    builders.board_changed("test")
+    sent = builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    assert look(signed_in, sent).all("table", class_="beside") == []
+
+
+# --- for a paper -----------------------------------------------------------------------------------------
+
+
+def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list[Submission]) -> None:
+    row = look(signed_in, inferred[1]).one("details", class_="take-along").one("pre").raw_text
+    board = signed_in.get("/board/test.tex").content.decode()
+    assert row in board.splitlines()
+    assert " & M1.1 & Owls & " in row
+
+
+def test_hostile_name_stays_text_in_the_latex_row(signed_in: Client, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method=r"<b>\input{x} & 50%")
+    builders.score_all()
+    pre = look(signed_in, sent).one("details", class_="take-along").one("pre")
+    assert pre.all("b") == []
+    assert r"\input" not in pre.raw_text
+    assert r"\& 50\%" in pre.raw_text
+
+
+# --- what a rejected file costs --------------------------------------------------------------------------
+
+
+def test_rejected_file_costs_no_slot_and_page_says_how_many_more_are_taken(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    Split.objects.filter(pk="test").update(quota_rejected_limit=20)
+    sent = builders.submit(owner, b"[]")
+    builders.score_all()
+    said = look(signed_in, sent).one("main").text
+    assert "It costs no slot of the quota." in said
+    assert "Of 20 rejected or cancelled files that are taken in 24 hours, 19 are left." in said
+
+
+def test_without_a_limit_of_rejected_files_none_is_named(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, b"[]")
+    builders.score_all()
+    said = look(signed_in, sent).one("main").text
+    assert "It costs no slot of the quota." in said
+    assert "24 hours" not in said
+
+
+def test_maintainer_reads_what_the_team_has_left(keeper: Client, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, b"[]")
+    builders.score_all()
+    QuotaOverride.objects.create(
+        team=sent.method.team,
+        split=sent.split,
+        quota_limit=None,
+        quota_window=timedelta(days=1),
+        quota_min_gap=timedelta(0),
+        quota_rejected_limit=2,
+        reason="A test.",
+    )
+    assert "1 is left." in look(keeper, sent).one("main").text
+
+
+# --- cost ------------------------------------------------------------------------------------------------
+
+
+def n_queries(client: Client, address: str, **query: str) -> int:
+    with CaptureQueriesContext(
+        connection,
+    ) as queries:
+        client.get(address, query)
+    return len(queries)
+
+
+def test_number_of_queries_does_not_grow_with_the_board_or_the_team(
+    signed_in: Client, inferred: list[Submission], edition: Edition, owner: User, stranger: User
+) -> None:
+    address = PAGE.format(inferred[1].pk)
+    look(signed_in, inferred[1])
+    before = n_queries(signed_in, address)
+    assert before <= 11
+    board_rows.fill(edition, n=30, user=stranger)
+    board_rows.score(edition, methods=list(Method.objects.filter(team=inferred[0].method.team)), user=owner)
+    builders.board_changed("test")
+    look(signed_in, inferred[1])
+    assert n_queries(signed_in, address) == before
+
+
+def test_while_nothing_moves_a_page_asks_little(signed_in: Client, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition))
+    address = STATE.format(sent.pk)
+    seen = look(signed_in, sent).one("input", name="seen").attributes["value"]
+    assert n_queries(signed_in, address, seen=seen) <= 10
+    builders.score_all()
+    seen = look(signed_in, sent).one("input", name="seen").attributes["value"]
+    assert n_queries(signed_in, address, seen=seen) <= 5
