@@ -6,8 +6,11 @@ import random
 from celery import Celery
 from celery.signals import setup_logging, worker_process_init, worker_process_shutdown
 from django_structlog.celery.steps import DjangoStructLogInitStep
+from kombu.transport import TRANSPORT_ALIASES
 
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
+
+TRANSPORT_ALIASES["filesystem"] = "leaderboard.folder_broker:Transport"
 
 app = Celery("leaderboard")
 app.config_from_object("django.conf:settings", namespace="CELERY")
