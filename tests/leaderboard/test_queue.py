@@ -18,6 +18,8 @@ from leaderboard.queue import Poller
 from tests import builders
 from tests.leaderboard import queue_rows
 
+PATIENCE_S = 60
+
 
 @pytest.fixture
 def nudged(monkeypatch: pytest.MonkeyPatch) -> list[uuid.UUID]:
@@ -114,12 +116,12 @@ def test_a_look_begins_nothing_once_it_is_told_to_stop(edition: Edition, owner: 
 
 
 @pytest.fixture
-def poller(settings: Settings) -> Iterator[Poller]:
-    """A poller in a hurry."""
+def poller(settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Iterator[Poller]:
+    """A poller in a hurry. It ends before `monkeypatch` ends, and so never looks at anything real."""
     settings.POLL_S = 0.01
     poller = Poller(rng=random.Random(0))
     yield poller
-    poller.stop(patience_s=10)
+    poller.stop(patience_s=PATIENCE_S)
     assert not poller.is_alive()
 
 
@@ -139,7 +141,7 @@ def test_poller_looks_again_after_a_look_that_broke(poller: Poller, monkeypatch:
     monkeypatch.setattr(scoring, "run_next", lambda *, rng: False)
     monkeypatch.setattr(queue, "work_behind", lambda *, rng, stopping: 0)
     poller.start()
-    assert looked_again.wait(10)
+    assert looked_again.wait(PATIENCE_S)
     assert broken == ["KeyError('a fault that nobody foresaw')"]
 
 
@@ -150,18 +152,18 @@ def test_poller_finishes_what_is_in_hand_before_it_stops(
 
     def run_next(*, rng: random.Random) -> bool:
         begun.set()
-        may_finish.wait(10)
+        may_finish.wait(PATIENCE_S)
         finished.set()
         return True
 
     monkeypatch.setattr(lifecycle, "release_expired", lambda *, rng: 0)
     monkeypatch.setattr(scoring, "run_next", run_next)
     poller.start()
-    assert begun.wait(10)
-    stop = threading.Thread(target=poller.stop, kwargs={"patience_s": 10})
+    assert begun.wait(PATIENCE_S)
+    stop = threading.Thread(target=poller.stop, kwargs={"patience_s": PATIENCE_S})
     stop.start()
     assert not finished.is_set()
     may_finish.set()
-    stop.join(10)
+    stop.join(PATIENCE_S)
     assert finished.is_set()
     assert not poller.is_alive()
