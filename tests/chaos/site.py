@@ -12,7 +12,7 @@ import evaluator
 from tests.chaos.processes import REPOSITORY, Process
 from tests.chaos.services import Postgres, Redis
 from tests.chaos.uploads import reader_memory_bytes
-from tests.journeys.production import BIN, await_that, free_port, settings_for
+from tests.journeys.production import BIN, await_that, free_port, get, settings_for
 
 # Seconds. Lease, heartbeat and wall are a tenth of the real ones, so that a run of minutes sees many of them.
 PACE = {
@@ -79,7 +79,7 @@ class Site:
 
     def _answers(self) -> bool:
         try:
-            return httpx.get(f"{self.url}/api/v1/splits", trust_env=False).status_code == 200
+            return get(f"{self.url}/api/v1/splits").status_code == 200
         except httpx.TransportError:
             return False
 

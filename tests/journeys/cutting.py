@@ -3,6 +3,7 @@
 import select
 import socket
 import threading
+from contextlib import suppress
 from enum import Enum
 from typing import Self
 
@@ -48,7 +49,12 @@ class CutNetwork:
                 client, _ = self._listener.accept()
             except OSError:
                 return
-            threading.Thread(target=self._pass_on, args=(client,), name="passed on", daemon=True).start()
+            threading.Thread(target=self._serve, args=(client,), name="passed on", daemon=True).start()
+
+    def _serve(self, client: socket.socket) -> None:
+        """Whichever side breaks off ends it for both, and is no fault of the network."""
+        with suppress(ConnectionError):
+            self._pass_on(client)
 
     def _cut_of(self, said: bytes) -> Cut | None:
         """What is to happen to the upload that begins with this, if one does."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.journeys.production import REPOSITORY
 
 EXAMPLES = REPOSITORY / "examples"
-PATIENCE_S = 90
+PATIENCE_S = 180
 
 Done = subprocess.CompletedProcess[str]
 Tsttc = Callable[..., Done]

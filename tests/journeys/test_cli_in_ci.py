@@ -16,13 +16,12 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import httpx
 import psycopg
 import pytest
 
 from tests.journeys import recipes
 from tests.journeys.cutting import Cut, CutNetwork
-from tests.journeys.production import Site, free_port, web_process
+from tests.journeys.production import Site, free_port, get, web_process
 from tests.journeys.programs import PATIENCE_S, Tsttc, command, environment
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
@@ -56,11 +55,7 @@ class Job:
 
     def submissions(self) -> list[dict[str, object]]:
         """What the server has of this team, newest first."""
-        answer = httpx.get(
-            f"{self.site.url}/api/v1/submissions",
-            headers={"Authorization": f"Bearer {self.token}"},
-            trust_env=False,
-        )
+        answer = get(f"{self.site.url}/api/v1/submissions", Authorization=f"Bearer {self.token}")
         assert answer.status_code == 200, answer.text
         return list(answer.json())
 
@@ -116,7 +111,7 @@ def test_job_waits_for_its_scores_and_can_prove_them(job: Job) -> None:
     assert job.tsttc("receipt", scored["id"], "-o", receipt).returncode == 0
     verified = job.tsttc("verify", receipt)
     assert verified.stdout.startswith("The receipt holds.\n"), verified.stderr
-    keys.write_text(httpx.get(f"{job.site.url}/.well-known/tsttc-receipt-keys.json", trust_env=False).text)
+    keys.write_text(get(f"{job.site.url}/.well-known/tsttc-receipt-keys.json").text)
     offline_url = f"http://127.0.0.1:{free_port()}"
     said = json.loads(job.at(offline_url)("verify", receipt, "--keys", keys, "--json").stdout)
     assert (said["submission"], said["scores"]["mid"]) == (scored["id"], scored["scores"]["mid"])

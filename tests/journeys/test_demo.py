@@ -16,7 +16,8 @@ import pytest
 
 from leaderboard.demo.seed import ENTRIES
 from tests.journeys.people import Visitor
-from tests.journeys.production import REPOSITORY, Site, await_that, free_port
+from tests.journeys.production import PATIENCE_S, REPOSITORY, Site, await_that, free_port, get
+from tests.leaderboard.child_processes import kernel_says
 from tests.services import environment_of_its_own
 
 pytestmark = pytest.mark.slow
@@ -46,7 +47,7 @@ def demo(directory: Path, *, port: int) -> Iterator[subprocess.Popen[str]]:
         finally:
             if supervisor.poll() is None:
                 supervisor.terminate()
-            supervisor.wait(timeout=60)
+            supervisor.wait(timeout=PATIENCE_S)
 
 
 def banner(supervisor: subprocess.Popen[str]) -> str:
@@ -61,17 +62,18 @@ def banner(supervisor: subprocess.Popen[str]) -> str:
 
 
 def entries(url: str) -> list[dict[str, Any]]:
-    return list(httpx.get(f"{url}/api/v1/splits/demo/board", trust_env=False).json()["entries"])
+    return list(get(f"{url}/api/v1/splits/demo/board").json()["entries"])
 
 
 def workers(supervisor: subprocess.Popen[str]) -> list[int]:
     """The process ids of the worker that the supervisor holds."""
     children = Path(f"/proc/{supervisor.pid}/task/{supervisor.pid}/children").read_text().split()
-    return [pid for pid in map(int, children) if b"celery" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    return [pid for pid in map(int, children) if "celery" in kernel_says(pid, "cmdline")]
 
 
 def is_alive(pid: int) -> bool:
-    return Path(f"/proc/{pid}").exists() and "\nState:\tZ" not in Path(f"/proc/{pid}/status").read_text()
+    status = kernel_says(pid, "status")
+    return bool(status) and "\nState:\tZ" not in status
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for processes in /proc")
@@ -104,7 +106,7 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
 
         (second,) = workers(supervisor)
         supervisor.send_signal(signal.SIGINT)
-        assert supervisor.wait(timeout=60) == 0
+        assert supervisor.wait(timeout=PATIENCE_S) == 0
         assert not is_alive(first)
         assert not is_alive(second)
     with pytest.raises(httpx.ConnectError):
@@ -116,7 +118,7 @@ def test_a_port_in_use_is_said_in_a_sentence_and_nothing_is_made(tmp_path: Path)
     with socket.create_server(("127.0.0.1", port)), demo(tmp_path, port=port) as supervisor:
         assert supervisor.stdout is not None
         said = supervisor.stdout.read()
-        assert supervisor.wait(timeout=60) == 1
+        assert supervisor.wait(timeout=PATIENCE_S) == 1
     assert f"Port {port} on 127.0.0.1 is in use" in said
     assert "Traceback" not in said
     assert not (tmp_path / "leaderboard.sqlite3").exists()

@@ -4,12 +4,11 @@ import json
 from collections.abc import Callable
 from typing import Any
 
-import httpx
 import pytest
 
 import evaluator
 from tests.journeys.people import PASSWORD, Program, Visitor
-from tests.journeys.production import Site, await_that
+from tests.journeys.production import Site, await_that, get
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -41,12 +40,12 @@ def said(site: Site, name: str, event: str, submission: str) -> dict[str, Any]:
 
 
 def is_ready(site: Site) -> bool:
-    return httpx.get(f"{site.url}/readyz", trust_env=False).status_code == 200
+    return get(f"{site.url}/readyz").status_code == 200
 
 
 def figure(site: Site, name: str) -> float:
     """One figure of /metrics, read from loopback as a Prometheus on the same machine would."""
-    answer = httpx.get(f"{site.url}/metrics", trust_env=False)
+    answer = get(f"{site.url}/metrics")
     assert answer.status_code == 200
     return next(float(line.split()[-1]) for line in answer.text.splitlines() if line.startswith(f"{name} "))
 
@@ -80,7 +79,7 @@ def test_a_submission_can_be_followed_through_every_process_and_nothing_secret_i
 
 
 def test_a_working_site_says_so(site: Site) -> None:
-    assert httpx.get(f"{site.url}/healthz", trust_env=False).json() == {"status": "alive"}
+    assert get(f"{site.url}/healthz").json() == {"status": "alive"}
     # The first sweep comes with beat's first round.
     await_that(lambda: is_ready(site), what="the site is ready")
     assert 0 <= figure(site, "tsttc_last_sweep_age_seconds") < 60
@@ -102,5 +101,5 @@ def test_figures_follow_what_is_scored(
 
 def test_a_stranger_reads_no_figures_through_a_proxy(site: Site) -> None:
     for header in ("X-Forwarded-For", "Forwarded", "X-Real-IP", "X-Forwarded-Proto"):
-        answer = httpx.get(f"{site.url}/metrics", headers={header: "127.0.0.1"}, trust_env=False)
+        answer = get(f"{site.url}/metrics", **{header: "127.0.0.1"})
         assert answer.status_code == 403

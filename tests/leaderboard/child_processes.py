@@ -12,11 +12,12 @@ def children() -> set[int]:
     """
     found = set()
     for task in Path("/proc/self/task").iterdir():
-        found |= {int(pid) for pid in (task / "children").read_text().split()}
+        # A thread that has ended meanwhile has no children.
+        found |= {int(pid) for pid in kernel_says("self", f"task/{task.name}/children").split()}
     return {pid for pid in found if "evaluator.quarantine" in kernel_says(pid, "cmdline")}
 
 
-def kernel_says(pid: int, name: str) -> str:
+def kernel_says(pid: int | str, name: str) -> str:
     """A file of the process's folder in /proc; empty once the process has ended."""
     with suppress(ProcessLookupError, FileNotFoundError):
         return Path(f"/proc/{pid}/{name}").read_text()

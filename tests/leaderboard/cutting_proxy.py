@@ -8,6 +8,7 @@ to a COMMIT gets lost.
 import select
 import socket
 import threading
+from contextlib import suppress
 from enum import Enum
 from typing import Self
 
@@ -61,7 +62,12 @@ class CuttingProxy:
                 client, _ = self._listener.accept()
             except OSError:
                 return
-            threading.Thread(target=self._pass_on, args=(client,), name="proxied", daemon=True).start()
+            threading.Thread(target=self._serve, args=(client,), name="proxied", daemon=True).start()
+
+    def _serve(self, client: socket.socket) -> None:
+        """Whichever side breaks off ends it for both, and is no fault of the proxy."""
+        with suppress(ConnectionError):
+            self._pass_on(client)
 
     def _is_the_one(self) -> bool:
         """Count one round trip; whether it is the one to cut."""
