@@ -4,11 +4,14 @@ import os
 from pathlib import Path
 
 import pytest
+from celery import current_app
+from django.core.cache import cache
 from django.db import connection
 from pytest_django import DjangoDbBlocker
 from pytest_django.fixtures import Settings
 
 from leaderboard import benchmark as benchmark_verbs
+from leaderboard.web.health import readiness
 from leaderboard.web.kept import memory
 
 # Playwright's own loop makes Django's guard against blocking calls in async code misfire.
@@ -45,6 +48,8 @@ SLOW_FILES = {
     "test_pages_method.py",
     "test_pages_outcome.py",
     "test_pages_publishing.py",
+    "test_pages_queue.py",
+    "test_pages_quotas.py",
     "test_pages_submission.py",
     "test_pages_withdrawing.py",
     "test_non_interference.py",
@@ -102,8 +107,35 @@ def private_directories(tmp_path: Path, settings: Settings) -> None:
 
 @pytest.fixture(autouse=True)
 def nothing_remembered() -> None:
-    """Each test has a database of its own; what was answered from another one holds no more."""
+    """Each test has a database of its own; what was answered from another one holds no more.
+
+    Nor does what the test before has found out about this machine, or done too often within a minute.
+    """
     memory.clear()
+    readiness.forget()
+    cache.clear()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def own_broker(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Messages of this process go to folders of its own, and not to those of `make demo`.
+
+    Not by a setting: Celery reads those once in a process.
+    """
+    folders = {
+        "data_folder_in": "messages",
+        "data_folder_out": "messages",
+        "processed_folder": "processed",
+        "control_folder": "control",
+    }
+    made = tmp_path_factory.mktemp("broker")
+    for name in set(folders.values()):
+        (made / name).mkdir()
+    options = current_app.conf.broker_transport_options
+    current_app.conf.broker_transport_options = {
+        **options,
+        **{option: str(made / name) for option, name in folders.items()},
+    }
 
 
 @pytest.fixture(autouse=True)
