@@ -9,9 +9,9 @@ from django.utils import timezone
 from rest_framework import serializers
 
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
-from leaderboard import deadlines, preview, rescoring, submissions
+from leaderboard import deadlines, preview, rescoring
 from leaderboard.entries import Details, Entry, Interval
-from leaderboard.models import Edition, Publication, Split, Status, Submission, Visibility
+from leaderboard.models import Edition, Publication, Split, Visibility
 from leaderboard.quotas import Quota
 from leaderboard.standings import Board
 
@@ -51,89 +51,6 @@ class ErrorSerializer(serializers.Serializer[Any]):
     problems = ProblemSerializer(many=True)
 
 
-class QueueSerializer(serializers.Serializer[Any]):
-    """The place in the queue, and an estimate from recent runs."""
-
-    ahead = serializers.IntegerField()
-    estimate_s = serializers.FloatField(allow_null=True)
-
-
-class NewSubmissionSerializer(serializers.Serializer[Any]):
-    """What a submission is made of (multipart)."""
-
-    split = serializers.CharField(help_text="Name of the split.")
-    method = serializers.CharField(help_text="Name of the method; a new name makes a new method.")
-    file = serializers.FileField(help_text="The prediction file (JSON).")
-    description = serializers.CharField(required=False)
-    paper_url = serializers.CharField(required=False)
-    code_url = serializers.CharField(required=False)
-    note = serializers.CharField(required=False, help_text="For the team; not shown to others.")
-    commit = serializers.CharField(required=False, help_text="Commit of the code that made the file.")
-
-
-class SubmissionSerializer(serializers.Serializer[Submission]):
-    """A submission as its team sees it."""
-
-    id = serializers.UUIDField()
-    state = serializers.ChoiceField(choices=Status.choices)
-    split = serializers.CharField()
-    edition = serializers.IntegerField(allow_null=True)
-    method = serializers.CharField()
-    method_id = serializers.UUIDField()
-    team = serializers.CharField()
-    url = serializers.URLField(help_text="The submission's page.")
-    api_url = serializers.URLField()
-    submitted_at = serializers.DateTimeField()
-    started_at = serializers.DateTimeField(allow_null=True)
-    finished_at = serializers.DateTimeField(allow_null=True)
-    is_final = serializers.BooleanField()
-    fault_is_ours = serializers.BooleanField()
-    digest = serializers.CharField(help_text="Digest of the file's bytes.")
-    size_bytes = serializers.IntegerField()
-    note = serializers.CharField(allow_blank=True)
-    commit = serializers.CharField(allow_blank=True)
-    queue = QueueSerializer(allow_null=True)
-    scores = ScoresSerializer(allow_null=True)
-    counts = CountsSerializer(allow_null=True)
-    n_out_of_range = serializers.IntegerField(allow_null=True)
-    truncated = serializers.DictField(child=serializers.IntegerField())
-    problems = ProblemSerializer(many=True)
-    n_problems = serializers.IntegerField()
-
-    def to_representation(self, instance: Submission) -> dict[str, Any]:
-        """The submission with its progress."""
-        progress = submissions.progress(instance)
-        method = instance.method
-        is_waiting = progress.n_ahead is not None
-        return {
-            "id": str(instance.pk),
-            "state": progress.state,
-            "split": instance.split_id,
-            "edition": progress.edition_number,
-            "method": method.name,
-            "method_id": str(method.pk),
-            "team": method.team.name,
-            "url": absolute("submission", instance.pk),
-            "api_url": absolute("api-submission", instance.pk),
-            "submitted_at": instance.submitted_at,
-            "started_at": progress.started_at,
-            "finished_at": progress.finished_at,
-            "is_final": progress.is_final,
-            "fault_is_ours": progress.fault_is_ours,
-            "digest": instance.digest,
-            "size_bytes": instance.size_bytes,
-            "note": instance.note,
-            "commit": instance.commit,
-            "queue": {"ahead": progress.n_ahead, "estimate_s": progress.estimate_s} if is_waiting else None,
-            "scores": progress.scores,
-            "counts": progress.counts or None,
-            "n_out_of_range": progress.n_out_of_range,
-            "truncated": progress.truncated,
-            "problems": progress.problems,
-            "n_problems": progress.n_problems,
-        }
-
-
 class SlotsSerializer(serializers.Serializer[Quota]):
     """What the team has left on a split."""
 
@@ -145,19 +62,6 @@ class SlotsSerializer(serializers.Serializer[Quota]):
     next_slot_at = serializers.DateTimeField(
         allow_null=True, help_text="When the next submission is taken; null: now, or never if the limit is 0."
     )
-
-
-class SubmittedSerializer(SubmissionSerializer):
-    """A submission that has just come in, and what the team has left after it."""
-
-    quota = SlotsSerializer()
-
-    def to_representation(self, instance: Submission) -> dict[str, Any]:
-        """The submission, and the quota that the view hands over."""
-        return {
-            **super().to_representation(instance),
-            "quota": SlotsSerializer(self.context["quota"]).data,
-        }
 
 
 class QuotaSerializer(SlotsSerializer):

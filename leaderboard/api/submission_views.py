@@ -20,16 +20,15 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import files, idempotency, method_ids, quotas, submissions, waiting
+from leaderboard import files, idempotency, method_ids, outcomes, quotas, submissions, waiting
 from leaderboard.api import listing
 from leaderboard.api.authentication import require_split
 from leaderboard.api.problems import BadValue
-from leaderboard.api.serializers import (
-    ErrorSerializer,
+from leaderboard.api.serializers import ErrorSerializer, absolute
+from leaderboard.api.submission_shapes import (
     NewSubmissionSerializer,
     SubmissionSerializer,
     SubmittedSerializer,
-    absolute,
 )
 from leaderboard.api.throttles import SubmitThrottle
 from leaderboard.api.views import visible
@@ -38,7 +37,7 @@ from leaderboard.models import Evaluation, Submission, User
 TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
 
 
-EVALUATIONS = Evaluation.objects.select_related("edition").prefetch_related("scores")
+EVALUATIONS = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
 
 
 class SubmissionsView(APIView):
@@ -97,7 +96,7 @@ class SubmissionsView(APIView):
         )
         replayed = {"Idempotent-Replayed": "true"} if answer.is_replayed else {}
         return Response(
-            SubmittedSerializer(made, context={"quota": quota}).data,
+            SubmittedSerializer(_told(made), context={"quota": quota}).data,
             status=201 if answer.submitted.is_new else 200,
             headers={"Location": absolute("api-submission", made.pk), **replayed},
         )
@@ -114,7 +113,8 @@ class SubmissionsView(APIView):
         """The submissions of one's own team, newest first, a page at a time; `Link` names the next page."""
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         page = listing.page_of(rows, request, order="-submitted_at")
-        data = SubmissionSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says
+        told = outcomes.of(page.rows, now=timezone.now())
+        data = SubmissionSerializer(told, many=True).data  # type: ignore[arg-type]  # many rows, as it says
         return Response(data, headers=page.headers)
 
 
@@ -150,12 +150,17 @@ class SubmissionView(APIView):
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         found = get_object_or_404(rows, pk=submission_id)
         if not wait_s or submissions.evaluation_of(found).is_final:
-            return Response(SubmissionSerializer(found).data)
+            return Response(SubmissionSerializer(_told(found)).data)
         gone = partial(_is_gone, request.META)
         if waiting.hold(found.pk, wait_s=wait_s, is_gone=gone):
-            return Response(SubmissionSerializer(get_object_or_404(rows.all(), pk=submission_id)).data)
+            now_there = get_object_or_404(rows.all(), pk=submission_id)
+            return Response(SubmissionSerializer(_told(now_there)).data)
         retry_after_s = waiting.THE_WATCHER.retry_after_s(rng=random.Random())  # noqa: S311 - to spread askers
-        return Response(SubmissionSerializer(found).data, headers={"Retry-After": str(retry_after_s)})
+        return Response(SubmissionSerializer(_told(found)).data, headers={"Retry-After": str(retry_after_s)})
+
+
+def _told(submission: Submission) -> outcomes.Outcome:
+    return outcomes.of([submission], now=timezone.now())[0]
 
 
 def _submit(request: Request, form: QueryDict) -> idempotency.Answer:

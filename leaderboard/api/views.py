@@ -11,13 +11,10 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import files, submissions
+from leaderboard import files, outcomes, submissions
 from leaderboard.api.authentication import split_of
-from leaderboard.api.serializers import (
-    ErrorSerializer,
-    SplitSerializer,
-    SubmissionSerializer,
-)
+from leaderboard.api.serializers import ErrorSerializer, SplitSerializer
+from leaderboard.api.submission_shapes import SubmissionSerializer
 from leaderboard.models import Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
 
@@ -40,8 +37,10 @@ class WithdrawView(APIView):
     def post(self, request: Request, submission_id: str) -> Response:
         """Cancel what waits; what was published leaves a tombstone. Cannot be undone."""
         submission = get_object_or_404(visible(request), pk=submission_id)
-        submissions.withdraw(submission=submission, actor=cast("User", request.user), now=timezone.now())
-        return Response(SubmissionSerializer(submission).data)
+        now = timezone.now()
+        submissions.withdraw(submission=submission, actor=cast("User", request.user), now=now)
+        (told,) = outcomes.of([submission], now=now)
+        return Response(SubmissionSerializer(told).data)
 
 
 class SplitsView(APIView):

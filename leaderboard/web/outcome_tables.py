@@ -8,7 +8,7 @@ from django.urls import reverse
 from evaluator.report import format_published
 from leaderboard import exports, outcomes
 from leaderboard.entries import Entry
-from leaderboard.models import Submission
+from leaderboard.models import Submission, Visibility
 from leaderboard.outcomes import Place
 from leaderboard.quotas import Quota
 from leaderboard.submissions import Progress
@@ -59,6 +59,8 @@ def outcome_table(
         intervals=outcomes.shown_intervals(progress, place),
         method_id=submission.method_id,
         submission_id=submission.pk,
+        visibility=submission.method.visibility,
+        pseudonym=submission.method.pseudonym if submission.method.visibility == Visibility.ANONYMOUS else "",
         rank=place.rank if place else None,
         best=place.best if place else frozenset(),
         second=place.second if place else frozenset(),

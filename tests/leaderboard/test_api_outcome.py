@@ -1,0 +1,178 @@
+"""What the API says of a scored submission beyond its scores: intervals, and its rank on the board."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.db import connection
+from django.db.models import F
+from django.test.utils import CaptureQueriesContext
+from django.utils import timezone
+from rest_framework.test import APIClient
+
+from leaderboard import outcomes, submissions
+from leaderboard.models import Edition, Evaluation, Method, Submission, User
+from tests import board_rows, builders
+from tests.editions import corrected, open_edition, publish
+
+LIST = "/api/v1/submissions"
+BOARD = "/api/v1/splits/test/board"
+PARTS = {"low", "high", "rank_low", "rank_high", "is_with_best"}
+
+
+@pytest.fixture
+def client(owner: User) -> APIClient:
+    """A program of the owner's, which may ask as often as these tests do."""
+    made = APIClient()
+    made.credentials(HTTP_AUTHORIZATION=f"Bearer {builders.token(owner)}")
+    return made
+
+
+def look(client: APIClient, submission: Submission, **query: str) -> dict[str, Any]:
+    found: dict[str, Any] = client.get(f"{LIST}/{submission.pk}", query).json()
+    return found
+
+
+def test_intervals_and_rank_are_those_of_the_board(client: APIClient, entries: list[Submission]) -> None:
+    builders.infer_all()
+    rows = {row["method_id"]: row for row in client.get(BOARD, {"intervals": "1"}).json()["entries"]}
+    for submission in entries:
+        body = look(client, submission)
+        row = rows[str(submission.method_id)]
+        assert (body["rank"], body["intervals"]) == (row["rank"], row["intervals"])
+        assert set(body["intervals"]["mid"]) == PARTS
+        assert body["intervals"]["mid"]["rank_low"] <= body["rank"] <= body["intervals"]["mid"]["rank_high"]
+
+
+def test_until_they_are_computed_intervals_are_awaited(client: APIClient, entries: list[Submission]) -> None:
+    before = look(client, entries[0])
+    assert (before["is_final"], before["intervals"], before["awaits_intervals"]) == (True, {}, True)
+    assert before["rank"] is not None
+    builders.infer_all()
+    after = look(client, entries[0])
+    assert after["awaits_intervals"] is False
+    assert after["intervals"]
+
+
+def test_nobody_is_told_to_wait_for_ever(client: APIClient, entries: list[Submission]) -> None:
+    Evaluation.objects.update(finished_at=F("finished_at") - outcomes.AWAITED_FOR)
+    assert look(client, entries[0])["awaits_intervals"] is False
+
+
+def test_too_few_recordings_are_not_waited_for(
+    client: APIClient, benchmark: None, owner: User, tmp_path: Path
+) -> None:
+    few = builders.import_truth(tmp_path, n_recordings=6)
+    sent = builders.submit(owner, builders.predictions(few))
+    builders.score_all()
+    assert look(client, sent)["awaits_intervals"] is False
+
+
+def test_ends_of_intervals_are_no_finer_than_what_is_published(
+    client: APIClient, entries: list[Submission]
+) -> None:
+    builders.infer_all()
+    ends = [found[end] for found in look(client, entries[0])["intervals"].values() for end in ("low", "high")]
+    assert ends
+    assert ends == [round(end, 2) for end in ends]
+
+
+def test_waiting_submission_has_neither(client: APIClient, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition))
+    body = look(client, sent)
+    assert (body["intervals"], body["awaits_intervals"], body["rank"]) == ({}, False, None)
+
+
+def test_private_one_has_intervals_no_range_and_the_rank_that_it_would_have(
+    client: APIClient, entries: list[Submission], edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(
+        owner, builders.predictions(edition, factor=1.01), method="Hidden", visibility="PRIVATE"
+    )
+    builders.score_all()
+    builders.infer_all()
+    body = look(client, sent)
+    assert (body["visibility"], body["rank"]) == ("PRIVATE", 1)
+    mid = body["intervals"]["mid"]
+    assert mid["low"] <= body["scores"]["mid"] <= mid["high"]
+    assert (mid["rank_low"], mid["rank_high"], mid["is_with_best"]) == (None, None, None)
+    # Nobody's rank has changed by it.
+    assert look(client, entries[0])["rank"] == 1
+
+
+def test_surpassed_one_has_intervals_and_neither_rank_nor_range(
+    client: APIClient, edition: Edition, owner: User
+) -> None:
+    worse, better = (builders.submit(owner, builders.predictions(edition, factor=f)) for f in (1.2, 1.1))
+    builders.score_all()
+    builders.infer_all()
+    body = look(client, worse)
+    assert body["rank"] is None
+    assert body["intervals"]["mid"]["low"] is not None
+    assert body["intervals"]["mid"]["rank_low"] is None
+    assert look(client, better)["rank"] is not None
+
+
+def test_withdrawn_one_has_no_rank(client: APIClient, entries: list[Submission], owner: User) -> None:
+    builders.infer_all()
+    submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+    body = look(client, entries[0])
+    assert body["rank"] is None
+    assert {found["rank_low"] for found in body["intervals"].values()} == {None}
+
+
+def test_result_of_a_former_edition_has_no_rank(
+    client: APIClient, entries: list[Submission], tmp_path: Path
+) -> None:
+    builders.infer_all()
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    second.evaluations.all().delete()
+    publish(second, leave_out=True)
+    body = look(client, entries[0])
+    assert (body["edition"], body["rank"]) == (1, None)
+    assert {found["rank_low"] for found in body["intervals"].values()} == {None}
+
+
+def test_list_tells_of_each_what_its_own_address_tells(
+    client: APIClient, entries: list[Submission], edition: Edition, owner: User
+) -> None:
+    for factor in (1.15, 1.3):
+        builders.submit(
+            owner, builders.predictions(edition, factor=factor), method="Hidden", visibility="PRIVATE"
+        )
+    builders.score_all()
+    builders.infer_all()
+    listed = client.get(LIST).json()
+    assert len(listed) == 6
+    assert [row["rank"] is None for row in listed].count(True) == 1
+    for row in listed:
+        assert row == client.get(f"{LIST}/{row['id']}").json()
+
+
+def n_queries(client: APIClient, address: str) -> int:
+    with CaptureQueriesContext(connection) as queries:
+        assert client.get(address).status_code == 200
+    return len(queries)
+
+
+def test_list_asks_no_more_of_the_database_for_many_than_for_few(
+    client: APIClient, entries: list[Submission], edition: Edition, owner: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition), method="Hidden", visibility="PRIVATE")
+    builders.score_all()
+    builders.infer_all()
+    client.get(LIST)
+    before = n_queries(client, LIST)
+    board_rows.score(edition, methods=list(Method.objects.filter(team=entries[0].method.team)), user=owner)
+    builders.board_changed("test")
+    client.get(LIST)
+    assert n_queries(client, LIST) == before
+
+
+def test_place_on_the_board_is_looked_up_for_nobody_who_waits(
+    client: APIClient, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition))
+    with CaptureQueriesContext(connection) as queries:
+        look(client, sent)
+    assert not [each for each in queries.captured_queries if "snapshot" in each["sql"]]
