@@ -31,7 +31,10 @@ SPECTACULAR_SETTINGS: Final[dict[str, Any]] = {
     "COMPONENT_SPLIT_REQUEST": True,
     "SCHEMA_PATH_PREFIX": "/api/v1",
     # One set of choices that several answers have is one thing, under one name.
-    "ENUM_NAME_OVERRIDES": {"MethodVisibilityEnum": "leaderboard.models.methods.Visibility"},
+    "ENUM_NAME_OVERRIDES": {
+        "MethodVisibilityEnum": "leaderboard.models.methods.Visibility",
+        "ShowVisibilityEnum": ["ANONYMOUS", "PUBLIC"],
+    },
     "POSTPROCESSING_HOOKS": [
         "drf_spectacular.hooks.postprocess_schema_enums",
         "leaderboard.api.schema.complete",

@@ -23,6 +23,7 @@ API_CODES: Final[dict[str, str]] = {
     "bad-cursor": "`after` names no row of this list.",
     "bad-edition": "`edition` is no edition's number.",
     "bad-moment": "`at` is no date or time.",
+    "bad-visibility": "`as` is neither ANONYMOUS nor PUBLIC.",
     "bad-filter": "The board cannot be filtered like that.",
     "unknown-column": "The board cannot be sorted by that.",
     "not-found": "There is nothing at this address that you may see.",

@@ -8,10 +8,11 @@ There is no way back. What everybody has seen cannot be unseen, and whoever coul
 show good ones only.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from uuid import UUID
 
 import structlog
 from django.db import transaction
@@ -36,6 +37,16 @@ class Sight:
     entry: Entry
     n_ranked: int
     n_attempts_now: int | None  # what the team's public rows say until then; None if it has none there
+    before: Entry | None = None  # the row that everybody sees until then
+    moved: tuple["Moved", ...] = ()
+
+
+@dataclass(frozen=True)
+class Moved:
+    """Another row of the board, and the rank that it would have then."""
+
+    entry: Entry
+    rank_after: int | None
 
 
 @dataclass(frozen=True)
@@ -59,6 +70,7 @@ def preview(*, method: Method, visibility: str, now: datetime) -> Preview:
     supposed = copy(method)
     supposed.visibility = visibility
     supposed.shown_at = method.shown_at or now
+    others = _public_others(method)
     sights = []
     splits = Split.objects.exclude(published_edition=None).select_related("published_edition__ground_truth")
     for split in splits:
@@ -66,13 +78,16 @@ def preview(*, method: Method, visibility: str, now: datetime) -> Preview:
         rows = standings.everybodys(split=split, edition=edition, supposed=supposed)
         entry = next((row for row in rows if row.method_id == method.pk), None)
         if entry is not None and edition is not None:
+            before = standings.everybodys(split=split, edition=edition)
             sights.append(
                 Sight(
                     split=split,
                     edition=edition,
                     entry=entry,
                     n_ranked=sum(row.rank is not None for row in rows),
-                    n_attempts_now=_attempts_now(split, edition, method),
+                    n_attempts_now=next((row.n_attempts for row in before if row.method_id in others), None),
+                    before=next((row for row in before if row.method_id == method.pk), None),
+                    moved=_moved(before, rows, method=method),
                 )
             )
     return Preview(
@@ -82,15 +97,26 @@ def preview(*, method: Method, visibility: str, now: datetime) -> Preview:
     )
 
 
-def _attempts_now(split: Split, edition: Edition, method: Method) -> int | None:
-    """The attempts that the team's other public rows speak of now."""
-    others = set(
-        Method.objects.filter(team=method.team_id, visibility=Visibility.PUBLIC)
-        .exclude(pk=method.pk)
-        .values_list("pk", flat=True)
-    )
-    rows = standings.everybodys(split=split, edition=edition) if others else ()
-    return next((row.n_attempts for row in rows if row.method_id in others), None)
+def _public_others(method: Method) -> set[UUID]:
+    """The team's other methods that everybody sees under their names."""
+    others = Method.objects.filter(team=method.team_id, visibility=Visibility.PUBLIC).exclude(pk=method.pk)
+    return set(others.values_list("pk", flat=True))
+
+
+def _moved(before: Sequence[Entry], after: Sequence[Entry], *, method: Method) -> tuple[Moved, ...]:
+    """The other rows whose rank would change, in the order of the ranks that they have."""
+    ranks = {_key(row): row.rank for row in after}
+    moved = [
+        Moved(entry=row, rank_after=ranks[_key(row)])
+        for row in before
+        if row.method_id != method.pk and ranks[_key(row)] != row.rank
+    ]
+    return tuple(sorted(moved, key=lambda row: (row.entry.rank or 0, row.entry.method.casefold())))
+
+
+def _key(row: Entry) -> tuple[UUID | None, str, str]:
+    """What a row is known by in two drawings of a board; a printed one has no id."""
+    return (row.method_id, "", "") if row.method_id else (None, row.source, row.method)
 
 
 def change(

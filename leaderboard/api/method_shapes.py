@@ -6,8 +6,9 @@ from typing import Any
 from rest_framework import serializers
 
 from leaderboard import methods
-from leaderboard.api.serializers import DetailsSerializer, absolute
+from leaderboard.api.serializers import DetailsSerializer, EntrySerializer, absolute
 from leaderboard.models import BoxSource, Cameras, Method, Visibility
+from leaderboard.visibility import Moved, Preview, Sight
 
 
 class MethodSerializer(serializers.Serializer[Method]):
@@ -71,6 +72,44 @@ class MethodChangesSerializer(serializers.Serializer[Any]):
         required=False, allow_null=True, help_text="Above 0; needs `hardware`, what it was measured on."
     )
     hardware = serializers.CharField(required=False, allow_null=True, max_length=120)
+
+
+class MovedSerializer(serializers.Serializer[Moved]):
+    """Another row of a board, whose rank would change."""
+
+    method = serializers.CharField(source="entry.method")
+    method_id = serializers.UUIDField(source="entry.method_id", allow_null=True)
+    rank_before = serializers.IntegerField(source="entry.rank", allow_null=True, help_text="Its rank now.")
+    rank_after = serializers.IntegerField(allow_null=True, help_text="Its rank then.")
+
+
+class SightSerializer(serializers.Serializer[Sight]):
+    """The board of one split as everybody would see it."""
+
+    split = serializers.CharField(source="split.name")
+    edition = serializers.IntegerField(source="edition.number", help_text="Number of its published edition.")
+    n_ranked = serializers.IntegerField(help_text="Rows with a rank that the board would have.")
+    before = EntrySerializer(allow_null=True, help_text="The method's row as everybody sees it now, if any.")
+    after = EntrySerializer(source="entry", help_text="Its row as everybody would see it then.")
+    n_attempts_before = serializers.IntegerField(
+        source="n_attempts_now",
+        allow_null=True,
+        help_text="Attempts that the team's other public rows tell of now; null: there are none.",
+    )
+    moved = MovedSerializer(many=True, help_text="Other rows whose ranks would change, in their order.")
+
+
+class ForeseenSerializer(serializers.Serializer[Preview]):
+    """What everybody would see of a method. Asking changes nothing."""
+
+    visibility = serializers.ChoiceField(choices=[Visibility.ANONYMOUS, Visibility.PUBLIC])
+    name = serializers.CharField(source="profile.name", help_text="If anonymous its pseudonym.")
+    team = serializers.CharField(source="profile.team")
+    description = serializers.CharField(source="profile.description", allow_blank=True)
+    paper_url = serializers.CharField(source="profile.paper_url", allow_blank=True)
+    code_url = serializers.CharField(source="profile.code_url", allow_blank=True)
+    details = DetailsSerializer(source="profile.details")
+    splits = SightSerializer(source="sights", many=True, help_text="Boards on which it has a row.")
 
 
 class ShowSerializer(serializers.Serializer[Any]):

@@ -7,7 +7,7 @@ from uuid import UUID
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from django.utils.dateparse import parse_datetime
-from drf_spectacular.utils import extend_schema
+from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework import exceptions
 from rest_framework.permissions import IsAuthenticatedOrReadOnly
 from rest_framework.request import Request
@@ -18,9 +18,15 @@ from leaderboard import methods, visibility
 from leaderboard.api import listing
 from leaderboard.api.authentication import split_of
 from leaderboard.api.bodies import DocumentParser
-from leaderboard.api.method_shapes import MethodChangesSerializer, MethodSerializer, ShowSerializer
+from leaderboard.api.method_shapes import (
+    ForeseenSerializer,
+    MethodChangesSerializer,
+    MethodSerializer,
+    ShowSerializer,
+)
+from leaderboard.api.problems import BadValue
 from leaderboard.api.serializers import ErrorSerializer
-from leaderboard.models import Method, User
+from leaderboard.models import Method, User, Visibility
 from leaderboard.texts import Refused
 
 NOT_FOUND = {(404, "application/problem+json"): ErrorSerializer}
@@ -86,10 +92,33 @@ class MethodView(APIView):
         return Response(_shape(edited, request))
 
 
+AS = OpenApiParameter(
+    "as",
+    str,
+    required=True,
+    enum=[Visibility.ANONYMOUS, Visibility.PUBLIC],
+    description="How it would be shown.",
+)
+
+
 class VisibilityView(APIView):
     """Who sees a method."""
 
     parser_classes = [DocumentParser]
+
+    @extend_schema(
+        operation_id="foresee_method",
+        parameters=[AS],
+        responses={200: ForeseenSerializer, (400, "application/problem+json"): ErrorSerializer, **REFUSED},
+    )
+    def get(self, request: Request, method_id: UUID) -> Response:
+        """What everybody would see of one's own method if it were shown: its rows, and whose ranks change."""
+        found, now = _own(request, method_id), timezone.now()
+        wanted = request.query_params.get("as", "")
+        if wanted not in (Visibility.ANONYMOUS, Visibility.PUBLIC):
+            raise BadValue("bad-visibility", "as", wanted, "ANONYMOUS or PUBLIC")
+        visibility.require_possible(found, visibility=wanted, reveal_at=None, now=now)
+        return Response(ForeseenSerializer(visibility.preview(method=found, visibility=wanted, now=now)).data)
 
     @extend_schema(
         operation_id="show_method", request=ShowSerializer, responses={200: MethodSerializer, **REFUSED}

@@ -157,6 +157,9 @@ class EntrySerializer(serializers.Serializer[Entry]):
     visibility = serializers.ChoiceField(
         choices=Visibility.choices, help_text="PRIVATE rows are your team's: nobody else's board has them."
     )
+    pseudonym = serializers.SerializerMethodField(
+        help_text="Of your team's own anonymous row: what everybody else reads in place of its name."
+    )
     date = serializers.CharField(source="date_text")
     description = serializers.CharField(allow_blank=True)
     paper_url = serializers.CharField(allow_blank=True)
@@ -179,6 +182,10 @@ class EntrySerializer(serializers.Serializer[Entry]):
         help_text="By the names of the scores, where they are computed; empty unless `intervals=1`.",
     )
 
+    def get_pseudonym(self, entry: Entry) -> str | None:
+        """Null for every row that the reader does not see under another name than others."""
+        return entry.pseudonym or None
+
     def to_representation(self, instance: Entry) -> dict[str, Any]:
         """The row; its intervals, which are most of its bytes, for who asks."""
         if instance.intervals and not self.context.get("has_intervals"):
@@ -193,6 +200,12 @@ class BoardSerializer(serializers.Serializer[Board]):
     edition = serializers.IntegerField(source="edition.number", default=None, allow_null=True)
     protocol = serializers.CharField(source="edition.protocol", default=None, allow_null=True)
     ground_truth = serializers.CharField(source="edition.ground_truth_id", default=None, allow_null=True)
+    n_sequences = serializers.IntegerField(
+        source="edition.ground_truth.n_sequences", default=None, allow_null=True
+    )
+    n_recordings = serializers.IntegerField(
+        source="edition.ground_truth.n_recordings", default=None, allow_null=True
+    )
     at = serializers.DateTimeField(allow_null=True, help_text="The time that was asked for, if any.")
     updated_at = serializers.DateTimeField(allow_null=True)
     is_open = serializers.BooleanField(help_text="Whether its split takes submissions.")

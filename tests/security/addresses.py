@@ -24,6 +24,8 @@ QUERIES: dict[str, tuple[str, ...]] = {
     "q": TEXTS,
     "team": TEXTS,
     "intervals": ("1", "0"),
+    "mine": ("1", "0"),
+    "as": ("ANONYMOUS", "PUBLIC"),
     "columns": ("mid", "rte", "both", "nonsense"),
     "n_frames": ("2", "6", "7"),
     "cameras": ("ONE", "SEVERAL", "x"),

@@ -137,10 +137,14 @@ LINES: dict[str, Line] = {
         is_json=True,
     ),
     "api-method-visibility": line(
-        POST="401 404 200 200 404 403 401", sends={"visibility": "ANONYMOUS", "confirm": True}, is_json=True
+        GET="401 404 400 400 404 403 401",
+        POST="401 404 200 200 404 403 401",
+        sends={"visibility": "ANONYMOUS", "confirm": True},
+        is_json=True,
     ),
     # Who may only submit has to know when.
     "api-quota": line(GET="401 200 200 200 200 200 401"),
+    # Without `as` the team is told what it forgot, and nobody else that there is anything.
     "api-revoke-token": line(POST=API_BLIND, sends={"token": "nonsense"}, is_json=True),
     "api-splits": line(GET=API_OPEN),
     "api-board": line(GET=API_OPEN),
