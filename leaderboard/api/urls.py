@@ -2,8 +2,6 @@
 
 from django.urls import path
 from django.views.generic import RedirectView
-from drf_spectacular.views import SpectacularAPIView
-from rest_framework.permissions import AllowAny
 
 from leaderboard.api import (
     account_views,
@@ -12,6 +10,7 @@ from leaderboard.api import (
     edition_views,
     method_views,
     receipt_views,
+    schema_views,
     submission_views,
     views,
 )
@@ -54,7 +53,7 @@ urlpatterns = [
     ),
     path("splits/<slug:split>/changelog", kept(edition_views.ChangelogView.as_view()), name="api-changelog"),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
-    path("schema", SpectacularAPIView.as_view(permission_classes=[AllowAny]), name="api-schema"),
+    path("schema", schema_views.SchemaView.as_view(), name="api-schema"),
     path(
         "docs",
         RedirectView.as_view(pattern_name="api_reference", http_method_names=["get", "head", "options"]),

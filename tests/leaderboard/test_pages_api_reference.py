@@ -4,6 +4,7 @@ from django.test import Client
 from django.urls import reverse
 
 from evaluator.problems import PROBLEM_CODES
+from leaderboard.api import schema_views
 from leaderboard.problem_codes import API_CODES
 from tests import pages
 
@@ -20,6 +21,19 @@ def test_every_operation_of_the_schema_is_described(client: Client, benchmark: N
     assert described == {
         f"{method.upper()} {path}" for path, methods in schema["paths"].items() for method in methods
     }
+
+
+def test_schema_comes_as_yaml_or_json_and_is_described_once(client: Client, benchmark: None) -> None:
+    address = reverse("api-schema")
+    as_yaml = client.get(address)
+    assert as_yaml["Content-Type"] == "application/vnd.oai.openapi; charset=utf-8"
+    assert as_yaml.text.startswith("openapi: 3.1.0\n")
+    as_json = client.get(f"{address}?format=json")
+    assert as_json["Content-Type"].startswith("application/vnd.oai.openapi+json")
+    assert as_json.json()["openapi"] == "3.1.0"
+    n_made = schema_views._written.cache_info().misses
+    assert client.get(address).content == as_yaml.content
+    assert schema_views._written.cache_info().misses == n_made
 
 
 def test_links_between_shapes_lead_somewhere(client: Client, benchmark: None) -> None:
