@@ -58,6 +58,8 @@ def create(
     _check(scopes=scopes, days=days)
     split = _split(split_name)
     with transaction.atomic():
+        # Two at once would both find room for the last one.
+        User.objects.select_for_update(no_key=True).get(pk=user.pk)
         n_standing = ApiToken.objects.filter(user=user, revoked_at=None, expiry__gt=now).count()
         if n_standing >= MAX_STANDING:
             raise Refused(

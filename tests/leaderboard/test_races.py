@@ -10,7 +10,7 @@ import pytest
 from django.core.files.base import ContentFile
 from django.db import connection
 
-from leaderboard import audit, invitations, quotas, submissions, teams
+from leaderboard import audit, invitations, quotas, submissions, teams, tokens
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -24,6 +24,7 @@ from leaderboard.models import (
 )
 from leaderboard.texts import Refused
 from tests import builders
+from tests.services import crowd_on_postgres
 
 T = TypeVar("T")
 FIRST_DAY = datetime(2026, 11, 1, 12, 0, tzinfo=UTC)
@@ -54,20 +55,21 @@ def at_once(n: int, deed: Callable[[int], T]) -> list[T]:
     All of them run at once where the server allows as many connections; otherwise as many as it does, and
     the rest as soon as one is free.
     """
-    n_threads = n_connections(n)
-    barrier = Barrier(n_threads, timeout=60)
+    with crowd_on_postgres():
+        n_threads = n_connections(n)
+        barrier = Barrier(n_threads, timeout=60)
 
-    def one(number: int) -> T:
-        try:
-            connection.ensure_connection()
-            if number < n_threads:
-                barrier.wait()
-            return deed(number)
-        finally:
-            connection.close()
+        def one(number: int) -> T:
+            try:
+                connection.ensure_connection()
+                if number < n_threads:
+                    barrier.wait()
+                return deed(number)
+            finally:
+                connection.close()
 
-    with ThreadPoolExecutor(n_threads) as pool:
-        return list(pool.map(one, range(n)))
+        with ThreadPoolExecutor(n_threads) as pool:
+            return list(pool.map(one, range(n)))
 
 
 def test_twenty_writers_of_fifty_events_each_keep_one_unbroken_chain() -> None:
@@ -111,6 +113,17 @@ def test_a_hundred_submissions_at_once_take_exactly_the_five_slots_there_are(
     assert rounds == [(5, 5)] * 20
     assert Evaluation.objects.count() == 100
     assert audit.verify().breaks == ()
+
+
+def test_tokens_made_at_once_stay_within_their_number(owner: User) -> None:
+    def make(number: int) -> bool:
+        try:
+            tokens.create(user=owner, name=f"CI {number}", now=FIRST_DAY)
+        except tokens.Refused:
+            return False
+        return True
+
+    assert sum(at_once(tokens.MAX_STANDING + 10, make)) == tokens.MAX_STANDING
 
 
 def test_the_same_bytes_at_once_are_one_submission_and_one_slot(edition: Edition, owner: User) -> None:
