@@ -27,7 +27,9 @@ class Queue(msgspec.Struct, frozen=True):
 class Submission(msgspec.Struct, frozen=True, kw_only=True):
     """A submission as the server shows it; `document` is its answer unabridged.
 
-    `is_new` is False for the answer to a file that was sent before.
+    `is_new` is False for the answer to a file that was sent before. `rank` is that of its method, where this
+    submission stands on the board for it; of a private method the one that it would have. `awaits_intervals`:
+    they follow the scores within seconds.
     """
 
     id: str
@@ -37,7 +39,11 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     method: str = ""
     method_id: str | None = None
     url: str | None = None
+    visibility: str = ""
     scores: dict[str, float | None] | None = None
+    intervals: dict[str, Interval] = {}
+    awaits_intervals: bool = False
+    rank: int | None = None
     counts: dict[str, int] | None = None
     n_out_of_range: int | None = None
     truncated: dict[str, int] | None = None
@@ -62,6 +68,15 @@ class Method(msgspec.Struct, frozen=True, kw_only=True):
     pseudonym: str | None = None
     reveal_at: str | None = None
     url: str = ""
+
+
+class Interval(msgspec.Struct, frozen=True, kw_only=True):
+    """Where a value may lie at 95 %, and its row in that column; None where that is not known."""
+
+    low: float | None = None
+    high: float | None = None
+    rank_low: int | None = None
+    rank_high: int | None = None
 
 
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):

@@ -239,6 +239,22 @@ class Client:
                 raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
             self.sleep(delay_s)
 
+    def settled(self, submission: Submission, *, timeout_s: float) -> Submission:
+        """A scored submission with its intervals, once they are computed; after `timeout_s` as it is then.
+
+        Of errors only those that waiting cannot cure are raised.
+        """
+        until_s = self.monotonic_s() + timeout_s
+        n_asked = 0
+        while submission.awaits_intervals:
+            n_asked += 1
+            delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=None, rng=self.rng)
+            if self.monotonic_s() + delay_s >= until_s:
+                break
+            self.sleep(delay_s)
+            submission = self._look(submission.id, wait_s=0).submission or submission
+        return submission
+
     def _look(self, submission_id: str, *, wait_s: float) -> _Glance:
         """One question about a submission; a fault that passes by itself is no answer, not an error."""
         address = self._address("submissions", submission_id)

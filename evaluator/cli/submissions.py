@@ -26,6 +26,7 @@ from evaluator.cli.options import (
     url_option,
 )
 from evaluator.cli.sending import opened, require_good, sent
+from evaluator.cli.values import in_short
 
 if TYPE_CHECKING:
     from evaluator.answers import Submission
@@ -222,6 +223,8 @@ def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]
 def _show(submission: Submission, named: str) -> None:
     click.echo(f"{state_in_words(submission)}: {printable(named)}")
     if submission.scores is not None:
+        for line in in_short(submission):
+            click.echo(line)
         click.echo("")
         for line in result_in_words(
             submission.scores,

@@ -142,10 +142,18 @@ def put_documented_answers(site: RecordedSite) -> None:
         "n_problems": 0,
     }
     scores = dict(zip(SCORE_NAMES, VALUES, strict=True))
+    unranked = {"rank_low": None, "rank_high": None, "is_with_best": None}  # as of every private method
     scored = submission | {
         "state": "SCORED",
         "queue": None,
         "scores": scores,
+        "intervals": {
+            "mid": {"low": 13.21, "high": 14.60, **unranked},
+            "rte": {"low": 11.18, "high": 12.52, **unranked},
+        },
+        "awaits_intervals": False,
+        "rank": 1,
+        "visibility": "PRIVATE",
         "counts": COUNTS,
         "n_out_of_range": 458,
         "truncated": {"-20": 171, "-0.15": 0, "0.05": 0, "20": 302},

@@ -1,0 +1,106 @@
+"""A scored submission in short: its rank, how sure its errors are, and the little while it takes to know."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from click.testing import Result
+
+from evaluator.client import Client
+from tests.evaluator.fake_time import FakeTime
+from tests.evaluator.recorded_site import RecordedSite, Reply
+from tests.evaluator.test_cli_submissions import GET, ID, POST, QUEUED, SCORED, submit
+
+INTERVAL = {"low": 9.6, "high": 10.905, "rank_low": 1, "rank_high": 3, "is_with_best": True}
+AWAITED = SCORED | {"intervals": {}, "awaits_intervals": True, "rank": 2, "visibility": "PUBLIC"}
+SURE = AWAITED | {"awaits_intervals": False, "intervals": {"mid": INTERVAL, "rte": INTERVAL}}
+MISSING = {"rank_low": None, "rank_high": None, "is_with_best": None}
+
+Tsttc = Callable[..., Result]
+
+
+def said(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> list[str]:
+    """What stands between the state and the table."""
+    site.put(GET, Reply(document))
+    result = tsttc("status", ID)
+    assert (result.exit_code, result.stderr) == (0, "")
+    lines = result.stdout.splitlines()
+    return lines[1 : lines.index("")]
+
+
+@pytest.mark.usefixtures("at_site")
+def test_rank_and_errors_come_with_where_they_may_lie(tsttc: Tsttc, site: RecordedSite) -> None:
+    assert said(tsttc, site, SURE) == [
+        "rank 2 (1–3)",
+        "MiD 10.25 (9.60–10.90), RTE 15.25 (9.60–10.90), in brackets at 95 %",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("more", "expected"),
+    [
+        ({"intervals": {}}, ["rank 2"]),
+        ({"rank": None, "intervals": {}}, []),
+        ({"intervals": {"mid": INTERVAL | {"rank_low": 2, "rank_high": 2}}}, ["rank 2 (2)"]),
+        (
+            {"visibility": "PRIVATE", "intervals": {"mid": INTERVAL | MISSING}},
+            ["shown to everybody it would be rank 2"],
+        ),
+        ({"rank": None, "intervals": {"mid": INTERVAL | {"low": None}}}, []),
+    ],
+)
+@pytest.mark.usefixtures("at_site")
+def test_what_is_not_known_is_left_out(
+    tsttc: Tsttc, site: RecordedSite, more: dict[str, Any], expected: list[str]
+) -> None:
+    assert [line for line in said(tsttc, site, SURE | more) if "rank" in line] == expected
+
+
+@pytest.mark.usefixtures("at_site")
+def test_server_that_tells_neither_is_no_fault(tsttc: Tsttc, site: RecordedSite) -> None:
+    assert said(tsttc, site, SCORED) == []
+
+
+@pytest.mark.usefixtures("at_site")
+def test_status_says_that_intervals_follow_and_does_not_wait(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(GET, Reply(AWAITED))
+    result = tsttc("status", ID)
+    assert result.stdout.startswith("SCORED, intervals follow: Foo++ on val\nrank 2\n\n")
+    assert len(site.requests) == 1
+
+
+@pytest.mark.usefixtures("at_site")
+def test_wait_and_watch_end_with_the_intervals(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(POST, Reply(QUEUED, status=201))
+    site.put(GET, Reply(AWAITED), Reply(AWAITED), Reply(SURE))
+    assert "rank 2 (1–3)" in submit(tsttc, "--wait").stdout
+    site.put(GET, Reply(AWAITED), Reply(SURE))
+    assert json.loads(tsttc("status", ID, "--watch", "--json").stdout) == SURE
+
+
+def test_intervals_are_waited_for_only_so_long(client: Client, site: RecordedSite, clock: FakeTime) -> None:
+    site.put(GET, *[Reply(AWAITED)] * 50)
+    scored = client.submission(ID)
+    asked = client.settled(scored, timeout_s=10)
+    assert (asked.is_final, asked.awaits_intervals) == (True, True)
+    assert sum(clock.slept_s) <= 10
+    assert len(site.requests) < 10
+
+
+def test_server_that_is_away_meanwhile_keeps_what_is_known(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(GET, Reply(AWAITED), Reply(status=503), Reply(SURE))
+    assert client.settled(client.submission(ID), timeout_s=10).rank == 2
+    assert len(clock.slept_s) == 2
+
+
+def test_nothing_is_asked_where_no_intervals_will_come(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    site.put(GET, Reply(SCORED))
+    client.settled(client.submission(ID), timeout_s=10)
+    assert clock.slept_s == []
