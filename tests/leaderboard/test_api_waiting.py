@@ -19,6 +19,8 @@ from tests.leaderboard.test_api_submissions import client_of
 from tests.leaderboard.test_lifecycle_races import at_once
 
 RNG = random.Random(0)
+PATIENCE_S = 60
+WAIT_S = 3 * PATIENCE_S  # whoever waits so long has not been let go
 
 
 def stays() -> bool:
@@ -53,10 +55,10 @@ class Waiter(threading.Thread):
         self.start()
 
     def run(self) -> None:
-        self.is_held = self.watcher.hold(self.submission_id, wait_s=30, is_gone=self.is_gone)
+        self.is_held = self.watcher.hold(self.submission_id, wait_s=WAIT_S, is_gone=self.is_gone)
 
     def has_come_back(self) -> bool:
-        self.join(10)
+        self.join(PATIENCE_S)
         return not self.is_alive()
 
 
@@ -69,7 +71,7 @@ def ended() -> None:
     """Once no watcher runs any more: what one does, or raises, belongs to the test that started it."""
     for thread in threading.enumerate():
         if thread.name == "watcher":
-            thread.join(10)
+            thread.join(PATIENCE_S)
             assert not thread.is_alive(), "nobody waits, and a watcher goes on"
 
 
@@ -85,7 +87,7 @@ def seated(watcher: waiting.Watcher, looks: Looks, n: int, **options) -> list[Wa
     """So many waiters, once the watcher looks for all of them."""
     waiters = [Waiter(watcher, **options) for _ in range(n)]
     while not looks.asked or len(looks.asked[-1]) < n:
-        assert looks.was_asked.acquire(timeout=10)
+        assert looks.was_asked.acquire(timeout=PATIENCE_S)
     return waiters
 
 
@@ -110,13 +112,13 @@ def test_who_finds_no_place_is_answered_at_once_and_the_later_the_more_there_are
     watcher: waiting.Watcher, looks: Looks
 ) -> None:
     waiters = seated(watcher, looks, 3)
-    assert not watcher.hold(uuid4(), wait_s=30, is_gone=stays)
+    assert not watcher.hold(uuid4(), wait_s=WAIT_S, is_gone=stays)
     assert watcher.retry_after_s(rng=RNG) == 1
     for _ in range(40):
-        assert not watcher.hold(uuid4(), wait_s=30, is_gone=stays)
+        assert not watcher.hold(uuid4(), wait_s=WAIT_S, is_gone=stays)
     assert 8 <= watcher.retry_after_s(rng=RNG) <= 13
     for _ in range(2_000):
-        watcher.hold(uuid4(), wait_s=30, is_gone=stays)
+        watcher.hold(uuid4(), wait_s=WAIT_S, is_gone=stays)
     assert watcher.retry_after_s(rng=RNG) == waiting.LONGEST_RETRY_AFTER_S
     # A place that is free again is given away again.
     looks.final = {waiter.submission_id for waiter in waiters}
@@ -125,8 +127,10 @@ def test_who_finds_no_place_is_answered_at_once_and_the_later_the_more_there_are
 
 
 def test_a_watcher_does_not_ask_for_who_has_left(looks: Looks) -> None:
-    slow = waiting.Watcher(look=looks, n_places=lambda: 3, every_s=0.2)
-    assert slow.hold(uuid4(), wait_s=0.01, is_gone=stays)
+    slow = waiting.Watcher(look=looks, n_places=lambda: 3, every_s=2)
+    # Seen to be gone at the first look, and away well before the next one.
+    [waiter] = seated(slow, looks, 1, is_gone=lambda: True)
+    assert waiter.has_come_back()
     ended()
     assert len(looks.asked) == 1
 
@@ -144,7 +148,7 @@ def test_a_process_that_ends_lets_everybody_go_and_takes_nobody(
     waiters = seated(watcher, looks, 3)
     watcher.close()
     assert all(waiter.has_come_back() for waiter in waiters)
-    assert not watcher.hold(uuid4(), wait_s=30, is_gone=stays)
+    assert not watcher.hold(uuid4(), wait_s=WAIT_S, is_gone=stays)
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
@@ -258,7 +262,7 @@ def test_waiters_hold_no_connection_and_hear_the_end_of_it(waiting_one: Submissi
         return str(APIClient().get("/api/v1/splits").status_code)
 
     def score() -> str:
-        is_waiting.wait(10)
+        is_waiting.wait(PATIENCE_S)
         builders.score_all()
         return "scored"
 
