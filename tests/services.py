@@ -22,10 +22,14 @@ POSTGRES_ADMIN_URL = os.environ.get("TSTTC_TEST_DATABASE_URL", "postgres://postg
 REDIS_URL = os.environ.get("TSTTC_TEST_REDIS_URL", "redis://127.0.0.1:6379/15")
 REQUIRED = os.environ.get("TSTTC_REQUIRE_SERVICES", "") == "1"
 REPOSITORY = Path(__file__).resolve().parent.parent
+# Of a server that is there and busy. One that is not there refuses at once.
+PATIENCE_S = 30
 
 # The mark on a Redis database that a test run has taken; it fades if the run dies.
 _MARK = "tsttc-test-run"
 _MARK_S = 3600
+# The number of the lock that a crowd on PostgreSQL holds.
+_CROWD = 20230901
 
 
 class ServiceMissing(RuntimeError):
@@ -48,7 +52,7 @@ def shown(url: str) -> str:
 def check_postgres() -> None:
     """Raise `ServiceMissing` unless the administrative database answers."""
     try:
-        psycopg.connect(POSTGRES_ADMIN_URL, connect_timeout=3).close()
+        psycopg.connect(POSTGRES_ADMIN_URL, connect_timeout=PATIENCE_S).close()
     except psycopg.OperationalError as fault:
         reason = str(fault).splitlines()[0]
         raise ServiceMissing(
@@ -78,6 +82,15 @@ def throwaway_database() -> Iterator[str]:
 
 
 @contextmanager
+def crowd_on_postgres() -> Iterator[None]:
+    """One crowd of connections at a time on the test server, whichever process it belongs to."""
+    with psycopg.connect(POSTGRES_ADMIN_URL, autocommit=True) as admin:
+        # It is let go with the connection.
+        admin.execute("SELECT pg_advisory_lock(%s)", [_CROWD])
+        yield
+
+
+@contextmanager
 def throwaway_redis() -> Iterator[str]:
     """The URL of an empty Redis database that nobody else's test run uses; emptied again at the end.
 
@@ -87,7 +100,9 @@ def throwaway_redis() -> Iterator[str]:
     highest = int(parts.path.strip("/") or 0)
     for number in range(highest, -1, -1):
         url = parts._replace(path=f"/{number}").geturl()
-        with redis.Redis.from_url(url, socket_timeout=3, socket_connect_timeout=3) as client:
+        with redis.Redis.from_url(
+            url, socket_timeout=PATIENCE_S, socket_connect_timeout=PATIENCE_S
+        ) as client:
             try:
                 is_ours = client.dbsize() == 0 and client.set(_MARK, os.getpid(), nx=True, ex=_MARK_S)
             except redis.RedisError as fault:

@@ -57,7 +57,7 @@ def at_once(n: int, deed: Callable[[int], T]) -> list[T]:
     """
     with crowd_on_postgres():
         n_threads = n_connections(n)
-        barrier = Barrier(n_threads, timeout=60)
+        barrier = Barrier(n_threads, timeout=180)
 
         def one(number: int) -> T:
             try:
