@@ -173,6 +173,8 @@ def test_claim_whose_answer_is_lost_is_not_left_to_its_lease(
         assert came_to_its_end, "the server was back at once"
         row = submissions[-1].evaluations.get()
         assert (row.status, row.attempt) in [(Status.SCORED, 1), (Status.QUEUED, 0)]
+        # What the cut connection had locked is free once the server has noticed: this waits for it.
+        queue_rows.make_due()
         while row.status == Status.QUEUED and scoring.run_next(rng=random.Random(0)):
             row.refresh_from_db()
         assert (row.status, row.attempt, row.n_infrastructure_strikes) == (Status.SCORED, 1, 0)
