@@ -80,7 +80,10 @@ class Interval(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
-    """One row of a board: scores by their ten names, None where an interval has no value."""
+    """One row of a board: scores by their ten names, None where an interval has no value.
+
+    `pseudonym` is that of an anonymous row of one's own team, which others see under it; else None.
+    """
 
     method: str
     scores: dict[str, float | None]
@@ -90,22 +93,61 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     date: str | None = None
     kind: str = "submission"
     visibility: str = "PUBLIC"
+    pseudonym: str | None = None
     withdrawn_at: str | None = None
+    intervals: dict[str, Interval] = {}
+
+    def interval(self, score: str) -> Interval:
+        """That of one score; without ends where it was not asked for, or is not known."""
+        return self.intervals.get(score, Interval())
 
 
 class Board(msgspec.Struct, frozen=True, kw_only=True):
-    """The ranked entries of a split's published edition; `document` is the server's answer unabridged."""
+    """The ranked entries of a split in an edition; `document` is the server's answer unabridged."""
 
     split: str
     entries: list[BoardEntry]
     document: JSON
     edition: Any = None
+    protocol: str | None = None
+    ground_truth: str | None = None
+    n_sequences: int | None = None
+    n_recordings: int | None = None
+    at: str | None = None
     updated_at: str | None = None
 
     @property
     def updated(self) -> str:
         """When it last changed, to the second; empty where nothing is known."""
         return re.sub(r"\.\d+", "", self.updated_at or "")
+
+
+class Moved(msgspec.Struct, frozen=True, kw_only=True):
+    """Another row of a board, whose rank changes."""
+
+    method: str
+    rank_before: int | None = None
+    rank_after: int | None = None
+
+
+class Sight(msgspec.Struct, frozen=True, kw_only=True):
+    """One split's board as it would be: its row before (None: there is none) and after, and who moves."""
+
+    split: str
+    after: BoardEntry
+    before: BoardEntry | None = None
+    edition: Any = None
+    n_ranked: int | None = None
+    moved: list[Moved] = []
+
+
+class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
+    """What everybody would see of a method; `document` is the server's answer unabridged."""
+
+    name: str
+    document: JSON
+    team: str = ""
+    splits: list[Sight] = []
 
 
 class Difference(msgspec.Struct, frozen=True, kw_only=True):
@@ -167,14 +209,16 @@ class ClientError(Exception):
 class Unreachable(ClientError):
     """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out.
 
-    `was_connected` says whether the server had been reached at all.
+    `was_connected` says whether the server had been reached at all; `was_refused` whether the machine was,
+    and nothing listened on it, as before a server has started.
     """
 
-    def __init__(self, *, url: str, reason: str, was_connected: bool) -> None:
+    def __init__(self, *, url: str, reason: str, was_connected: bool, was_refused: bool = False) -> None:
         super().__init__(f"no answer from {url}: {reason}")
         self.url = url
         self.reason = reason
         self.was_connected = was_connected
+        self.was_refused = was_refused
 
 
 class Refused(ClientError):

@@ -19,17 +19,17 @@ import time
 import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import BinaryIO, Self, TypeVar
-from urllib.parse import quote, urlsplit
+from urllib.parse import quote, urlencode, urlsplit
 
 import httpx
-import msgspec
 
 from evaluator.answers import (
     JSON,
-    BadAnswer,
     Board,
     Compared,
+    Foreseen,
     Method,
     NotReady,
     Quota,
@@ -38,7 +38,7 @@ from evaluator.answers import (
     TimedOut,
     Unreachable,
 )
-from evaluator.exchange import PASSING_STATUSES, Patience, checked, retry_after_s
+from evaluator.exchange import PASSING_STATUSES, Patience, checked, next_page, one, retry_after_s, rows
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "::1", "localhost"})
 LONGEST_WAIT_S = (
@@ -133,15 +133,38 @@ class Client:
         # A request of this very call may have made it, of which only the answer was lost.
         is_ours = idempotency_key is None and "Idempotent-Replayed" in response.headers
         is_new = is_ours or response.status_code == httpx.codes.CREATED
-        return self._read(response, Submission, is_new=is_new)
+        return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
         """The present state of a submission. Raises ClientError."""
         return self._get(Submission, "submissions", submission_id)
 
-    def board(self, split: str, *, sort: str = "rank") -> Board:
-        """The board of a split's published edition, in the order of column `sort`. Raises ClientError."""
-        return self._get(Board, "splits", split, "board", params={"sort": sort})
+    def board(
+        self,
+        split: str,
+        *,
+        sort: str = "rank",
+        edition: int | None = None,
+        at: str | None = None,
+        has_intervals: bool = False,
+    ) -> Board:
+        """The board of a split, in the order of column `sort`: the present one, or that of an `edition`.
+
+        With `at` (a date, or an ISO time) as it stood then; of an edition there is no other time. With
+        `has_intervals` each value comes with where it may lie. Raises ClientError.
+        """
+        place = [] if edition is None else ["editions", str(edition)]
+        asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
+        params = {name: value for name, value in asked.items() if value}
+        return self._get(Board, "splits", split, *place, "board", params=params)
+
+    def board_page(self, board: Board, *, sort: str = "rank", at: str | None = None) -> str:
+        """The address at which this very board stays: its edition's page, or the board as of that time."""
+        is_of_edition = board.edition is not None and not at
+        path = f"{quote(board.split, safe='')}/{f'editions/{board.edition}/' if is_of_edition else ''}"
+        asked = {"at": at, "sort": sort if sort != "rank" else None}
+        query = urlencode({name: value for name, value in asked.items() if value})
+        return f"{self.url}/board/{path}{'?' if query else ''}{query}"
 
     def manifest(self, split: str) -> bytes:
         """The split's manifest, CSV: the ground truth's columns but the values. Raises ClientError."""
@@ -152,7 +175,7 @@ class Client:
         """The digest of that manifest; None for a split that has none yet. Raises ClientError."""
         address = self._address("splits", split, "editions")
         response = self._insist(lambda: self._get_as_anybody(address, accept="application/json"))
-        for edition in _rows(response, JSON):
+        for edition in rows(response, JSON):
             if edition.get("is_board"):
                 digest = edition.get("manifest")
                 return digest if isinstance(digest, str) else None
@@ -161,7 +184,7 @@ class Client:
     def quota(self) -> list[Quota]:
         """What one's own team has left, split by split. Raises ClientError."""
         address = self._address("quota")
-        return _rows(self._insist(lambda: self._http.get(address)), Quota)
+        return rows(self._insist(lambda: self._http.get(address)), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
         """Methods of a split's board, by id, side by side. Raises ClientError.
@@ -173,7 +196,7 @@ class Client:
         address, n_asked = self._address("compare"), 0
         while True:
             response = self._insist(lambda: self._http.get(address, params=params))
-            found = self._read(response, Compared)
+            found = one(response, Compared)
             if found.is_complete:
                 return found
             n_asked += 1
@@ -186,12 +209,25 @@ class Client:
     def own_method(self, name_or_id: str) -> Method | None:
         """The method of one's own team of that name or id. Raises ClientError."""
         address = self._address("methods")
-        rows = _rows(self._insist(lambda: self._http.get(address)), Method)
-        return next((row for row in rows if name_or_id in {row.id, row.name}), None)
+        params: Mapping[str, str] = {}
+        while True:
+            response = self._insist(partial(self._http.get, address, params=params))
+            named = (row for row in rows(response, Method) if name_or_id in {row.id, row.name})
+            found, following = next(named, None), next_page(response)
+            if found is not None or not following or following == params:
+                return found
+            params = following
 
     def method(self, method_id: str) -> Method:
         """A method, as one may see it. Raises ClientError."""
         return self._get(Method, "methods", method_id)
+
+    def foreseen(self, method_id: str, visibility: str) -> Foreseen:
+        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS".
+
+        Raises ClientError.
+        """
+        return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
         """Show a method of one's own to everybody, "PUBLIC" or "ANONYMOUS"; there is no way back.
@@ -201,7 +237,7 @@ class Client:
         """
         address = self._address("methods", method_id, "visibility")
         body = {"visibility": visibility, "confirm": True, "reveal_at": reveal_at}
-        return self._read(self._insist(lambda: self._http.post(address, json=body)), Method)
+        return one(self._insist(lambda: self._http.post(address, json=body)), Method)
 
     def receipt(self, submission_id: str) -> bytes:
         """The signed receipt of a scored submission, JSON as it came. Raises ClientError."""
@@ -268,9 +304,7 @@ class Client:
             if refused.status not in PASSING_STATUSES:
                 raise
             return _Glance(retry_after_s=refused.retry_after_s)
-        return _Glance(
-            submission=self._read(response, Submission), retry_after_s=retry_after_s(response.headers)
-        )
+        return _Glance(submission=one(response, Submission), retry_after_s=retry_after_s(response.headers))
 
     @property
     def _longest_s(self) -> float:
@@ -279,7 +313,7 @@ class Client:
 
     def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
         address = self._address(*path)
-        return self._read(self._insist(lambda: self._http.get(address, params=params)), kind)
+        return one(self._insist(lambda: self._http.get(address, params=params)), kind)
 
     def _get_as_anybody(self, address: str, *, accept: str) -> httpx.Response:
         """What everybody may read is read without the token, which may not be good for reading."""
@@ -304,31 +338,27 @@ class Client:
         return response
 
     def _insist(self, send: Callable[[], httpx.Response]) -> httpx.Response:
-        """Send until answered, at most `patience.n_tries` times, as long as trying again makes sense."""
+        """Send until answered, as often as the patience goes, as long as trying again makes sense."""
         n_failed = 0
         while True:
             try:
                 return self._checked(send)
             except (Unreachable, Refused) as fault:
                 n_failed += 1
-                if n_failed >= self.patience.n_tries or not self._may_pass(fault):
+                if n_failed >= self._n_tries() or not self._may_pass(fault):
                     raise
                 delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
             self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng))
 
+    def _n_tries(self) -> int:
+        return self.patience.n_tries if self._was_answered else self.patience.n_first_tries
+
     def _may_pass(self, fault: Unreachable | Refused) -> bool:
         if isinstance(fault, Unreachable):
-            # An address where nothing ever answered is a mistake more often than a pause.
-            return self._was_answered
+            # Where nothing ever answered, a machine that turns connections away may be starting its server;
+            # any other fault is a mistake in the address more often than a pause.
+            return self._was_answered or fault.was_refused
         return self.patience.may_pass(fault)
-
-    def _read(self, response: httpx.Response, kind: type[T], **more: object) -> T:
-        """The JSON answer as `kind`, with the whole of it as its `document`."""
-        url = str(response.url)
-        document = _decoded(response)
-        if not isinstance(document, dict):
-            raise BadAnswer(url=url, found="JSON, but no object")
-        return _converted(document, kind, url=url, **more)
 
 
 @dataclass(frozen=True, slots=True)
@@ -345,30 +375,3 @@ def fresh_key(file: BinaryIO, fields: Mapping[str, str]) -> str:
         digest.update(block)
     what = json.dumps([digest.hexdigest(), sorted(fields.items()), uuid.uuid4().hex])
     return hashlib.sha256(what.encode()).hexdigest()
-
-
-def _decoded(response: httpx.Response) -> object:
-    try:
-        return msgspec.json.decode(response.content)
-    except msgspec.DecodeError:
-        found = response.headers.get("content-type", "no content type")
-        raise BadAnswer(url=str(response.url), found=f"not JSON ({found})") from None
-
-
-def _rows(response: httpx.Response, kind: type[T]) -> list[T]:
-    """The JSON answer as a list of `kind`."""
-    url, found = str(response.url), _decoded(response)
-    if not isinstance(found, list):
-        raise BadAnswer(url=url, found="JSON, but no list")
-    return [_converted(row, kind, url=url) for row in found]
-
-
-def _converted(document: object, kind: type[T], *, url: str, **more: object) -> T:
-    """`document` as `kind`; a struct gets the whole of it as its member `document`."""
-    value = document
-    if isinstance(document, dict) and hasattr(kind, "__struct_fields__"):
-        value = {**document, "document": document, **more}
-    try:
-        return msgspec.convert(value, kind)
-    except msgspec.ValidationError as error:
-        raise BadAnswer(url=url, found=str(error)) from None

@@ -7,13 +7,15 @@ import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import TypeVar
 
 import httpx
 import msgspec
 
-from evaluator.answers import Redirected, Refused, Unreachable
+from evaluator.answers import BadAnswer, Redirected, Refused, Unreachable
 from evaluator.problems import Problem
 
+T = TypeVar("T")
 PASSING_STATUSES = frozenset({429, 502, 503, 504})  # the same request may succeed a little later
 QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide, however soon it is
 
@@ -22,10 +24,12 @@ QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide
 class Patience:
     """How often and how long to try again: delays grow by `factor`, each shortened by up to `jitter`.
 
-    As it stands it bears with a server that is away for a quarter of a minute, as for a restart.
+    As it stands it bears with a server that is away for a quarter of a minute, as for a restart, and for ten
+    seconds with one that has not answered yet, as where it and a job start together.
     """
 
     n_tries: int = 9
+    n_first_tries: int = 8  # where nothing has ever answered, and connections are refused
     first_delay_s: float = 0.25
     longest_delay_s: float = 10.0
     longest_retry_after_s: float = 60.0  # who asks for more than this gets their answer reported instead
@@ -54,7 +58,9 @@ def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
         raise Unreachable(url=url, reason=str(error), was_connected=False) from error
     except (httpx.ConnectError, httpx.ConnectTimeout, httpx.ProxyError) as error:
-        raise Unreachable(url=url, reason=_reason(error), was_connected=False) from error
+        raise Unreachable(
+            url=url, reason=_reason(error), was_connected=False, was_refused=_was_refused(error)
+        ) from error
     except (httpx.TransportError, httpx.DecodingError) as error:
         raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
     if response.is_success:
@@ -86,6 +92,14 @@ def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
     return str(error).strip() or type(error).__name__
 
 
+def _was_refused(error: BaseException) -> bool:
+    """Whether the machine was found, and turned the connection away: no wrong name, no bad certificate."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, ConnectionError):
+        cause = cause.__cause__ or cause.__context__
+    return cause is not None
+
+
 def _refused(response: httpx.Response) -> Refused:
     """An error answer read leniently: whatever stands between client and server may have written it."""
     try:
@@ -112,3 +126,51 @@ def _refused(response: httpx.Response) -> Refused:
 
 def _text(value: object) -> str:
     return value if isinstance(value, str) else ""
+
+
+def decoded(response: httpx.Response) -> object:
+    """The JSON of an answer. Raises BadAnswer."""
+    try:
+        return msgspec.json.decode(response.content)
+    except msgspec.DecodeError:
+        found = response.headers.get("content-type", "no content type")
+        raise BadAnswer(url=str(response.url), found=f"not JSON ({found})") from None
+
+
+def one(response: httpx.Response, kind: type[T], **more: object) -> T:
+    """The JSON answer as `kind`, with the whole of it as its `document`. Raises BadAnswer."""
+    url, document = str(response.url), decoded(response)
+    if not isinstance(document, dict):
+        raise BadAnswer(url=url, found="JSON, but no object")
+    return _converted(document, kind, url=url, **more)
+
+
+def rows(response: httpx.Response, kind: type[T]) -> list[T]:
+    """The JSON answer as a list of `kind`. Raises BadAnswer."""
+    url, found = str(response.url), decoded(response)
+    if not isinstance(found, list):
+        raise BadAnswer(url=url, found="JSON, but no list")
+    return [_converted(row, kind, url=url) for row in found]
+
+
+def next_page(response: httpx.Response) -> Mapping[str, str]:
+    """What to ask the same address for to get the next page of a list; empty on the last.
+
+    Of the header `Link` only the question is taken: a token goes to no other address, whatever it says.
+    """
+    link = response.links.get("next", {}).get("url", "")
+    try:
+        return dict(httpx.URL(link).params)
+    except httpx.InvalidURL:
+        raise BadAnswer(url=str(response.url), found=f"a next page that is none ({link[:60]})") from None
+
+
+def _converted(document: object, kind: type[T], *, url: str, **more: object) -> T:
+    """`document` as `kind`; a struct gets the whole of it as its member `document`."""
+    value = document
+    if isinstance(document, dict) and hasattr(kind, "__struct_fields__"):
+        value = {**document, "document": document, **more}
+    try:
+        return msgspec.convert(value, kind)
+    except msgspec.ValidationError as error:
+        raise BadAnswer(url=url, found=str(error)) from None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,10 @@ if TYPE_CHECKING:
 
 # A problem that names one of these is about the command's options; any other is about the file.
 OPTIONS = frozenset(
-    {"split", "method", "description", "paper_url", "code_url", "note", "commit", "sort", "m", "visibility"}
+    {
+        *("split", "method", "description", "paper_url", "code_url", "note", "commit"),
+        *("sort", "at", "m", "visibility"),
+    }
 )
 WORDS_OF_403 = frozenset({"token-scope", "token-split"})
 
@@ -34,12 +38,15 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.answers import ClientError  # noqa: PLC0415 -- loads msgspec
     from evaluator.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.exchange import Patience  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)
     if bearer and site.scheme == "http" and site.hostname not in LOOPBACK_HOSTS:
         click.echo(f"Warning: the token goes to {url} unencrypted; use https where you can.", err=True)
+    # A job may begin before its server has; a person who mistyped an address wants to hear of it at once.
+    patience = Patience(n_first_tries=1) if sys.stderr.isatty() else Patience()
     try:
-        with Client(url=url, token=bearer, user_agent=f"tsttc/{version()}") as client:
+        with Client(url=url, token=bearer, user_agent=f"tsttc/{version()}", patience=patience) as client:
             yield client
     except ClientError as error:
         raise in_words(error, url=url) from error

@@ -60,12 +60,15 @@ class Request:
 
 
 class RecordedSite:
-    """Gives the answers put for `METHOD path` in turn, the last one for ever; keeps the requests."""
+    """Gives the answers put for `METHOD path` in turn, the last one for ever; keeps the requests.
 
-    def __init__(self) -> None:
+    Without a `port` it takes one that is free.
+    """
+
+    def __init__(self, *, port: int = 0) -> None:
         self.requests: list[Request] = []
         self._replies: dict[str, list[Reply]] = defaultdict(list)
-        self._server = ThreadingHTTPServer(("127.0.0.1", 0), self._handler())
+        self._server = ThreadingHTTPServer(("127.0.0.1", port), self._handler())
         self._server.daemon_threads = True
         self._thread = threading.Thread(target=self._server.serve_forever, args=(0.01,))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import random
-import socket
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
 from pathlib import Path
@@ -101,15 +100,48 @@ def test_server_that_keeps_cutting_is_reported_after_a_few_tries(
     assert clock.slept_s == sorted(clock.slept_s)
 
 
-def test_address_where_nothing_listens_is_reported_at_once(clock: FakeTime) -> None:
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        url = f"http://127.0.0.1:{unused.getsockname()[1]}"
-        with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
-            client.board("test")
-    assert not caught.value.was_connected
-    assert caught.value.url == url
-    assert clock.slept_s == []
+def test_board_is_asked_for_as_of_a_time_in_an_edition_and_with_intervals(
+    client: Client, site: RecordedSite
+) -> None:
+    answer = Reply({"split": "test", "edition": 2, "entries": []})
+    site.put("GET /api/v1/splits/test/board", answer)
+    site.put("GET /api/v1/splits/test/editions/1/board", answer)
+    board = client.board("test", at="2026-11-20", has_intervals=True)
+    client.board("test", edition=1)
+    assert [request.path for request in site.requests] == [
+        "/api/v1/splits/test/board?sort=rank&at=2026-11-20&intervals=1",
+        "/api/v1/splits/test/editions/1/board?sort=rank",
+    ]
+    assert client.board_page(board) == f"{site.url}/board/test/editions/2/"
+    assert client.board_page(board, sort="-mid", at="2026-11-20") == (
+        f"{site.url}/board/test/?at=2026-11-20&sort=-mid"
+    )
+
+
+def test_one_s_own_method_is_found_on_any_page_and_the_token_goes_nowhere_else(
+    client: Client, site: RecordedSite
+) -> None:
+    def page(name: str, following: str) -> Reply:
+        link = f'<{following}>; rel="next"' if following else ""
+        row = {"id": f"id-{name}", "name": name, "visibility": "PRIVATE"}
+        return Reply([row], headers={"Link": link} if link else {})
+
+    # Whatever host the link names, as that of a proxy would: only its question is taken.
+    pages = [page("a", "https://elsewhere.example/x?after=1&limit=1"), page("b", "/m?after=2"), page("c", "")]
+    site.put("GET /api/v1/methods", *pages)
+    found = client.own_method("c")
+    assert found is not None
+    assert found.id == "id-c"
+    paths = [request.path for request in site.requests]
+    assert paths == ["/api/v1/methods", "/api/v1/methods?after=1&limit=1", "/api/v1/methods?after=2"]
+    assert client.own_method("nowhere") is None
+
+
+def test_pages_that_lead_to_themselves_end(client: Client, site: RecordedSite) -> None:
+    row = {"id": "id-a", "name": "a", "visibility": "PRIVATE"}
+    site.put("GET /api/v1/methods", Reply([row], headers={"Link": '</m?after=1>; rel="next"'}))
+    assert client.own_method("nowhere") is None
+    assert len(site.requests) == 2
 
 
 def test_busy_server_is_asked_again_when_it_said(client: Client, site: RecordedSite, clock: FakeTime) -> None:

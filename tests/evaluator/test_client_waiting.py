@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import io
+import random
+import socket
+from contextlib import ExitStack
 
 import pytest
 
@@ -147,3 +150,52 @@ def test_progress_is_told_as_the_file_is_read_and_begins_anew_with_each_try(
     client.submit(io.BytesIO(data), filename="p", split="val", method="F", on_progress=told.append)
     assert told.count(len(data)) >= 2
     assert [request.parts()["file"][1] for request in site.requests] == [data] * 2
+
+
+# --- first contact ----------------------------------------------------------------------------------------
+
+
+def nothing_listens_at() -> str:
+    with socket.socket() as unused:
+        unused.bind(("127.0.0.1", 0))
+        return f"http://127.0.0.1:{unused.getsockname()[1]}"
+
+
+def test_server_that_starts_seconds_after_the_job_is_waited_for(clock: FakeTime) -> None:
+    """A job and its server, or the network between them, often come up together."""
+    url = nothing_listens_at()
+    with ExitStack() as running:
+
+        def sleep(seconds: float) -> None:
+            was_s = clock.now_s
+            clock.sleep(seconds)
+            if was_s < 5 <= clock.now_s:
+                site = running.enter_context(RecordedSite(port=int(url.rpartition(":")[2])))
+                site.put(ONE, Reply(SCORED))
+
+        with Client(url=url, sleep=sleep, rng=random.Random(0)) as client:
+            assert client.submission("abc").is_final
+    assert 5 <= clock.now_s < 10
+
+
+def test_address_where_nothing_ever_listens_is_reported_within_a_quarter_of_a_minute(
+    clock: FakeTime,
+) -> None:
+    url = nothing_listens_at()
+    with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
+        client.board("test")
+    assert (caught.value.url, caught.value.was_connected, caught.value.was_refused) == (url, False, True)
+    assert clock.slept_s == sorted(clock.slept_s)
+    assert 7 < clock.now_s < 15
+    patience = Patience(n_first_tries=1)
+    with Client(url=url, sleep=clock.sleep, patience=patience) as client, pytest.raises(Unreachable):
+        client.board("test")
+    assert clock.now_s < 15, "one try is one try"
+
+
+@pytest.mark.parametrize("url", ["http://a..b", "http://no-such-host.invalid", f"http://{'a' * 70}.org"])
+def test_host_that_is_none_is_reported_at_once(clock: FakeTime, url: str) -> None:
+    with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
+        client.board("test")
+    assert (caught.value.was_connected, caught.value.was_refused, clock.slept_s) == (False, False, [])
+    assert caught.value.reason
