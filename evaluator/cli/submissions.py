@@ -50,7 +50,10 @@ def _key(_context: click.Context, _parameter: click.Parameter, value: str | None
 @predictions_argument
 @click.option("--split", required=True, callback=slug, help="The split that it predicts: val, test, …")
 @click.option(
-    "--method", callback=sendable, required=True, help="Name of the method; a new name makes a new one."
+    "--method",
+    callback=sendable,
+    required=True,
+    help="Name or id of the method; a new name makes a new one.",
 )
 @click.option("--description", callback=sendable, help="One sentence about the method.")
 @click.option("--paper-url", callback=sendable, metavar="URL", help="Where the paper is.")
