@@ -17,7 +17,9 @@ from evaluator.cli.places import keep_server_of_login, server_of_login
 from evaluator.cli.tokens import account, checked, forget_token, keep_token, required_keyring
 
 if TYPE_CHECKING:
-    from evaluator.answers import Quota
+    from evaluator.answers import Foreseen, Quota
+
+N_MOVED_TOLD = 5  # rows whose rank changes; the first show what the others do
 
 
 @click.command(short_help="Keep a token in the keyring of this machine.")
@@ -129,7 +131,7 @@ def publish(
     """Show METHOD, the name or id of one of your own, to everybody. Public is for ever.
 
     New methods are private: only your team sees them on the boards. An anonymous one shows its numbers under
-    a pseudonym, and can be made public later.
+    a pseudonym, and can be made public later. Before it asks, it shows what everybody will see.
 
     \b
     Examples:
@@ -148,7 +150,8 @@ def publish(
                 exit_code=Exit.USAGE,
                 code="unknown-method",
             )
-        _confirm(found.name, visibility, is_said=yes)
+        if not yes:
+            _confirm(found.name, visibility, client.foreseen(found.id, visibility.upper()))
         shown = client.show_method(found.id, visibility.upper(), reveal_at=reveal_at)
     if as_json:
         echo_json(shown.document)
@@ -159,9 +162,10 @@ def publish(
     click.echo(printable(f"{found.name} is {visibility} now{called}{until}{address}"))
 
 
-def _confirm(name: str, visibility: str, *, is_said: bool) -> None:
-    if is_said:
-        return
+def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
+    """Show what others will see, and ask; where nobody can be asked, say so."""
+    for line in _foreseen_in_words(foreseen):
+        click.echo(line, err=True)
     meaning = {
         "public": "with its name, team and scores, for ever: it can be withdrawn, not hidden again",
         "anonymous": "its scores under a pseudonym, without name and team",
@@ -173,10 +177,37 @@ def _confirm(name: str, visibility: str, *, is_said: bool) -> None:
             exit_code=Exit.USAGE,
             code="not-confirmed",
             hint="Nothing was changed. Say --yes if it is meant.",
+            more={"preview": foreseen.document},
         )
     click.echo(words, err=True)
     if not click.confirm("Go on?", err=True):
         raise Failure("Nothing was changed.", exit_code=Exit.USAGE, code="not-confirmed")
+
+
+def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
+    """What everybody would see: the rows that it would have, and whose ranks would change."""
+    from evaluator.cli.values import texts_of  # noqa: PLC0415 -- the commands about tokens need no scores
+
+    yield printable(f"Everybody will see {foreseen.name}, team {foreseen.team}:")
+    table = [[Cell(text, is_bold=True) for text in ("split", "rank", "of", "MiD", "RTE", "now")]]
+    for sight in foreseen.splits:
+        ranks = [NO_VALUE if rank is None else f"{rank:,}" for rank in (sight.after.rank, sight.n_ranked)]
+        values = texts_of(sight.after, missing=NO_VALUE, scores=("mid", "rte"))
+        now = f"seen as {sight.before.method}" if sight.before else "not seen"
+        table.append([Cell(printable(text)) for text in (sight.split, *ranks, *values, now)])
+    if foreseen.splits:
+        yield from aligned(table, align="<>>..<")
+    else:
+        yield "It has no scored submission on a board yet. What it scores from then on is seen at once."
+    for sight in foreseen.splits:
+        if sight.moved:
+            told = [
+                f"{row.method} {row.rank_before} to {row.rank_after}" for row in sight.moved[:N_MOVED_TOLD]
+            ]
+            rest = len(sight.moved) - len(told)
+            more = f", and {rest:,} more" if rest else ""
+            yield printable(f"On {sight.split} other ranks change: {', '.join(told)}{more}.")
+    yield ""
 
 
 def _asked(url: str) -> str:

@@ -209,9 +209,37 @@ def put_more_documented_answers(site: RecordedSite) -> None:
     site.put("GET /api/v1/methods", Reply([mine]))
     site.put(f"GET /api/v1/methods/{METHOD_ID}", Reply(mine))
     url = f"https://leaderboard.example.org/methods/{METHOD_ID}/"
+    site.put(f"GET /api/v1/methods/{METHOD_ID}/visibility", Reply(_foreseen()))
     site.put(
         f"POST /api/v1/methods/{METHOD_ID}/visibility", Reply(mine | {"visibility": "PUBLIC", "url": url})
     )
+
+
+def _foreseen() -> dict[str, Any]:
+    """What everybody would see of the one submission: the board of test as it is documented."""
+    board = published_board("test", dict(zip(SCORE_NAMES, VALUES, strict=True)))
+    rows = board["entries"]
+    assert isinstance(rows, list)
+    own = next(row for row in rows if row["method"] == "Foo++")
+    moved = [
+        {
+            "method": row["method"],
+            "method_id": None,
+            "rank_before": row["rank"] - 1,
+            "rank_after": row["rank"],
+        }
+        for row in rows
+        if row["rank"] > own["rank"]
+    ]
+    sight = {
+        "split": "test",
+        "edition": 2,
+        "n_ranked": len(rows),
+        "before": None,
+        "after": own,
+        "moved": moved,
+    }
+    return {"visibility": "PUBLIC", "name": "Foo++", "team": "TJU-V", "splits": [sight]}
 
 
 def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object]:

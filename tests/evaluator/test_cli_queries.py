@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -120,6 +123,21 @@ def truth_of_30_recordings(tmp_path: Path) -> Path:
 
 MINE = {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE"}
 SHOW = f"POST /api/v1/methods/{METHOD_ID}/visibility"
+FORESEE = f"GET /api/v1/methods/{METHOD_ID}/visibility"
+SCORES = dict.fromkeys(SCORE_NAMES, 14.0)
+MOVED = [{"method": f"M{n}", "method_id": None, "rank_before": n, "rank_after": n + 1} for n in range(3, 10)]
+FORESEEN: dict[str, Any] = {
+    "visibility": "PUBLIC",
+    "name": "Foo++",
+    "team": "TJU-V\x1b[2J",
+    "splits": [
+        {"split": "test", "edition": 2, "n_ranked": 1207, "before": None, "moved": MOVED}
+        | {"after": {"rank": 3, "method": "Foo++", "scores": SCORES | {"rte": None}}},
+        {"split": "val", "edition": 1, "n_ranked": 6, "moved": []}
+        | {"before": {"rank": 1, "method": "Anonymous 3f9c2a", "scores": SCORES}}
+        | {"after": {"rank": 1, "method": "Foo++", "scores": SCORES}},
+    ],
+}
 
 
 @pytest.mark.parametrize("name", ["Foo++", METHOD_ID])
@@ -127,13 +145,68 @@ def test_publish_shows_one_s_own_method_once_it_is_confirmed(
     tsttc: Tsttc, site: RecordedSite, name: str
 ) -> None:
     site.put("GET /api/v1/methods", Reply([MINE]))
+    site.put(FORESEE, Reply(FORESEEN))
     site.put(SHOW, Reply(MINE | {"visibility": "PUBLIC", "url": "https://e.example/methods/x/"}))
     asked = tsttc("publish", name)
-    assert (asked.exit_code, site.posts) == (2, [])
+    assert (asked.exit_code, asked.stdout, site.posts) == (2, "", [])
     assert "Say --yes if it is meant." in asked.stderr
     result = tsttc("publish", name, "--yes")
     assert (result.exit_code, result.stdout) == (0, "Foo++ is public now: https://e.example/methods/x/\n")
     assert json.loads(site.posts[0].body) == {"visibility": "PUBLIC", "confirm": True, "reveal_at": None}
+
+
+def test_publish_shows_what_everybody_will_see_before_it_asks(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put("GET /api/v1/methods", Reply([MINE]))
+    site.put(FORESEE, Reply(FORESEEN))
+    lines = tsttc("publish", "Foo++").stderr.splitlines()
+    assert lines[0] == r"Everybody will see Foo++, team TJU-V\x1b[2J:"
+    assert [line.split() for line in lines[1:4]] == [
+        ["split", "rank", "of", "MiD", "RTE", "now"],
+        ["test", "3", "1,207", "14.00", "–", "not", "seen"],
+        ["val", "1", "6", "14.00", "14.00", "seen", "as", "Anonymous", "3f9c2a"],
+    ]
+    assert lines[4] == (
+        "On test other ranks change: M3 3 to 4, M4 4 to 5, M5 5 to 6, M6 6 to 7, M7 7 to 8, and 2 more."
+    )
+    assert lines[6].startswith("Error: This shows Foo++ to everybody")
+    assert site.requests[-1].path.endswith(f"/{METHOD_ID}/visibility?as=PUBLIC")
+    refused = tsttc("publish", "Foo++", "--as", "anonymous", "--json")
+    assert json.loads(refused.stdout)["preview"] == FORESEEN
+    assert site.requests[-1].path.endswith("?as=ANONYMOUS")
+    site.put(FORESEE, Reply(FORESEEN | {"splits": []}))
+    tsttc("publish", "Foo++")
+    assert "It has no scored submission on a board yet." in tsttc("publish", "Foo++").stderr
+
+
+def test_publish_asks_a_person_after_what_everybody_will_see(site: RecordedSite) -> None:
+    site.put("GET /api/v1/methods", Reply([MINE]))
+    site.put(FORESEE, Reply(FORESEEN))
+    keyboard, end = os.openpty()
+    os.write(keyboard, b"n\n")
+    environment = {"TSTTC_URL": site.url, "TSTTC_TOKEN": "secret-token"}
+    done = subprocess.run(
+        [sys.executable, "-m", "evaluator", "publish", "Foo++"],
+        stdin=end,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=REPOSITORY,
+        env=os.environ | environment,
+    )
+    os.close(end)
+    os.close(keyboard)
+    assert (done.returncode, done.stdout, site.posts) == (2, "", [])
+    seen, _, asked = done.stderr.partition("This shows Foo++ to everybody")
+    assert seen.startswith("Everybody will see Foo++")
+    assert "Go on? [y/N]: " in asked
+    assert asked.endswith("Error: Nothing was changed.\n")
+
+
+def test_publish_that_is_confirmed_needs_no_preview(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put("GET /api/v1/methods", Reply([MINE]))
+    site.put(SHOW, Reply(MINE | {"visibility": "PUBLIC"}))
+    assert tsttc("publish", "Foo++", "--yes").exit_code == 0
+    assert [request.method for request in site.requests] == ["GET", "POST"]
 
 
 def test_publish_under_a_pseudonym_until_a_day(tsttc: Tsttc, site: RecordedSite) -> None:
