@@ -1,9 +1,13 @@
-"""A board as a table for papers and notes: LaTeX and Markdown, from texts that are formatted already."""
+"""A board as a table for papers and notes: LaTeX and Markdown, from texts that are formatted already.
+
+The site's exports and the command line print their boards by this, so that the same board is the same table.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from typing import Final
 
 from evaluator.escaping import latex, latex_comment, markdown
@@ -34,6 +38,90 @@ class Row:
     method: str
     team: str
     cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """What a table was taken from. `address` is one at which the same board stays; None is not known."""
+
+    split: str
+    address: str
+    edition: int | None = None
+    protocol: str | None = None
+    ground_truth: str | None = None  # its digest
+    n_sequences: int | None = None
+    n_recordings: int | None = None
+    moment: datetime | None = None  # as of which
+    has_own_rows: bool = False
+
+
+def about(origin: Origin) -> tuple[str, ...]:
+    """The lines that stand above or below a table: enough to find it again when the board has moved on."""
+    lines = [f"TSTTC leaderboard, {origin.split}: {origin.address}"]
+    if origin.edition is not None:
+        facts = [f"Edition {origin.edition}"]
+        if origin.protocol:
+            facts.append(f"protocol {origin.protocol}")
+        if origin.n_sequences is not None and origin.n_recordings is not None:
+            facts.append(f"{origin.n_sequences:,} sequences of {origin.n_recordings:,} recordings")
+        lines.append(", ".join(facts))
+    if origin.ground_truth:
+        lines.append(f"Ground truth {origin.ground_truth}")
+    if origin.moment is not None:
+        lines.append(f"As of {origin.moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC")
+    if origin.has_own_rows:
+        lines.append(
+            "Not what everybody sees: rows marked (private) are seen by one team alone, and others see those "
+            "marked (anonymous) under a pseudonym"
+        )
+    return tuple(lines)
+
+
+def mark_of(*, visibility: str, pseudonym: str | None) -> str:
+    """What is said of a row of one's own that others do not see as it is; nothing of any other row.
+
+    >>> mark_of(visibility="PRIVATE", pseudonym=None), mark_of(visibility="ANONYMOUS", pseudonym="Anon 3f")
+    ('private', 'anonymous')
+    >>> mark_of(visibility="ANONYMOUS", pseudonym=None), mark_of(visibility="PUBLIC", pseudonym=None)
+    ('', '')
+    """
+    return "private" if visibility == "PRIVATE" else "anonymous" if pseudonym else ""
+
+
+def marked(name: str, mark: str) -> str:
+    """A name with what is said of its row.
+
+    >>> marked("Owl", "private"), marked("Owl", "")
+    ('Owl (private)', 'Owl')
+    """
+    return f"{name} ({mark})" if mark else name
+
+
+def short_authors(authors: str) -> str:
+    """Authors as a table has room for them.
+
+    >>> short_authors("Yuheng Shi, Zehao Huang, Yan Yan")
+    'Shi et al.'
+    >>> short_authors("Ada Lovelace, Charles Babbage"), short_authors("Ada Lovelace")
+    ('Lovelace and Babbage', 'Ada Lovelace')
+    """
+    names = [name.strip() for name in authors.split(",") if name.strip()]
+    if len(names) < 2:
+        return authors
+    surnames = [name.split()[-1] for name in names]
+    return " and ".join(surnames) if len(names) == 2 else f"{surnames[0]} et al."
+
+
+def rank_text(rank: int | None, *, low: int | None = None, high: int | None = None) -> str:
+    """A rank, and behind it where the row may stand.
+
+    >>> rank_text(2), rank_text(2, low=1, high=3), rank_text(1, low=1, high=1), rank_text(None)
+    ('2', '2 (1–3)', '1 (1)', '–')
+    """
+    text = ABSENT if rank is None else str(rank)
+    if low is None or high is None:
+        return text
+    return f"{text} ({low}{f'–{high}' if high != low else ''})"
 
 
 def columns(metrics: Sequence[str] = METRICS) -> tuple[str, ...]:

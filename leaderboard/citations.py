@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from functools import lru_cache
 from typing import Final
 
+from evaluator import layouts
 from evaluator.escaping import latex, one_line
 from leaderboard.benchmark import PUBLISHED_DIR
 from leaderboard.entries import Entry
@@ -19,7 +20,10 @@ _IN_ADDRESSES: Final = {character: f"%{ord(character):02X}" for character in '{}
 
 
 def board_bibtex(entries: Iterable[Entry]) -> str:
-    """The benchmark's paper, then one entry for each further paper that a row names."""
+    """The benchmark's paper, then one entry for each further paper that a row names.
+
+    That of a row of one's own that others do not see as it is says so in its note, which styles print.
+    """
     found = {benchmark_key(): of_benchmark()}
     for entry in entries:
         if entry.withdrawn_at is None and (entry.source_title or entry.paper_url):
@@ -62,6 +66,7 @@ def of_entry(entry: Entry, *, page: str = "") -> str:
     if entry.kind == "published":
         year = str(entry.year or "")
         return _paper(key_of(entry), entry.source_title, entry.team, year, entry.paper_url)
+    mark = layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
     return _entry(
         key_of(entry),
         {
@@ -69,7 +74,7 @@ def of_entry(entry: Entry, *, page: str = "") -> str:
             "author": f"{{{latex(entry.team)}}}",
             "year": f"{entry.date:%Y}" if entry.date else "",
             **_address(entry.paper_url or page),
-            "note": "TSTTC leaderboard",
+            "note": layouts.marked("TSTTC leaderboard", mark),
         },
     )
 

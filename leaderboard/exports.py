@@ -2,12 +2,15 @@
 
 Every number is the text that the page shows. The texts of strangers are shown as they are and have no power
 over what is around them, in a spreadsheet, a paper or a note.
+
+What a board holds is for whoever draws it to decide. A row of one's own that others do not see as it is says
+so in every form: in a paper it would tell them.
 """
 
 import csv
 import io
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict, fields, replace
 from typing import Final
 
 from evaluator import layouts
@@ -17,13 +20,14 @@ from leaderboard.entries import Details, Entry, Interval
 from leaderboard.filters import BadFilter
 from leaderboard.standings import Board
 
+short_authors = layouts.short_authors
 DECIMALS: Final = 2
 _DETAILS: Final = tuple(field.name for field in fields(Details))
 CSV_COLUMNS: Final = (
     *("rank", "rank_low", "rank_high", "kind", "method", "team", "date"),
     *SCORE_NAMES,
     *("n_attempts", *_DETAILS, "description", "paper_url", "code_url", "source"),
-    *("method_id", "withdrawn_at"),
+    *("method_id", "withdrawn_at", "visibility"),
 )
 """Of a board; with intervals the lower and upper ends of the ten values follow."""
 
@@ -65,9 +69,19 @@ WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
 
 def has_intervals(text: str) -> bool:
     """Whether an address asks for intervals; without a word it does not. Raises `filters.BadFilter`."""
+    return is_asked_for("intervals", text)
+
+
+def is_asked_for(name: str, text: str) -> bool:
+    """Whether an address asks for more than usual; without a word it does not. Raises `filters.BadFilter`."""
     if text and text not in WITH_INTERVALS:
-        raise BadFilter("intervals", text, f"one of {', '.join(WITH_INTERVALS)}")
+        raise BadFilter(name, text, f"one of {', '.join(WITH_INTERVALS)}")
     return WITH_INTERVALS.get(text, False)
+
+
+def mark_of(entry: Entry) -> str:
+    """What is said of a row of one's own that others do not see as it is; nothing of any other row."""
+    return layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
 
 
 # --- a board ---------------------------------------------------------------------------------------------
@@ -108,6 +122,7 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
         **{name: getattr(entry, name) for name in ("description", "paper_url", "code_url", "source")},
         "method_id": entry.method_id,
         "withdrawn_at": entry.withdrawn_at.isoformat() if entry.withdrawn_at else None,
+        "visibility": entry.visibility,
     }
     if has_intervals:
         for name in SCORE_NAMES:
@@ -135,24 +150,28 @@ def board_markdown(
 
 def about(board: Board, *, address: str) -> tuple[str, ...]:
     """What a table was taken from: enough to find it again when the board has moved on."""
-    lines = [f"TSTTC leaderboard, {board.split.pk}: {address}"]
-    if board.edition is not None:
-        truth = board.edition.ground_truth
-        lines += [
-            f"Edition {board.edition.number}, protocol {board.edition.protocol}, "
-            f"{truth.n_sequences:,} sequences of {truth.n_recordings:,} recordings",
-            f"Ground truth {truth.digest}",
-        ]
-    moment = board.at or board.updated_at
-    if moment is not None:
-        lines.append(f"As of {moment:%Y-%m-%d %H:%M} UTC")
-    return tuple(lines)
+    truth = board.edition.ground_truth if board.edition else None
+    origin = layouts.Origin(
+        split=board.split.pk,
+        address=address,
+        edition=board.edition.number if board.edition else None,
+        protocol=board.edition.protocol if board.edition else None,
+        ground_truth=truth.digest if truth else None,
+        n_sequences=truth.n_sequences if truth else None,
+        n_recordings=truth.n_recordings if truth else None,
+        moment=board.at or board.updated_at,
+        has_own_rows=any(mark_of(entry) for entry in board.entries if entry.withdrawn_at is None),
+    )
+    return layouts.about(origin)
 
 
 def _layout(board: Board, *, metrics: Sequence[str], has_intervals: bool) -> list[layouts.Row]:
     columns = layouts.columns(metrics)
     return [
-        _layout_row(entry, columns=columns, has_intervals=has_intervals)
+        replace(
+            _layout_row(entry, columns=columns, has_intervals=has_intervals),
+            method=layouts.marked(entry.method, mark_of(entry)),
+        )
         for entry in board.entries
         if entry.withdrawn_at is None
     ]
@@ -173,12 +192,8 @@ def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) ->
 
 
 def _rank(entry: Entry, *, has_range: bool) -> str:
-    text = layouts.ABSENT if entry.rank is None else str(entry.rank)
-    found = entry.intervals.get("mid", Interval())
-    if not has_range or found.rank_low is None or found.rank_high is None:
-        return text
-    both = str(found.rank_low) if found.rank_low == found.rank_high else f"{found.rank_low}–{found.rank_high}"
-    return f"{text} ({both})"
+    found = entry.intervals.get("mid", Interval()) if has_range else Interval()
+    return layouts.rank_text(entry.rank, low=found.rank_low, high=found.rank_high)
 
 
 def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:
@@ -190,18 +205,3 @@ def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:
         is_best=name in entry.best,
         is_second=name in entry.second,
     )
-
-
-def short_authors(authors: str) -> str:
-    """Authors as a table has room for them.
-
-    >>> short_authors("Yuheng Shi, Zehao Huang, Yan Yan")
-    'Shi et al.'
-    >>> short_authors("Ada Lovelace, Charles Babbage"), short_authors("Ada Lovelace")
-    ('Lovelace and Babbage', 'Ada Lovelace')
-    """
-    names = [name.strip() for name in authors.split(",") if name.strip()]
-    if len(names) < 2:
-        return authors
-    surnames = [name.split()[-1] for name in names]
-    return " and ".join(surnames) if len(names) == 2 else f"{surnames[0]} et al."

@@ -73,7 +73,7 @@ def draw_board(
         "board": shown,
         "table": table,
         "tools": tools(shown, query),
-        "exports": export_views.links(split, edition, query),
+        "exports": export_views.offers(shown, edition, query),
     }
     return render(request, template, context | more)
 

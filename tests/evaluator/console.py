@@ -266,7 +266,16 @@ def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object
         entries.append(row | {"method_id": REJECTED_ID})
     entries.sort(key=lambda entry: entry["scores"]["mid"])
     ranked = [{"rank": rank, **entry} for rank, entry in enumerate(entries, start=1)]
-    return {"split": split, "edition": 2, "updated_at": "2026-11-20T12:00:00Z", "entries": ranked}
+    return {
+        "split": split,
+        "edition": 2,
+        "protocol": "tsttc-1",
+        "ground_truth": "sha256:" + "9f" * 32,
+        "n_sequences": COUNTS["overall"],
+        "n_recordings": 120,
+        "updated_at": "2026-11-20T12:00:00Z",
+        "entries": ranked,
+    }
 
 
 def main() -> None:

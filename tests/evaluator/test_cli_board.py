@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import socket
 import subprocess
 import sys
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,11 @@ from click.testing import Result
 
 from evaluator.answers import Board
 from evaluator.cli import standings
+from evaluator.cli.connection import connect
+from evaluator.client import Client
+from evaluator.exchange import Patience
 from evaluator.protocol import SCORE_NAMES
+from tests.evaluator.fake_time import FakeTime
 from tests.evaluator.recorded_site import RecordedSite, Reply, problem
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -66,15 +72,32 @@ Tsttc = Callable[..., Result]
 pytestmark = pytest.mark.usefixtures("at_site")
 
 
-def test_unreachable_server_is_told_with_its_address(tsttc: Tsttc, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_unreachable_server_is_told_with_its_address(
+    tsttc: Tsttc, clock: FakeTime, monkeypatch: pytest.MonkeyPatch
+) -> None:
     with socket.socket() as unused:
         unused.bind(("127.0.0.1", 0))
         url = f"http://127.0.0.1:{unused.getsockname()[1]}"
-        monkeypatch.setenv("TSTTC_URL", url)
-        result = tsttc("board")
+    monkeypatch.setenv("TSTTC_URL", url)
+    monkeypatch.setattr("evaluator.client.Client", partial(Client, sleep=clock.sleep))
+    result = tsttc("board")
     assert result.exit_code == 3
     assert result.stderr.startswith(f"Error: Nothing answers at {url} (")
     assert "Check --server" in result.stderr
+    assert 7 < clock.now_s < 15, "a job may begin before its server has"
+
+
+@pytest.mark.parametrize(("is_terminal", "n_tries"), [(True, 1), (False, Patience().n_first_tries)])
+def test_person_who_watches_hears_of_a_silent_address_at_once(
+    monkeypatch: pytest.MonkeyPatch, is_terminal: bool, n_tries: int
+) -> None:
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return is_terminal
+
+    monkeypatch.setattr(sys, "stderr", Screen())
+    with connect("http://127.0.0.1:9", with_token=False) as client:
+        assert client.patience.n_first_tries == n_tries
 
 
 @pytest.mark.parametrize(
@@ -164,10 +187,45 @@ def test_names_of_strangers_cannot_steer_the_terminal(tsttc: Tsttc, site: Record
     assert r"a\nb\x07" in shown
 
 
-def test_private_rows_of_one_s_own_team_are_marked(tsttc: Tsttc, site: RecordedSite) -> None:
-    entries = [row | {"visibility": "PRIVATE"} for row in BOARD_DOCUMENT["entries"][1:2]]
+def test_rows_of_one_s_own_team_that_others_do_not_see_are_marked(tsttc: Tsttc, site: RecordedSite) -> None:
+    row = BOARD_DOCUMENT["entries"][1]
+    masked = row | {"method": "Bar", "visibility": "ANONYMOUS", "pseudonym": "Anonymous 3f9c2a"}
+    theirs = row | {"method": "Anonymous 77aa00", "visibility": "ANONYMOUS", "pseudonym": None}
+    entries = [row | {"visibility": "PRIVATE"}, masked, theirs]
     site.put(BOARD, Reply(BOARD_DOCUMENT | {"entries": entries}))
-    assert "Foo++ (private)" in tsttc("board", "--mine").stdout
+    shown = tsttc("board", "--mine").stdout
+    assert "Foo++ (private)  " in shown
+    assert "Bar (anonymous)  " in shown
+    assert "Anonymous 77aa00  " in shown
+    assert site.requests[0].headers["Authorization"] == "Bearer secret-token"
+
+
+def test_board_is_shown_in_an_edition_as_of_a_time_and_with_intervals(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    row = BOARD_DOCUMENT["entries"][1]
+    known = {"mid": {"low": 19.5, "high": 20.75, "rank_low": 1, "rank_high": 2, "is_with_best": True}}
+    answer = Reply(BOARD_DOCUMENT | {"entries": [BOARD_DOCUMENT["entries"][0], row | {"intervals": known}]})
+    site.put(BOARD, answer)
+    site.put("GET /api/v1/splits/test/editions/1/board", answer)
+    lines = tsttc("board", "--at", "2026-11-20", "--intervals").stdout.splitlines()
+    assert "20.00 [19.50, 20.75]  21.00  " in lines[5]
+    assert lines[5].split()[:2] == ["2", "(1–2)"]
+    assert lines[4].index(".8") == lines[5].index(".00"), "decimal points stand below each other"
+    assert tsttc("board", "--edition", "1").exit_code == 0
+    assert [request.path for request in site.requests] == [
+        "/api/v1/splits/test/board?sort=rank&at=2026-11-20&intervals=1",
+        "/api/v1/splits/test/editions/1/board?sort=rank",
+    ]
+    for arguments in (["--edition", "0"], ["--edition", "x"], ["--edition", "1", "--at", "2026-11-20"]):
+        assert tsttc("board", *arguments).exit_code == 2
+    assert len(site.requests) == 2
+
+
+def test_moment_that_is_none_is_wrong_usage_in_the_server_s_words(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(BOARD, Reply(problem("'soon' is no date or time.", code="bad-moment", where="at"), 400))
+    result = tsttc("board", "--at", "soon")
+    assert (result.exit_code, result.stderr) == (2, "Error: 'soon' is no date or time.\n")
 
 
 def found(document: dict[str, Any]) -> Board:

@@ -32,7 +32,7 @@ TTC_S = read_predictions(PREDICTIONS, manifest=MANIFEST).ttc_s
 
 HOSTILE = r"\input{x} $a_b$ | *c* <i> =1+1" + "\x1b[31m\n"
 VALUES: dict[str, Any] = dict.fromkeys(SCORE_NAMES, 20.0)
-BOARD = {
+BOARD: dict[str, Any] = {
     "split": "test",
     "edition": 2,
     "entries": [
@@ -42,6 +42,15 @@ BOARD = {
         | {"withdrawn_at": "2026-11-20T12:00:00Z"},
     ],
 }
+
+
+OWN = [
+    {"rank": 1, "method": "Owl", "team": "T", "visibility": "PRIVATE", "scores": VALUES | {"mid": 1.0}},
+    {"rank": 2, "method": "Bat", "team": "T", "visibility": "ANONYMOUS", "pseudonym": "Anonymous 3f9c2a"}
+    | {"scores": VALUES},
+    {"rank": 2, "method": "Anonymous 77aa00", "team": "Anonymous", "visibility": "ANONYMOUS"}
+    | {"scores": VALUES},
+]
 
 
 @pytest.fixture
@@ -81,6 +90,60 @@ def test_board_as_markdown_is_one_line_for_each_entry(board: Callable[[str], str
     assert "**14.50**" in rows[2]
     assert "<i>" not in text
     assert "\x1b" not in text
+
+
+@pytest.mark.parametrize("form", ["latex", "markdown"])
+def test_rows_that_others_do_not_see_are_marked_and_take_no_mark_of_a_column(
+    tsttc: Tsttc, site: RecordedSite, at_site: None, form: str
+) -> None:
+    site.put("GET /api/v1/splits/test/board", Reply(BOARD | {"entries": [*OWN, *BOARD["entries"]]}))
+    text = tsttc("board", "--mine", "--format", form).stdout.replace("\\", "")
+    assert "Owl (private) " in text
+    assert "Bat (anonymous) " in text
+    assert "Anonymous 77aa00 " in text
+    assert "Not what everybody sees: rows marked (private)" in text
+    best = {"latex": "textbf{{{}}}", "markdown": "**{}**"}[form]
+    assert best.format("14.50") in text
+    assert best.format("1.00") not in text
+
+
+def test_spreadsheet_says_who_sees_each_row(tsttc: Tsttc, site: RecordedSite, at_site: None) -> None:
+    site.put("GET /api/v1/splits/test/board", Reply(BOARD | {"entries": [*OWN, *BOARD["entries"]]}))
+    rows = list(csv.DictReader(io.StringIO(tsttc("board", "--mine", "--format", "csv").stdout)))
+    assert [row["visibility"] for row in rows] == ["PRIVATE", "ANONYMOUS", "ANONYMOUS", *["PUBLIC"] * 3]
+    assert rows[0]["method"] == "Owl", "a program finds the name as it is"
+
+
+def test_tables_say_where_they_were_taken_from(tsttc: Tsttc, site: RecordedSite, at_site: None) -> None:
+    told = {"protocol": "tsttc-1", "ground_truth": "sha256:" + "9f" * 32, "n_sequences": 28600}
+    told |= {"n_recordings": 120, "updated_at": "2026-11-20T12:34:56.789Z"}
+    site.put("GET /api/v1/splits/test/board", Reply(BOARD | told))
+    assert tsttc("board", "--format", "latex").stdout.splitlines()[:5] == [
+        f"% TSTTC leaderboard, test: {site.url}/board/test/editions/2/",
+        "% Edition 2, protocol tsttc-1, 28,600 sequences of 120 recordings",
+        "% Ground truth sha256:" + "9f" * 32,
+        "% As of 2026-11-20 12:34 UTC",
+        r"% It needs \usepackage{booktabs}.",
+    ]
+    asked = ["--at", "2026-11-20", "--sort", "-mid", "--format", "latex"]
+    first = tsttc("board", *asked).stdout.splitlines()[0]
+    assert first == f"% TSTTC leaderboard, test: {site.url}/board/test/?at=2026-11-20&sort=-mid"
+
+
+def test_intervals_stand_in_every_form(tsttc: Tsttc, site: RecordedSite, at_site: None) -> None:
+    known = {"low": 14.1, "high": 15.0, "rank_low": 1, "rank_high": 1}
+    rows = [BOARD["entries"][0] | {"intervals": {"mid": known}}, *BOARD["entries"][1:]]
+    site.put("GET /api/v1/splits/test/board", Reply(BOARD | {"entries": rows}))
+    latex, markdown, text = (
+        tsttc("board", "--intervals", "--format", form).stdout for form in ("latex", "markdown", "csv")
+    )
+    assert r"1 (1) & =cmd & T & \textbf{14.50} {\scriptsize [14.10, 15.00]} & " in latex
+    assert r"| 1 (1) | \=cmd | T | **14.50** [14.10, 15.00] | " in markdown
+    first, second, _ = csv.DictReader(io.StringIO(text))
+    ends = ("rank_low", "rank_high", "mid_low", "mid_high", "rte_negative_high")
+    assert [first[name] for name in ends] == ["1", "1", "14.10", "15.00", ""]
+    assert {second[name] for name in ends} == {""}
+    assert all(request.path.endswith("&intervals=1") for request in site.requests)
 
 
 def test_board_as_json_is_the_same_by_both_names(tsttc: Tsttc, board: Callable[[str], str]) -> None:

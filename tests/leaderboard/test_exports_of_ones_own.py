@@ -1,0 +1,174 @@
+"""Exports end up in papers: they hold what everybody sees, and one's own rows for who asks, marked."""
+
+import csv
+import html
+import io
+import re
+
+import msgspec
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from evaluator import answers
+from evaluator.cli import formats
+from leaderboard import teams
+from leaderboard.models import Edition, Method, User, Visibility
+from tests import board_rows, pages
+from tests.leaderboard.test_exports import boards_changed, text_of
+
+FORMS = ("csv", "tex", "md", "bib")
+PAPER = "https://example.org/papers/own"
+
+
+@pytest.fixture
+def own(edition: Edition, owner: User) -> list[Method]:
+    """Of the owner's team a private, an anonymous and a public method; of another's an anonymous one."""
+    private, masked, public, others = board_rows.fill(edition, n=4, user=owner)
+    team = teams.team_of(user=owner)
+    for method, name, visibility in (
+        (private, "Secretissimo", Visibility.PRIVATE),
+        (masked, "Maskenball", Visibility.ANONYMOUS),
+        (public, "Offenbach", Visibility.PUBLIC),
+    ):
+        Method.objects.filter(pk=method.pk).update(
+            team=team, name=name, visibility=visibility, paper_url=PAPER
+        )
+    Method.objects.filter(pk=others.pk).update(visibility=Visibility.ANONYMOUS, name="Theirs")
+    boards_changed()
+    return [private, masked, public, others]
+
+
+@pytest.mark.parametrize("query", ["", "?intervals=1", "?q=e&sort=-mid", "?mine=0"])
+@pytest.mark.parametrize("form", FORMS)
+def test_whoever_takes_a_board_along_takes_what_everybody_sees(
+    own: list[Method], owner: User, teammate: User, client: Client, form: str, query: str
+) -> None:
+    for path in ("/board/test", "/board/test/editions/1"):
+        everybodys = Client().get(f"{path}.{form}{query}").content
+        for user in (owner, teammate):
+            client.force_login(user)
+            answer = client.get(f"{path}.{form}{query}")
+            assert answer.content == everybodys
+            assert answer["Cache-Control"] == "private, no-store"
+    for secret in (b"Secretissimo", b"Maskenball", b"private)", b"anonymous)"):
+        assert secret not in everybodys
+
+
+@pytest.mark.parametrize("form", ["tex", "md", "bib"])
+def test_one_s_own_rows_come_marked_for_who_asks(
+    own: list[Method], owner: User, client: Client, form: str
+) -> None:
+    client.force_login(owner)
+    text = text_of(client, form, "?mine=1").replace("\\", "")
+    marked = {
+        "tex": r"{} \({}\) &",
+        "md": r"{} \({}\) \|",
+        "bib": r"title = {{{{{}}}}}[^@]*leaderboard \({}\)",
+    }
+    for name, mark in (("Secretissimo", "private"), ("Maskenball", "anonymous")):
+        assert re.search(marked[form].format(name, mark), text), text
+        assert len(re.findall(name, text)) == 1
+    assert re.search(r"Offenbach (&|\|)", text) or form == "bib"
+    assert own[1].pseudonym not in text
+    assert "Theirs" not in text
+    assert (own[3].pseudonym in text) == (form != "bib")
+    assert ("Not what everybody sees" in text) == (form != "bib")
+
+
+def test_the_spreadsheet_says_who_sees_each_row(own: list[Method], owner: User, client: Client) -> None:
+    def seen(query: str) -> dict[str, str]:
+        rows = csv.DictReader(io.StringIO(text_of(client, "csv", query)))
+        return {row["method"]: row["visibility"] for row in rows if row["kind"] == "submission"}
+
+    client.force_login(owner)
+    others = {"Offenbach": "PUBLIC", own[3].pseudonym: "ANONYMOUS"}
+    assert seen("") == {own[1].pseudonym: "ANONYMOUS", **others}
+    assert seen("?mine=1") == {"Secretissimo": "PRIVATE", "Maskenball": "ANONYMOUS", **others}
+
+
+def test_private_rows_take_nobody_s_rank_and_no_mark(own: list[Method], owner: User, client: Client) -> None:
+    client.force_login(owner)
+
+    def lines(query: str) -> set[str]:
+        body = text_of(client, "tex", query).partition("\\midrule\n")[2]
+        return {re.sub(r"& .*? & .*? &", "&", line, count=1) for line in body.splitlines()}
+
+    added = lines("?mine=1") - lines("")
+    assert len(added) == 1
+    assert not re.search("textbf|underline", added.pop())
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_nobody_s_own_rows_are_a_clear_refusal(own: list[Method], form: str, client: Client) -> None:
+    answer = client.get(f"/board/test.{form}?mine=1")
+    assert answer.status_code == 400
+    assert "nobody is signed in" in pages.page(answer).one("main").text
+    assert client.get(f"/board/test.{form}?mine=1", headers={"Authorization": "Bearer x"}).status_code == 400
+    assert client.get(f"/board/test.{form}?mine=perhaps").status_code == 400
+
+
+def test_who_has_no_such_rows_gets_everybody_s(own: list[Method], stranger: User, client: Client) -> None:
+    client.force_login(stranger)
+    assert text_of(client, "tex", "?mine=1") == text_of(client, "tex")
+
+
+def links(client: Client, address: str = "/board/test/") -> dict[str, list[str]]:
+    """What a page offers: by the words before, the addresses."""
+    found = pages.page(client.get(address)).all("p", class_="take-along")
+    return {p.text.partition(":")[0]: [a.attributes["href"] for a in p.all("a")] for p in found}
+
+
+def test_the_page_offers_every_form_with_and_without_intervals(own: list[Method], client: Client) -> None:
+    (offered,) = links(client, "/board/test/?sort=rte").values()
+    forms = [f"/board/test.{form}?sort=rte" for form in ("csv", "json", "tex", "md", "bib")]
+    sure = [f"{address}&intervals=1" for address in forms[:-1]]
+    assert offered == [*forms, *sure, "/board/test/feed.atom"]
+    for address in offered:
+        assert client.get(address, follow=True).status_code == 200
+    assert r"\scriptsize" in client.get(sure[2]).text
+
+
+def test_the_page_offers_one_s_own_rows_to_who_has_some(
+    own: list[Method], owner: User, stranger: User, client: Client
+) -> None:
+    client.force_login(stranger)
+    assert links(client).keys() == {"Take it along"}
+    client.force_login(owner)
+    offered = links(client)
+    assert offered.keys() == {
+        "Take it along as everybody sees it",
+        "With your own rows, marked, for nobody else",
+    }
+    everybodys, with_own = offered.values()
+    # The API's document is that of whoever asks: with their own rows, which it marks.
+    assert not [address for address in everybodys if ".json" in address or "mine" in address]
+    assert with_own[:5] == [f"/board/test.{form}?mine=1" for form in ("csv", "json", "tex", "md", "bib")]
+    document = client.get(with_own[1], follow=True).json()
+    told = {row["method"]: (row["visibility"], row["pseudonym"]) for row in document["entries"]}
+    assert told["Secretissimo"] == ("PRIVATE", None)
+    assert told["Maskenball"] == ("ANONYMOUS", own[1].pseudonym)
+    assert told[own[3].pseudonym] == ("ANONYMOUS", None)
+    # Where no such row fits the filter there is nothing to add.
+    assert links(client, "/board/test/?q=Offenbach").keys() == {"Take it along"}
+
+
+# --- the same from the command line ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("query", ["", "intervals=1", "sort=-rte_large", "at=NOW&sort=team"])
+@pytest.mark.parametrize("path", ["", "/editions/1"])
+@pytest.mark.parametrize("form", ["tex", "md"])
+def test_command_line_and_site_write_the_same_table(
+    own: list[Method], owner: User, client: Client, form: str, path: str, query: str
+) -> None:
+    write = {"tex": formats.as_latex, "md": formats.as_markdown}[form]
+    client.force_login(owner)
+    query = query.replace("NOW", f"{timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}")
+    for reader, mine in ((Client(), ""), (client, "&mine=1")):
+        there = text_of(reader, form, f"?{query}{mine}", split=f"test{path}")
+        document = reader.get(f"/api/v1/splits/test{path}/board?{query}").json()
+        board = msgspec.convert({**document, "document": document}, answers.Board)
+        address = re.search(r"(?<=test: )\S+", html.unescape(there.replace("\\", "")))
+        assert address is not None
+        assert write(board, address=address[0]) == there
