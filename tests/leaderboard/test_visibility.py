@@ -181,9 +181,10 @@ def test_the_preview_is_what_everybody_then_sees(method: Method, owner: User, to
         data = builders.predictions(split().published_edition, factor=1.5)
         builders.submit(owner, data, method=name, visibility=shown)
     builders.score_all()
-    foreseen = visibility.preview(method=method, visibility=to, now=timezone.now())
+    now = timezone.now()
+    foreseen = visibility.preview(method=method, visibility=to, now=now)
     assert method.visibility == Visibility.PRIVATE
-    change(method, to, owner)
+    visibility.change(method=method, visibility=to, actor=owner, now=now)
     (sight,) = foreseen.sights
     entry = rows()[foreseen.profile.name]
     assert sight.entry == entry
