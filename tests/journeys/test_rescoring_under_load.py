@@ -26,7 +26,7 @@ from leaderboard.demo.truth import simulate
 from tests import crowd
 from tests.chaos.services import postgres_folder, redis_program
 from tests.chaos.site import SPLIT, Site, running_site
-from tests.journeys.production import REPOSITORY, await_that
+from tests.journeys.production import PATIENCE_S, REPOSITORY, await_that
 from tests.services import ServiceMissing, skip_or_fail
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
@@ -99,11 +99,15 @@ def n_undecided(site: Site) -> int:
 
 
 def n_held(site: Site) -> int:
-    """Evaluations of the second edition that a worker has in hand."""
+    """Evaluations of the second edition that a worker has in hand.
+
+    Not those that are locked: they are about to be decided, even if whoever said so is stopped or killed.
+    """
     return ask(
         site,
-        "SELECT count(*) FROM leaderboard_evaluation e JOIN leaderboard_edition d ON d.id = e.edition_id "
-        "WHERE d.number = 2 AND e.status = 'RUNNING'",
+        "SELECT count(*) FROM (SELECT e.id FROM leaderboard_evaluation e "
+        "JOIN leaderboard_edition d ON d.id = e.edition_id "
+        "WHERE d.number = 2 AND e.status = 'RUNNING' FOR UPDATE OF e SKIP LOCKED) held",
     )
 
 
@@ -232,7 +236,7 @@ def kill_a_worker_with_a_batch(site: Site, is_opened: Callable[[], bool]) -> int
         working.send(signal.SIGCONT)
         return False
 
-    deadline_s = time.monotonic() + 60
+    deadline_s = time.monotonic() + PATIENCE_S
     while not has_hands_full():
         assert time.monotonic() < deadline_s, "the second edition was never in hand"
     n_lost = n_held(site)
