@@ -14,7 +14,7 @@ from tests.browser.site import open_split, web_alone
 from tests.journeys.production import Site
 
 PASSWORD = "kestrel-altimeter-9"
-PATIENCE_MS = 30_000
+PATIENCE_MS = 120_000
 MAX_PREDICTIONS_BYTES = 200_000
 
 NewPage = Callable[..., Page]

@@ -13,7 +13,7 @@ from tests.browser.chromium import NARROW, WIDE
 from tests.browser.conftest import PASSWORD, NewPage, show, sign_up, submit
 from tests.browser.site import open_split, predictions, web_alone, worker
 from tests.browser.test_looks import SCREENS, look_at
-from tests.journeys.production import Site
+from tests.journeys.production import Site, await_that, get
 
 pytestmark = pytest.mark.browser
 
@@ -70,6 +70,12 @@ def rows(page: Page) -> list[str]:
     return page.locator("table.board tbody tr").all_inner_texts()
 
 
+def have_intervals(site: Site, *methods: str) -> bool:
+    """Whether these methods' rows are complete: intervals come after the scores."""
+    found = [row for row in get(site.url + BOARD).text.split("<tr") if "95 % interval: " in row]
+    return all(any(f">{method}</a>" in row for row in found) for method in methods)
+
+
 def decide(page: Page, *, reason: str, button: str) -> None:
     """Give a reason and go through with it; the page is the board afterwards."""
     page.get_by_label("Reason").fill(reason)
@@ -87,6 +93,7 @@ def test_from_opening_to_the_board_and_back(
         show(team)
     with worker(site):
         expect(team.locator("[aria-current=step] .label")).to_have_text("Scored")
+        await_that(lambda: have_intervals(site, "Near", "Far"), what="both have their intervals")
     submission, before = team.url, rows(keeper)
     site.manage("open_edition", SPLIT, "--truth", str(corrected(site, factor=3.0)))
 
