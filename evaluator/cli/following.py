@@ -58,6 +58,4 @@ def state_in_words(submission: Submission) -> str:
         words += f", {submission.queue.ahead:,} ahead"
         if submission.queue.estimate_s is not None:
             words += f", about {submission.queue.estimate_s:.0f} s"
-    if submission.awaits_intervals:
-        words += ", intervals follow"
     return words

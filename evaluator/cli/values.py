@@ -50,6 +50,8 @@ def in_short(submission: Submission) -> Iterator[str]:
     ]
     if errors:
         yield f"{', '.join(errors)}, in brackets at 95 %"
+    elif submission.awaits_intervals:
+        yield "Intervals are being computed."
 
 
 def range_text(low: int | None, high: int | None) -> str:

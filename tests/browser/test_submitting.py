@@ -132,17 +132,20 @@ def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.G
     page.evaluate("window.isTheSamePage = true")
     with worker(site):
         await_step(page, "Scored")
-    expect(page.locator(".result table")).to_have_count(2)
-    expect(page.locator("#outcome")).to_contain_text("truncated")
+        expect(page.locator(".result table")).to_have_count(2)
+        expect(page.locator("#outcome")).to_contain_text("truncated")
+        expect(page.locator(".result .span").first).to_contain_text("–")
+    expect(page.locator("[aria-current=step]")).not_to_have_class(re.compile("moving"))
     assert page.evaluate("window.isTheSamePage") is True
 
 
-def test_polling_ends_with_the_result(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
+def test_polling_ends_with_the_intervals(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
     page.clock.install()
     sign_up(page, email="ends@example.org", name="Ends")
     submit(page, predictions(truth, factor=1.2), method="Ending")
     with worker(site):
         await_step(page, "Scored")
+        expect(page.locator("[aria-current=step] .note")).to_have_count(0)
     asked: list[str] = []
     page.on("request", lambda request: asked.append(request.url))
     page.clock.fast_forward(10_000)

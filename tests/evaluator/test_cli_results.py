@@ -65,10 +65,8 @@ def test_server_that_tells_neither_is_no_fault(tsttc: Tsttc, site: RecordedSite)
 
 
 @pytest.mark.usefixtures("at_site")
-def test_status_says_that_intervals_follow_and_does_not_wait(tsttc: Tsttc, site: RecordedSite) -> None:
-    site.put(GET, Reply(AWAITED))
-    result = tsttc("status", ID)
-    assert result.stdout.startswith("SCORED, intervals follow: Foo++ on val\nrank 2\n\n")
+def test_status_says_that_intervals_are_computed_and_does_not_wait(tsttc: Tsttc, site: RecordedSite) -> None:
+    assert said(tsttc, site, AWAITED) == ["rank 2", "Intervals are being computed."]
     assert len(site.requests) == 1
 
 

@@ -49,8 +49,9 @@ def test_submission_scores_what_score_says_offline(tsttc: Tsttc, predictions: st
     assert builders.score_all() == 1
     done = tsttc("status", identity, "--watch")
     assert done.returncode == 0, done.stderr
-    assert done.stdout.splitlines()[0] == "SCORED: Foo++ on val"
-    assert done.stdout.splitlines()[2:] == offline[: offline.index("", 4)]
+    lines = done.stdout.splitlines()
+    assert lines[:2] == ["SCORED: Foo++ on val", "shown to everybody it would be rank 1"]
+    assert lines[lines.index("") + 1 :] == offline[: offline.index("", 4)]
 
 
 def test_rejection_has_the_words_of_check(tsttc: Tsttc) -> None:
