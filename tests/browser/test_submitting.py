@@ -10,7 +10,7 @@ import evaluator
 from tests.browser.chromium import NARROW, tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import predictions, worker
-from tests.journeys.production import Site
+from tests.journeys.production import Site, await_that, get
 
 pytestmark = pytest.mark.browser
 
@@ -65,6 +65,9 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     site.manage("shell", "-v0", "-c", RIVAL)
     with worker(site):
         await_step(page, "Scored")
+        # Afterwards the page stands still, and the other method is on the board as well.
+        expect(page.locator("[aria-current=step] .note")).to_have_count(0)
+        await_that(lambda: "By somebody else" in get(f"{site.url}/board/test/").text, what="all is scored")
     tab_to(page, "Make it public…")
     press("Enter")
     page.wait_for_url("**/visibility/")
