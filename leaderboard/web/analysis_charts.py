@@ -76,7 +76,8 @@ def _curve(bins: Sequence[Mapping[str, Any]]) -> Chart:
         for metric, symbol in METRIC_SYMBOLS.items()
         if bins
     )
-    return Chart("curve", panels, ("Time to contact in s", "Sequences", "MiD", "RTE"), points)
+    columns = ("Time to contact in s", "Sequences", "MiD ×10⁻⁴", "RTE %")
+    return Chart("curve", panels, columns, points, numbers=(1, 2, 3))
 
 
 def _steps(bins: Sequence[Mapping[str, Any]], metric: str) -> SafeString:
@@ -111,9 +112,9 @@ def _histogram(bins: Sequence[Mapping[str, Any]]) -> Chart:
         for row in bins
     )
     panels = (
-        (("Sequences by MiD, ×10⁻⁴; the last bar holds all that is larger", _bars(bins)),) if bins else ()
+        (("Sequences by MiD, ×10⁻⁴; the last bar holds all that lies beyond", _bars(bins)),) if bins else ()
     )
-    return Chart("histogram", panels, ("MiD", "Sequences"), points)
+    return Chart("histogram", panels, ("MiD ×10⁻⁴", "Sequences"), points, numbers=(1,))
 
 
 def _bars(bins: Sequence[Mapping[str, Any]]) -> SafeString:
@@ -126,8 +127,21 @@ def _bars(bins: Sequence[Mapping[str, Any]]) -> SafeString:
         for i, row in enumerate(bins)
     )
     parts.append(format_html('<path class="bars" d="{}"/>', bars))
-    parts += [frame.column_label(float(i), f"{bins[i]['low']:.3g}") for i in range(0, len(bins), 6)]
+    parts += [frame.column_label(at, tick_text(tick)) for at, tick in _bar_ticks(bins)]
     return frame.svg("How many sequences have which MiD; the table below says the same.", parts)
+
+
+def _bar_ticks(bins: Sequence[Mapping[str, Any]]) -> list[tuple[float, float]]:
+    """Round values of MiD, and where they stand among bars of equal width; none at the bar of the rest.
+
+    >>> _bar_ticks([{"low": 0.0}, {"low": 4.0}, {"low": 8.0}, {"low": 12.0}])
+    [(0.0, 0.0), (1.25, 5.0), (2.5, 10.0)]
+    """
+    end = bins[-1]["low"]
+    if end <= 0:
+        return [(0.0, 0.0)]
+    ticks = round_ticks(0.0, end, n=4)
+    return [((len(bins) - 1) * tick / end, tick) for tick in ticks if tick <= end]
 
 
 # --- predicted against true ------------------------------------------------------------------------------
@@ -136,8 +150,12 @@ def _bars(bins: Sequence[Mapping[str, Any]]) -> SafeString:
 def _scatter(drawn: Mapping[str, Sequence[float]]) -> Chart:
     pairs = sorted(zip(drawn["true_s"], drawn["predicted_s"], strict=True))
     points = tuple(Point((f"{true_s:.3f}", f"{predicted_s:.3f}")) for true_s, predicted_s in pairs)
-    panels = (("Predicted against true time to contact, in s", _cloud(pairs)),) if pairs else ()
-    return Chart("scatter", panels, ("True in s", "Predicted in s"), points)
+    panels = (
+        (("Predicted (upwards) against true time to contact (to the right), in s", _cloud(pairs)),)
+        if pairs
+        else ()
+    )
+    return Chart("scatter", panels, ("True in s", "Predicted in s"), points, numbers=(0, 1))
 
 
 def _cloud(pairs: Sequence[tuple[float, float]]) -> SafeString:

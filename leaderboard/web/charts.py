@@ -17,12 +17,19 @@ from django.utils.safestring import SafeString
 from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
 from leaderboard.entries import Interval
-from leaderboard.exports import short_authors
+from leaderboard.exports import printed_decimals, short_authors
 from leaderboard.snapshots import Attempt
 from leaderboard.standings import Entry
 from leaderboard.web.chart_frames import Frame, decade_ticks, log_ground
 from leaderboard.web.drawing import round_ticks
-from leaderboard.web.tables import METRIC_SYMBOLS, METRIC_UNITS, interval_words, rank_range
+from leaderboard.web.tables import (
+    METRIC_SYMBOLS,
+    METRIC_UNITS,
+    SCORED_DECIMALS,
+    figure_css,
+    interval_words,
+    rank_range,
+)
 
 # One shape for each series: nobody has to tell colours apart.
 _SHAPES: Final = (
@@ -63,6 +70,7 @@ class Chart:
     columns: tuple[str, ...]
     points: tuple[Point, ...]
     series: tuple[Series, ...] = ()
+    numbers: tuple[int, ...] = ()  # which columns hold numbers of their own, from 0: they stand at the right
 
     @property
     def is_live(self) -> bool:
@@ -95,9 +103,15 @@ def profile(entries: Sequence[Entry]) -> Chart:
         (f"{symbol}, {METRIC_UNITS[metric]}", _profile_panel(metric, shown))
         for metric, symbol in METRIC_SYMBOLS.items()
     )
+    # As if all had two decimals: those of papers keep the room of the missing one.
+    css = figure_css(format_published(entry.scores[name]) for entry in shown for name in SCORE_NAMES)
     points = tuple(
         Point(
-            (METRIC_SYMBOLS[name[:3]], name[4:] or "overall", *(_value_words(entry, name) for entry in shown))
+            (
+                METRIC_SYMBOLS[name[:3]],
+                name[4:] or "overall",
+                *(_value_cell(entry, name, css) for entry in shown),
+            )
         )
         for name in SCORE_NAMES
     )
@@ -117,8 +131,35 @@ def _series_label(entry: Entry) -> str:
 
 def _value_words(entry: Entry, name: str) -> str:
     words = interval_words(entry.intervals.get(name, Interval()))
-    value = format_published(entry.scores[name])
+    value = format_published(entry.scores[name], decimals=_decimals(entry))
     return f"{value} ({words})" if words else value
+
+
+def _value_cell(entry: Entry, name: str, css: str) -> SafeString:
+    """The same for a table; `css` gives what stands before the interval its width."""
+    words = interval_words(entry.intervals.get(name, Interval()))
+    return format_html(
+        '<span class="{}{}">{}</span>{}',
+        css,
+        _decimals_css(entry),
+        format_published(entry.scores[name], decimals=_decimals(entry)),
+        f" ({words})" if words else "",
+    )
+
+
+def _decimals(entry: Entry) -> int:
+    """With how many decimals its values are written: those of papers as they are printed."""
+    return printed_decimals(entry.scores.values()) if entry.kind == "published" else SCORED_DECIMALS
+
+
+def _decimals_css(entry: Entry) -> str:
+    decimals = _decimals(entry)
+    return "" if decimals == SCORED_DECIMALS else f" d{decimals}"
+
+
+def _mid_cell(entry: Entry, value: float) -> SafeString:
+    text = format_published(value, decimals=_decimals(entry))
+    return format_html('<span class="{}">{}</span>', _decimals_css(entry).strip(), text)
 
 
 def _profile_panel(metric: str, shown: Sequence[Entry]) -> SafeString:
@@ -199,7 +240,7 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
                     _day_text(day, entry),
                     entry.method,
                     _team(entry),
-                    format_published(value),
+                    _mid_cell(entry, value),
                     "yes" if is_record else "",
                 ),
                 x=datetime(day.year, day.month, day.day, tzinfo=UTC).timestamp(),
@@ -211,8 +252,9 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
     return Chart(
         kind="progress",
         panels=(("Motion-in-depth error (MiD), ×10⁻⁴, logarithmic, by date", _progress_panel(points)),),
-        columns=("Date", "Method", "Team", "MiD", "Best until then"),
+        columns=("Date", "Method", "Team", "MiD ×10⁻⁴", "Best until then"),
         points=tuple(points),
+        numbers=(3,),
     )
 
 
@@ -278,7 +320,7 @@ def latency(entries: Sequence[Entry]) -> Chart:
                     _team(entry),
                     f"{found:g}",
                     entry.details.hardware or "not said",
-                    format_published(value),
+                    _mid_cell(entry, value),
                     "yes" if is_on_front else "",
                 ),
                 x=found,
@@ -295,8 +337,9 @@ def latency(entries: Sequence[Entry]) -> Chart:
                 _latency_panel(points),
             ),
         ),
-        columns=("Method", "Team", "Latency in ms", "Hardware", "MiD", "On the front"),
+        columns=("Method", "Team", "Latency in ms", "Hardware", "MiD ×10⁻⁴", "On the front"),
         points=tuple(points),
+        numbers=(2, 4),
     )
 
 

@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
+from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
 from evaluator.protocol import SCORE_NAMES
@@ -13,7 +14,7 @@ from leaderboard.standings import Entry
 from leaderboard.web import charts, drawing
 from leaderboard.web.charts import Chart
 from leaderboard.web.drawing import Scale
-from leaderboard.web.tables import Group, Heading, score_groups, score_heading
+from leaderboard.web.tables import Group, Heading, figure_css, score_groups, score_heading
 
 _DIFFERENCE_PX: Final = 150.0
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
@@ -27,7 +28,7 @@ class DifferenceRow:
     first: str
     second: str
     difference: str
-    interval: str
+    interval: str  # both ends as wide as the widest, so that points stand in line
     p: str
     is_significant: bool
     drawn: SafeString
@@ -141,13 +142,14 @@ def _difference_group(
         if end is not None
     ]
     scale = drawing.zero_scale(ends, width_px=_DIFFERENCE_PX)
+    css = figure_css(map(signed, ends))
     rows = tuple(
-        _difference_row(name, pair, differences[name], scale) for name in names if name in differences
+        _difference_row(name, pair, differences[name], scale, css) for name in names if name in differences
     )
     return DifferenceGroup(group=group, axis=drawing.axis(scale), rows=rows)
 
 
-def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale) -> DifferenceRow:
+def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css: str) -> DifferenceRow:
     return DifferenceRow(
         heading=score_heading(name),
         first=format_published(pair.first.scores[name]),
@@ -155,7 +157,12 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale) -> D
         difference=signed(found.difference),
         interval=""
         if found.low is None or found.high is None
-        else f"{signed(found.low)} to {signed(found.high)}",
+        else format_html(
+            '<span class="{css}">{}</span> to <span class="{css}">{}</span>',
+            signed(found.low),
+            signed(found.high),
+            css=css,
+        ),
         p="" if found.p is None else p_text(found.p),
         is_significant=found.is_significant,
         drawn=drawing.difference(scale, found.difference, found.low, found.high),

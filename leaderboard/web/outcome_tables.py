@@ -28,6 +28,7 @@ class BesideRow:
     mid_gap: str
     rte: str
     rte_gap: str
+    css: str = ""  # how many decimals its values have, where fewer than usual
     source: str = ""  # of a row printed in a paper
     compare_href: str = ""  # to what the differences mean, where recordings can be compared
 
@@ -117,6 +118,7 @@ def _beside_row(entry: Entry, other: Entry, *, href: str, about: str, compare_hr
         mid_gap=_gap(entry, other, "mid"),
         rte=format_published(other.scores["rte"], decimals=decimals),
         rte_gap=_gap(entry, other, "rte"),
+        css="" if decimals == SCORED_DECIMALS else f" d{decimals}",
         source=other.source,
         compare_href=compare_href,
     )

@@ -70,9 +70,9 @@ class Cell:
     has_room: bool = False  # for a whisker: its column has one, though this value may have none
 
     @property
-    def span(self) -> str:
-        """The interval as shortly as a narrow column has room for it."""
-        return self.interval.replace(" to ", "–")
+    def ends(self) -> list[str]:
+        """Both ends of the interval, for a column too narrow to have them side by side."""
+        return self.interval.split(" to ")
 
 
 @dataclass(frozen=True)
@@ -297,6 +297,15 @@ def interval_words(found: Interval) -> str:
     if found.low is None or found.high is None:
         return ""
     return f"{format_published(found.low)} to {format_published(found.high)}"
+
+
+def figure_css(texts: Iterable[str]) -> str:
+    """The class that gives each of these figures the width of the widest, so that points stand in line.
+
+    >>> figure_css(["9.36", "13.66"])
+    'figure w5'
+    """
+    return f"figure w{max((len(text) for text in texts), default=0)}"
 
 
 def rank_range(entry: Entry) -> str:
