@@ -24,7 +24,7 @@ function inks() {
 const shortly = (_, values) => values.map((v) => (v === null ? "" : String(Number(v.toPrecision(2)))));
 
 // 1, 2, 5, 10, …: what the drawing has at its left as well.
-function roundSteps(_, __, low, high) {
+function roundSteps(low, high) {
   const steps = [];
   for (let power = Math.floor(Math.log10(low)); power <= Math.log10(high); power++) {
     for (const factor of [1, 2, 5]) {
@@ -35,11 +35,19 @@ function roundSteps(_, __, low, high) {
   return steps;
 }
 
+// From the last round step at or below to the first at or above; without it there would be whole decades.
+function roundRange(low, high) {
+  if (low === null) return [1, 10];
+  const first = roundSteps(low / 10, low).at(-1);
+  return [first, roundSteps(Math.max(high, first * 1.01), 10 * high).at(0)];
+}
+
 function options(figure, rows, reading, box) {
   const ink = inks();
   const isTime = figure.dataset.chart === "progress";
   const font = `11px ${getComputedStyle(document.body).fontFamily}`;
-  const axis = { stroke: ink.quiet, font, grid: { stroke: ink.hair, width: 1 }, ticks: { stroke: ink.hair, width: 1 } };
+  // Every round number is written; by itself the library leaves out most of those between decades.
+  const axis = { stroke: ink.quiet, font, filter: (_, steps) => steps, grid: { stroke: ink.hair, width: 1 }, ticks: { stroke: ink.hair, width: 1 } };
   const two = (v) => String(v).padStart(2, "0");
   const date = (s, isLong) => {
     const at = new Date(s * 1000);
@@ -49,8 +57,14 @@ function options(figure, rows, reading, box) {
   const dates = (_, moments) => moments.map((s) => date(s, moments.at(-1) - moments[0] > 150 * DAY_S));
   // One day alone gets a month around it; else there would be years of nothing.
   const first = rows[0].x;
-  const isOneDay = first === rows.at(-1).x;
-  const around = (_, low, high) => (isOneDay ? [first - 15 * DAY_S, first + 15 * DAY_S] : [low, high]);
+  const last = rows.at(-1).x;
+  const isOneDay = first === last;
+  // A mark at an end stands off it; what was drawn closer is shown as it was drawn.
+  const margin = isOneDay ? 15 * DAY_S : 0.04 * (last - first);
+  const isWhole = (low, high) => low <= first && high >= last;
+  const around = (_, low, high) => (isWhole(low, high) ? [first - margin, last + margin] : [low, high]);
+  const aroundLog = (_, low, high) => (isWhole(low, high) ? roundRange(first, last) : [low, high]);
+  const splits = (_, __, low, high) => roundSteps(low, high);
   return {
     width: box.clientWidth,
     height: box.clientHeight,
@@ -59,10 +73,10 @@ function options(figure, rows, reading, box) {
     tzDate: (s) => uPlot.tzDate(new Date(s * 1000), "UTC"),
     legend: { show: false },
     cursor: { y: false, points: { size: 11, width: 2, stroke: ink.accent, fill: "transparent" } },
-    scales: { x: isTime ? { time: true, range: around } : { time: false, distr: 3 }, y: { distr: 3 } },
+    scales: { x: isTime ? { time: true, range: around } : { time: false, distr: 3, range: aroundLog }, y: { distr: 3, range: (_, low, high) => roundRange(low, high) } },
     axes: [
-      { ...axis, grid: { show: false }, space: isTime ? 85 : 60, values: isTime ? dates : shortly },
-      { ...axis, size: 42, splits: roundSteps, values: shortly },
+      { ...axis, grid: { show: false }, space: isTime ? 85 : 30, values: isTime ? dates : shortly, ...(isTime ? {} : { splits }) },
+      { ...axis, size: 42, splits, values: shortly },
     ],
     series: [
       {},
