@@ -4,11 +4,12 @@ The usual viewers of such schemas style themselves inline and load fonts from el
 forbids both.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from http import HTTPStatus
-from typing import Any
+from typing import Any, Final
 
 from drf_spectacular.generators import SchemaGenerator
 
@@ -16,6 +17,8 @@ from evaluator.problems import PROBLEM_CODES
 from leaderboard import problem_codes
 
 Node = Mapping[str, Any]
+# What the schema's generator appends for a choice that has no words of its own.
+_BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -155,9 +158,18 @@ def _answers(responses: Node) -> Iterable[Answer]:
 def _fields(node: Node) -> tuple[Field, ...]:
     required = node.get("required", [])
     return tuple(
-        Field(name, _kind(field), field.get("description", ""), name in required)
+        Field(name, _kind(field), _without_choices(field.get("description", "")), name in required)
         for name, field in node.get("properties", {}).items()
     )
+
+
+def _without_choices(about: str) -> str:
+    """A description without the list of choices that only repeats the names that its kind has already.
+
+    >>> _without_choices("Who sees it.\\n\\n* `PRIVATE` - PRIVATE\\n* `PUBLIC` - PUBLIC")
+    'Who sees it.'
+    """
+    return _BARE_CHOICE.sub("", about).strip()
 
 
 def _kind(node: Node) -> Kind:
