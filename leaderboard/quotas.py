@@ -296,7 +296,7 @@ def override(
     return row
 
 
-def end_override(*, row: QuotaOverride, actor: User | None) -> None:
+def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") -> None:
     """Let the split's rules hold for the team again. Raises `NotMaintainer`."""
     _require_maintainer(actor)
     with transaction.atomic():
@@ -306,7 +306,7 @@ def end_override(*, row: QuotaOverride, actor: User | None) -> None:
             noun="Team",
             noun_id=row.team_id,
             actor=actor,
-            details={"split": row.split_id},
+            details={"split": row.split_id, "reason": reason},
         )
 
 

@@ -14,9 +14,9 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import editions, exports, preview, rescoring
-from leaderboard.models import Edition, Split, User
-from leaderboard.web import edition_tables
+from leaderboard import editions, exports, preview, quotas, rescoring
+from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
+from leaderboard.web import edition_tables, queue_tables
 from leaderboard.web.maintainer_forms import DiscardForm, OpenForm, PublishForm, RollBackForm, VerbForm
 from leaderboard.web.views import STOP_POLLING
 
@@ -34,7 +34,7 @@ def maintainers_only(view: View) -> View:
             raise Http404
         try:
             return uncached(request, *args, **kwargs)
-        except rescoring.NotMaintainer as refusal:
+        except (rescoring.NotMaintainer, quotas.NotMaintainer) as refusal:
             # They were one when the request came in.
             raise Http404 from refusal
 
@@ -44,11 +44,18 @@ def maintainers_only(view: View) -> View:
 @maintainers_only
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
-    """Every split: its board, what is being prepared, what failed."""
+    """What else there is to look after, and every split: its board, what is being prepared, what failed."""
     splits = Split.objects.select_related("published_edition__ground_truth")
     desks = [edition_tables.desk_row(editions.desk(split)) for split in splits]
     is_running = any(not shown.is_final for row in desks for shown in row.running)
-    return render(request, "maintainers/hub.html", {"desks": desks, "is_running": is_running})
+    context = {
+        "desks": desks,
+        "is_running": is_running,
+        "queue": queue_tables.totals(),
+        "n_overrides": QuotaOverride.objects.count(),
+        "n_events": AuditEvent.objects.count(),
+    }
+    return render(request, "maintainers/hub.html", context)
 
 
 @maintainers_only

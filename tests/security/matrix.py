@@ -112,6 +112,14 @@ LINES: dict[str, Line] = {
     "maintain_audit": line(GET=KEEPERS),
     "maintain_audit_csv": line(GET=KEEPERS),
     "maintain_audit_json": line(GET=KEEPERS),
+    "maintain_queue": line(GET=KEEPERS),
+    "maintain_queue_state": line(GET=KEEPERS),
+    # Without anything chosen there is nothing to retry, without rules none to set.
+    "maintain_retry": line(POST="404 404 404 404 422 404 404"),
+    "maintain_quotas": line(GET=KEEPERS),
+    "maintain_team_quotas": line(GET=KEEPERS),
+    "maintain_quota": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
+    "maintain_quota_end": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
     "maintain_open": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
     "maintain_edition": line(GET=KEEPERS),
     "maintain_progress": line(GET="404 404 404 404 286 404 404"),
@@ -136,6 +144,7 @@ LINES: dict[str, Line] = {
         sends={"description": "x"},
         is_json=True,
     ),
+    # Without `as` the team is told what it forgot, and nobody else that there is anything.
     "api-method-visibility": line(
         GET="401 404 400 400 404 403 401",
         POST="401 404 200 200 404 403 401",
@@ -144,7 +153,6 @@ LINES: dict[str, Line] = {
     ),
     # Who may only submit has to know when.
     "api-quota": line(GET="401 200 200 200 200 200 401"),
-    # Without `as` the team is told what it forgot, and nobody else that there is anything.
     "api-revoke-token": line(POST=API_BLIND, sends={"token": "nonsense"}, is_json=True),
     "api-splits": line(GET=API_OPEN),
     "api-board": line(GET=API_OPEN),

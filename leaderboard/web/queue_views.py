@@ -1,0 +1,76 @@
+"""The queue for maintainers: what failed by our fault, what runs, what waits; and to have it tried again."""
+
+from typing import Any, cast
+
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.urls import reverse
+from django.views.decorators.http import require_POST, require_safe
+
+from leaderboard import lifecycle
+from leaderboard.models import User
+from leaderboard.web.edition_tables import counted
+from leaderboard.web.maintainer_views import maintainers_only
+from leaderboard.web.queue_forms import QueueFilter, RetryForm
+from leaderboard.web.queue_tables import shown
+
+
+@maintainers_only
+@require_safe
+def queue(request: HttpRequest) -> HttpResponse:
+    """The three lists, or one of them page by page."""
+    return _page(request)
+
+
+@maintainers_only
+@require_safe
+def queue_state(request: HttpRequest) -> HttpResponse:
+    """What an open page asks for: nothing new, or what the queue is now."""
+    asked = QueueFilter(request.GET)
+    if not asked.is_valid():
+        return HttpResponse(status=400)
+    context = _context(request, asked)
+    if request.GET.get("seen") == context["shown"].seen:
+        return HttpResponse(status=204)
+    return render(request, "maintainers/queue_state.html", context)
+
+
+@maintainers_only
+@require_POST
+def retry(request: HttpRequest) -> HttpResponse:
+    """Queue again what failed by our fault, and go back to the list that it was chosen from."""
+    form = RetryForm(request.POST)
+    if not form.is_valid():
+        return _page(request, status=422, refusals=form.errors["evaluation"])
+    n_retried = 0
+    for evaluation in form.cleaned_data["evaluation"]:
+        try:
+            lifecycle.retry(evaluation=evaluation, actor=cast("User", request.user), reason="from the queue")
+            n_retried += 1
+        except lifecycle.LostRace as race:
+            messages.warning(request, f"{str(race).capitalize()}.")
+    if n_retried:
+        messages.success(request, f"{counted(n_retried, 'evaluation')} queued again.")
+    query = request.GET.urlencode()
+    return redirect(f"{reverse('maintain_queue')}{'?' if query else ''}{query}")
+
+
+def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpResponse:
+    asked = QueueFilter(request.GET)
+    if not asked.is_valid():
+        return render(request, "maintainers/queue.html", {"form": asked}, status=400)
+    return render(request, "maintainers/queue.html", {**_context(request, asked), **more}, status=status)
+
+
+def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
+    """What was asked for, ready to be drawn, and how to ask for it again."""
+    found = shown(**asked.cleaned_data, number=request.GET.get("page"))
+    number = found.sections[0].page.number if asked.cleaned_data["state"] else 1
+    return {
+        "form": asked,
+        "shown": found,
+        "query": asked.query(),
+        "split_query": asked.query(state=""),
+        "page_query": asked.query(page=number if number > 1 else ""),
+    }

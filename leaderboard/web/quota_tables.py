@@ -1,0 +1,105 @@
+"""Quotas in words, as maintainers look at them: rules of splits and teams, and what a team has left."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from django.db.models import Q, QuerySet
+
+from leaderboard import names, quotas
+from leaderboard.models import QuotaOverride, Split, Team, User
+from leaderboard.models.quotas import QuotaRules
+from leaderboard.templatetags.board import grouped
+
+MAX_FOUND = 50
+
+
+@dataclass(frozen=True)
+class Rules:
+    """Four limits in words, one by one and in a sentence."""
+
+    limit: str
+    window: str
+    min_gap: str
+    rejected_limit: str
+    sentence: str
+
+
+@dataclass(frozen=True)
+class TeamRow:
+    """A team on one split: the rules that hold for it, and what it has left of them."""
+
+    split: Split
+    own: QuotaOverride | None
+    rules: Rules
+    quota: quotas.Quota
+
+    @property
+    def is_never(self) -> bool:
+        """Whether no slot opens by itself."""
+        return not self.quota.is_open and self.quota.next_slot_at is None
+
+
+def rules_of(row: QuotaRules) -> Rules:
+    """The rules of a split or of a team on it, in words."""
+    return Rules(
+        limit=_most(row.quota_limit),
+        window=quotas.span(row.quota_window),
+        min_gap=quotas.span(row.quota_min_gap) if row.quota_min_gap else "–",
+        rejected_limit=_most(row.quota_rejected_limit),
+        sentence=sentence_of(row),
+    )
+
+
+def sentence_of(row: QuotaRules) -> str:
+    """Rules as part of a sentence.
+
+    >>> from datetime import timedelta
+    >>> sentence_of(QuotaOverride(quota_limit=3, quota_window=timedelta(days=30), quota_rejected_limit=None))
+    '3 submissions within 30 days; any number of rejected or cancelled files'
+    >>> sentence_of(QuotaOverride(quota_min_gap=timedelta(hours=1), quota_rejected_limit=20))
+    'any number of submissions, at least 1 hour apart; 20 rejected or cancelled files within 24 hours'
+    """
+    sent = turned_away = "any number of"
+    within = within_a_day = ""
+    if row.quota_limit is not None:
+        sent, within = grouped(row.quota_limit), f" within {quotas.span(row.quota_window)}"
+    if row.quota_rejected_limit is not None:
+        turned_away, within_a_day = grouped(row.quota_rejected_limit), " within 24 hours"
+    apart = f", at least {quotas.span(row.quota_min_gap)} apart" if row.quota_min_gap else ""
+    submissions = "submission" if row.quota_limit == 1 else "submissions"
+    files = "file" if row.quota_rejected_limit == 1 else "files"
+    return f"{sent} {submissions}{within}{apart}; {turned_away} rejected or cancelled {files}{within_a_day}"
+
+
+def overrides() -> QuerySet[QuotaOverride]:
+    """All rules of single teams, split by split."""
+    rows = QuotaOverride.objects.select_related("team", "set_by")
+    return rows.order_by("split__position", "split", "team__name")
+
+
+def team_rows(team: Team, *, viewer: User, now: datetime) -> tuple[TeamRow, ...]:
+    """The team on every split. Whose the question is (`viewer`) makes no difference to a team."""
+    own = {row.split_id: row for row in team.quota_overrides.select_related("set_by")}
+    return tuple(
+        TeamRow(
+            split=split,
+            own=own.get(split.pk),
+            rules=rules_of(own.get(split.pk, split)),
+            quota=quotas.state(team=team, user=viewer, split=split, now=now),
+        )
+        for split in Split.objects.all()
+    )
+
+
+def teams_like(text: str) -> list[Team]:
+    """Teams with this text in their name or in somebody's address; one more than are shown."""
+    by_address = Team.objects.filter(members__email__icontains=text).values("pk")
+    fits = Q(name__icontains=text) | Q(pk__in=by_address)
+    look = names.look(text)
+    if look:
+        fits |= Q(look__contains=look)
+    return list(Team.objects.filter(fits).prefetch_related("members").order_by("name")[: MAX_FOUND + 1])
+
+
+def _most(count: int | None) -> str:
+    return "no limit" if count is None else grouped(count)
