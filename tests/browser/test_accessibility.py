@@ -24,13 +24,15 @@ RUN = """() => axe.run(document, {resultTypes: ["violations"]}).then(found => fo
   .flatMap(({id, nodes}) => nodes.map(node => [id, node.target, node.failureSummary].join(": "))))"""
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 # What leads to no page, or to none that a sample is needed for.
-OTHERS = {"form": "csv", "secret": "none", "user_id": "0", "invitation_id": str(UUID(int=0))}
+OTHERS = {"form": "csv", "secret": "none", "handle": str(UUID(int=0)), "invitation_id": str(UUID(int=0))}
 VIEWS = (
     "/board/val/?columns=mid&nerf=no",
     "/board/val/?columns=rte&q=nothing+like+it",
     "/compare/?split=val",
     "/compare/?split=val&m={method_id}&m={second_method_id}",
 )
+# Parts of pages, for a page that is open.
+PARTS = ("/state/", "/progress/")
 FAULTS = ("/nowhere/", "/?sort=nothing", f"/board/{world.SPLIT}/?at=never")
 
 
@@ -94,6 +96,22 @@ def test_no_page_of_the_signed_in_has_a_serious_fault(
         mine = [each for each in addresses(known) if is_page(member, each)]
     assert {"/submit/", "/submissions/", f"/submissions/{known['submission_id']}/"} <= set(mine)
     assert list(faults_of(page, [*sorted(set(mine) - set(public_pages(site, known))), *own])) == []
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+def test_no_page_of_maintainers_has_a_serious_fault(
+    new_page: NewPage, site: Site, known: dict[str, str], scheme: str
+) -> None:
+    page = new_page(color_scheme=scheme)
+    sign_in(page, world.MAINTAINER)
+    with httpx.Client(base_url=site.url, trust_env=False, cookies=cookies_of(page)) as keeper:
+        asked = [each for each in addresses(known) if each.startswith("/maintain/")]
+        asked = [each for each in asked if not each.endswith(PARTS)]
+        desk = [each for each in asked if is_page(keeper, each)]
+    team = f"/maintain/quotas/{known['team_id']}/"
+    assert {"/maintain/", "/maintain/queue/", "/maintain/quotas/", team, f"{team}val/end/"} <= set(desk)
+    views = [f"/maintain/queue/?state={state}" for state in ("failed", "waiting")]
+    assert list(faults_of(page, [*desk, *views, "/maintain/quotas/?team=owls"])) == []
 
 
 def test_no_page_that_says_what_was_wrong_has_a_serious_fault(browser: Browser, site: Site) -> None:

@@ -4,6 +4,7 @@
 """
 
 import json
+import random
 import tempfile
 from datetime import timedelta
 from pathlib import Path
@@ -15,12 +16,13 @@ from django.db import transaction
 from django.utils import timezone
 
 import evaluator
-from leaderboard import boards, comparisons, ground_truth, submissions
+from leaderboard import boards, comparisons, ground_truth, lifecycle, quotas, submissions
 from leaderboard.demo.estimators import Estimator
 from leaderboard.demo.truth import simulate
 from leaderboard.models import BoxSource, Edition, Evaluation, Method, Split, Submission, User, Visibility
 from tests import builders
 from tests.journeys.production import Site
+from tests.leaderboard import queue_rows
 
 SPLIT = "val"
 OWNER, RIVAL, MAINTAINER = "owner@example.org", "rival@example.org", "maintainer@example.org"
@@ -46,7 +48,8 @@ def populated(site: Site) -> dict[str, str]:
 def populate() -> str:
     """Make the board in this process' database."""
     owner, rival, maintainer = (_person(email) for email in (OWNER, RIVAL, MAINTAINER))
-    User.objects.filter(pk=maintainer.pk).update(is_staff=True)
+    maintainer.is_staff = True
+    maintainer.save(update_fields=["is_staff"])
     truth = _truth()
     for name, (email, noise, latency_ms) in METHODS.items():
         person = owner if email == OWNER else rival
@@ -75,6 +78,7 @@ def populate() -> str:
         now=timezone.now(),
     )
     builders.infer_all()
+    _give_maintainers_something_to_do(owner, maintainer)
     return json.dumps(
         {
             "method_id": str(shown.method_id),
@@ -82,6 +86,7 @@ def populate() -> str:
             "private_method_id": str(secret.method_id),
             "submission_id": str(shown.pk),
             "rejected_id": str(broken.pk),
+            "team_id": str(shown.method.team_id),
         }
     )
 
@@ -119,6 +124,32 @@ def _describe(method: Method, *, latency_ms: float | None) -> None:
         uses_nerf=False if latency_ms else None,
         latency_ms=latency_ms,
         hardware="one GPU" if latency_ms else "",
+    )
+
+
+def _give_maintainers_something_to_do(owner: User, maintainer: User) -> None:
+    """Something that failed by our fault, something that waits, and a team with rules of its own."""
+    edition = Edition.objects.get(split=SPLIT)
+    failed = queue_rows.queued(edition, owner)
+    for _ in range(lifecycle.MAX_POISON_STRIKES):
+        queue_rows.make_due()
+        lifecycle.give_back(
+            queue_rows.claim(), strike=lifecycle.Strike.POISON, reason="signal 9", rng=random.Random(0)
+        )
+    waiting = queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
+    # No worker of another test is to take it.
+    never = timezone.now() + timedelta(days=365)
+    Evaluation.objects.filter(pk=waiting.pk).update(due_at=never)
+    quotas.override(
+        team=failed.submission.method.team,
+        split=edition.split,
+        limit=9,
+        window=timedelta(days=2),
+        min_gap=timedelta(0),
+        rejected_limit=None,
+        reason="Their deadline is before everybody else's.",
+        actor=maintainer,
+        now=timezone.now(),
     )
 
 
