@@ -9,7 +9,7 @@ import yaml
 from tests.journeys.production import REPOSITORY
 
 FOLDER = REPOSITORY / "examples" / "ci"
-INSTALL = 'python -m pip install "$TSTTC_PACKAGE"'
+INSTALL = 'python -m pip install "tsttc @ $TSTTC_SOURCE"'
 
 
 @dataclass(frozen=True)

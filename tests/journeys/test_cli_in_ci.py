@@ -203,7 +203,8 @@ def test_nothing_in_time_says_how_to_go_on(job: Job, paused_worker: Callable[[],
     assert (watched.returncode, watched.stdout[:6]) == (0, "SCORED")
 
 
-def test_server_that_is_not_there_is_told_at_once(job: Job) -> None:
+def test_server_that_is_never_there_is_told_after_a_few_tries(job: Job) -> None:
+    """Not at once: a job may begin before its server has."""
     url = f"http://127.0.0.1:{free_port()}"
     done = job.submit(job.predictions(1.02), tsttc=job.at(url))
     assert done.returncode == 3
