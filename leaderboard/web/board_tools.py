@@ -71,6 +71,12 @@ class Tools:
     sentence: str
     clear_href: str
 
+    @property
+    def has_choices(self) -> bool:
+        """Whether any filter is set, besides the text to find: else they need no room."""
+        chosen = any(is_chosen for chooser in self.choosers for *_, is_chosen in chooser.options)
+        return chosen or any(field.value for field in self.typed)
+
 
 def tools(board: Board, query: BoardQuery) -> Tools:
     """What stands above this board."""

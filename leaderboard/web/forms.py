@@ -26,7 +26,7 @@ class SignupForm(forms.Form):
         max_length=80,
         required=False,
         help_text="Your own or your team's. Without one you appear as “Team” with a number; "
-        "your e-mail address is shown to your team alone.",
+        "your email address is shown to your team alone.",
         widget=forms.TextInput(attrs={"autocomplete": "nickname"}),
     )
     field_order = ["email", "name", "password1", "password2"]
