@@ -20,8 +20,9 @@ from leaderboard.web import health as doors
 
 
 @pytest.fixture(autouse=True)
-def _broker_folder(tmp_path: Path, settings: Settings) -> None:
-    """A broker made of files that nobody else touches, and no answer from an earlier test."""
+def _broker_folder(tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A broker made of files that nobody else touches, no answer from an earlier test, and no hurry."""
+    monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 60)
     settings.CELERY_BROKER_URL = "filesystem://"
     settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"data_folder_out": str(tmp_path)}
     doors.readiness.forget()
@@ -129,6 +130,7 @@ def test_database_that_accepts_but_never_answers_is_given_up(
         "PASSWORD": "swordfish",
         "OPTIONS": {"connect_timeout": 60},
     }
+    monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 2)
     monkeypatch.setitem(connections.settings, "default", elsewhere)
     response = Client().get("/readyz")
     assert response.status_code == 503
