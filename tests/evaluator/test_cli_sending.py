@@ -15,7 +15,7 @@ from click.testing import Result
 
 from evaluator import read_manifest
 from tests.evaluator.recorded_site import CUT, RecordedSite, Reply, problem
-from tests.evaluator.worlds import REPOSITORY
+from tests.evaluator.worlds import REPOSITORY, screen_text
 
 Tsttc = Callable[..., Result]
 pytestmark = pytest.mark.usefixtures("at_site")
@@ -179,9 +179,8 @@ def test_terminal_shows_a_bar_and_a_pipe_does_not(site: RecordedSite, tmp_path: 
         cwd=REPOSITORY,
         env=os.environ | {"TERM": "xterm"},
     )
-    with open(terminal, "rb", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
-        shown = screen.read(1 << 16).decode()
     os.close(end)
+    shown = screen_text(terminal)
     assert "large.json" in shown
     assert "MB" in shown
     assert done.stdout.startswith(b"Submission ")

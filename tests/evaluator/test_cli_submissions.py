@@ -16,6 +16,7 @@ from click.testing import Result
 
 from evaluator.protocol import SCORE_NAMES
 from tests.evaluator.recorded_site import CUT, RecordedSite, Reply, problem
+from tests.evaluator.worlds import screen_text
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PREDICTIONS = REPOSITORY / "examples" / "predictions.json"
@@ -307,7 +308,7 @@ def test_ctrl_c_while_waiting_ends_quietly_with_130(site: RecordedSite) -> None:
     assert waiting.stderr is not None
     assert waiting.stderr.readline() == "QUEUED, 2 ahead, about 4 s\n"
     waiting.send_signal(signal.SIGINT)
-    stdout, stderr = waiting.communicate(timeout=30)
+    stdout, stderr = waiting.communicate(timeout=120)
     assert (waiting.returncode, stdout, stderr.strip()) == (130, "", "Interrupted.")
 
 
@@ -324,9 +325,8 @@ def test_terminal_shows_the_state_live_and_cannot_be_steered_by_it(site: Recorde
         cwd=REPOSITORY,
         env=os.environ | {"TERM": "xterm"},
     )
-    with open(terminal, "rb", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
-        shown = screen.read(1 << 16).decode()
     os.close(end)
+    shown = screen_text(terminal)
     assert (done.returncode, json.loads(done.stdout)) == (0, SCORED)
     assert "QUEUED, 2 ahead, about 4 s" in shown
     assert r"[red]\x1b[2JNEW" in shown

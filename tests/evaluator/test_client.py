@@ -151,10 +151,10 @@ def test_busy_server_is_asked_again_when_it_said(client: Client, site: RecordedS
 
 
 def test_retry_after_as_a_date_is_understood(client: Client, site: RecordedSite, clock: FakeTime) -> None:
-    when = format_datetime(datetime.now(UTC) + timedelta(seconds=20), usegmt=True)
+    when = format_datetime(datetime.now(UTC) + timedelta(seconds=50), usegmt=True)
     site.put(ONE, Reply(status=503, headers={"Retry-After": when}), Reply(SCORED))
     client.submission("abc")
-    assert 10 < clock.slept_s[0] <= 20
+    assert 10 < clock.slept_s[0] <= 50
 
 
 @pytest.mark.parametrize("value", ["soon", "-5", "²", "Fri, 99 Nov 2026 00:00:00 GMT", "1e5"])

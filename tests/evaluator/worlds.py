@@ -4,6 +4,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from evaluator import GroundTruth
@@ -12,6 +13,15 @@ from evaluator.tables import Table
 REPOSITORY = Path(__file__).resolve().parents[2]
 GOLDEN = REPOSITORY / "tests" / "golden" / "toolkit.json"
 SHARED_DATA = Path(os.environ.get("TSTTC_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
+
+
+def screen_text(terminal: int) -> str:
+    """All that was written to a pseudo terminal whose other ends are closed; closes this one as well."""
+    shown = b""
+    with os.fdopen(terminal, "rb", buffering=0) as screen, suppress(OSError):  # that is how its end is told
+        while piece := screen.read(1 << 16):
+            shown += piece
+    return shown.decode()
 
 
 def make_truth(ttc_s: Iterable[float], *, anno_ids: Sequence[int] | None = None) -> GroundTruth:
