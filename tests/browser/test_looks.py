@@ -105,7 +105,12 @@ def test_what_has_the_focus_can_be_seen(page: Page, truth: evaluator.GroundTruth
         assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") == "solid"
 
 
-def test_print_has_the_whole_table_and_no_navigation(page: Page, truth: evaluator.GroundTruth) -> None:
+@pytest.mark.parametrize("viewport", [WIDE, {"width": 703, "height": 1000}, NARROW])
+def test_print_has_the_whole_table_and_no_navigation(
+    new_page: NewPage, truth: evaluator.GroundTruth, viewport: dict[str, int]
+) -> None:
+    # A sheet of A4 is 703 px wide between its margins: as narrow as a small tablet.
+    page = new_page(viewport=viewport)
     page.emulate_media(media="print")
     page.goto("/")
     expect(page.locator(".site-nav")).to_be_hidden()
