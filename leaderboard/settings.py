@@ -105,6 +105,8 @@ MIDDLEWARE = [
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "csp.middleware.CSPMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
+    # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
+    "leaderboard.api.headers.ApiHeadersMiddleware",
     # Before sessions and accounts, which somebody without either should not pay for.
     "leaderboard.web.kept.KeptMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
@@ -116,7 +118,6 @@ MIDDLEWARE = [
     "django_htmx.middleware.HtmxMiddleware",
     # Last on the way in: its page needs the rest, and nothing before it reads the body.
     "leaderboard.web.limits.UploadLimitMiddleware",
-    "leaderboard.api.headers.ApiHeadersMiddleware",
 ]
 ROOT_URLCONF = "leaderboard.urls"
 WSGI_APPLICATION = "leaderboard.wsgi.application"

@@ -8,11 +8,10 @@ import hashlib
 import math
 from collections.abc import Callable
 
-from django.conf import settings
-from django.http import HttpRequest, HttpResponse
-from django.utils.cache import get_conditional_response
+from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
 from leaderboard.api.throttles import Counted, counted
+from leaderboard.keeping import is_known
 
 Next = Callable[[HttpRequest], HttpResponse]
 
@@ -48,12 +47,18 @@ def _left(limit: Counted) -> str:
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
     """The answer with its ETag, or 304 for a program that has it already.
 
-    What is the same for everybody has one of its own, where it is kept.
+    What is kept for everybody has one of its own, and a file, which is not made for nothing, says it itself.
     """
-    says_who = "Authorization" in request.headers or settings.SESSION_COOKIE_NAME in request.COOKIES
-    if request.method != "GET" or response.status_code != 200 or response.streaming or not says_who:
+    if request.method not in {"GET", "HEAD"} or response.status_code != 200:
+        return response
+    if response.streaming:
         return response
     if not response.has_header("ETag"):
         response["ETag"] = f'"{hashlib.sha256(response.content).hexdigest()[:32]}"'
-    found = get_conditional_response(request, etag=response["ETag"], response=response)
-    return found if isinstance(found, HttpResponse) else response
+    if not is_known(request, response["ETag"]):
+        return response
+    known = HttpResponseNotModified()
+    for name in ("ETag", "Vary", "Cache-Control"):
+        if response.has_header(name):
+            known[name] = response[name]
+    return known

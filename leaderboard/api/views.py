@@ -2,7 +2,7 @@
 
 from typing import cast
 
-from django.http import FileResponse, Http404, HttpResponseBase
+from django.http import FileResponse, Http404, HttpResponseBase, HttpResponseNotModified
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
 from drf_spectacular.utils import extend_schema
@@ -15,6 +15,7 @@ from leaderboard import files, outcomes, submissions
 from leaderboard.api.authentication import split_of
 from leaderboard.api.serializers import ErrorSerializer, SplitSerializer
 from leaderboard.api.submission_shapes import SubmissionSerializer
+from leaderboard.keeping import is_known
 from leaderboard.models import Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
 
@@ -70,9 +71,13 @@ class ManifestView(APIView):
         if found.published_edition is None:
             raise Http404
         digest = found.published_edition.ground_truth.manifest_digest
+        tag = {"ETag": f'"{digest}"'}
+        if is_known(request._request, tag["ETag"]):
+            return HttpResponseNotModified(headers=tag)
         return FileResponse(
             files.store().open(files.manifest_name(digest), "rb"),
             as_attachment=True,
             filename=f"tsttc-{found.pk}-manifest.csv",
             content_type="text/csv",
+            headers=tag,
         )

@@ -22,10 +22,9 @@ from typing import Final
 from django.conf import settings
 from django.contrib.messages.storage.cookie import CookieStorage
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
-from django.utils.http import parse_etags
 
 from leaderboard import boards
-from leaderboard.keeping import is_kept
+from leaderboard.keeping import is_kept, is_known
 from leaderboard.web.context import splits_of
 
 Next = Callable[[HttpRequest], HttpResponse]
@@ -93,13 +92,13 @@ class Answer:
         etag = f'"{self.etag}-gz"' if takes_gzip else f'"{self.etag}"'
         body = self.compressed if takes_gzip else self.body
         response = HttpResponse(b"" if request.method == "HEAD" else body)
-        is_known = _is_known(request, etag)
-        if is_known:
+        is_304 = is_known(request, etag)
+        if is_304:
             response = HttpResponseNotModified()
         for name, value in self.headers:
-            if not is_known or name in HEADERS_OF_304:
+            if not is_304 or name in HEADERS_OF_304:
                 response[name] = value
-        if not is_known:
+        if not is_304:
             response["Content-Length"] = str(len(body))
             if takes_gzip:
                 response["Content-Encoding"] = "gzip"
@@ -107,15 +106,6 @@ class Answer:
         response["Cache-Control"] = ANYBODYS
         response["Vary"] = VARY
         return response
-
-
-def _is_known(request: HttpRequest, etag: str) -> bool:
-    header = request.META.get("HTTP_IF_NONE_MATCH")
-    if not header:
-        return False
-    # A proxy that compresses makes a strong tag a weak one; for the question of 304 they are the same.
-    known = {tag.removeprefix("W/") for tag in parse_etags(header)}
-    return "*" in known or etag in known
 
 
 class Memory:
@@ -167,7 +157,7 @@ class KeptMiddleware:
     """Answers anybody from memory where that holds, and remembers what views of that kind answer."""
 
     # Where such views are; elsewhere not even the state is asked for.
-    PREFIXES: Final = ("/board/", "/methods/", "/compare/", "/feed", "/api/v1/splits")
+    PREFIXES: Final = ("/board/", "/methods/", "/compare/", "/feed", "/api/v1/splits", "/api/v1/methods/")
 
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response

@@ -1,6 +1,7 @@
 """What everybody sees is drawn once, is never old, never mixed, and says nothing of what is private."""
 
 import gzip
+import uuid
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
@@ -13,7 +14,7 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
-from leaderboard import boards, snapshots, standings, submissions, teams
+from leaderboard import boards, methods, snapshots, standings, submissions, teams, visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -45,7 +46,7 @@ PUBLIC = (
     *("/api/v1/splits/test/editions/1/board", "/api/v1/splits/test/changelog"),
     *("/board/test/charts/", "/board/test.csv", "/board/test.tex?intervals=1", "/board/test.md?sort=rte"),
     *("/board/test.bib", "/board/test/editions/1.csv", "/feed.atom", "/board/test/feed.atom"),
-    *("/methods/{method}/badge.svg", "/methods/{method}/badge.svg?split=val"),
+    *("/methods/{method}/badge.svg", "/methods/{method}/badge.svg?split=val", "/api/v1/methods/{method}"),
 )
 
 
@@ -245,9 +246,9 @@ def test_own_private_rows_are_added_for_their_team_alone(
 def test_a_public_page_takes_three_statements_whatever_its_size(
     edition: Edition, owner: User, client: Client, n: int
 ) -> None:
-    methods = board_rows.fill(edition, n=n, user=owner)
+    rows = board_rows.fill(edition, n=n, user=owner)
     client.get(PAGE)  # whoever finds a changed board draws it, for all who follow
-    addresses = [address.format(method=methods[0].pk, other=methods[1].pk) for address in PUBLIC]
+    addresses = [address.format(method=rows[0].pk, other=rows[1].pk) for address in PUBLIC]
     for address in addresses:
         if address.startswith("/compare/"):
             client.get(address)  # whoever compares first asks a worker to
@@ -263,10 +264,11 @@ def test_a_public_page_takes_three_statements_whatever_its_size(
 # --- conditional requests and compression ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("address", [PAGE, API, "/board/test/editions/1/"])
+@pytest.mark.parametrize("address", [PAGE, API, "/board/test/editions/1/", "/api/v1/methods/{}"])
 def test_who_knows_an_answer_is_not_sent_it_again(
     edition: Edition, filled: list[Method], client: Client, address: str
 ) -> None:
+    address = address.format(filled[0].pk)
     first = client.get(address)
     tag = first["ETag"]
     assert tag.startswith('"')
@@ -323,10 +325,34 @@ def test_security_headers_are_those_of_any_page(
 
 
 def test_only_whole_answers_are_remembered(edition: Edition, client: Client) -> None:
-    for address in (f"{API}?sort=nothing", "/board/nowhere/", f"{API}?at=2026-01-01"):
+    for address in (
+        *(f"{API}?sort=nothing", "/board/nowhere/", f"{API}?at=2026-01-01"),
+        f"/api/v1/methods/{uuid.uuid4()}",
+    ):
         first = client.get(address)
-        assert not first.has_header("ETag"), address
+        assert first.has_header("ETag") == (first.status_code == 200), address
         assert memory.get(address) is None, address
+
+
+def test_a_method_is_nowhere_until_it_is_shown_and_told_of_as_it_is_then(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    method = Method.objects.create(team=teams.team_of(user=owner), name="Secret")
+    address = f"/api/v1/methods/{method.pk}"
+    assert client.get(address).status_code == 404
+    visibility.change(method=method, visibility="ANONYMOUS", actor=owner, now=timezone.now())
+    assert client.get(address).json()["name"] == method.pseudonym
+    assert memory.get(address) is not None
+    mine = Client()
+    mine.force_login(owner)
+    assert mine.get(address).json()["name"] == "Secret"
+    assert client.get(address).json()["name"] == method.pseudonym
+    methods.edit(method=method, changes={"n_frames": 3}, actor=owner)
+    assert client.get(address).json()["details"]["n_frames"] == 3
+    visibility.change(method=method, visibility="PUBLIC", actor=owner, now=timezone.now())
+    assert client.get(address).json()["name"] == "Secret"
+    teams.rename(team=method.team, name="Eagle Owls", actor=owner)
+    assert client.get(address).json()["team"] == "Eagle Owls"
 
 
 def test_nobody_chooses_what_others_are_answered_from_memory(edition: Edition, tmp_path: Path) -> None:

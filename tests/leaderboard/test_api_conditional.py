@@ -1,0 +1,95 @@
+"""Every answer of the API has an ETag, and who has it already is told so and nothing else."""
+
+from typing import Any
+
+import pytest
+from django.test import Client
+
+from leaderboard.models import Edition, Submission, User
+from leaderboard.web.kept import memory
+from tests import builders
+from tests.openapi import schema
+
+
+@pytest.fixture
+def shown(edition: Edition, owner: User) -> Submission:
+    """A public method on the board, compared with another one."""
+    sent = [
+        builders.submit(owner, builders.predictions(edition, factor=1 + n / 10), method=f"M{n}")
+        for n in range(2)
+    ]
+    builders.score_all()
+    builders.infer_all()
+    pair = [("split", "test"), *(("m", str(each.method_id)) for each in sent)]
+    Client().get("/api/v1/compare", pair)
+    builders.infer_all()
+    return sent[0]
+
+
+def asked(client: Client, address: str, *, known: str = "") -> Any:
+    """The answer, read to its end, for a reader who has this tag."""
+    response = client.get(address, headers={"If-None-Match": known} if known else {})
+    response.getvalue()
+    return response
+
+
+def addresses(shown: Submission) -> list[str]:
+    """Everything that can be read, filled with what is there."""
+    values = {
+        "split": "test",
+        "number": 1,
+        "method_id": shown.method_id,
+        "submission_id": shown.pk,
+    }
+    described = schema()["paths"]
+    found = [path.format(**values) for path, operations in described.items() if "get" in operations]
+    other = Submission.objects.exclude(pk=shown.pk).get()
+    pair = f"split=test&m={shown.method_id}&m={other.method_id}"
+    return [
+        *(f"{path}?{pair}" if path.endswith("/compare") else path for path in found),
+        "/api/v1/splits/test/board?at=2030-01-01",
+        f"/api/v1/splits/test/board?at={shown.submitted_at:%Y-%m-%d}",
+    ]
+
+
+@pytest.mark.parametrize(("is_somebody", "n_least"), [(False, 10), (True, 15)])
+def test_whatever_is_answered_has_a_tag_that_is_a_304_when_it_is_asked_with(
+    shown: Submission, owner: User, is_somebody: bool, n_least: int
+) -> None:
+    client = Client()
+    if is_somebody:
+        client.force_login(owner)
+    n_answered = 0
+    for address in addresses(shown):
+        first = asked(client, address)
+        if first.status_code != 200:
+            assert not first.has_header("ETag"), address
+            continue
+        n_answered += 1
+        tag = first["ETag"]
+        assert tag.startswith('"'), address
+        for known in (tag, f"W/{tag}", f'"other", {tag}', "*"):
+            again = asked(client, address, known=known)
+            assert (again.status_code, again.getvalue(), again["ETag"]) == (304, b"", tag), address
+        for response in (first, again):
+            expected = "private, no-store" if is_somebody else "public, no-cache"
+            assert response["Cache-Control"] == expected, address
+            assert {"Cookie", "Authorization"} <= set(response["Vary"].split(", ")), address
+        assert asked(client, address, known='"other"').status_code == 200, address
+        head = client.head(address)
+        head.close()  # a file of which nothing is sent
+        assert head["ETag"].startswith('"'), address
+    assert n_answered >= n_least
+
+
+def test_the_tag_of_a_manifest_is_its_digest(edition: Edition) -> None:
+    response = asked(Client(), "/api/v1/splits/test/manifest")
+    assert response["ETag"] == f'"{edition.ground_truth.manifest_digest}"'
+
+
+def test_an_answer_is_remembered_whole_also_when_the_first_who_asks_has_it(shown: Submission) -> None:
+    address = "/api/v1/splits/test/board"
+    tag = Client().get(address)["ETag"]
+    memory.clear()
+    assert Client().get(address, headers={"If-None-Match": tag}).status_code == 304
+    assert memory.get(address) is not None
