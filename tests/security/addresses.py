@@ -15,26 +15,46 @@ FORMS = ("csv", "json", "tex", "md", "bib", "nonsense")
 TIMES = ("2026-03-01", "2026-03-03", "2026-03-05T12:00:00Z", "2026-03-11", "2099-01-01", "nonsense", "")
 PAGES = ("1", "2", "0", "-1", "999999", "last", "x")
 TEXTS = ("secret", "Secret Agency", "Owls", "Anonymous", "Very Secret Net", "%", "'", "")
-# What pages may be asked, beside what the schema says of the API: name and values.
+# By the names of leaderboard.filters: what each takes, what is there, what is hidden, and what it refuses.
+FILTERS: dict[str, tuple[str, ...]] = {
+    "frames": ("2", "6", "7"),
+    "cameras": ("one", "several", "x"),
+    "boxes": ("given", "detected", "none", "x"),
+    **dict.fromkeys(("nerf", "extra", "code", "paper"), ("yes", "no", "maybe")),
+    "pretraining": ("imagenet", "corpus", "Larks", "Hidden", "none", "x" * 81),
+    "parameters": ("25M", "400k", "31000000", "0.5b", "many"),
+    "latency": ("12.5", "1000", "nan"),
+    "hardware": ("gpu", "Larks", "Hidden", "Secret", "x" * 81),
+    "q": (*TEXTS, "x" * 81),
+}
+# What boards may be asked, on pages and in the API: name and values.
 QUERIES: dict[str, tuple[str, ...]] = {
     "sort": (*(f"{sign}{name}" for name in SORTABLE for sign in ("", "-")), "nonsense"),
     "at": TIMES,
+    "columns": ("mid", "rte", "both", "nonsense"),
     "page": PAGES,
-    "format": FORMATS,
-    "q": TEXTS,
-    "team": TEXTS,
-    "intervals": ("1", "0"),
+    "intervals": ("1", "0", "nonsense"),
     "mine": ("1", "0"),
     "as": ("ANONYMOUS", "PUBLIC"),
-    "columns": ("mid", "rte", "both", "nonsense"),
-    "n_frames": ("2", "6", "7"),
-    "cameras": ("ONE", "SEVERAL", "x"),
-    "box_source": ("GIVEN", "x"),
-    "uses_nerf": ("yes", "no"),
-    "uses_extra_data": ("yes", "no"),
-    "has_code": ("1", "yes"),
-    "latency_ms": ("100", "nan"),
+    **FILTERS,
+    "format": FORMATS,
+    "team": TEXTS,
 }
+# Several things at once, as the links and forms of the pages ask for them.
+TOGETHER = tuple(
+    urlencode(asked)
+    for asked in (
+        {"sort": "-rte", "columns": "rte", "hardware": "gpu", "page": "1"},
+        {"sort": "mid_crucial", "columns": "mid", "nerf": "no", "frames": "6"},
+        {"at": "2026-03-05T12:00:00Z", "hardware": "Larks", "intervals": "1"},
+        {"at": "2026-03-11", "columns": "rte", "sort": "-team", "pretraining": "corpus"},
+        {"q": "anonymous", "code": "no", "paper": "no", "page": "2"},
+        {"parameters": "50M", "latency": "1000", "intervals": "1", "sort": "date"},
+        {"cameras": "one", "boxes": "given", "extra": "no", "q": "secret"},
+    )
+)
+
+
 # They say how this machine is, which changes by the second, and nothing of what is entered.
 OF_THE_MACHINE = {"readyz", "metrics"}
 
@@ -103,6 +123,8 @@ def _queries(route: Route, scene: Scene, described: dict[str, dict[str, Any]]) -
     for name, values in asked.items():
         for value in values:
             yield urlencode({name: value})
+    if "sort" in asked:
+        yield from TOGETHER
 
 
 # Pages that have a board in them, and take its questions.

@@ -2,21 +2,25 @@
 
 import os
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.parse import urlencode
 
 from django.db import transaction
 from django.http import HttpResponse, StreamingHttpResponse
 from django.test import Client
 
+from leaderboard import filters
 from leaderboard.models import Method, Snapshot, Submission
 from leaderboard.web import kept
-from tests.security.addresses import addresses
+from leaderboard.web.board_query import BoardQuery
+from tests.security.addresses import FILTERS, QUERIES, TOGETHER, addresses
 from tests.security.people import ADDRESS
 from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, START, build
 
 WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
-ADDRESSES_IN_THE_SUITE = 540
+ADDRESSES_IN_THE_SUITE = 640
 # Random in every answer by its nature: the token of a form, and the name of a request in the log.
 FORM_TOKEN = re.compile(rb'(?<=name="csrfmiddlewaretoken" value=")[^"]+|(?<=X-CSRFToken": ")[^"]+')
 RANDOM_HEADERS = {"X-Request-ID"}
@@ -66,12 +70,31 @@ def looked_at(directory: Path, *, has_secrets: bool, limit: int | None) -> dict[
 
 
 def thinned(paths: list[str], limit: int) -> list[str]:
-    """Every address without a question, few of the administration, and of the others what fits, evenly."""
+    """Every address without a question, few of the administration; of the others each question somewhere, and
+    of the rest what fits, evenly.
+    """
     of_admin = [path for path in paths if path.startswith("/admin/")]
     plain = [path for path in paths if "?" not in path and path not in of_admin[10:]]
     asked = [path for path in paths if "?" in path]
-    step = max(1.0, len(asked) / max(1, limit - len(plain)))
-    return plain + [asked[int(n * step)] for n in range(int(len(asked) / step))]
+    once = list(somewhere(asked))
+    rest = [path for path in asked if path not in set(once)]
+    step = max(1.0, len(rest) / max(1, limit - len(plain) - len(once)))
+    return plain + once + [rest[int(n * step)] for n in range(int(len(rest) / step))]
+
+
+def somewhere(asked: list[str]) -> Iterator[str]:
+    """Every question at one of the addresses that take it, a board's if there is one, each at the next one."""
+    places: dict[str, list[str]] = {}
+    for path in asked:
+        place, question = path.split("?", maxsplit=1)
+        places.setdefault(question, []).append(place)
+    for number, (question, takers) in enumerate(places.items()):
+        found = [place for place in takers if is_of_a_board(place)] or takers
+        yield f"{found[number % len(found)]}?{question}"
+
+
+def is_of_a_board(address: str) -> bool:
+    return address.startswith(("/board/", "/api/v1/splits/")) or address.partition("?")[0] == "/"
 
 
 def differences(directory: Path, *, limit: int | None) -> tuple[list[str], int, dict[int, int]]:
@@ -106,9 +129,32 @@ def first_difference(one: Seen, other: Seen) -> str:
 def test_nobody_sees_what_is_hidden_at_any_address(db: None, tmp_path: Path) -> None:
     told, n_addresses, statuses = differences(tmp_path, limit=None if WHOLE else ADDRESSES_IN_THE_SUITE)
     assert not told, f"{len(told)} differ:\n" + "\n".join(told[:20])
-    assert n_addresses >= 500
+    assert n_addresses >= 600
     assert {200, 302, 400, 401, 404} <= set(statuses)
     assert not [status for status in statuses if status >= 500]
+
+
+def test_boards_are_asked_whatever_their_pages_ask(db: None, tmp_path: Path) -> None:
+    assert set(FILTERS) == set(filters.NAMES)
+    asked = {name for name in QUERIES if name not in {"format", "team", "intervals", "mine", "as"}}
+    assert BoardQuery(given=dict.fromkeys(asked, "x")).href(page="x").count("=") == len(asked)
+    for name, values in FILTERS.items():
+        good = [value for value in values if taken(name, value)]
+        assert 0 < len(good) < len(values), name
+    paths = thinned(addresses(build(tmp_path / "world", has_secrets=False)), ADDRESSES_IN_THE_SUITE)
+    boards = [path for path in paths if is_of_a_board(path)]
+    for question in (
+        *(urlencode({name: value}) for name, values in FILTERS.items() for value in values),
+        *TOGETHER,
+    ):
+        assert [path for path in boards if path.endswith(f"?{question}")], question
+
+
+def taken(name: str, value: str) -> bool:
+    try:
+        return filters.parse({name: value}).is_set or not value
+    except filters.BadFilter:
+        return False
 
 
 def test_what_is_hidden_is_there_and_would_be_noticed(db: None, tmp_path: Path) -> None:

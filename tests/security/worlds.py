@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any
 from uuid import UUID
 
 from django.conf import settings
@@ -47,6 +48,23 @@ PUBLIC = (
     ("Jays", "Wide", 1.30, "PUBLIC"),
     ("Strangers", "Their own", 1.25, "PUBLIC"),
     ("Strangers", "Their secret", 1.15, "PRIVATE"),
+)
+# What methods say of themselves, one after the other: so that each filter lets something through.
+SAID: tuple[dict[str, Any], ...] = (
+    {
+        "n_frames": 6,
+        "cameras": "ONE",
+        "box_source": "GIVEN",
+        "uses_nerf": False,
+        "uses_extra_data": False,
+        "pretraining": "ImageNet",
+        "n_parameters": 31_000_000,
+        "latency_ms": 12.5,
+        "hardware": "one GPU",
+        "code_url": "https://example.org/code",
+    },
+    {"n_frames": 2, "cameras": "SEVERAL", "box_source": "NONE", "uses_nerf": True, "uses_extra_data": True},
+    {"box_source": "DETECTED", "n_parameters": 400_000, "pretraining": "none", "paper_url": "https://a.org"},
 )
 
 
@@ -129,10 +147,12 @@ def _enter(
         visibility.change(method=sent.method, visibility=shown, actor=user, now=now + timedelta(hours=1))
     scene.methods.append(sent.method_id)
     scene.submissions.append(sent.pk)
+    Method.objects.filter(pk=sent.method_id).update(**SAID[number % len(SAID)])
     if shown == "ANONYMOUS":
         # What an anonymous method says of itself beyond choices and numbers is nobody's business either.
         Method.objects.filter(pk=sent.method_id).update(
             description=f"By {user.name}.",
+            pretraining=f"{user.name}'s corpus",
             hardware=f"{user.name}'s GPU",
             paper_url=f"https://{user.pk}.example.org/",
         )
@@ -179,6 +199,8 @@ class Secrets:
         now = START + timedelta(days=1 + number, hours=-3)
         good = builders.predictions(self._edition, factor=1.01 + number / 100)
         made = self._kept(submit(user, good, method=f"Secret Method {number}", now=now), number)
+        said = SAID[number % len(SAID)] | {"pretraining": "Secret corpus", "hardware": "Secret GPU"}
+        Method.objects.filter(pk=made.method_id).update(**said)
         submit(user, b"{}" + b" " * number, method=f"Secret Method {number}", now=now)
         builders.score_all()
         if number == 2:
