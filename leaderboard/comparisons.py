@@ -16,8 +16,8 @@ from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
 from django.db.models import QuerySet
 
-from evaluator import published, uncertainty
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES, get_protocol
+from evaluator import published, sentences, uncertainty
+from evaluator.protocol import SCORE_NAMES, get_protocol
 from leaderboard import bags, broker, entries, inference, snapshots, standings
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.standings import Entry
@@ -25,9 +25,6 @@ from leaderboard.standings import Entry
 MIN_METHODS, MAX_METHODS = 2, 5
 # A worker takes a fraction of a second for each; nobody's questions may keep all the others' waiting.
 MAX_WAITING = 500
-SIGNIFICANT = 0.05
-_INTERVAL_WORDS = {"overall": "", **{name: f" on {name}" for name in INTERVAL_NAMES[1:]}}
-_METRIC_WORDS = {"mid": ("MiD", ""), "rte": ("RTE", " percentage points")}
 
 
 class BadComparison(Exception):
@@ -67,7 +64,7 @@ class Difference:
     @property
     def is_significant(self) -> bool:
         """Whether p is below 5 %."""
-        return self.p is not None and self.p < SIGNIFICANT
+        return sentences.is_significant(self)
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,12 @@ class Pair:
         """What the difference in one column means, in words; empty while it is not known."""
         if self.differences is None or name not in self.differences:
             return ""
-        return sentence(self.first.method, self.second.method, name=name, found=self.differences[name])
+        first, second = self.first.method, self.second.method
+        return sentences.sentence(first, second, name=name, found=self.differences[name])
+
+    def others(self) -> tuple[str, tuple[str, ...]]:
+        """Of the columns beside overall MiD: how many differ significantly, and a sentence for each."""
+        return sentences.others(self.first.method, self.second.method, self.differences or {})
 
 
 @dataclass(frozen=True)
@@ -254,38 +256,3 @@ def _rounded(
         "high": published(gap.high, decimals=decimals),
         "p": None if gap.p is None else 1.0 if shown == 0 else float(f"{gap.p:.2g}"),
     }
-
-
-# --- in words --------------------------------------------------------------------------------------------
-
-
-def sentence(first: str, second: str, *, name: str, found: Difference) -> str:
-    """What a difference means, in words.
-
-    >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
-    "A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003."
-    >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))
-    "A's RTE is 0.70 ± 0.50 percentage points higher than B's; p = 0.02."
-    """
-    metric, _, interval = name.partition("_")
-    label, unit = _METRIC_WORDS[metric]
-    column = f"{label}{_INTERVAL_WORDS[interval or 'overall']}"
-    if found.difference == 0 and not found.is_significant:
-        return f"{first} and {second} have the same {column}."
-    direction = "lower" if found.difference < 0 else "higher"
-    if found.low is None or found.high is None or found.p is None:
-        amount = f"{abs(found.difference):.2f}".rstrip("0").rstrip(".")
-        return (
-            f"{first}'s {column} is {amount}{unit} {direction} than {second}'s; "
-            "there are too few recordings to say whether that means anything."
-        )
-    half = (found.high - found.low) / 2
-    decimals = _decimals(half)
-    amount = f"{abs(found.difference):.{decimals}f} ± {half:.{decimals}f}"
-    caveat = "" if found.is_significant else ", which chance alone may well have made"
-    return f"{first}'s {column} is {amount}{unit} {direction} than {second}'s; p = {found.p:.2g}{caveat}."
-
-
-def _decimals(half: float) -> int:
-    """As many as give the half width two digits, and never more than are published."""
-    return 0 if half >= 10 else 1 if half >= 0.995 else 2

@@ -4,37 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import click
 
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
-from evaluator.cli.gates import SIGNIFICANT, named
+from evaluator.cli.gates import named
 from evaluator.cli.layout import NO_VALUE, UNITS, Cell, aligned, printable, short_name
 from evaluator.cli.options import json_option, sendable, slug, url_option
 from evaluator.cli.reading import TABLE, bytes_of, naming
 from evaluator.cli.tokens import has_token
 from evaluator.protocol import SCORE_NAMES
+from evaluator.sentences import SIGNIFICANT, Found, others
 
 if TYPE_CHECKING:
     from evaluator.answers import Compared
 
 Scores = Mapping[str, float | None]
-
-
-class Found(Protocol):
-    """A difference, computed here or by the server: first minus second, its 95 % interval, and p."""
-
-    @property
-    def difference(self) -> float: ...
-    @property
-    def low(self) -> float | None: ...
-    @property
-    def high(self) -> float | None: ...
-    @property
-    def p(self) -> float | None: ...
 
 
 @click.command(short_help="Say how far two methods, or two files, differ beyond chance.")
@@ -54,7 +42,8 @@ def compare(*, first: str, second: str, split: str, truth_path: Path | None, url
     """Compare FIRST with SECOND, methods of a board by name or id, or with --truth two prediction files.
 
     Whole recordings are resampled, since what follows in one recording is alike: each column gets the
-    difference, its 95 % interval, and the p of a two-sided test. Below 0 the first is better.
+    difference, its 95 % interval, and the p of a two-sided test. Below 0 the first is better. Below the table
+    stands what overall MiD means in words, and which other columns differ significantly.
 
     \b
     Examples:
@@ -96,6 +85,16 @@ def _server_s_words(
     if said or found.reason:
         yield ""
         yield printable(said or found.reason)
+    yield from _others(names, found.differences())
+
+
+def _others(names: tuple[str, str], found: Mapping[str, Found]) -> Iterator[str]:
+    """What the columns beside overall MiD say."""
+    lead, said = others(*names, found)
+    if lead:
+        yield lead
+    for sentence in said:
+        yield f"  {printable(sentence)}"
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool) -> None:
@@ -128,6 +127,8 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
     click.echo("")
     click.echo(UNITS)
     click.echo(verdict(str(first), str(second), found))
+    for line in _others((str(first), str(second)), found):
+        click.echo(line)
 
 
 def table(names: tuple[str, str], scores: tuple[Scores, Scores], found: Mapping[str, Found]) -> list[str]:

@@ -18,6 +18,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
 from evaluator.protocol import SCORE_NAMES
+from evaluator.sentences import SIGNIFICANT
 
 if TYPE_CHECKING:
     from evaluator.answers import Board, BoardEntry, Difference
@@ -36,7 +37,6 @@ _CONDITION: Final = re.compile(
     re.ASCII,
 )
 _OR: Final = re.compile(r"\bor\b", re.ASCII)
-SIGNIFICANT: Final = 0.05
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Scores = Mapping[str, float | None]

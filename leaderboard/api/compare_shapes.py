@@ -5,6 +5,7 @@ from typing import Any
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 
+from evaluator import sentences
 from evaluator.protocol import SCORE_NAMES
 from leaderboard.api.serializers import EntrySerializer
 from leaderboard.comparisons import Compared, Difference, Pair
@@ -23,7 +24,16 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     p = serializers.FloatField(
         allow_null=True, help_text="Of the two-sided cluster sign-flip test; null: too few recordings."
     )
-    is_significant = serializers.BooleanField(help_text="Whether p is below 0.05.")
+    is_significant = serializers.BooleanField(
+        help_text="Whether p is below 0.05; of ten columns and several pairs, some are by chance."
+    )
+    sentence = serializers.SerializerMethodField(
+        help_text="What it means, in words. Its p is of this column and pair alone, whatever else one asks."
+    )
+
+    def get_sentence(self, found: Difference) -> str:
+        """Of this column."""
+        return sentences.sentence(**self.context["names"], name=self.field_name or "", found=found)
 
 
 class DifferencesSerializer(serializers.Serializer[Any]):
@@ -53,7 +63,8 @@ class PairSerializer(serializers.Serializer[Pair]):
         if pair.differences is None:
             return None
         found = {name: pair.differences.get(name) for name in SCORE_NAMES}
-        return dict(DifferencesSerializer(found).data)
+        names = {"first": pair.first.method, "second": pair.second.method}
+        return dict(DifferencesSerializer(found, context={"names": names}).data)
 
     def get_sentence(self, pair: Pair) -> str:
         """Of the overall MiD."""

@@ -45,10 +45,15 @@ class DifferenceGroup:
 
 @dataclass(frozen=True)
 class PairTable:
-    """Two methods: a sentence, and their differences; no groups while they are being computed."""
+    """Two methods: what came out in words, and their differences; no groups while they are being computed.
+
+    `others` are sentences of the columns beside overall MiD, `others_lead` says what they are.
+    """
 
     pair: Pair
     sentence: str
+    others_lead: str
+    others: tuple[str, ...]
     groups: tuple[DifferenceGroup, ...]
     has_intervals: bool
 
@@ -118,9 +123,12 @@ def _listed(names: Sequence[str]) -> str:
 
 def _pair_table(pair: Pair) -> PairTable:
     differences = pair.differences or {}
+    others_lead, others = pair.others()
     return PairTable(
         pair=pair,
         sentence=pair.sentence(),
+        others_lead=others_lead,
+        others=others,
         groups=tuple(
             _difference_group(group, names, pair, differences)
             for group, names in zip(score_groups(), (SCORE_NAMES[:5], SCORE_NAMES[5:]), strict=True)

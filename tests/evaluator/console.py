@@ -199,7 +199,12 @@ def put_more_documented_answers(site: RecordedSite) -> None:
     table = (EXAMPLES / "manifest.csv").read_bytes()
     site.put("GET /api/v1/splits/demo/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
     found = {"difference": -1.18, "low": -1.73, "high": -0.62, "p": 0.0004}
-    differences = dict.fromkeys(SCORE_NAMES, found)
+    differences = {
+        name: found
+        if name in {"mid", "mid_crucial", "rte"}
+        else found | {"low": -2.9, "high": 0.54, "p": 0.17}
+        for name in SCORE_NAMES
+    }
     sentence = "Foo++'s MiD is 1.18 ± 0.56 lower than Bar's; p = 0.0004."
     compared = {"split": "val", "edition": 2, "is_complete": True, "reason": "", "entries": []}
     pair = {"differences": differences, "sentence": sentence}

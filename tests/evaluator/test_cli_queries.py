@@ -70,6 +70,14 @@ def test_compare_asks_until_it_is_computed_and_shows_interval_and_p(tsttc: Tsttc
     assert rows["difference"][1:3] == ["-1.20", "–"]
     assert (rows["95 % from"][3], rows["95 % to"][3], rows["p"][1]) == ("-2.00", "-0.40", "0.0030")
     assert result.stdout.endswith("\n\nA is better.\n")
+    found["mid_crucial"] = {"difference": -4.1, "low": -5.3, "high": -2.9, "p": 0.0003}
+    found["rte"] = {"difference": -0.1, "low": -0.3, "high": 0.1, "p": 0.4}
+    told = tsttc("compare", "A", "id-b", "--split", "val").stdout.split("A is better.\n")[1]
+    assert told == (
+        "Of 2 other columns 1 differs significantly, each by itself "
+        "(of twenty columns of equals, one does):\n"
+        "  A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003.\n"
+    )
     assert site.requests[-1].path == "/api/v1/compare?split=val&m=id-a&m=id-b"
     assert json.loads(tsttc("compare", "A", "B", "--split", "val", "--json").stdout) == ready
 
@@ -104,7 +112,9 @@ def test_files_are_compared_offline_as_the_library_does(
     assert document["differences"]["mid"]["p"] == expected["mid"].p
     assert document["differences"]["mid"]["low"] == expected["mid"].low
     assert document["first"]["scores"]["overall"]["mid"] < document["second"]["scores"]["overall"]["mid"]
-    assert f"In MiD {files[0]} is better by more than chance alone makes" in tsttc(*arguments).stdout
+    said = tsttc(*arguments).stdout
+    assert f"In MiD {files[0]} is better by more than chance alone makes" in said
+    assert f"  {files[0]}'s RTE is " in said
     assert site.requests == []
     bad = tsttc("compare", EXAMPLES / "broken.json", files[0], "--truth", truth_of_30_recordings)
     assert bad.exit_code == 1

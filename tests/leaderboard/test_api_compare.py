@@ -37,6 +37,12 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
         found = pair["differences"]["mid"]
         assert found["low"] <= found["difference"] <= found["high"]
         assert "MiD is" in pair["sentence"]
+        names = {entry["method_id"]: entry["method"] for entry in body["entries"]}
+        for name, found in pair["differences"].items():
+            if found is not None:
+                assert found["sentence"].startswith(names[pair["first"]]), name
+                assert (" on small" in found["sentence"]) == name.endswith("_small"), name
+        assert pair["differences"]["mid"]["sentence"] == pair["sentence"]
     assert client.get(address(*ids, more="&edition=1")).json() == body
 
 

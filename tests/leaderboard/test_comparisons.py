@@ -9,9 +9,9 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from evaluator import SCORE_NAMES, compare_predictions, published, read_predictions
+from evaluator import SCORE_NAMES, compare_predictions, published, read_predictions, sentences
 from leaderboard import backlog, bags, comparisons, files, ground_truth, submissions
-from leaderboard.comparisons import BadComparison, Difference, NotOnTheBoard, UnknownMethod, sentence
+from leaderboard.comparisons import BadComparison, Difference, NotOnTheBoard, UnknownMethod
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
 from tests import builders
 from tests.editions import ANYBODY
@@ -246,7 +246,7 @@ def test_what_is_published_alike_is_not_told_apart_by_its_p(
     ],
 )
 def test_a_sentence_says_how_much_and_how_surely(found: Difference, said: str) -> None:
-    assert sentence("A", "B", name="mid_crucial", found=found) == said
+    assert sentences.sentence("A", "B", name="mid_crucial", found=found) == said
 
 
 def test_waiting_questions_are_told_to_the_workers_again(entries: list[Submission], edition: Edition) -> None:

@@ -44,6 +44,11 @@ def test_verdict_comes_first_then_every_difference_with_interval_and_p(
     verdict = root.one("p", class_="verdict").text
     assert verdict.startswith(f"{near.method.name}'s MiD is ")
     assert f"lower than {far.method.name}'s; p = " in verdict
+    lead = root.one("p", class_="others").text
+    others = [item.text for item in root.one("ul", class_="others").all("li")]
+    assert lead.startswith("Of 1 other column 1 differs significantly"), "the others have too few recordings"
+    assert len(others) == len(root.one("table", class_="differences").all("tr", class_="significant")) - 1
+    assert all(f"{near.method.name}'s " in other and "; p = 0." in other for other in others)
     rows = [
         row for row in root.one("table", class_="differences").all("tr") if row.all("svg", class_="whisker")
     ]
@@ -69,6 +74,7 @@ def test_five_methods_are_ten_pairs_and_one_verdict(client: Client, edition: Edi
     root = get(client, *ids)
     assert len(root.all("section", class_="pair")) == 10
     assert root.one("p", class_="verdict").text.startswith("Of these five, M0 has the lowest MiD, ")
+    assert all(len(pair.all("p", class_="others")) == 1 for pair in root.all("section", class_="pair"))
 
 
 def test_every_bad_question_has_a_page_that_says_what_is_wrong(
@@ -114,6 +120,7 @@ def test_too_few_recordings_are_said_and_no_p_is_shown(
     root = get(client, *ids)
     assert "this ground truth has 12; expected at least 20" in words(root)
     assert "95 % interval" not in [head.text for head in root.one("table", class_="differences").all("th")]
+    assert root.all("p", class_="others") == []
     board = pages.page(client.get("/board/test/"))
     assert "this ground truth has 12; expected at least 20" in board.one("main").text
     assert board.all("svg", class_="whisker") == []
