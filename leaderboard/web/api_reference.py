@@ -11,8 +11,6 @@ from functools import cache
 from http import HTTPStatus
 from typing import Any, Final
 
-from drf_spectacular.generators import SchemaGenerator
-
 from evaluator.problems import PROBLEM_CODES
 from leaderboard import problem_codes
 
@@ -87,6 +85,8 @@ class Reference:
 @cache
 def reference() -> Reference:
     """The reference; the schema cannot change while the process lives."""
+    from drf_spectacular.generators import SchemaGenerator  # noqa: PLC0415 - needs the settings; `read` does not
+
     schema: dict[str, Any] = SchemaGenerator().get_schema(request=None, public=True)
     return read(schema)
 
@@ -117,7 +117,8 @@ def _spelt_out(node: Any, named: Node) -> Any:
         return node
     target = named.get(str(node.get("$ref", "")).rpartition("/")[2])
     if target is not None and "properties" not in target:
-        return target
+        # What a field says beside naming it, its own description, goes before the enumeration's.
+        return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
     return {key: _spelt_out(value, named) for key, value in node.items()}
 
 

@@ -2,7 +2,9 @@
 
 import math
 import random
+import re
 from datetime import timedelta
+from pathlib import Path
 from uuid import UUID
 
 import pytest
@@ -17,6 +19,7 @@ from leaderboard.models import Edition, Evaluation, User
 from tests.leaderboard import queue_rows
 
 RNG = random.Random(0)
+REPOSITORY = Path(__file__).resolve().parents[2]
 
 
 def figures() -> dict[str, float]:
@@ -184,3 +187,11 @@ def test_figures_have_no_names_of_people(edition: Edition, owner: User) -> None:
     text = Client().get("/metrics").text
     assert owner.email not in text
     assert owner.name not in text
+
+
+def test_every_figure_is_documented_and_nothing_else(db: None) -> None:
+    documented = set(re.findall(r"\btsttc_[a-z_]+", (REPOSITORY / "docs" / "operations.md").read_text()))
+    families = list(text_string_to_metric_families(metrics.exposition().decode()))
+    given = {f"{family.name}_total" if family.type == "counter" else family.name for family in families}
+    assert len(given) >= 9
+    assert documented == given

@@ -2,6 +2,7 @@
 
 from datetime import timedelta
 from itertools import product
+from pathlib import Path
 
 import pytest
 from django.db import IntegrityError, transaction
@@ -257,3 +258,9 @@ def test_a_report_without_a_token_says_what_is_expected(db: None, body: object) 
 def test_a_session_is_no_obstacle_to_a_report(client: Client, owner: User, secret: str) -> None:
     client.force_login(owner)
     assert client.post(REVOKE, {"token": secret}, content_type="application/json").status_code == 200
+
+
+def test_secret_scanners_are_told_what_a_token_looks_like_and_where_to_end_it() -> None:
+    told = (Path(__file__).resolve().parents[2] / "SECURITY.md").read_text()
+    assert f"    {tokens.PATTERN.pattern}\n" in told
+    assert f"POST {REVOKE}" in told
