@@ -83,7 +83,7 @@ def thinned(paths: list[str], limit: int) -> list[str]:
 
 
 def somewhere(asked: list[str]) -> Iterator[str]:
-    """Every question at one of the addresses that take it, a board's if there is one, each at the next one."""
+    """Every question at one of the addresses that take it, a board's if there is one, each at the next."""
     places: dict[str, list[str]] = {}
     for path in asked:
         place, question = path.split("?", maxsplit=1)
