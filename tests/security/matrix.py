@@ -84,7 +84,7 @@ LINES: dict[str, Line] = {
     "submit": line(GET=SIGNED_IN, POST="in 422 422 422 422 in in"),
     "submissions": line(GET=SIGNED_IN),
     "submission": line(GET=OWN),
-    # 286: it is scored, do not ask again.
+    # 286: it is scored and has its intervals, do not ask again.
     "submission_state": line(GET="in 404 286 286 286 in in"),
     # Hidden splits have none, whoever asks.
     "analysis": line(GET="in 404 404 404 404 in in"),
