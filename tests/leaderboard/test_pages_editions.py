@@ -41,6 +41,11 @@ def facts(root: pages.Element) -> dict[str, str]:
     return {dt.text: dd.text for dt, dd in zip(facts.all("dt"), facts.all("dd"), strict=True)}
 
 
+def changed_on() -> str:
+    """Of the last time that an edition became the board."""
+    return f"{Publication.objects.latest('pk').at:%Y-%m-%d}"
+
+
 def test_present_edition_is_the_board(client: Client, entries: list[Submission]) -> None:
     assert pages.board_rows(get(client, OLD)) == pages.board_rows(get(client, "/board/test/"))
     assert get(client, OLD).one("p", class_="notice").text.startswith("This is the board now.")
@@ -56,7 +61,7 @@ def test_former_edition_keeps_its_board_and_names_its_successor(
     root = get(client, OLD)
     assert pages.board_rows(root) == before
     notice = root.one("p", class_="notice")
-    assert notice.text.startswith(f"Replaced by edition 2 on {timezone.now():%Y-%m-%d}. “Labels corrected.”")
+    assert notice.text.startswith(f"Replaced by edition 2 on {changed_on()}. “Labels corrected.”")
     assert [a.attributes["href"] for a in notice.all("a")] == [NEW, "/board/test/"]
     assert pages.board_rows(get(client, NEW)) == pages.board_rows(get(client, "/board/test/")) != before
 
@@ -103,7 +108,8 @@ def test_edition_in_preparation_is_nothing_to_anybody(
 
 
 def test_board_as_it_stood_at_a_time(client: Client, entries: list[Submission]) -> None:
-    yesterday = timezone.now() - timedelta(days=1)
+    sent_at = entries[0].submitted_at
+    yesterday = sent_at - timedelta(days=1)
     root = get(client, f"/board/test/?at={yesterday:%Y-%m-%d}")
     assert len(pages.board_rows(root)) == 5
     assert "as it stood on" in root.one("main").text
@@ -177,11 +183,19 @@ def test_list_has_every_published_edition_and_what_became_of_it(
     open_edition(corrected(tmp_path, factor=1.5))
     root = get(client, EDITIONS)
     rows = [[cell.text for cell in row.all("td")] for row in root.one("tbody").all("tr")]
-    today = f"{timezone.now():%Y-%m-%d}"
+    opened, changed = (f"{row.at:%Y-%m-%d}" for row in Publication.objects.order_by("pk"))
     first, second = (edition.ground_truth.short_digest for edition in Edition.objects.all()[:2])
     assert rows == [
-        ["edition 2", "the board now", today, second, "tsttc-1", "120", "5 labels corrected"],
-        ["edition 1", f"replaced by edition 2 on {today}", today, first, "tsttc-1", "120", "the first"],
+        ["edition 2", "the board now", changed, second, "tsttc-1", "120", "5 labels corrected"],
+        [
+            "edition 1",
+            f"replaced by edition 2 on {changed}",
+            opened,
+            first,
+            "tsttc-1",
+            "120",
+            "the first",
+        ],
     ]
 
 
@@ -274,7 +288,8 @@ def test_withdrawn_entry_leaves_its_mark_in_every_edition(
     submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
     rows = get(client, address).one("table", class_="board").one("tbody").all("tr")
     (row,) = [row for row in rows if "withdrawn" in row.classes]
-    assert row.one("div", class_="name").text == f"M1.05 withdrawn {timezone.now():%Y-%m-%d}"
+    withdrawn_at = Submission.objects.get(pk=entries[0].pk).withdrawn_at
+    assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:

@@ -14,8 +14,9 @@ from tests.editions import corrected, open_edition, publish, roll_back
 from tests.leaderboard.test_pages_everywhere import assert_sound
 
 
-def today() -> str:
-    return f"{timezone.now():%Y-%m-%d}"
+def changed_on() -> str:
+    """Of the last time that an edition became the board."""
+    return f"{Publication.objects.latest('pk').at:%Y-%m-%d}"
 
 
 def address(submission: Submission, part: str = "") -> str:
@@ -64,7 +65,7 @@ def test_team_is_told_what_a_correction_did_to_its_entry(
     publish(second)
     assert mid(sent, 1) != mid(sent, 2)
     assert notices(signed_in, sent) == [
-        f"Re-scored in edition 2 on {today()}: Labels corrected. MiD {mid(sent, 1)} → {mid(sent, 2)}. "
+        f"Re-scored in edition 2 on {changed_on()}: Labels corrected. MiD {mid(sent, 1)} → {mid(sent, 2)}. "
         "Edition 1 stays as it was; all editions."
     ]
 
@@ -77,7 +78,7 @@ def test_team_is_told_that_a_correction_was_taken_back(
     roll_back()
     (notice,) = notices(signed_in, sent)
     assert notice.startswith(
-        f"Edition 1 is the board again since {today()}: A mistake. MiD {mid(sent, 2)} → "
+        f"Edition 1 is the board again since {changed_on()}: A mistake. MiD {mid(sent, 2)} → "
     )
 
 
@@ -96,8 +97,8 @@ def test_team_is_told_that_the_new_truth_cannot_score_its_file(
     builders.score_all()
     publish(second)
     assert notices(signed_in, sent) == [
-        f"Edition 2 became the board on {today()}: Labels corrected. It cannot score this file, for the "
-        f"reason below. In edition 1 it keeps its result, MiD {mid(sent, 1)}. "
+        f"Edition 2 became the board on {changed_on()}: Labels corrected. It cannot score this file, for "
+        f"the reason below. In edition 1 it keeps its result, MiD {mid(sent, 1)}. "
         "Edition 1 stays as it was; all editions."
     ]
     outcome = pages.page(signed_in.get(address(sent))).one("div", id="outcome").text
@@ -171,11 +172,12 @@ def test_team_withdraws_and_is_told_when(
     response = client.post(address(sent, "withdraw/"), follow=True)
     assert response.redirect_chain == [(address(sent), 302)]
     assert "The submission is withdrawn." in pages.page(response).one("div", class_="messages").text
-    assert notices(client, sent)[0].startswith(f"Withdrawn by its team on {today()}")
+    sent.refresh_from_db()
+    assert notices(client, sent)[0].startswith(f"Withdrawn by its team on {sent.withdrawn_at:%Y-%m-%d}")
     assert AuditEvent.objects.get(verb="withdrawn").actor == user
     board = pages.page(client.get("/board/test/"))
     (row,) = [row for row in pages.board_rows(board) if row[1].startswith(sent.method.name)]
-    assert f"withdrawn {today()}" in row[1]
+    assert f"withdrawn {sent.withdrawn_at:%Y-%m-%d}" in row[1]
     assert set(row[4:-1]) == {"–"}  # the last is how often the team tried, which stays
 
 
