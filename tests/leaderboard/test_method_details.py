@@ -289,7 +289,8 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
     assert seen() == before
     assert not any(veiled.pseudonym.encode() in answer for answer in before)
     client.force_login(owner)
-    assert all(b"Veiled" in answer for answer in seen())
+    mine = [answer for address, answer in zip(addresses, seen(), strict=True) if ".csv" not in address]
+    assert all(b"Veiled" in answer for answer in mine)  # what is taken along has nothing of one's own
 
 
 @pytest.mark.parametrize(
