@@ -87,6 +87,7 @@ def populate(edition: Edition) -> World:
     submission = builders.submit(users["owner"], builders.predictions(edition), method="Hidden")
     builders.score_all()
     Method.objects.update(visibility=Visibility.PRIVATE)
+    builders.infer_all()
     _fill_the_administration(users["maintainer"], submission)
     tokens = {role: builders.token(user) for role, user in users.items()}
     # A token without the scope that a method needs: the other one.
