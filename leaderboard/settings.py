@@ -6,12 +6,15 @@ Every variable is described in `docs/operations.md`.
 """
 
 import logging
+import os
 import sys
 from collections.abc import Callable
+from contextlib import suppress
 from datetime import timedelta
 from ipaddress import ip_network
 from pathlib import Path
 from secrets import token_urlsafe
+from tempfile import mkstemp
 from typing import Any
 
 import environ
@@ -58,8 +61,13 @@ def embedded_key(name: str, make: Callable[[], str]) -> str:
     """A key of this checkout's own, made once, so that what it signed survives a restart of the demo."""
     path = DATA_DIR / name
     if not path.exists():
-        path.touch(mode=0o600)
-        path.write_text(make())
+        # Whole at once, and the first one's for all: several processes may start together.
+        handle, own = mkstemp(dir=DATA_DIR, prefix=f".{name}-")
+        with os.fdopen(handle, "w") as file:
+            file.write(make())
+        with suppress(FileExistsError):
+            os.link(own, path)
+        Path(own).unlink()
     return path.read_text()
 
 
