@@ -18,7 +18,6 @@ from leaderboard.entries import (
     Scored,
     flat_scores,
     named,
-    placed,
     profile_of,
     published_entry,
     scored_in,
@@ -28,10 +27,10 @@ from leaderboard.entries import (
 from leaderboard.filters import Filters
 from leaderboard.models import Edition, Evaluation, Method, Split, Status, Submission, User, Visibility
 from leaderboard.models.methods import MethodQuerySet
+from leaderboard.order import PRIMARY, Place, in_ranks, key, listed
 
 __all__ = ["Board", "Entry", "board", "everybodys", "flat_scores", "scores_in", "with_own"]
 
-PRIMARY = "mid"
 TEXT_COLUMNS = ("rank", "method", "team", "date")
 SORTABLE = (*TEXT_COLUMNS, *SCORE_NAMES)
 
@@ -140,7 +139,7 @@ def arranged(
     return Board(
         split=split,
         edition=edition,
-        entries=tuple(_sorted([entry for entry in entries if filters.admits(entry)], sort)),
+        entries=tuple(listed([entry for entry in entries if filters.admits(entry)], by=sort)),
         sort=sort,
         at=at,
         updated_at=max(dates, default=None),
@@ -185,7 +184,7 @@ def everybodys(
         rows = _best_of_each(shown, split=split, edition=edition, at=at, supposed=supposed)
         attempts = _attempts(shown, split=split, at=at, supposed=supposed)
         entries += [replace(row, n_attempts=attempts.of(row)) for row in rows]
-    return tuple(_marked(_ranked(entries)))
+    return in_ranks(entries)
 
 
 def _best_of_each(
@@ -206,7 +205,7 @@ def _best_of_each(
     evaluations = list(rows.order_by("pk"))
     scored = scored_in(edition, methods=methods, has_ranges=at is None)
     unscorable = _unscorable(split, edition)
-    best: dict[UUID, Entry] = {}
+    best: dict[UUID, tuple[Place, Entry]] = {}
     for evaluation in evaluations:
         submission = evaluation.submission
         if supposed is not None and submission.method_id == supposed.pk:
@@ -224,10 +223,11 @@ def _best_of_each(
             withdrawn_at=withdrawn_at,
             is_unscorable=evaluation.submission_id in unscorable,
         )
+        place = key(entry.scores[PRIMARY], submission.submitted_at)
         rival = best.get(method.pk)
-        if rival is None or _key(entry) < _key(rival):
-            best[method.pk] = entry
-    return list(best.values())
+        if rival is None or place < rival[0]:
+            best[method.pk] = place, entry
+    return [entry for _, entry in best.values()]
 
 
 def _unscorable(split: Split, edition: Edition) -> set[UUID]:
@@ -239,7 +239,7 @@ def _unscorable(split: Split, edition: Edition) -> set[UUID]:
 
 
 @dataclass(frozen=True)
-class _Attempts:
+class Attempts:
     """How many scored submissions each method has, and the public ones of each team together."""
 
     by_method: Mapping[UUID, int]
@@ -257,7 +257,7 @@ class _Attempts:
 
 def _attempts(
     methods: MethodQuerySet, *, split: Split, at: datetime | None, supposed: Method | None = None
-) -> _Attempts:
+) -> Attempts:
     """Counted are submissions that were scored in a published edition: those that cost a slot for good."""
     scored = Evaluation.objects.filter(
         submission=OuterRef("pk"), status=Status.SCORED, edition__published_at__isnull=False
@@ -279,7 +279,7 @@ def _attempts(
             visibility = supposed.visibility  # noqa: PLW2901 - as if it were
         if visibility == Visibility.PUBLIC:
             by_team[team_id] = by_team.get(team_id, 0) + n
-    return _Attempts(by_method=by_method, by_team=by_team, team_of=team_of)
+    return Attempts(by_method=by_method, by_team=by_team, team_of=team_of)
 
 
 # --- what a reader's own team sees beside ----------------------------------------------------------------
@@ -346,56 +346,3 @@ def _private_rows(
         for row in rows
         if row.method_id is not None
     ]
-
-
-# --- order -----------------------------------------------------------------------------------------------
-
-
-def _key(entry: Entry) -> tuple[bool, float, datetime]:
-    """Better first: a value before none, lower before higher, earlier before later."""
-    value = entry.scores[PRIMARY]
-    assert entry.date is not None  # noqa: S101 - for the type checker: every submission has a date
-    return (value is None, value or 0.0, entry.date)
-
-
-def _ranked(entries: list[Entry]) -> list[Entry]:
-    ranks = ranking.rank([entry.scores[PRIMARY] for entry in entries])
-    return [placed(entry, rank) for entry, rank in zip(entries, ranks, strict=True)]
-
-
-def _marked(entries: list[Entry]) -> list[Entry]:
-    """Mark the best and the second of each column."""
-    best: dict[int, set[str]] = {}
-    second: dict[int, set[str]] = {}
-    for name in SCORE_NAMES:
-        firsts, seconds = ranking.best_and_second([entry.scores[name] for entry in entries])
-        for index in firsts:
-            best.setdefault(index, set()).add(name)
-        for index in seconds:
-            second.setdefault(index, set()).add(name)
-    return [
-        replace(entry, best=frozenset(best.get(i, ())), second=frozenset(second.get(i, ())))
-        for i, entry in enumerate(entries)
-    ]
-
-
-def _sorted(entries: list[Entry], sort: str) -> list[Entry]:
-    """In the order of one column; rows without a value come last, ties by rank, value and name."""
-    column = sort.removeprefix("-")
-    in_rank_order = sorted(
-        entries, key=lambda e: (e.rank or len(entries) + 1, e.scores[PRIMARY] or 0, e.method.casefold())
-    )
-
-    def value(entry: Entry) -> str | float | int | None:
-        if column in SCORE_NAMES:
-            return entry.scores[column]
-        if column == "rank":
-            return entry.rank
-        if column == "date":
-            return entry.date_text or None
-        return (entry.method if column == "method" else entry.team).casefold()
-
-    valued = [entry for entry in in_rank_order if value(entry) is not None]
-    without = [entry for entry in in_rank_order if value(entry) is None]
-    valued.sort(key=value, reverse=sort.startswith("-"))  # type: ignore[arg-type]  # one column, one type
-    return [*valued, *without]

@@ -1,0 +1,60 @@
+"""The order of a board: who is better, which ranks and marks that makes, and how rows are listed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from datetime import datetime
+
+from evaluator import ranking
+from evaluator.protocol import SCORE_NAMES
+from leaderboard.entries import Entry, placed
+
+PRIMARY = "mid"
+Place = tuple[bool, float, datetime]
+
+
+def key(value: float | None, submitted_at: datetime) -> Place:
+    """Of a method's submissions, the better first: a value before none, lower before higher, then earlier."""
+    return (value is None, value or 0.0, submitted_at)
+
+
+def in_ranks(entries: Sequence[Entry]) -> tuple[Entry, ...]:
+    """The same rows with their ranks, and with the best and the second of each column marked."""
+    ranks = ranking.rank([entry.scores[PRIMARY] for entry in entries])
+    return tuple(_marked([placed(entry, rank) for entry, rank in zip(entries, ranks, strict=True)]))
+
+
+def _marked(entries: list[Entry]) -> list[Entry]:
+    best: dict[int, set[str]] = {}
+    second: dict[int, set[str]] = {}
+    for name in SCORE_NAMES:
+        firsts, seconds = ranking.best_and_second([entry.scores[name] for entry in entries])
+        for index in firsts:
+            best.setdefault(index, set()).add(name)
+        for index in seconds:
+            second.setdefault(index, set()).add(name)
+    return [
+        replace(entry, best=frozenset(best.get(i, ())), second=frozenset(second.get(i, ())))
+        for i, entry in enumerate(entries)
+    ]
+
+
+def listed(entries: Sequence[Entry], *, by: str) -> list[Entry]:
+    """In the order of one column; rows without a value come last, ties by rank, value and name."""
+    column = by.removeprefix("-")
+    in_rank_order = sorted(
+        entries, key=lambda e: (e.rank or len(entries) + 1, e.scores[PRIMARY] or 0, e.method.casefold())
+    )
+
+    def value(entry: Entry) -> str | float | int | None:
+        if column in SCORE_NAMES:
+            return entry.scores[column]
+        if column == "rank":
+            return entry.rank
+        if column == "date":
+            return entry.date_text or None
+        return (entry.method if column == "method" else entry.team).casefold()
+
+    valued = [entry for entry in in_rank_order if value(entry) is not None]
+    without = [entry for entry in in_rank_order if value(entry) is None]
+    valued.sort(key=value, reverse=by.startswith("-"))  # type: ignore[arg-type]  # one column, one type
+    return [*valued, *without]
