@@ -15,6 +15,9 @@ from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Sco
 from leaderboard.models.methods import MethodQuerySet
 
 ANONYMOUS_TEAM = "Anonymous"
+OTHER_REASON = "other"
+# Of why a file cannot be scored in another edition, what everybody is told: it is about that edition.
+_REASONS_TOLD = ("missing-keys", "unknown-keys", "undefined-error")
 _INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
 
 
@@ -86,7 +89,12 @@ class Entry:
     pseudonym: str = ""  # of one's own anonymous row: under which everybody else sees it
     shown_at: datetime | None = None  # since when everybody sees its method
     withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
-    is_unscorable: bool = False  # of a former edition, whose successor cannot score the file
+    unscorable: str = ""  # of a former edition: the code of why the published one cannot score the file
+
+    @property
+    def is_unscorable(self) -> bool:
+        """Whether it stays in a former edition, because the published one cannot score its file."""
+        return bool(self.unscorable)
 
     @property
     def is_visible_to_all(self) -> bool:
@@ -156,7 +164,7 @@ def submitted_entry(
     *,
     profile: Profile,
     withdrawn_at: datetime | None = None,
-    is_unscorable: bool = False,
+    unscorable: str = "",
 ) -> Entry:
     """The row of a submission, as `profile` tells of its method."""
     submission = evaluation.submission
@@ -172,8 +180,18 @@ def submitted_entry(
         visibility=submission.method.visibility,
         shown_at=submission.method.shown_at,
         withdrawn_at=withdrawn_at,
-        is_unscorable=is_unscorable,
+        unscorable=unscorable,
     )
+
+
+def reason_told(problems: Iterable[Mapping[str, str]]) -> str:
+    """The code of why an edition cannot score a file that another one scored, as far as it is told.
+
+    >>> reason_told([{"code": "not-finite"}, {"code": "missing-keys"}]), reason_told([{"code": "not-finite"}])
+    ('missing-keys', 'other')
+    """
+    codes = (problem["code"] for problem in problems)
+    return next((code for code in codes if code in _REASONS_TOLD), OTHER_REASON)
 
 
 # --- their values ----------------------------------------------------------------------------------------
@@ -217,7 +235,7 @@ def scored_in(
 ) -> dict[UUID, Scored]:
     """Values and intervals of every evaluation in an edition, or of these methods: one query.
 
-    Ranges are of the entries that stand now; without `has_ranges` they are left out.
+    Ranges are of the entries that stand now; without `has_ranges` they are left out, as if there were none.
     """
     rows = Score.objects.filter(evaluation__edition=edition)
     if methods is not None:
@@ -229,8 +247,9 @@ def scored_in(
         scored = found.setdefault(pk, Scored())
         name = _name(metric, interval)
         scored.values[name] = value
-        if any(item is not None for item in inferred):
-            scored.intervals[name] = Interval(*(inferred if has_ranges else inferred[:2]))
+        known = inferred if has_ranges else inferred[:2]
+        if any(item is not None for item in known):
+            scored.intervals[name] = Interval(*known)
     return found
 
 

@@ -20,6 +20,7 @@ from leaderboard.entries import (
     named,
     profile_of,
     published_entry,
+    reason_told,
     scored_in,
     scores_in,
     submitted_entry,
@@ -204,7 +205,7 @@ def _best_of_each(
     # Before their scores, which are written with them; in an order of their own, so that bytes keep theirs.
     evaluations = list(rows.order_by("pk"))
     scored = scored_in(edition, methods=methods, has_ranges=at is None)
-    unscorable = _unscorable(split, edition)
+    unscorable = unscorable_in(edition, split=split)
     best: dict[UUID, tuple[Place, Entry]] = {}
     for evaluation in evaluations:
         submission = evaluation.submission
@@ -221,7 +222,7 @@ def _best_of_each(
             scored.get(evaluation.pk) or Scored(),
             profile=profile_of(method, is_masked=method.visibility == Visibility.ANONYMOUS),
             withdrawn_at=withdrawn_at,
-            is_unscorable=evaluation.submission_id in unscorable,
+            unscorable=unscorable.get(evaluation.submission_id, ""),
         )
         place = key(entry.scores[PRIMARY], submission.submitted_at)
         rival = best.get(method.pk)
@@ -230,12 +231,19 @@ def _best_of_each(
     return [entry for _, entry in best.values()]
 
 
-def _unscorable(split: Split, edition: Edition) -> set[UUID]:
-    """Submissions of a former edition that the published one rejects: its manifest has other keys."""
+def unscorable_in(edition: Edition, *, split: Split) -> dict[UUID, str]:
+    """Submissions that a former edition scored and the published one rejects: its manifest has other keys.
+
+    By each the code of the reason.
+    """
     if split.published_edition_id in {None, edition.pk}:
-        return set()
-    rejected = Evaluation.objects.filter(edition=split.published_edition_id, status=Status.REJECTED)
-    return set(rejected.values_list("submission", flat=True))
+        return {}
+    rejected = Evaluation.objects.filter(
+        edition=split.published_edition_id,
+        status=Status.REJECTED,
+        submission__in=Evaluation.objects.filter(edition=edition, status=Status.SCORED).values("submission"),
+    )
+    return {pk: reason_told(problems) for pk, problems in rejected.values_list("submission", "problems")}
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,8 @@
 """Editions as they are drawn: what changed in words, how far a re-scoring is, and what it would change."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Final
-from uuid import UUID
 
 from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
@@ -75,13 +74,8 @@ def with_reasons(table: BoardTable, board: Board) -> BoardTable:
     present = board.split.published_edition
     if present is None or not any(row.entry.is_unscorable for row in table.rows):
         return table
-    rejected = Evaluation.objects.filter(edition=present, status=Status.REJECTED)
-    reasons: dict[UUID | None, str] = {
-        submission_id: unscorable_words(problems, present.number)
-        for submission_id, problems in rejected.values_list("submission", "problems")
-    }
     rows = [
-        replace(row, note=reasons.get(row.entry.submission_id, ""))
+        replace(row, note=unscorable_words(row.entry.unscorable, present.number))
         if row.entry.is_unscorable and not row.entry.withdrawn_at
         else row
         for row in table.rows
@@ -89,16 +83,13 @@ def with_reasons(table: BoardTable, board: Board) -> BoardTable:
     return replace(table, rows=tuple(rows))
 
 
-def unscorable_words(problems: Sequence[Mapping[str, str]], number: int) -> str:
+def unscorable_words(code: str, number: int) -> str:
     """Why an edition cannot score a file that a former one scored; nothing of the file itself is told.
 
-    >>> unscorable_words([{"code": "missing-keys"}], 3)
-    'Edition 3 added sequences that its file does not predict.'
+    >>> unscorable_words("missing-keys", 3), unscorable_words("other", 3)
+    ('Edition 3 added sequences that its file does not predict.', 'Edition 3 cannot score its file.')
     """
-    for problem in problems:
-        if problem["code"] in _WHY_UNSCORABLE:
-            return _WHY_UNSCORABLE[problem["code"]].format(number)
-    return f"Edition {number} cannot score its file."
+    return _WHY_UNSCORABLE.get(code, "Edition {} cannot score its file.").format(number)
 
 
 @dataclass(frozen=True)
