@@ -23,7 +23,7 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.names import clean_name, like
-from leaderboard.snapshots import Attempt
+from leaderboard.present import Attempt
 from leaderboard.texts import Refused, clean_text, clean_url
 
 MAX_PARAMETERS = 10**15

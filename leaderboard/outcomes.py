@@ -15,7 +15,7 @@ from evaluator import ranking
 from leaderboard import inference, snapshots, submissions
 from leaderboard.entries import Entry, Interval, profile_of, scored_of, submitted_entry
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
-from leaderboard.snapshots import Drawn
+from leaderboard.present import Drawn
 from leaderboard.standings import PRIMARY
 from leaderboard.submissions import Progress
 

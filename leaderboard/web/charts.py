@@ -18,7 +18,7 @@ from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
 from leaderboard.entries import Interval
 from leaderboard.exports import printed_decimals, short_authors
-from leaderboard.snapshots import Attempt
+from leaderboard.present import Attempt
 from leaderboard.standings import Entry
 from leaderboard.web.chart_frames import Frame, decade_ticks, log_ground
 from leaderboard.web.drawing import round_ticks

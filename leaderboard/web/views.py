@@ -10,6 +10,7 @@ from django.db.models import Prefetch
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
+from django.utils.functional import SimpleLazyObject
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
@@ -49,7 +50,9 @@ def home(request: HttpRequest) -> HttpResponse:
 def board(request: HttpRequest, split: str) -> HttpResponse:
     """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
     found = split_or_404(request, split)
-    return draw_board(request, "board.html", split=found, news=edition_tables.news(found))
+    # Asked for only by a page that tells it: a board of the past does not.
+    news = SimpleLazyObject(lambda: edition_tables.news(found))
+    return draw_board(request, "board.html", split=found, news=news)
 
 
 def draw_board(
