@@ -244,7 +244,9 @@ def scored_in(
     for pk, metric, interval, value, *inferred in rows.values_list(
         "evaluation_id", "metric", "interval", "value", *_INFERRED
     ):
-        scored = found.setdefault(pk, Scored())
+        scored = found.get(pk)
+        if scored is None:
+            scored = found[pk] = Scored()
         name = _name(metric, interval)
         scored.values[name] = value
         known = inferred if has_ranges else inferred[:2]
