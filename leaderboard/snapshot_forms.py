@@ -79,6 +79,8 @@ class Form(Generic[T]):
         self.name = name
         self.make = make
         self.memory = Memory[T](n_remembered)
+        # Of its own, so that nobody who asks for one form waits for another to be drawn.
+        self.drawing = threading.Lock()
         self._made = made
         self._parts = (made, *parts)
 

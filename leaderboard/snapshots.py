@@ -8,7 +8,6 @@ mixes two; its `etag` is the digest of what it says, so that a change which nobo
 An edition is kept in two forms: its board as of now, and what its boards of the past are made of.
 """
 
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import datetime, timedelta
@@ -165,12 +164,9 @@ def _read(form: Form[T], edition_ids: Sequence[int]) -> dict[int, T | None]:
     return found
 
 
-_drawing = threading.Lock()
-
-
 def _drawn_by_one(form: Form[T], edition: Edition) -> T:
     """Draw it, or wait for the thread of this process that does."""
-    with _drawing:
+    with form.drawing:
         stamped = _editions(form).get(pk=edition.pk)
         found = form.memory.get(_stamp(form, stamped.split, stamped))
         return found if found is not None else draw(edition, form)
