@@ -209,7 +209,7 @@ def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
     """The ten names and their values; None where an interval is empty."""
     values: dict[str, float | None] = dict.fromkeys(SCORE_NAMES)
     for score in scores:
-        values[_name(score.metric, score.interval)] = score.value
+        values[score_name(score.metric, score.interval)] = score.value
     return values
 
 
@@ -217,7 +217,7 @@ def scored_of(scores: Iterable[Score]) -> Scored:
     """The values of one evaluation with their intervals."""
     found = Scored()
     for score in scores:
-        name = _name(score.metric, score.interval)
+        name = score_name(score.metric, score.interval)
         found.values[name] = score.value
         inferred = [getattr(score, column) for column in _INFERRED]
         if any(item is not None for item in inferred):
@@ -247,7 +247,7 @@ def scored_in(
         scored = found.get(pk)
         if scored is None:
             scored = found[pk] = Scored()
-        name = _name(metric, interval)
+        name = score_name(metric, interval)
         scored.values[name] = value
         known = inferred if has_ranges else inferred[:2]
         if any(item is not None for item in known):
@@ -266,5 +266,6 @@ def placed(entry: Entry, rank: int | None) -> Entry:
     return replace(entry, rank=rank, intervals={**entry.intervals, "mid": unplaced})
 
 
-def _name(metric: str, interval: str) -> str:
+def score_name(metric: str, interval: str) -> str:
+    """The name of a value of a board; an error's alone is that of the overall one."""
     return metric if interval == "overall" else f"{metric}_{interval}"

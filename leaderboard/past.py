@@ -19,18 +19,20 @@ from leaderboard.entries import (
     Entry,
     Interval,
     Profile,
-    Scored,
     named,
     profile_of,
     published_entry,
-    scored_in,
+    score_name,
 )
-from leaderboard.models import Edition, Evaluation, Method, Status, Visibility
+from leaderboard.models import Edition, Evaluation, Method, Score, Status, Visibility
 from leaderboard.order import PRIMARY, Place, in_ranks, key
 from leaderboard.standings import Attempts, unscorable_in
 
-_NONE = (None,) * len(SCORE_NAMES)
-_PRIMARY = SCORE_NAMES.index(PRIMARY)
+Values = list[float | None]
+
+_NONE: Values = [None] * len(SCORE_NAMES)  # never changed: copied
+_PLACE = {name: place for place, name in enumerate(SCORE_NAMES)}
+_PRIMARY = _PLACE[PRIMARY]
 # Of an evaluation and its submission, what a row says; reports and problems are long.
 _COLUMNS = (
     "pk",
@@ -129,14 +131,13 @@ def _runs(edition: Edition, places: Mapping[UUID, int]) -> tuple[Run, ...]:
     rows = Evaluation.objects.filter(
         edition=edition, status=Status.SCORED, submission__method__in=Method.objects.shown()
     )
-    scored = scored_in(edition, methods=Method.objects.shown(), has_ranges=False)
+    # Before their scores, which are written with them; in an order of their own, so that bytes keep theirs.
+    evaluations = list(rows.order_by("pk").values_list(*_COLUMNS))
+    scored = _scored(edition)
     unscorable = unscorable_in(edition, split=edition.split)
     found = []
-    for pk, scored_at, submission_id, method_id, submitted_at, withdrawn_at in rows.order_by(
-        "pk"
-    ).values_list(*_COLUMNS):
-        said = scored.get(pk) or Scored()
-        intervals = [said.intervals.get(name) or Interval() for name in SCORE_NAMES]
+    for pk, scored_at, submission_id, method_id, submitted_at, withdrawn_at in evaluations:
+        values, low, high = scored.get(pk) or (_NONE, _NONE, _NONE)
         found.append(
             Run(
                 method=places[method_id],
@@ -146,12 +147,28 @@ def _runs(edition: Edition, places: Mapping[UUID, int]) -> tuple[Run, ...]:
                 scored_at=scored_at,
                 withdrawn_at=withdrawn_at,
                 unscorable=unscorable.get(submission_id, ""),
-                scores=tuple(said.values[name] for name in SCORE_NAMES),
-                low=tuple(interval.low for interval in intervals),
-                high=tuple(interval.high for interval in intervals),
+                scores=tuple(values),
+                low=tuple(low),
+                high=tuple(high),
             )
         )
     return tuple(found)
+
+
+def _scored(edition: Edition) -> dict[UUID, tuple[Values, Values, Values]]:
+    """The values of each evaluation of a shown method, and their lower and upper ends."""
+    rows = Score.objects.filter(
+        evaluation__edition=edition, evaluation__submission__method__in=Method.objects.shown()
+    )
+    found: dict[UUID, tuple[Values, Values, Values]] = {}
+    columns = ("evaluation_id", "metric", "interval", "value", "low", "high")
+    for pk, metric, interval, value, low, high in rows.values_list(*columns):
+        known = found.get(pk)
+        if known is None:
+            known = found[pk] = list(_NONE), list(_NONE), list(_NONE)
+        place = _PLACE[score_name(metric, interval)]
+        known[0][place], known[1][place], known[2][place] = value, low, high
+    return found
 
 
 # --- made of the facts -----------------------------------------------------------------------------------
