@@ -11,6 +11,7 @@ from typing import Any
 from uuid import UUID
 
 from evaluator.protocol import SCORE_NAMES
+from leaderboard import days
 from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility
 from leaderboard.models.methods import MethodQuerySet
 
@@ -168,18 +169,19 @@ def submitted_entry(
 ) -> Entry:
     """The row of a submission, as `profile` tells of its method."""
     submission = evaluation.submission
+    method = submission.method
     return Entry(
         kind="submission",
         **named(profile),
         scores=flat_scores([]) if withdrawn_at else scored.values,
         intervals={} if withdrawn_at else scored.intervals,
-        date=submission.submitted_at,
+        date=days.told(submission.submitted_at, is_masked=method.is_masked),
         method_id=submission.method_id,
         submission_id=submission.pk,
         evaluation_id=evaluation.pk,
-        visibility=submission.method.visibility,
-        shown_at=submission.method.shown_at,
-        withdrawn_at=withdrawn_at,
+        visibility=method.visibility,
+        shown_at=days.told_or_none(method.shown_at, is_masked=method.is_masked),
+        withdrawn_at=days.told_or_none(withdrawn_at, is_masked=method.is_masked),
         unscorable=unscorable,
     )
 

@@ -15,6 +15,7 @@ from uuid import UUID
 from django.db.models import Min
 
 from evaluator.protocol import SCORE_NAMES
+from leaderboard import days
 from leaderboard.entries import (
     Entry,
     Interval,
@@ -51,9 +52,18 @@ class Shown:
     method_id: UUID
     shown_at: datetime
     visibility: str
-    profile: Profile
+    profile: Profile  # as everybody sees it
     team_id: UUID | None  # of a named one
     counted_at: tuple[datetime, ...]  # when each of its submissions to the split was scored first, in order
+
+    @property
+    def is_masked(self) -> bool:
+        """Whether everybody sees it under a pseudonym."""
+        return self.visibility == Visibility.ANONYMOUS
+
+    def known_until(self, at: datetime) -> datetime:
+        """Until when a board as of `at` knows what happened to it."""
+        return days.known_until(at, is_masked=self.is_masked)
 
 
 @dataclass(frozen=True)
@@ -116,7 +126,7 @@ def _counted(split_id: str) -> dict[UUID, list[datetime]]:
 
 def _shown(method: Method, counted_at: list[datetime]) -> Shown:
     assert method.shown_at is not None  # noqa: S101 - for the type checker: a constraint says so
-    is_masked = method.visibility == Visibility.ANONYMOUS
+    is_masked = method.is_masked
     return Shown(
         method_id=method.pk,
         shown_at=method.shown_at,
@@ -178,9 +188,11 @@ def everybodys(past: Past, *, at: datetime) -> tuple[Entry, ...]:
     """The rows that everybody saw at that time, ranked and marked, as everybody sees them now."""
     best: dict[int, tuple[Place, Run]] = {}
     for run in past.runs:
-        withdrawn_at = _withdrawn_at(run, at)
+        method = past.methods[run.method]
+        until = method.known_until(at)
+        withdrawn_at = _withdrawn_at(run, until)
         # What nobody saw before it was withdrawn leaves no stone.
-        if run.scored_at > at or past.methods[run.method].shown_at > (withdrawn_at or at):
+        if run.scored_at > until or method.shown_at > (withdrawn_at or until):
             continue
         value = None if withdrawn_at else run.scores[_PRIMARY]
         place = key(value, run.submitted_at)
@@ -198,20 +210,20 @@ def _withdrawn_at(run: Run, at: datetime) -> datetime | None:
 
 
 def _entry(run: Run, method: Shown, at: datetime) -> Entry:
-    withdrawn_at = _withdrawn_at(run, at)
+    withdrawn_at = _withdrawn_at(run, method.known_until(at))
     ends = () if withdrawn_at else zip(SCORE_NAMES, run.low, run.high, strict=True)
     return Entry(
         kind="submission",
         **named(method.profile),
         scores=dict(zip(SCORE_NAMES, _NONE if withdrawn_at else run.scores, strict=True)),
         intervals={name: Interval(low, high) for name, low, high in ends if (low, high) != (None, None)},
-        date=run.submitted_at,
+        date=days.told(run.submitted_at, is_masked=method.is_masked),
         method_id=method.method_id,
         submission_id=run.submission_id,
         evaluation_id=run.evaluation_id,
         visibility=method.visibility,
-        shown_at=method.shown_at,
-        withdrawn_at=withdrawn_at,
+        shown_at=days.told(method.shown_at, is_masked=method.is_masked),
+        withdrawn_at=days.told_or_none(withdrawn_at, is_masked=method.is_masked),
         unscorable=run.unscorable,
     )
 
@@ -221,9 +233,10 @@ def _attempts(past: Past, at: datetime) -> Attempts:
     by_method, by_team = dict[UUID, int](), dict[UUID, int]()
     team_of: dict[UUID, UUID] = {}
     for method in past.methods:
-        if method.shown_at > at:
+        until = method.known_until(at)
+        if method.shown_at > until:
             continue
-        n = by_method[method.method_id] = bisect_right(method.counted_at, at)
+        n = by_method[method.method_id] = bisect_right(method.counted_at, until)
         if method.team_id is not None:
             team_of[method.method_id] = method.team_id
             by_team[method.team_id] = by_team.get(method.team_id, 0) + n

@@ -5,9 +5,9 @@ from datetime import datetime
 from typing import Any
 from uuid import UUID
 
-from leaderboard import standings
+from leaderboard import days, standings
 from leaderboard.entries import Entry
-from leaderboard.models import Edition, Method, Score, Status
+from leaderboard.models import Edition, Method, Score, Status, Visibility
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,15 @@ def _attempts(edition: Edition) -> tuple[Attempt, ...]:
         evaluation__submission__method__in=Method.objects.shown(),
         interval="overall",
     )
-    columns = ("submission__method_id", "submission_id", "submission__submitted_at")
+    columns = (
+        *("submission__method_id", "submission__method__visibility"),
+        *("submission_id", "submission__submitted_at"),
+    )
     found: dict[UUID, dict[str, Any]] = {}
-    for method_id, pk, at, metric, value in rows.values_list(
+    for method_id, visibility, pk, sent_at, metric, value in rows.values_list(
         *(f"evaluation__{column}" for column in columns), "metric", "value"
     ):
+        at = days.told(sent_at, is_masked=visibility == Visibility.ANONYMOUS)
         found.setdefault(pk, {"method_id": method_id, "submission_id": pk, "at": at})[metric] = value
     attempts = (Attempt(**said) for said in found.values())
     return tuple(sorted(attempts, key=lambda a: (a.at, a.submission_id.int), reverse=True))

@@ -6,13 +6,13 @@ from datetime import UTC, datetime, time
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
-from django.db.models import Count, Exists, OuterRef
+from django.db.models import Count, Exists, OuterRef, Q
 from django.utils import timezone
 from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator import ranking
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import deadlines
+from leaderboard import days, deadlines
 from leaderboard.entries import (
     Entry,
     Scored,
@@ -201,7 +201,7 @@ def _best_of_each(
         edition=edition, status=Status.SCORED, submission__method__in=methods
     ).select_related("submission__method__team")
     if at is not None:
-        rows = rows.filter(finished_at__lte=at)
+        rows = rows.filter(_finished_by(at, method="submission__method"))
     # Before their scores, which are written with them; in an order of their own, so that bytes keep theirs.
     evaluations = list(rows.order_by("pk"))
     scored = scored_in(edition, methods=methods, has_ranges=at is None)
@@ -211,16 +211,15 @@ def _best_of_each(
         submission = evaluation.submission
         if supposed is not None and submission.method_id == supposed.pk:
             submission.method = supposed
-        withdrawn_at = submission.withdrawn_at
-        if at is not None and withdrawn_at is not None and withdrawn_at > at:
+        method, withdrawn_at = submission.method, submission.withdrawn_at
+        if at is not None and withdrawn_at is not None and withdrawn_at > method.known_until(at):
             withdrawn_at = None
-        if withdrawn_at and not submission.method.was_shown(at=withdrawn_at):
+        if withdrawn_at and not method.was_shown_before(withdrawn_at):
             continue  # nobody saw it: no stone for what was never there
-        method = submission.method
         entry = submitted_entry(
             evaluation,
             scored.get(evaluation.pk) or Scored(),
-            profile=profile_of(method, is_masked=method.visibility == Visibility.ANONYMOUS),
+            profile=profile_of(method, is_masked=method.is_masked),
             withdrawn_at=withdrawn_at,
             unscorable=unscorable.get(evaluation.submission_id, ""),
         )
@@ -229,6 +228,12 @@ def _best_of_each(
         if rival is None or place < rival[0]:
             best[method.pk] = place, entry
     return [entry for _, entry in best.values()]
+
+
+def _finished_by(at: datetime, *, method: str) -> Q:
+    """What had been decided by then, of anonymous methods by the end of that day."""
+    is_masked = Q(**{f"{method}__visibility": Visibility.ANONYMOUS})
+    return Q(finished_at__lte=at) | is_masked & Q(finished_at__lte=days.known_until(at, is_masked=True))
 
 
 def unscorable_in(edition: Edition, *, split: Split) -> dict[UUID, str]:
@@ -271,7 +276,7 @@ def _attempts(
         submission=OuterRef("pk"), status=Status.SCORED, edition__published_at__isnull=False
     )
     if at is not None:
-        scored = scored.filter(finished_at__lte=at)
+        scored = scored.filter(_finished_by(at, method="submission__method"))
     rows = (
         Submission.objects.filter(Exists(scored), split=split, method__in=methods)
         .order_by()

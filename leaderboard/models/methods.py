@@ -10,6 +10,7 @@ from django.db import models
 from django.db.models import Q
 from django.utils import timezone
 
+from leaderboard import days
 from leaderboard.models.people import Membership, Team, User
 
 # Larger than any error or latency; what lies beyond is NaN or an infinity, which PostgreSQL sorts above it.
@@ -43,9 +44,15 @@ class MethodQuerySet(models.QuerySet["Method"]):
     """Questions about methods."""
 
     def shown(self, *, at: datetime | None = None) -> Self:
-        """Methods that everybody sees, under their name or a pseudonym; with `at` those shown by then."""
+        """Methods that everybody sees, under their name or a pseudonym; with `at` those shown by then.
+
+        Anonymous ones by the end of that day (see leaderboard/days.py).
+        """
         rows = self.exclude(visibility=Visibility.PRIVATE)
-        return rows if at is None else rows.filter(shown_at__lte=at)
+        if at is None:
+            return rows
+        by_then = Q(visibility=Visibility.ANONYMOUS, shown_at__lte=days.known_until(at, is_masked=True))
+        return rows.filter(by_then | Q(shown_at__lte=at))
 
     def of(self, user: User | AnonymousUser) -> Self:
         """Methods of the person's own team."""
@@ -123,7 +130,20 @@ class Method(models.Model):
         """Whether everybody sees it, by then already if `at` is given."""
         if self.visibility == Visibility.PRIVATE:
             return False
-        return at is None or (self.shown_at is not None and self.shown_at <= at)
+        return at is None or (self.shown_at is not None and self.shown_at <= self.known_until(at))
+
+    def was_shown_before(self, at: datetime) -> bool:
+        """Whether everybody saw it at that very moment."""
+        return self.was_shown() and self.shown_at is not None and self.shown_at <= at
+
+    @property
+    def is_masked(self) -> bool:
+        """Whether everybody else sees it under a pseudonym."""
+        return self.visibility == Visibility.ANONYMOUS
+
+    def known_until(self, at: datetime) -> datetime:
+        """Until when a board as of `at` knows what happened to it."""
+        return days.known_until(at, is_masked=self.is_masked)
 
     def is_named_for(self, user: User | AnonymousUser) -> bool:
         """Whether this reader may know whose it is: it is public, or theirs, or they are a maintainer."""

@@ -112,7 +112,7 @@ def test_it_is_what_the_database_says_at_every_moment(
     eventful: list[Submission], owner: User, stranger: User
 ) -> None:
     to_anybody = assert_the_same(ANYBODY)
-    assert len(to_anybody) >= 10
+    assert len(to_anybody) >= 9  # what happened to anonymous methods on one day is one board
     assert assert_the_same(owner, sort="-rte") != to_anybody
     assert assert_the_same(stranger) != to_anybody
 

@@ -1,0 +1,31 @@
+"""Days in UTC: as exactly as everybody is told when something happened to an anonymous method.
+
+A second would tell whose it is: of a team that sends an anonymous method and a named one in one go, say.
+"""
+
+from datetime import UTC, datetime, time
+
+
+def told(at: datetime, *, is_masked: bool) -> datetime:
+    """The time as everybody is told it: of an anonymous method the beginning of its day.
+
+    >>> told(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
+    '2026-11-21T00:00:00+00:00'
+    """
+    return datetime.combine(at.astimezone(UTC).date(), time.min, tzinfo=UTC) if is_masked else at
+
+
+def told_or_none(at: datetime | None, *, is_masked: bool) -> datetime | None:
+    """The same of what may not have happened."""
+    return None if at is None else told(at, is_masked=is_masked)
+
+
+def known_until(at: datetime, *, is_masked: bool) -> datetime:
+    """Until when a board as of `at` knows what happened to a method: to an anonymous one on the whole day.
+
+    So nobody narrows down its time by asking for board after board.
+
+    >>> known_until(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
+    '2026-11-21T23:59:59.999999+00:00'
+    """
+    return datetime.combine(at.astimezone(UTC).date(), time.max, tzinfo=UTC) if is_masked else at
