@@ -48,6 +48,8 @@ def sentence(first: str, second: str, *, name: str, found: Found) -> str:
     "A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003."
     >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))
     "A's RTE is 0.70 ± 0.50 percentage points higher than B's; p = 0.02."
+    >>> sentence("Two frames", "B", name="mid", found=Difference(-2.0, -3.1, -0.9, 0.002))
+    "Two frames' MiD is 2.0 ± 1.1 lower than B's; p = 0.002."
     """
     metric, _, interval = name.partition("_")
     label, unit = _METRIC_WORDS[metric]
@@ -58,14 +60,20 @@ def sentence(first: str, second: str, *, name: str, found: Found) -> str:
     if found.low is None or found.high is None or found.p is None:
         amount = f"{abs(found.difference):.2f}".rstrip("0").rstrip(".")
         return (
-            f"{first}'s {column} is {amount}{unit} {direction} than {second}'s; "
+            f"{_of(first)} {column} is {amount}{unit} {direction} than {_of(second)}; "
             "there are too few recordings to say whether that means anything."
         )
     half = (found.high - found.low) / 2
     decimals = _decimals(half)
     amount = f"{abs(found.difference):.{decimals}f} ± {half:.{decimals}f}"
-    caveat = "" if is_significant(found) else ", which chance alone may well have made"
-    return f"{first}'s {column} is {amount}{unit} {direction} than {second}'s; p = {found.p:.2g}{caveat}."
+    chance = f"p = {found.p:.2g}" + (
+        "" if is_significant(found) else ", which chance alone may well have made"
+    )
+    return f"{_of(first)} {column} is {amount}{unit} {direction} than {_of(second)}; {chance}."
+
+
+def _of(name: str) -> str:
+    return f"{name}'" if name.endswith(("s", "S")) else f"{name}'s"
 
 
 def _decimals(half: float) -> int:

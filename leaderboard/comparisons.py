@@ -142,7 +142,7 @@ def _chosen(board: standings.Board, methods: Sequence[UUID], viewer: User | Anon
     """The methods' rows, in the order that was asked for."""
     if not MIN_METHODS <= len(methods) <= MAX_METHODS:
         raise BadComparison(
-            f"{len(methods)} methods were named; expected {MIN_METHODS} to {MAX_METHODS} to compare."
+            f"{_n_methods(len(methods))} named; expected {MIN_METHODS} to {MAX_METHODS} to compare."
         )
     if len(set(methods)) < len(methods):
         raise BadComparison("A method was named twice; expected different ones to compare.")
@@ -205,6 +205,10 @@ def _turned(found: Difference) -> Difference:
     low = None if found.high is None else 0.0 - found.high
     high = None if found.low is None else 0.0 - found.low
     return Difference(0.0 - found.difference, low, high, found.p)
+
+
+def _n_methods(n: int) -> str:
+    return "1 method was" if n == 1 else f"{n} methods were"
 
 
 # --- a worker's work -------------------------------------------------------------------------------------

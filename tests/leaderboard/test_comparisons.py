@@ -147,7 +147,7 @@ def test_an_anonymous_method_is_compared_under_its_pseudonym(entries: list[Submi
 
 def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission], owner: User) -> None:
     many = [entries[0], entries[1], entries[2], entries[3]]
-    with pytest.raises(BadComparison, match=r"1 methods were named; expected 2 to 5"):
+    with pytest.raises(BadComparison, match=r"1 method was named; expected 2 to 5"):
         ask(entries[0])
     with pytest.raises(BadComparison, match=r"6 methods were named"):
         ask(*many, *many[:2])

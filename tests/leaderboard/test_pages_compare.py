@@ -86,7 +86,7 @@ def test_every_bad_question_has_a_page_that_says_what_is_wrong(
         (["x", ids[0]], "test", 404, "There is no method 'x'; expected an identifier"),
         ([ids[0], uuid4()], "test", 404, "that you may see"),
         ([ids[0], secret.method_id], "test", 404, "that you may see"),
-        ([ids[0]], "test", 400, "1 methods were named; expected 2 to 5"),
+        ([ids[0]], "test", 400, "1 method was named; expected 2 to 5"),
         ([*ids, uuid4(), uuid4()], "test", 400, "6 methods were named; expected 2 to 5"),
         ([ids[0], ids[0]], "test", 400, "named twice"),
         (ids[:2], "val", 400, "has no board yet"),
