@@ -77,7 +77,7 @@ def test_whatever_is_answered_has_a_tag_that_is_a_304_when_it_is_asked_with(
             assert {"Cookie", "Authorization"} <= set(response["Vary"].split(", ")), address
         assert asked(client, address, known='"other"').status_code == 200, address
         head = client.head(address)
-        head.close()  # a file of which nothing is sent
+        head.getvalue()  # to its end, which closes what it would be sent from
         assert head["ETag"].startswith('"'), address
     assert n_answered >= n_least
 
