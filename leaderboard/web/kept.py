@@ -167,7 +167,7 @@ class KeptMiddleware:
         path = request.path_info
         if path != "/" and not path.startswith(self.PREFIXES):
             return self._get_response(request)
-        # A board of the past is made for its one reader, who is counted: there is no end of times to ask for.
+        # A board of the past is made for its one reader: there is no end of times to ask for.
         if not is_anybodys(request) or "at" in request.GET:
             return self._get_response(request)
         address = request.get_full_path_info()
