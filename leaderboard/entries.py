@@ -11,8 +11,7 @@ from typing import Any
 from uuid import UUID
 
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import days
-from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility
+from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility, days
 from leaderboard.models.methods import MethodQuerySet
 
 ANONYMOUS_TEAM = "Anonymous"

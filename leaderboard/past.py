@@ -15,7 +15,6 @@ from uuid import UUID
 from django.db.models import Min
 
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import days
 from leaderboard.entries import (
     Entry,
     Interval,
@@ -25,7 +24,7 @@ from leaderboard.entries import (
     published_entry,
     score_name,
 )
-from leaderboard.models import Edition, Evaluation, Method, Score, Status, Visibility
+from leaderboard.models import Edition, Evaluation, Method, Score, Status, Visibility, days
 from leaderboard.order import PRIMARY, Place, in_ranks, key
 from leaderboard.standings import Attempts, unscorable_in
 

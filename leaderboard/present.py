@@ -5,9 +5,9 @@ from datetime import datetime
 from typing import Any
 from uuid import UUID
 
-from leaderboard import days, standings
+from leaderboard import standings
 from leaderboard.entries import Entry
-from leaderboard.models import Edition, Method, Score, Status, Visibility
+from leaderboard.models import Edition, Method, Score, Status, Visibility, days
 
 
 @dataclass(frozen=True)

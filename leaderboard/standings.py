@@ -12,7 +12,7 @@ from django.utils.dateparse import parse_date, parse_datetime
 
 from evaluator import ranking
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import days, deadlines
+from leaderboard import deadlines
 from leaderboard.entries import (
     Entry,
     Scored,
@@ -26,7 +26,17 @@ from leaderboard.entries import (
     submitted_entry,
 )
 from leaderboard.filters import Filters
-from leaderboard.models import Edition, Evaluation, Method, Split, Status, Submission, User, Visibility
+from leaderboard.models import (
+    Edition,
+    Evaluation,
+    Method,
+    Split,
+    Status,
+    Submission,
+    User,
+    Visibility,
+    days,
+)
 from leaderboard.models.methods import MethodQuerySet
 from leaderboard.order import PRIMARY, Place, in_ranks, key, listed
 

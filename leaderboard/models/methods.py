@@ -10,7 +10,7 @@ from django.db import models
 from django.db.models import Q
 from django.utils import timezone
 
-from leaderboard import days
+from leaderboard.models import days
 from leaderboard.models.people import Membership, Team, User
 
 # Larger than any error or latency; what lies beyond is NaN or an infinity, which PostgreSQL sorts above it.

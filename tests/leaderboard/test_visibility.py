@@ -3,7 +3,7 @@
 import json
 import random
 import re
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from typing import Any
 
 import pytest
@@ -17,9 +17,7 @@ from leaderboard.models import (
     AuditEvent,
     BoardVersion,
     Edition,
-    Evaluation,
     Method,
-    Publication,
     Split,
     Submission,
     User,
@@ -180,62 +178,6 @@ def test_what_was_withdrawn_before_it_was_shown_leaves_no_stone(
     sent.save()
     change(method, "PUBLIC", owner)
     assert "Secret sauce" not in rows()
-
-
-# --- anonymous: when ---------------------------------------------------------------------------------------
-
-DAY = datetime(2026, 1, 2, tzinfo=UTC)
-NOON = datetime(2026, 1, 2, 12, 34, 56, tzinfo=UTC)
-
-
-@pytest.fixture
-def at_noon(method: Method, sent: Submission, owner: User) -> Method:
-    """An anonymous method that came on a day long past, at noon, to a board that was there in the morning."""
-    change(method, Visibility.ANONYMOUS, owner)
-    Method.objects.update(shown_at=NOON)
-    Submission.objects.update(submitted_at=NOON - timedelta(minutes=1))
-    Evaluation.objects.update(finished_at=NOON - timedelta(seconds=30))
-    Publication.objects.update(at=DAY + timedelta(hours=8))
-    Edition.objects.update(published_at=DAY + timedelta(hours=8))
-    builders.board_changed("test")
-    return method
-
-
-def api_rows(client: Client, at: datetime | None = None) -> dict[str, dict[str, Any]]:
-    query = {"at": at.isoformat()} if at else {}
-    entries = client.get("/api/v1/splits/test/board", query).json()["entries"]
-    return {entry["method"]: entry for entry in entries}
-
-
-def test_times_of_an_anonymous_method_are_told_by_the_day(
-    client: Client, at_noon: Method, sent: Submission
-) -> None:
-    for withdrawn_at in (None, NOON + timedelta(minutes=1)):
-        Submission.objects.update(withdrawn_at=withdrawn_at)
-        builders.board_changed("test")
-        found = b"".join(everything_a_reader_can_ask(client, at_noon, sent)).decode()
-        found += client.get("/board/test/feed.atom").text + client.get("/board/test/charts/").text
-        assert at_noon.pseudonym in found
-        assert re.findall(r"2026-01-02.12:3\d", found) == []
-    assert api_rows(client)[at_noon.pseudonym]["withdrawn_at"] == "2026-01-02T00:00:00Z"
-    Method.objects.update(visibility=Visibility.PUBLIC)
-    builders.board_changed("test")
-    assert api_rows(client)["Secret sauce"]["withdrawn_at"] == "2026-01-02T12:35:56Z"
-
-
-def test_boards_of_one_day_do_not_tell_when_on_it_an_anonymous_method_came(
-    client: Client, at_noon: Method
-) -> None:
-    boards = [api_rows(client, DAY + timedelta(hours=hour)) for hour in (8, 12, 13, 23)]
-    assert all(board == boards[0] for board in boards)
-    assert boards[0][at_noon.pseudonym]["rank"] == 1
-    Method.objects.update(visibility=Visibility.PUBLIC)
-    builders.board_changed("test")
-    shown = [
-        "Secret sauce" in api_rows(client, at)
-        for at in (NOON - timedelta(seconds=1), NOON, DAY + timedelta(days=1))
-    ]
-    assert shown == [False, True, True]
 
 
 # --- leaving private ---------------------------------------------------------------------------------------
