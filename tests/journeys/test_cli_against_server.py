@@ -103,9 +103,9 @@ def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     lines = done.stdout.splitlines()
     assert lines[0].startswith("val · edition 1 · updated ")
     own = next(line.split() for line in lines if "Foo++" in line)
-    assert own[:3] == ["1", "Foo++", "Owls"]
+    assert own[:4] == ["1", "Foo++", "(private)", "Owls"]
     assert any(line.startswith("   1  Deep Scale") for line in lines), "a private method takes nobody's rank"
-    assert own[4] == f"{offline['scores']['overall']['mid']:.2f}"
+    assert own[5] == f"{offline['scores']['overall']['mid']:.2f}"
     assert "Shi et al. (published)  2023" in done.stdout
     document = json.loads(tsttc("board", "val", "--mine", "--sort", "-rte", "--json").stdout)
     assert document["sort"] == "-rte"

@@ -172,7 +172,7 @@ def test_failure_of_the_server_is_answered_with_that_page(
     def fail(**_: object) -> None:
         raise RuntimeError("a secret detail")
 
-    monkeypatch.setattr("leaderboard.standings.board", fail)
+    monkeypatch.setattr("leaderboard.snapshots.board", fail)
     client.raise_request_exception = False
     response = client.get("/")
     assert response.status_code == 500

@@ -258,7 +258,7 @@ def test_entries_that_become_rejected_say_why(
         assert status.text.startswith("rejected, was scored")
         assert "worse" in status.classes
     listed = said(keeper, f"{SECOND}publish/")
-    assert "4 scored entries cannot be scored in it: M1.05 (Owls)" in listed
+    assert "4 scored entries cannot be scored in it, and stay in edition 1, marked: M1.05 (Owls)" in listed
 
 
 def test_private_entries_are_marked_for_maintainers(keeper: Client, rescored: Edition) -> None:
