@@ -16,18 +16,20 @@ class UnnamedFileUploadHandler(FileUploadHandler):
     """Streams an upload to the disk. Gives back its room at once if the disk is full."""
 
     file: UploadedFile
+    is_open = False
 
     def new_file(self, *args: Any, **kwargs: Any) -> None:
         """Begin a file."""
         super().new_file(*args, **kwargs)
         self.file = UploadedFile(
-            tempfile.TemporaryFile(),  # noqa: SIM115 - the request closes it
+            tempfile.TemporaryFile(),  # noqa: SIM115 - the request closes it, or else this handler
             self.file_name,
             self.content_type,
             0,
             self.charset,
             self.content_type_extra,
         )
+        self.is_open = True
 
     def receive_data_chunk(self, raw_data: bytes, start: int) -> None:
         """Write a part of it. Raises `OSError` if there is no room."""
@@ -45,6 +47,7 @@ class UnnamedFileUploadHandler(FileUploadHandler):
             self.upload_interrupted()
             raise
         self.file.size = file_size
+        self.is_open = False  # the request closes it
         return self.file
 
     def upload_interrupted(self) -> None:
@@ -52,3 +55,9 @@ class UnnamedFileUploadHandler(FileUploadHandler):
         # Closing writes what is still in memory, for which there may be no room either.
         with suppress(OSError):
             self.file.close()
+        self.is_open = False
+
+    def __del__(self) -> None:
+        """Close what nobody else does: of a request that could not be read on, no handler is told."""
+        if self.is_open:
+            self.upload_interrupted()

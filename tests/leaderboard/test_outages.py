@@ -1,6 +1,7 @@
 """What stands beneath the leaderboard fails: a clear answer on every door, and nothing half kept."""
 
 import errno
+import gc
 import io
 import os
 import tempfile
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime
 from pathlib import Path
+from typing import IO
 
 import psycopg
 import pytest
@@ -223,6 +225,35 @@ def test_upload_that_fills_the_disk_gives_its_room_back(
     monkeypatch.setattr(tempfile, "TemporaryFile", lambda: full)
     assert api(b"x" * 11).status_code == 507
     assert full.closed
+
+
+BROKEN_AFTER_A_FILE = (
+    b'--x\r\nContent-Disposition: form-data; name="file"; filename="p.json"\r\n\r\n{}\r\n'
+    b"--x\r\nContent-Disposition: form-data; name=" + b"a" * 5000 + b"\r\n\r\n1\r\n--x--\r\n"
+)
+
+
+@pytest.mark.parametrize("path", ["/api/v1/submissions", "/submit/"])
+def test_upload_whose_request_cannot_be_read_on_gives_its_room_back(
+    edition: Edition, owner: User, path: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[IO[bytes]] = []
+    real = tempfile.TemporaryFile
+
+    def remember() -> IO[bytes]:
+        made.append(real())
+        return made[-1]
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", remember)
+    client = Client(raise_request_exception=False)
+    client.force_login(owner)
+    response = client.generic(
+        "POST", path, BROKEN_AFTER_A_FILE, content_type="multipart/form-data; boundary=x"
+    )
+    assert 400 <= response.status_code < 500
+    del response
+    gc.collect()
+    assert [file.closed for file in made] == [True]
 
 
 def test_upload_has_no_name_that_a_killed_process_could_leave_behind(
