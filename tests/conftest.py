@@ -21,6 +21,18 @@ os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 # Files whose tests score many predictions, each in a child process as a worker does, or make whole worlds.
 SLOW_FILES = {
     "test_admin_retry.py",
+    "test_past.py",
+    "test_api_outcome.py",
+    "test_standings.py",
+    "test_api_conditional.py",
+    "test_exports_of_ones_own.py",
+    "test_foreseen.py",
+    "test_first_visit.py",
+    "test_anonymity.py",
+    "test_deadlines.py",
+    "test_receipts.py",
+    "test_names.py",
+    "test_logs.py",
     "test_api_compare.py",
     "test_attempts.py",
     "test_broker.py",
