@@ -10,6 +10,9 @@ from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
 SIGNIFICANT: Final = 0.05
 _INTERVAL_WORDS: Final = {"overall": "", **{name: f" on {name}" for name in INTERVAL_NAMES[1:]}}
 _METRIC_WORDS: Final = {"mid": ("MiD", ""), "rte": ("RTE", " percentage points")}
+_DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
+# Of the normal distribution's 97.5 % point: what a difference must be to be found with a power of 80 %.
+_DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 
 
 class Found(Protocol):
@@ -40,52 +43,105 @@ def is_significant(found: Found) -> bool:
     return found.p is not None and found.p < SIGNIFICANT
 
 
-def sentence(first: str, second: str, *, name: str, found: Found) -> str:
-    """What a difference in one column means, in words.
+def p_text(p: float) -> str:
+    """A p-value in words: all four decimals, so that none is rounded to the 0.05 that it lies below.
+
+    >>> p_text(0.0496), p_text(0.3), p_text(1.0)
+    ('p = 0.0496', 'p = 0.3000', 'p = 1')
+    """
+    return "p = 1" if p == 1 else f"p = {p:.4f}"
+
+
+def detectable_difference(found: Found) -> float | None:
+    """The smallest difference that four of five such tests would have found (80 % power).
+
+    1.43 half widths of the 95 % confidence interval: (z of 97.5 % + z of 80 %) / z of 97.5 %. None for a
+    difference that is significant, and where there is no interval.
+    """
+    if found.low is None or found.high is None or is_significant(found):
+        return None
+    return _DETECTABLE * (found.high - found.low) / 2
+
+
+def sentence(first: str, second: str, *, name: str, found: Found, decimals: int = 2) -> str:
+    """What a difference in one column means, in words; `decimals` are those in which values are published.
 
     >>> from evaluator.uncertainty import Difference
     >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
-    "A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003."
-    >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))
-    "A's RTE is 0.70 ± 0.50 percentage points higher than B's; p = 0.02."
-    >>> sentence("Two frames", "B", name="mid", found=Difference(-2.0, -3.1, -0.9, 0.002))
-    "Two frames' MiD is 2.0 ± 1.1 lower than B's; p = 0.002."
+    "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
+    >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
+    "A's RTE is 0.70 percentage points higher than B's (95 % confidence interval: 0.20 to 1.20 higher; ...
+    >>> print(sentence("Two frames", "B", name="mid", found=Difference(-2.0, -2.5, 0.3, 0.0812)))
+    Two frames' MiD is 2.0 lower than B's (95 % confidence interval: 0.3 higher to 2.5 lower; p = 0.0812). \
+That is not significant. A difference above 2.0 would have been found in four of five such tests.
     """
     metric, _, interval = name.partition("_")
     label, unit = _METRIC_WORDS[metric]
     column = f"{label}{_INTERVAL_WORDS[interval or 'overall']}"
-    if found.difference == 0 and not is_significant(found):
-        return f"{first} and {second} have the same {column}."
-    direction = "lower" if found.difference < 0 else "higher"
-    if found.low is None or found.high is None or found.p is None:
-        amount = f"{abs(found.difference):.2f}".rstrip("0").rstrip(".")
-        return (
-            f"{_of(first)} {column} is {amount}{unit} {direction} than {_of(second)}; "
-            "there are too few recordings to say whether that means anything."
-        )
-    half = (found.high - found.low) / 2
-    decimals = _decimals(half)
-    amount = f"{abs(found.difference):.{decimals}f} ± {half:.{decimals}f}"
-    chance = f"p = {found.p:.2g}" + (
-        "" if is_significant(found) else ", which chance alone may well have made"
+    if round(found.difference, decimals) == 0:
+        return f"{first} and {second} have the same {column} to {_DECIMALS_IN_WORDS[decimals]}."
+    digits = _digits(found, decimals)
+    gap = (
+        f"{_of(first)} {column} is {_amount(found.difference, digits)}{unit} "
+        f"{_direction(found.difference)} than {_of(second)}"
     )
-    return f"{_of(first)} {column} is {amount}{unit} {direction} than {_of(second)}; {chance}."
+    if found.low is None or found.high is None or found.p is None:
+        return f"{gap}; there are too few recordings to say whether that is significant."
+    ends = _ends(found.difference, found.low, found.high, digits)
+    told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p)})."
+    detectable = detectable_difference(found)
+    if detectable is None:
+        return told
+    return (
+        f"{told} That is not significant. A difference above {_amount(detectable, digits)}{unit} would have "
+        "been found in four of five such tests."
+    )
 
 
 def _of(name: str) -> str:
     return f"{name}'" if name.endswith(("s", "S")) else f"{name}'s"
 
 
-def _decimals(half: float) -> int:
-    """As many as give the half width two digits, and never more than are published."""
-    return 0 if half >= 10 else 1 if half >= 0.995 else 2
+def _direction(difference: float) -> str:
+    return "lower" if difference < 0 else "higher"
 
 
-def others(first: str, second: str, found: Mapping[str, Found]) -> tuple[str, tuple[str, ...]]:
+def _ends(difference: float, low: float, high: float, digits: int) -> str:
+    """From the smaller effect to the larger one, each with its own direction where they have two.
+
+    >>> _ends(-2.0, -2.5, -0.3, 1), _ends(0.5, -0.3, 2.5, 1), _ends(-2.0, -2.5, 0.0, 1)
+    ('0.3 to 2.5 lower', '0.3 lower to 2.5 higher', '0.0 to 2.5 lower')
+    """
+    near, far = (high, low) if difference < 0 else (low, high)
+    start = _amount(near, digits)
+    if near and (near < 0) != (far < 0):
+        start = f"{start} {_direction(near)}"
+    return f"{start} to {_amount(far, digits)} {_direction(far or difference)}"
+
+
+def _amount(value: float, digits: int) -> str:
+    """Its size; what is not 0 has at least one unit of the last digit."""
+    unit = 10.0**-digits
+    return f"{max(abs(value), unit) if value else 0.0:.{digits}f}"
+
+
+def _digits(found: Found, decimals: int) -> int:
+    """As many as give the half width two digits, enough to tell the difference, never more than published."""
+    if found.low is None or found.high is None:
+        return decimals
+    half = (found.high - found.low) / 2
+    fewest = 0 if half >= 10 else 1 if half >= 0.995 else 2
+    smallest = min(abs(value) for value in (found.difference, found.low, found.high) if value)
+    return min(decimals, max(fewest, next((n for n in (0, 1) if round(smallest, n)), 2)))
+
+
+def others(
+    first: str, second: str, found: Mapping[str, Found], *, decimals: int = 2
+) -> tuple[str, tuple[str, ...]]:
     """Beside overall MiD: how many columns differ significantly, of how many, and a sentence for each.
 
-    Whoever looks through nine columns finds some by chance, so the first text says how many were looked at
-    and what that means. It is empty where no column has a p.
+    A look through nine columns finds some by chance, so the first text says how many columns were tested and
+    what that means. It is empty where no column has a p.
 
     >>> from evaluator.uncertainty import Difference
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
@@ -104,4 +160,6 @@ def others(first: str, second: str, found: Mapping[str, Found]) -> tuple[str, tu
         f"Of {len(tested)} other {columns} {len(told)} {differ} significantly, each by itself "
         "(of twenty columns of equals, one does):"
     )
-    return lead, tuple(sentence(first, second, name=name, found=found[name]) for name in told)
+    return lead, tuple(
+        sentence(first, second, name=name, found=found[name], decimals=decimals) for name in told
+    )

@@ -17,7 +17,7 @@ from evaluator.cli.options import json_option, sendable, slug, url_option
 from evaluator.cli.reading import TABLE, bytes_of, naming
 from evaluator.cli.tokens import has_token
 from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import SIGNIFICANT, Found, others
+from evaluator.sentences import Found, others, sentence
 
 if TYPE_CHECKING:
     from evaluator.answers import Compared
@@ -93,8 +93,8 @@ def _others(names: tuple[str, str], found: Mapping[str, Found]) -> Iterator[str]
     lead, said = others(*names, found)
     if lead:
         yield lead
-    for sentence in said:
-        yield f"  {printable(sentence)}"
+    for each in said:
+        yield f"  {printable(each)}"
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool) -> None:
@@ -126,8 +126,10 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
         click.echo(line)
     click.echo("")
     click.echo(UNITS)
-    click.echo(verdict(str(first), str(second), found))
-    for line in _others((str(first), str(second)), found):
+    names = str(first), str(second)
+    if "mid" in found:
+        click.echo(printable(sentence(*names, name="mid", found=found["mid"])))
+    for line in _others(names, found):
         click.echo(line)
 
 
@@ -151,14 +153,3 @@ def table(names: tuple[str, str], scores: tuple[Scores, Scores], found: Mapping[
         [Cell("p"), *column("p", 4, sign="")],
     ]
     return aligned(rows, align="<" + "." * len(SCORE_NAMES))
-
-
-def verdict(first: str, second: str, found: Mapping[str, Found]) -> str:
-    """What the difference in MiD means, in a sentence."""
-    mid = found.get("mid")
-    if mid is None or mid.p is None:
-        return "There are too few recordings to tell a difference from chance."
-    if mid.p >= SIGNIFICANT or not mid.difference:
-        return f"In MiD the two do not differ by more than chance alone may well make (p = {mid.p:.2g})."
-    better = first if mid.difference < 0 else second
-    return f"In MiD {printable(better)} is better by more than chance alone makes (p = {mid.p:.2g})."

@@ -18,7 +18,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
 from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import SIGNIFICANT
+from evaluator.sentences import SIGNIFICANT, p_text
 
 if TYPE_CHECKING:
     from evaluator.answers import Board, BoardEntry, Difference
@@ -222,15 +222,15 @@ def judge_against(
 
 
 def in_numbers(found: Difference) -> str:
-    """`+1.20 [0.40, 2.00], p = 0.003`: a difference, its 95 % interval, and p.
+    """`+1.20 [+0.40, +2.00], p = 0.0030`: a difference, its 95 % interval, and p.
 
     >>> from evaluator.answers import Difference
     >>> in_numbers(Difference(difference=1.2, low=0.4, high=2.0, p=0.003))
-    '+1.20 [+0.40, +2.00], p = 0.003'
+    '+1.20 [+0.40, +2.00], p = 0.0030'
     """
     if found.low is None or found.high is None or found.p is None:
         return f"{found.difference:+.2f}"
-    return f"{found.difference:+.2f} [{found.low:+.2f}, {found.high:+.2f}], p = {found.p:.2g}"
+    return f"{found.difference:+.2f} [{found.low:+.2f}, {found.high:+.2f}], {p_text(found.p)}"
 
 
 def _worse(words: str) -> Failure:
@@ -242,7 +242,7 @@ def worse_than_options(command: Command) -> Command:
     command = click.option(
         "--significant",
         is_flag=True,
-        help=f"With --fail-if-worse-than: only for what chance alone hardly makes (p < {SIGNIFICANT:g}).",
+        help=f"With --fail-if-worse-than: only for a significant difference (p < {SIGNIFICANT:g}).",
     )(command)
     return click.option(
         "--fail-if-worse-than",

@@ -5,7 +5,7 @@ from typing import Any
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 
-from evaluator import sentences
+from evaluator import published, sentences
 from evaluator.protocol import SCORE_NAMES
 from leaderboard.api.serializers import EntrySerializer
 from leaderboard.comparisons import Compared, Difference, Pair
@@ -27,9 +27,17 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     is_significant = serializers.BooleanField(
         help_text="Whether p is below 0.05; of ten columns and several pairs, some are by chance."
     )
+    detectable_difference = serializers.SerializerMethodField(
+        help_text="The smallest difference that four of five such tests would have found (80 % power); null: "
+        "this one is significant, or there are too few recordings."
+    )
     sentence = serializers.SerializerMethodField(
         help_text="What it means, in words. Its p is of this column and pair alone, whatever else one asks."
     )
+
+    def get_detectable_difference(self, found: Difference) -> float | None:
+        """Rounded as differences are."""
+        return published(sentences.detectable_difference(found))
 
     def get_sentence(self, found: Difference) -> str:
         """Of this column."""

@@ -79,7 +79,7 @@ def comparison(compared: Compared) -> Comparison:
 
 
 def verdict(compared: Compared) -> str:
-    """What came out, in words: a sentence for two, for more who is best and whom it is told apart from.
+    """What came out, in words: a sentence for two; for more the best, and what it is better than.
 
     Empty while a worker still computes it.
     """
@@ -95,13 +95,13 @@ def verdict(compared: Compared) -> str:
     )
     if compared.reason:
         return f"{head} There are too few recordings to say what the differences mean."
-    relations = (("significantly better than", worse), ("not told apart from", alike))
+    relations = (("significantly better than", worse), ("not significantly better than", alike))
     parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
     return f"{head} On these recordings it is {', and '.join(parts)}."
 
 
 def _told_apart(best: Entry, pairs: Sequence[Pair]) -> tuple[list[str], list[str]]:
-    """Whom the best is significantly better than in MiD, and whom it is not told apart from."""
+    """The methods that the best is significantly better than in MiD, and the others."""
     worse: list[str] = []
     alike: list[str] = []
     for pair in pairs:
@@ -190,9 +190,9 @@ def signed(value: float) -> str:
 
 
 def p_text(p: float) -> str:
-    """A p-value with two digits.
+    """A p-value with its four decimals, below each other in a column.
 
-    >>> p_text(0.0003), p_text(0.0441), p_text(0.8)
-    ('0.0003', '0.044', '0.80')
+    >>> p_text(0.0003), p_text(0.0496), p_text(0.8)
+    ('0.0003', '0.0496', '0.8000')
     """
-    return f"{p:.2g}" if p < 0.0995 else f"{p:.2f}"
+    return f"{p:.4f}"

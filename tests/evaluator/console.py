@@ -205,7 +205,9 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         else found | {"low": -2.9, "high": 0.54, "p": 0.17}
         for name in SCORE_NAMES
     }
-    sentence = "Foo++'s MiD is 1.18 ± 0.56 lower than Bar's; p = 0.0004."
+    sentence = (
+        "Foo++'s MiD is 1.18 lower than Bar's (95 % confidence interval: 0.62 to 1.73 lower; p = 0.0004)."
+    )
     compared = {"split": "val", "edition": 2, "is_complete": True, "reason": "", "entries": []}
     pair = {"differences": differences, "sentence": sentence}
     site.put("GET /api/v1/compare", Reply(compared | {"pairs": [pair]}))

@@ -199,7 +199,7 @@ def test_method_that_is_not_clear_is_wrong_usage_before_the_file_is_sent(
 @pytest.mark.parametrize(
     ("difference", "exit_code", "words"),
     [
-        ({"difference": 1.0, "low": 0.4, "high": 1.6, "p": 0.003}, 6, "+1.00 [+0.40, +1.60], p = 0.003"),
+        ({"difference": 1.0, "low": 0.4, "high": 1.6, "p": 0.003}, 6, "+1.00 [+0.40, +1.60], p = 0.0030"),
         ({"difference": 1.0, "low": -0.4, "high": 2.4, "p": 0.21}, 0, ""),
         ({"difference": 1.0, "low": None, "high": None, "p": None}, 6, "too few recordings"),
     ],

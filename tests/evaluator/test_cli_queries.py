@@ -15,6 +15,7 @@ from click.testing import Result
 
 from evaluator import compare_predictions, read_predictions, read_truth
 from evaluator.protocol import SCORE_NAMES
+from evaluator.sentences import sentence
 from tests.evaluator.console import METHOD_ID, RECEIPT, RECEIPT_KEYS
 from tests.evaluator.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.worlds import REPOSITORY
@@ -76,7 +77,8 @@ def test_compare_asks_until_it_is_computed_and_shows_interval_and_p(tsttc: Tsttc
     assert told == (
         "Of 2 other columns 1 differs significantly, each by itself "
         "(of twenty columns of equals, one does):\n"
-        "  A's MiD on crucial is 4.1 ± 1.2 lower than B's; p = 0.0003.\n"
+        "  A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; "
+        "p = 0.0003).\n"
     )
     assert site.requests[-1].path == "/api/v1/compare?split=val&m=id-a&m=id-b"
     assert json.loads(tsttc("compare", "A", "B", "--split", "val", "--json").stdout) == ready
@@ -113,7 +115,7 @@ def test_files_are_compared_offline_as_the_library_does(
     assert document["differences"]["mid"]["low"] == expected["mid"].low
     assert document["first"]["scores"]["overall"]["mid"] < document["second"]["scores"]["overall"]["mid"]
     said = tsttc(*arguments).stdout
-    assert f"In MiD {files[0]} is better by more than chance alone makes" in said
+    assert sentence(str(files[0]), str(files[1]), name="mid", found=expected["mid"]) in said
     assert f"  {files[0]}'s RTE is " in said
     assert site.requests == []
     bad = tsttc("compare", EXAMPLES / "broken.json", files[0], "--truth", truth_of_30_recordings)

@@ -1,4 +1,4 @@
-"""The verdict over a comparison, in words: whom the best is told apart from, and whom it is not."""
+"""The verdict over a comparison, in words: what the best is significantly better than."""
 
 from types import SimpleNamespace
 from typing import Any, cast
@@ -28,11 +28,11 @@ def compared(p_of_b: float, p_of_c: float, *, reason: str = "") -> Compared:
     ("p_of_b", "p_of_c", "said"),
     [
         (0.001, 0.001, "it is significantly better than B and C."),
-        (0.4, 0.4, "it is not told apart from B and C."),
-        (0.4, 0.001, "it is significantly better than C, and not told apart from B."),
+        (0.4, 0.4, "it is not significantly better than B and C."),
+        (0.4, 0.001, "it is significantly better than C, and not significantly better than B."),
     ],
 )
-def test_the_best_of_three_is_named_and_whom_it_is_told_apart_from(
+def test_the_best_of_three_is_named_with_those_that_it_is_significantly_better_than(
     p_of_b: float, p_of_c: float, said: str
 ) -> None:
     sentence = compare_tables.verdict(compared(p_of_b, p_of_c))

@@ -43,12 +43,12 @@ def test_verdict_comes_first_then_every_difference_with_interval_and_p(
     root = get(client, near.method_id, far.method_id)
     verdict = root.one("p", class_="verdict").text
     assert verdict.startswith(f"{near.method.name}'s MiD is ")
-    assert f"lower than {far.method.name}'s; p = " in verdict
+    assert f"lower than {far.method.name}'s (95 % confidence interval: " in verdict
     lead = root.one("p", class_="others").text
     others = [item.text for item in root.one("ul", class_="others").all("li")]
     assert lead.startswith("Of 1 other column 1 differs significantly"), "the others have too few recordings"
     assert len(others) == len(root.one("table", class_="differences").all("tr", class_="significant")) - 1
-    assert all(f"{near.method.name}'s " in other and "; p = 0." in other for other in others)
+    assert all(f"{near.method.name}'s " in other and " lower; p = 0." in other for other in others)
     rows = [
         row for row in root.one("table", class_="differences").all("tr") if row.all("svg", class_="whisker")
     ]

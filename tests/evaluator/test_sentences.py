@@ -1,0 +1,103 @@
+"""What a difference means, in words: both ends of its interval, a p that nothing rounds to 0.05."""
+
+import re
+
+import pytest
+
+from evaluator.sentences import detectable_difference, others, sentence
+from evaluator.uncertainty import Difference
+
+FAR = Difference(-4.1, -5.3, -2.9, 0.0003)
+
+
+def said(found: Difference, *, name: str = "mid", decimals: int = 2) -> str:
+    return sentence("A", "B", name=name, found=found, decimals=decimals)
+
+
+@pytest.mark.parametrize(
+    ("found", "amount", "ends"),
+    [
+        (FAR, "4.1 lower", "2.9 to 5.3 lower"),
+        (Difference(13.27, 2.0, 25.0, 0.0123), "13 higher", "2 to 25 higher"),
+        (Difference(0.04, 0.01, 0.07, 0.03), "0.04 higher", "0.01 to 0.07 higher"),
+        # Fewer digits would make an end 0, which it is not: 0 is outside of what is significant.
+        (Difference(-13.0, -25.0, -0.4, 0.0496), "13.0 lower", "0.4 to 25.0 lower"),
+        (Difference(-1.5, -2.96, -0.04, 0.0496), "1.50 lower", "0.04 to 2.96 lower"),
+        # Full digits, as of files on one's own machine: an end keeps its side of 0.
+        (Difference(-1.5, -2.9612, -0.0004, 0.0496), "1.50 lower", "0.01 to 2.96 lower"),
+    ],
+)
+def test_a_significant_difference_has_both_ends_of_its_interval(
+    found: Difference, amount: str, ends: str
+) -> None:
+    assert said(found) == (
+        f"A's MiD is {amount} than B's (95 % confidence interval: {ends}; p = {found.p:.4f})."
+    )
+
+
+@pytest.mark.parametrize(
+    ("found", "ends", "detectable"),
+    [
+        (Difference(-2.0, -2.5, 0.3, 0.0812), "0.3 higher to 2.5 lower", "2.0"),
+        (Difference(1.1, -0.3, 2.5, 0.12), "0.3 lower to 2.5 higher", "2.0"),
+        (Difference(-1.25, -2.5, 0.0, 0.05), "0.0 to 2.5 lower", "1.8"),
+    ],
+)
+def test_an_undecided_difference_says_what_would_have_been_found(
+    found: Difference, ends: str, detectable: str
+) -> None:
+    text = said(found)
+    assert f"(95 % confidence interval: {ends}; p = {found.p:.4f})." in text
+    assert text.endswith(
+        f"That is not significant. A difference above {detectable} would have been found in four of five "
+        "such tests."
+    )
+
+
+def test_the_detectable_difference_is_that_of_80_percent_power() -> None:
+    stats = pytest.importorskip("scipy.stats")
+    ratio = (stats.norm.ppf(0.975) + stats.norm.ppf(0.8)) / stats.norm.ppf(0.975)
+    found = detectable_difference(Difference(-0.1, -1.1, 0.9, 0.8))
+    assert found == pytest.approx(ratio, rel=1e-6)
+    assert detectable_difference(FAR) is None
+    assert detectable_difference(Difference(-0.1, None, None, None)) is None
+
+
+def test_errors_in_percent_differ_by_percentage_points() -> None:
+    text = said(Difference(0.7, -0.2, 1.6, 0.12), name="rte_small")
+    assert text.startswith("A's RTE on small is 0.70 percentage points higher than B's (95 %")
+    assert "A difference above 1.29 percentage points would" in text
+
+
+@pytest.mark.parametrize(
+    ("difference", "decimals", "words"),
+    [
+        (0.0, 2, "two decimals"),
+        (-0.0012, 2, "two decimals"),
+        (0.004, 2, "two decimals"),
+        (0.04, 1, "one decimal"),
+    ],
+)
+def test_no_difference_is_called_lower_or_higher_by_zero(
+    difference: float, decimals: int, words: str
+) -> None:
+    found = Difference(difference, difference - 0.001, difference + 0.001, 0.0003)
+    assert said(found, decimals=decimals) == f"A and B have the same MiD to {words}."
+
+
+def test_digits_are_no_more_than_are_published() -> None:
+    text = said(Difference(-0.4, -0.7, -0.1, 0.02), decimals=1)
+    assert re.findall(r"\d+\.\d+", text)[:3] == ["0.4", "0.1", "0.7"]
+
+
+def test_with_too_few_recordings_a_difference_means_nothing() -> None:
+    text = said(Difference(-0.4, None, None, None))
+    assert text == (
+        "A's MiD is 0.40 lower than B's; there are too few recordings to say whether that is significant."
+    )
+
+
+def test_other_columns_are_told_with_their_number() -> None:
+    lead, told = others("A", "B", {"mid": FAR, "mid_small": FAR, "rte": Difference(0.1, -0.2, 0.4, 0.5)})
+    assert lead.startswith("Of 2 other columns 1 differs significantly")
+    assert told == (sentence("A", "B", name="mid_small", found=FAR),)
