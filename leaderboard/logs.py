@@ -20,8 +20,14 @@ SECRETS: Final = (
     (re.compile(r"(?i)\b(bearer|basic)\s+[\w.~+/=-]+"), r"\1 [hidden]"),
     # The password in a service's URL.
     (re.compile(r"(?<=://)[^/\s@\"']+@"), "[hidden]@"),
-    # A mailed link that opens an account.
-    (re.compile(r"(/accounts/(?:confirm-email|password/reset/key))/[^\s\"'?]+"), r"\1/[hidden]"),
+    # A link that opens an account or a team, also as the value of another address.
+    (
+        re.compile(
+            r"(?i)((?:/|%2F)(?:accounts(?:/|%2F)(?:confirm-email|password(?:/|%2F)reset(?:/|%2F)key)"
+            r"|team(?:/|%2F)join)(?:/|%2F))[^\s\"'?&]+"
+        ),
+        r"\1[hidden]",
+    ),
     # An e-mail address.
     (re.compile(r"[\w.+-]+@[\w-]+(?:\.[\w-]+)+"), "[address hidden]"),
 )
@@ -32,6 +38,8 @@ def without_secrets(text: str) -> str:
 
     >>> without_secrets("GET /accounts/password/reset/key/4-abc-def/ by ada@example.org")
     'GET /accounts/password/reset/key/[hidden] by [address hidden]'
+    >>> without_secrets("Forbidden (CSRF token missing.): /team/join/OTU0bQ-x_y/")
+    'Forbidden (CSRF token missing.): /team/join/[hidden]'
     >>> without_secrets("redis://:swordfish@cache:6379/0 refused")
     'redis://[hidden]@cache:6379/0 refused'
     """

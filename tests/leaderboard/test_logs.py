@@ -3,12 +3,15 @@
 import io
 import json
 import logging
+import logging.config
+import runpy
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 import structlog
+from django.conf import settings
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client, RequestFactory
 from django.utils.functional import SimpleLazyObject
@@ -113,6 +116,40 @@ def test_no_secret_no_address_and_no_true_value_is_ever_written(
     telling = [repr(float(value)) for value in truth.ttc_s if len(repr(float(value))) > 8]
     assert len(telling) > 100
     assert [value for value in telling if value[:8] in text] == []
+
+
+@pytest.mark.parametrize("has_csrf_cookie", [False, True])
+def test_secret_of_an_invitation_is_in_no_line_of_any_logger(
+    has_csrf_cookie: bool, owner: User, written: io.StringIO
+) -> None:
+    secret = "OTU0bQ-canary_of-an_invitation"
+    strict = Client(enforce_csrf_checks=True)
+    strict.force_login(owner)
+    if has_csrf_cookie:
+        strict.get("/submit/")
+    # Django itself logs the whole path of a POST that it turns away.
+    assert strict.post(f"/team/join/{secret}/").status_code == 403
+    strict.get(f"/team/join/{secret}/")
+    Client().get(f"/accounts/login/?next=%2Fteam%2Fjoin%2F{secret}%2F")
+    # What a server in front of Django, or an access log, would write.
+    logging.getLogger("gunicorn.access").warning('"GET /team/join/%s/ HTTP/1.1" 200', secret)
+    logging.getLogger("django.server").warning(
+        '"POST /accounts/login/?next=%%2Fteam%%2Fjoin%%2F%s%%2F"', secret
+    )
+    text = written.getvalue()
+    assert "django.security.csrf" in text
+    assert "/team/join/[hidden]" in text
+    assert secret not in text
+
+
+def test_every_handler_of_the_real_configurations_takes_secrets_out() -> None:
+    gunicorn = runpy.run_path(str(Path(settings.BASE_DIR) / "deploy/gunicorn.conf.py"))
+    assert gunicorn["accesslog"] is None
+    for configuration in (settings.LOGGING, gunicorn["logconfig_dict"]):
+        formatters = logging.config.DictConfigurator(configuration)
+        for handler in configuration["handlers"].values():
+            made = formatters.configure_formatter(dict(configuration["formatters"][handler["formatter"]]))
+            assert isinstance(made, logs.CleanFormatter)
 
 
 def test_run_that_fails_by_our_fault_is_found_by_its_submission(
