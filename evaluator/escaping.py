@@ -1,4 +1,4 @@
-"""Texts of strangers inside LaTeX, BibTeX and Markdown: shown as they are, without power over what is around.
+"""Texts of strangers inside LaTeX, BibTeX, Markdown and CSV: shown as they are, without power around them.
 
 LaTeX comes out as ASCII that every engine takes, with no package but booktabs.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Iterable
 from typing import Final
 
 _COMMANDS: Final = {
@@ -77,6 +78,12 @@ _GREEK: Final = {
     for letter in f"αβγδεζηθικλμνξπρστυφχψω{_CAPITALS}"
     for name in [unicodedata.name(letter).split()[-1].lower().replace("lamda", "lambda")]
 }
+# A spreadsheet takes a cell that begins like this for a formula and runs it; the wide forms as well. Where
+# a comma is the decimal sign, lines are split at semicolons or tabs: there a cell begins behind each of these.
+_FORMULA: Final = re.compile(r"(?P<before>[;\t\r\n|])(?=[\s\"']*[=+\-@＝＋－＠])")
+_FORMULA_AT_START: Final = re.compile(r"[ \"]*[=+\-@\t\r\n＝＋－＠]")
+# A number of a table that must stay one; everything else is a text.
+_CSV_NUMBER: Final = re.compile(r"[0-9]+(\.[0-9]+)?")
 _MARKDOWN: Final = re.compile(r"([\\`*_{}\[\]()#+!|~$^=-])")
 
 
@@ -134,3 +141,33 @@ def markdown(text: str) -> str:
     plain = _MARKDOWN.sub(r"\\\1", plain)
     plain = re.sub(r"(?i)\b(www)\.", r"\1&#46;", plain)
     return plain.replace("://", "&#58;//").replace("@", "&#64;")
+
+
+def guarded(text: str) -> str:
+    """A text that no spreadsheet takes for a formula: an apostrophe stands before what might be one.
+
+    >>> guarded("=1+1"), guarded("Deep Scale"), guarded("A;=1+1;B")
+    ("'=1+1", 'Deep Scale', "A;'=1+1;B")
+    """
+    inside = _FORMULA.sub(r"\g<before>'", text)
+    return f"'{inside}" if _FORMULA_AT_START.match(inside) else inside
+
+
+def csv_cell(value: object) -> str:
+    """A cell of a CSV table (RFC 4180): numbers as they are, texts guarded and quoted, None and "" empty.
+
+    >>> print(csv_cell(15.03), csv_cell("15.03"), csv_cell(None), csv_cell("A;=1"), csv_cell('a "b" c'))
+    15.03 15.03  "A;'=1" "a ""b"" c"
+    """
+    if value is None or value == "":
+        return ""
+    text = str(value)
+    if isinstance(value, bool | int | float) or _CSV_NUMBER.fullmatch(text):
+        return text
+    doubled = guarded(text).replace('"', '""')
+    return f'"{doubled}"'
+
+
+def csv_line(cells: Iterable[object], *, end: str = "\r\n") -> str:
+    """A row of a CSV table, with the end of its line."""
+    return ",".join(map(csv_cell, cells)) + end

@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING, Final
 
 from evaluator import layouts
 from evaluator.cli.values import texts_of
-from evaluator.escaping import one_line
+from evaluator.escaping import csv_line, one_line
 from evaluator.protocol import SCORE_NAMES
 
 if TYPE_CHECKING:
     from evaluator.answers import Board, BoardEntry
 
-# A spreadsheet takes a cell that begins like this for a formula and runs it; the wide forms as well.
-_FORMULA_STARTS: Final = tuple("=+-@＝＋－＠")
 _COLUMNS: Final = ("rank", "method", "team", "date", "kind", *SCORE_NAMES, "visibility")
 _OF_INTERVALS: Final = (
     *("rank_low", "rank_high"),
@@ -29,14 +25,13 @@ def as_csv(board: Board, *, has_intervals: bool = False) -> str:
 
     `visibility` tells the rows of one's own team that others do not see, or not under this name.
     """
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow([*_COLUMNS, *(_OF_INTERVALS if has_intervals else ())])
+    lines = [",".join((*_COLUMNS, *(_OF_INTERVALS if has_intervals else ()))) + "\n"]
     for entry in board.entries:
-        texts = [_guarded(text or "") for text in (entry.method, entry.team, entry.date)]
+        # No terminal takes them for an order, either.
+        texts = [one_line(text or "") for text in (entry.method, entry.team, entry.date)]
         values = [*texts_of(entry, missing=""), entry.visibility, *(_ends(entry) if has_intervals else ())]
-        writer.writerow([_number(entry.rank), *texts, entry.kind, *values])
-    return out.getvalue()
+        lines.append(csv_line((entry.rank, *texts, entry.kind, *values), end="\n"))
+    return "".join(lines)
 
 
 def as_latex(board: Board, *, address: str) -> str:
@@ -92,16 +87,6 @@ def _ends(entry: BoardEntry) -> list[str]:
     intervals = [entry.interval(name) for name in SCORE_NAMES]
     ends = [end_text(end) for found in intervals for end in (found.low, found.high)]
     return [_number(ranks.rank_low), _number(ranks.rank_high), *ends]
-
-
-def _guarded(text: str) -> str:
-    """`text` on one line that no spreadsheet takes for a formula, and no terminal for an order.
-
-    >>> _guarded("=1+1"), _guarded("Foo++")
-    ("'=1+1", 'Foo++')
-    """
-    line = one_line(text)
-    return f"'{line}" if line.lstrip().startswith(_FORMULA_STARTS) else line
 
 
 def _rows(board: Board) -> list[layouts.Row]:

@@ -9,6 +9,14 @@ FORMULAS = tuple(
         ("1+1", 'HYPERLINK("http://x.example","a")', "cmd|'/c calc'!A1"),
     )
 )
+# Where a spreadsheet splits lines at semicolons or tabs, a cell begins in the middle of a text.
+SPLIT_FORMULAS = (
+    "A;=WEBSERVICE('x')&A1;",
+    "Csv;=1+1;",
+    'Csv;"=1+1";',
+    "Csv; @SUM(1)",
+    "Csv;＝1+1",
+)
 MARKUP = (
     "<script>alert(1)</script>",
     "</title><script>alert(1)</script>",
@@ -171,6 +179,7 @@ LONG = (
 
 NAMES: tuple[str, ...] = (
     *FORMULAS,
+    *SPLIT_FORMULAS,
     *MARKUP,
     *LATEX,
     *MARKDOWN,

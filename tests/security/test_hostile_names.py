@@ -14,8 +14,8 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django.fixtures import Settings
 
+from evaluator.escaping import guarded
 from leaderboard import lifecycle
-from leaderboard.exports import guarded
 from leaderboard.lifecycle import Outcome
 from leaderboard.models import Edition, Method, Split, Status, User, Visibility
 from tests import builders, pages
@@ -156,6 +156,12 @@ def _in_csv(visitor: Client, named: Named) -> None:
     assert {guarded(name) for name in named.names} <= names
     bad = [cell for row in rows for cell in row.values() if FORMULA.match(cell) and not NUMBER.match(cell)]
     assert bad == []
+    # As a spreadsheet reads it that splits lines elsewhere: no cell runs there, either.
+    for separator in ";\t":
+        cells = [
+            c for row in csv.reader(io.StringIO(response.content.decode()), delimiter=separator) for c in row
+        ]
+        assert [cell for cell in cells if FORMULA.match(cell) and not NUMBER.match(cell)] == []
     assert PLAIN_FILE_NAME.match(response.headers["Content-Disposition"])
 
 
