@@ -79,7 +79,7 @@ _GREEK: Final = {
     for name in [unicodedata.name(letter).split()[-1].lower().replace("lamda", "lambda")]
 }
 # A spreadsheet takes a cell that begins like this for a formula and runs it; the wide forms as well. Where
-# a comma is the decimal sign, lines are split at semicolons or tabs: there a cell begins behind each of these.
+# a comma is the decimal sign, lines are split at semicolons or tabs: there a cell begins behind each of them.
 _FORMULA: Final = re.compile(r"(?P<before>[;\t\r\n|])(?=[\s\"']*[=+\-@＝＋－＠])")
 _FORMULA_AT_START: Final = re.compile(r"[ \"]*[=+\-@\t\r\n＝＋－＠]")
 # A number of a table that must stay one; everything else is a text.

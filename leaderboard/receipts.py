@@ -1,7 +1,8 @@
 """Score receipts: what a submission scored, signed with the site's key, for its team to hand on.
 
 A receipt names its method as the team does, whoever else may see the method: it is given to the team alone,
-and the team decides who reads it. It attests to one edition for ever, also once a later one is the board.
+and the team decides who reads it. Beside the name, which is that of the day of signing, stands the method's
+id, which never changes. It attests to one edition for ever, also once a later one is the board.
 """
 
 from collections.abc import Sequence

@@ -101,7 +101,7 @@ def _in_words(found: Verified) -> Iterator[str]:
     facts = {
         "signed by": found.site,
         "scored": found.scored_at,
-        "method": f"{found.method} ({found.method_id})",
+        "method": f"{found.method_id}, named {found.method} when signed",
         "submission": found.submission,
         "split": f"{found.split}, edition {found.edition}, {found.protocol}",
         "truth": found.ground_truth,

@@ -271,6 +271,11 @@ def test_verify_asks_the_named_server_for_its_keys_and_no_other(
     assert result.exit_code == 0
     assert result.stdout.startswith("The receipt holds.\n")
     assert "13.92" in result.stdout
+    # A name is a word of the team and can change; the id cannot.
+    assert (
+        f"method       {RECEIPT['method']['id']}, named {RECEIPT['method']['name']} when signed\n"
+        in result.stdout
+    )
     assert result.stderr == (
         f"Note: the receipt names https://leaderboard.example.org; the keys are those of {site.url}.\n"
     )

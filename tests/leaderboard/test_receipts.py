@@ -65,6 +65,16 @@ def test_an_anonymous_methods_receipt_names_it_to_its_team(scored: Submission, o
     assert verified(client_of(owner).get(address(scored)).content).method == "Foo"
 
 
+def test_receipts_before_and_after_a_renaming_verify_and_name_one_method_by_its_id(
+    scored: Submission, owner: User
+) -> None:
+    before = client_of(owner).get(address(scored)).content
+    scored.method.__class__.objects.update(name="Another famous method")
+    found = [verified(before), verified(client_of(owner).get(address(scored)).content)]
+    assert [one.method for one in found] == ["Foo", "Another famous method"]
+    assert {one.method_id for one in found} == {str(scored.method_id)}
+
+
 def test_only_what_is_scored_and_stands_has_a_receipt(edition: Edition, owner: User) -> None:
     client = client_of(owner)
     waiting = builders.submit(owner, builders.predictions(edition))
