@@ -51,7 +51,7 @@ class Verified:
     """What a receipt says, its signature checked. `scores` has the ten names; None where there is no value.
 
     `edition` is the edition in which the score stands, whether or not a later one has taken its place.
-    `method_id` is the method for ever; `method` is the name that its team gave it when the receipt was signed.
+    `method_id` stays for ever; `method` is the name that it had when the receipt was signed.
     """
 
     site: str

@@ -6,15 +6,11 @@ Every variable is described in `docs/operations.md`.
 """
 
 import logging
-import os
 import sys
-from collections.abc import Callable
-from contextlib import suppress
 from datetime import timedelta
 from ipaddress import ip_network
 from pathlib import Path
 from secrets import token_urlsafe
-from tempfile import mkstemp
 from typing import Any
 
 import environ
@@ -23,26 +19,14 @@ from csp.constants import NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
 from django.core.management.utils import get_random_secret_key
 
-from leaderboard import logs, openapi
+from leaderboard import environment, logs, openapi
+from leaderboard.environment import key_of_checkout, required
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environ.Env()
 
-PROFILE: str = env.str("TSTTC_PROFILE", default="embedded")
-if PROFILE not in {"embedded", "production"}:
-    raise ImproperlyConfigured(f"TSTTC_PROFILE is {PROFILE!r}; expected 'embedded' or 'production'.")
-PRODUCTION = PROFILE == "production"
+PRODUCTION = environment.PRODUCTION
 TESTING = "pytest" in sys.modules
-
-
-def required(name: str, *, embedded: Any) -> Any:
-    """The variable's text; in production its absence is an error, elsewhere `embedded` stands in."""
-    if PRODUCTION and not env.str(name, default=""):
-        raise ImproperlyConfigured(
-            f"{name} is not set. In production it has no default; docs/operations.md describes it."
-        )
-    return env.str(name, default=embedded)
-
 
 # --- where things are kept -------------------------------------------------------------------------------
 
@@ -54,28 +38,18 @@ BAGS_DIR = env.str("TSTTC_BAGS_DIR", default="")
 FILES_DIR = Path(env.str("TSTTC_FILES_DIR", default=str(DATA_DIR / "files")))
 STATIC_ROOT = Path(env.str("TSTTC_STATIC_ROOT", default=str(BASE_DIR / "staticfiles")))
 if not PRODUCTION:
-    DATA_DIR.mkdir(parents=True, exist_ok=True)
-
-
-def embedded_key(name: str, make: Callable[[], str]) -> str:
-    """A key of this checkout's own, made once, so that what it signed survives a restart of the demo."""
-    path = DATA_DIR / name
-    if not path.exists():
-        # Whole at once, and the first one's for all: several processes may start together.
-        handle, own = mkstemp(dir=DATA_DIR, prefix=f".{name}-")
-        with os.fdopen(handle, "w") as file:
-            file.write(make())
-        with suppress(FileExistsError):
-            os.link(own, path)
-        Path(own).unlink()
-    return path.read_text()
-
+    # Sessions, password hashes, mailed links in logs: other accounts of this machine read none of it.
+    environment.make_private(DATA_DIR)
 
 # --- the frame -------------------------------------------------------------------------------------------
 
-SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="") or embedded_key("secret-key", get_random_secret_key)
+SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="") or key_of_checkout(
+    DATA_DIR / "secret-key", get_random_secret_key
+)
 # Signs score receipts (see leaderboard/receipts.py); what former keys signed still verifies.
-RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="") or embedded_key("receipt-key", token_urlsafe)
+RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="") or key_of_checkout(
+    DATA_DIR / "receipt-key", token_urlsafe
+)
 RECEIPT_OLD_KEYS = env.list("TSTTC_RECEIPT_OLD_KEYS", default=[])
 DEBUG = env.bool("TSTTC_DEBUG", default=False)
 ALLOWED_HOSTS = required("TSTTC_ALLOWED_HOSTS", embedded="*").split(",")

@@ -29,7 +29,11 @@ def mounts(service: dict[str, Any]) -> dict[str, str]:
 
 
 READ = names_in(
-    "leaderboard/settings.py", "deploy/gunicorn.conf.py", "deploy/Caddyfile", "deploy/healthcheck.py"
+    "leaderboard/settings.py",
+    "leaderboard/environment.py",
+    "deploy/gunicorn.conf.py",
+    "deploy/Caddyfile",
+    "deploy/healthcheck.py",
 )
 
 
