@@ -12,6 +12,7 @@ from uuid import UUID
 
 from evaluator.protocol import SCORE_NAMES
 from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility, days
+from leaderboard.models.benchmark import SINCE_EVER
 from leaderboard.models.methods import MethodQuerySet
 
 ANONYMOUS_TEAM = "Anonymous"
@@ -147,6 +148,7 @@ def published_entry(result: PublishedResult) -> Entry:
         source=f"{result.authors} ({result.year}). {result.source_title}. {result.source_table}.",
         source_title=result.source_title,
         details=Details(uses_nerf=result.uses_nerf, latency_ms=result.latency_ms, hardware=result.hardware),
+        shown_at=result.added_at if result.added_at > SINCE_EVER else None,
     )
 
 

@@ -108,8 +108,8 @@ def digest_of(edition: Edition, rows: Sequence[Standing]) -> str:
 
 
 def _printed(edition: Edition) -> list[tuple[float, ...]]:
-    """The ten numbers of each row that was printed in a paper; NaN where it has none."""
-    rows = PublishedResult.objects.filter(split=edition.split_id).values_list("scores", flat=True)
+    """The ten numbers of each row on its board that is quoted from a paper; NaN where it has none."""
+    rows = PublishedResult.objects.on_board(edition.split, edition).values_list("scores", flat=True)
     return [tuple(float(scores.get(name) or "nan") for name in SCORE_NAMES) for scores in rows]
 
 
@@ -122,7 +122,7 @@ def stale(*, now: datetime, held: Collection[str] | None) -> list[Edition]:
     undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
     found = (
         Edition.objects.filter(discarded_at=None)
-        .select_related("ground_truth")
+        .select_related("ground_truth", "split")
         .annotate(is_busy=Exists(undecided))
         .order_by("pk")
     )

@@ -1,6 +1,7 @@
 """Boards of the past, made of facts that change only when the board does.
 
-What an edition's board showed at any moment follows from when its entries were scored, shown and withdrawn.
+What an edition's board showed at any moment follows from when its entries were scored, shown and withdrawn,
+and from when rows of papers were added and replaced.
 These facts are read once (`facts`), and the board of a moment is made of them without the database
 (`everybodys`). `leaderboard/standings.py` says what a board of the past is, by reading it from the database;
 what is made here is the same, row by row.
@@ -82,10 +83,23 @@ class Run:
 
 
 @dataclass(frozen=True)
+class Quoted:
+    """A row of a paper, and while it stood on the board."""
+
+    entry: Entry
+    added_at: datetime
+    replaced_at: datetime | None
+
+    def stood(self, at: datetime) -> bool:
+        """Whether it stood on the board at that time."""
+        return self.added_at <= at and (self.replaced_at is None or at < self.replaced_at)
+
+
+@dataclass(frozen=True)
 class Past:
     """All that everybody may know of an edition's boards at any time."""
 
-    printed: tuple[Entry, ...]  # the rows of papers
+    quoted: tuple[Quoted, ...]  # the rows of papers
     methods: tuple[Shown, ...]
     runs: tuple[Run, ...]
 
@@ -100,10 +114,23 @@ def facts(edition: Edition) -> Past:
     shown = Method.objects.shown().filter(pk__in=counted).select_related("team").order_by("pk")
     methods = tuple(_shown(method, counted[method.pk]) for method in shown)
     return Past(
-        printed=tuple(published_entry(result) for result in split.published_results.order_by("pk")),
+        quoted=_quoted(edition),
         methods=methods,
         runs=_runs(edition, {method.method_id: i for i, method in enumerate(methods)}),
     )
+
+
+def _quoted(edition: Edition) -> tuple[Quoted, ...]:
+    """The rows of papers that ever stood on the edition's board: none that came after it was the board."""
+    ended_at = edition.ended_at(edition.split)
+    found = []
+    for result in edition.split.published_results.order_by("pk"):
+        if ended_at is not None and result.added_at > ended_at:
+            continue
+        is_later = ended_at is not None and result.replaced_at is not None and result.replaced_at > ended_at
+        replaced_at = None if is_later else result.replaced_at
+        found.append(Quoted(published_entry(result), result.added_at, replaced_at))
+    return tuple(found)
 
 
 def _counted(split_id: str) -> dict[UUID, list[datetime]]:
@@ -200,7 +227,8 @@ def everybodys(past: Past, *, at: datetime) -> tuple[Entry, ...]:
             best[run.method] = place, run
     attempts = _attempts(past, at)
     rows = [_entry(run, past.methods[run.method], at) for _, run in best.values()]
-    return in_ranks([*past.printed, *(replace(row, n_attempts=attempts.of(row)) for row in rows)])
+    quoted = [row.entry for row in past.quoted if row.stood(at)]
+    return in_ranks([*quoted, *(replace(row, n_attempts=attempts.of(row)) for row in rows)])
 
 
 def _withdrawn_at(run: Run, at: datetime) -> datetime | None:

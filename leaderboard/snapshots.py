@@ -23,7 +23,7 @@ from leaderboard import boards, past, present, standings
 from leaderboard.entries import Details, Entry, Interval, Profile
 from leaderboard.filters import Filters
 from leaderboard.models import Edition, Snapshot, Split, User
-from leaderboard.past import Past, Run, Shown
+from leaderboard.past import Past, Quoted, Run, Shown
 from leaderboard.present import Attempt, Drawn
 from leaderboard.snapshot_forms import Form, Kept
 from leaderboard.standings import Board
@@ -43,7 +43,9 @@ BOARD: Final = Form(
 """The form in which the pages, the API and the exports read a board."""
 
 # Every attempt is in it, so it is larger, and it is asked for less.
-PAST: Final = Form("past", Past, parts=[Shown, Run, Entry, Profile, Details], make=past.facts, n_remembered=4)
+PAST: Final = Form(
+    "past", Past, parts=[Shown, Run, Quoted, Entry, Profile, Details], make=past.facts, n_remembered=4
+)
 """The form of which they make the board as it stood at any time."""
 
 FORMS: Final[Mapping[str, Form[Any]]] = {form.name: form for form in (BOARD, PAST)}
@@ -120,7 +122,7 @@ def board(
     standings.require_column(sort)
     frame = edition or (edition_at(split, at) if at else split.published_edition)
     if frame is None:
-        entries = standings.everybodys(split=split, edition=None)
+        entries = standings.everybodys(split=split, edition=None, at=at)
     elif at is None:
         entries = shown(split=split, edition=frame).entries
     else:

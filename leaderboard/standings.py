@@ -30,6 +30,7 @@ from leaderboard.models import (
     Edition,
     Evaluation,
     Method,
+    PublishedResult,
     Split,
     Status,
     Submission,
@@ -187,7 +188,8 @@ def everybodys(
 
     `supposed` is a method with a visibility that it does not have yet: the rows as they would be then.
     """
-    entries = [published_entry(result) for result in split.published_results.order_by("pk")]
+    quoted = PublishedResult.objects.on_board(split, edition, at=at)
+    entries = [published_entry(result) for result in quoted]
     if edition is not None:
         shown = Method.objects.shown(at=at)
         if supposed is not None:

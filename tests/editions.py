@@ -1,12 +1,14 @@
 """Editions for tests: corrected ground truth, and the verbs with their usual arguments."""
 
 from pathlib import Path
+from typing import Any
 
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
 from evaluator import GroundTruth, evaluate, published, read_predictions
-from leaderboard import rescoring, scoring, standings
+from evaluator.protocol import SCORE_NAMES
+from leaderboard import benchmark, rescoring, scoring, standings
 from leaderboard.models import (
     Edition,
     Publication,
@@ -58,6 +60,30 @@ def roll_back(*, replaces: int = 2) -> Publication:
     return rescoring.roll_back(
         split_name="test", reason="A mistake.", now=timezone.now(), actor=None, replaces=replaces
     )
+
+
+def paper(slug: str = "later", *, split: str = "test", mid: float = 1.0) -> dict[str, Any]:
+    """A document of one row that a paper prints, such as those in leaderboard/published/."""
+    method = {"slug": slug, "name": slug.title(), "description": "", "uses_nerf": False, "latency_ms": None}
+    return {
+        "source": {
+            "title": "Later",
+            "authors": "L. Ater",
+            "year": 2026,
+            "url": "https://example.org/later",
+            "table": "Table 1",
+            "code": "",
+        },
+        "columns": list(SCORE_NAMES),
+        "methods": [method],
+        "results": {split: {slug: [mid, *[10.0] * (len(SCORE_NAMES) - 1)]}},
+    }
+
+
+def quote(slug: str = "later", *, mid: float = 1.0) -> benchmark.Imported:
+    """Put a row of a paper on the board of the test split, in place of any that it has by that name."""
+    document = paper(slug, mid=mid)
+    return benchmark.import_published(document=document, now=timezone.now(), is_replacing=True)
 
 
 def board_now() -> standings.Board:

@@ -1,12 +1,17 @@
 """What is competed on: splits, revisions of their ground truth, editions, and rows printed in papers."""
 
-from typing import ClassVar
+from datetime import UTC, datetime
+from typing import ClassVar, Self
 
 from django.db import connection, models
+from django.db.models import Q
 from django.utils import timezone
 
 from leaderboard.models.people import User
 from leaderboard.models.quotas import QuotaRules
+
+# Of quoted rows that stand since their split exists: before any time that a board can sensibly be asked for.
+SINCE_EVER = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 class SplitQuerySet(models.QuerySet["Split"]):
@@ -124,6 +129,16 @@ class Edition(models.Model):
         """Whether it stands beside the board, neither published nor given up."""
         return self.published_at is None and self.discarded_at is None
 
+    def ended_at(self, split: Split) -> datetime | None:
+        """When a former edition last stopped being the board; None of the board and of one that never was.
+
+        `split` is the edition's own, with its published edition as of now.
+        """
+        if self.published_at is None or split.published_edition_id == self.pk:
+            return None
+        ends = Publication.objects.filter(replaced=self).order_by("-at", "-pk")
+        return ends.values_list("at", flat=True).first()
+
 
 class Publication(models.Model):
     """That an edition became the board of its split: the public changelog. Append-only."""
@@ -151,8 +166,28 @@ class Publication(models.Model):
         return f"{self.edition} {self.get_kind_display()}"
 
 
+class PublishedResultQuerySet(models.QuerySet["PublishedResult"]):
+    """Questions about quoted rows."""
+
+    def on_board(self, split: Split, edition: Edition | None, *, at: datetime | None = None) -> Self:
+        """The rows that stand on a board, or stood on it at a time, in their order.
+
+        A former edition keeps the rows that stood when it last stopped being the board: what is added,
+        replaced or taken away later never changes it.
+        """
+        rows = self.filter(split=split).order_by("pk")
+        ended_at = edition.ended_at(split) if edition is not None else None
+        as_of = min((moment for moment in (at, ended_at) if moment is not None), default=None)
+        if as_of is None:
+            return rows.filter(replaced_at=None)
+        return rows.filter(Q(replaced_at=None) | Q(replaced_at__gt=as_of), added_at__lte=as_of)
+
+
 class PublishedResult(models.Model):
-    """A row printed in a paper: ranked beside the submissions, marked, never re-scored."""
+    """A row quoted from a paper: ranked beside the submissions, marked, never re-scored.
+
+    A row that is corrected is not changed but replaced by another one, so that boards of the past stay.
+    """
 
     split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="published_results")
     slug = models.SlugField(max_length=64)
@@ -168,10 +203,26 @@ class PublishedResult(models.Model):
     latency_ms = models.FloatField(null=True, blank=True)
     hardware = models.CharField(max_length=120, blank=True)
     scores = models.JSONField(help_text="The ten published numbers by name.")
+    added_at = models.DateTimeField(
+        default=timezone.now, help_text="Since when it stands on the board; 1970: since the split exists."
+    )
+    replaced_at = models.DateTimeField(
+        null=True, blank=True, help_text="Until when it stood there; empty: it still does."
+    )
+
+    objects: ClassVar[PublishedResultQuerySet] = PublishedResultQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     class Meta:
         constraints = [
-            models.UniqueConstraint(fields=["split", "slug"], name="published_result_once_per_split"),
+            models.UniqueConstraint(
+                fields=["split", "slug"],
+                condition=Q(replaced_at=None),
+                name="published_result_once_per_split",
+            ),
+            models.CheckConstraint(
+                condition=Q(replaced_at=None) | Q(replaced_at__gte=models.F("added_at")),
+                name="published_result_is_replaced_after_it_was_added",
+            ),
         ]
 
     def __str__(self) -> str:

@@ -18,6 +18,7 @@ from leaderboard.models import (
     Evaluation,
     Method,
     Publication,
+    PublishedResult,
     Score,
     Snapshot,
     Split,
@@ -27,7 +28,7 @@ from leaderboard.models import (
 )
 from leaderboard.snapshots import BOARD, PAST
 from tests import board_rows, builders
-from tests.editions import ANYBODY, corrected, open_edition, publish, roll_back
+from tests.editions import ANYBODY, corrected, open_edition, publish, quote, roll_back
 
 A_MOMENT = timedelta(microseconds=1)
 MAX_STATEMENTS = 3
@@ -41,6 +42,8 @@ def events() -> list[datetime]:
         Evaluation.objects.values_list("finished_at", flat=True),
         Method.objects.values_list("shown_at", flat=True),
         Publication.objects.values_list("at", flat=True),
+        PublishedResult.objects.values_list("added_at", flat=True),
+        PublishedResult.objects.values_list("replaced_at", flat=True),
     )
     return sorted({moment for moment in known if moment is not None})
 
@@ -131,6 +134,9 @@ def test_it_follows_every_change(edition: Edition, eventful: list[Submission], o
             reveal_at=timezone.now() + timedelta(milliseconds=1),
         ),
         lambda: visibility.reveal_due(now=timezone.now() + timedelta(hours=1)),
+        lambda: quote("deep-scale", mid=1.0),
+        lambda: quote("deep-scale", mid=2.0),
+        lambda: quote("later", mid=3.0),
     ]
     seen = assert_the_same(ANYBODY)
     for change in changes:
@@ -150,7 +156,9 @@ def test_it_is_of_the_edition_that_was_the_board(
     assert any("unscorable='unknown-keys'" in row for board in assert_the_same(ANYBODY) for row in board)
     send(stranger, second, "Short", 1.12)
     assert_the_same(ANYBODY)
+    quote("after-the-first", mid=1.0)
     roll_back()
+    quote("after-the-second", mid=2.0)
     assert_the_same(ANYBODY)
     builders.score_all()
     found = assert_the_same(ANYBODY)

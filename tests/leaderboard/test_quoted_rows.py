@@ -1,0 +1,146 @@
+"""Rows quoted from papers stand since the day they were added: what was shown before never changes."""
+
+import json
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.db import IntegrityError, transaction
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import benchmark, inference
+from leaderboard.models import AuditEvent, Edition, PublishedResult, Snapshot, Split
+from leaderboard.models.benchmark import SINCE_EVER
+from tests.editions import board_now, corrected, open_edition, paper, publish, quote, roll_back
+
+FORMS = ("/board/test/editions/1/", "/board/test/editions/1.csv", "/board/test/editions/1.tex")
+A_DAY = timedelta(days=1)
+
+
+def representations(client: Client, at: datetime) -> dict[str, bytes]:
+    """A board of the past and a former edition, in every format."""
+    moment = f"{at.astimezone(UTC):%Y-%m-%dT%H:%M:%S.%fZ}"
+    past = [f"/board/test{form}?at={moment}" for form in ("/", ".csv", ".tex", ".md")]
+    api = [f"/api/v1/splits/test/board?at={moment}", "/api/v1/splits/test/editions/1/board"]
+    addresses = [*past, *api, *FORMS, "/board/test/editions/1.md", "/board/test/?at=2020-01-01"]
+    found = {address: client.get(address) for address in addresses}
+    assert {response.status_code for response in found.values()} == {200}
+    return {address: response.content for address, response in found.items()}
+
+
+def on_board() -> dict[str, float | None]:
+    return {e.method: e.scores["mid"] for e in board_now().entries if e.kind == "published"}
+
+
+@pytest.fixture
+def former(edition: Edition, tmp_path: Path) -> Edition:
+    """The first edition, which another one has replaced."""
+    publish(open_edition(corrected(tmp_path, factor=1.3)))
+    return edition
+
+
+def test_a_row_that_is_added_or_replaced_changes_no_board_of_the_past_and_no_former_edition(
+    client: Client, former: Edition
+) -> None:
+    at = timezone.now()
+    before = representations(client, at)
+    quote("later", mid=1.0)
+    quote("deep-scale", mid=0.5)
+    assert (on_board()["Later"], on_board()["Deep-Scale"]) == (1.0, 0.5)
+    assert "Deep Scale" not in on_board()
+    assert representations(client, at) == before
+    # Nor does what is kept of them, once it is drawn anew.
+    Snapshot.objects.all().delete()
+    assert representations(client, at) == before
+    later = client.get(f"/board/test.csv?at={timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}").text
+    assert "Later" in later
+    assert board_now().updated_at is not None
+    assert board_now().updated_at > at
+
+
+def test_a_board_that_stands_has_every_row_and_a_former_one_those_of_its_time(
+    former: Edition, client: Client
+) -> None:
+    quote("second")
+    roll_back()
+    quote("first-again")
+    # The first edition is the board again, so it has what came meanwhile; the second is a former one.
+    assert {"Second", "First-Again"} <= set(on_board())
+    second = client.get("/board/test/editions/2.csv").text
+    assert "Second" in second
+    assert "First-Again" not in second
+
+
+def test_ranges_of_a_former_edition_count_the_rows_of_its_time(former: Edition) -> None:
+    first, second = Edition.objects.order_by("number").select_related("split")
+    before = [inference.digest_of(edition, []) for edition in (first, second)]
+    quote("later")
+    after = [inference.digest_of(edition, []) for edition in (first, second)]
+    assert before[0] == after[0]
+    assert before[1] != after[1]
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_rows_that_come_with_their_split_stand_since_ever_and_later_ones_since_their_day() -> None:
+    PublishedResult.objects.filter(slug="sot").delete()
+    assert set(PublishedResult.objects.values_list("added_at", flat=True)) == {SINCE_EVER}
+    benchmark.ensure_splits()
+    later = PublishedResult.objects.filter(slug="sot")
+    assert later.count() == 2
+    assert all(timezone.now() - row.added_at < A_DAY for row in later)
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_a_document_is_imported_once_and_another_content_replaces_only_when_told(tmp_path: Path) -> None:
+    path = tmp_path / "paper.json"
+    path.write_text(json.dumps(paper("later", mid=1.0)))
+    call_command("import_published", str(path))
+    call_command("import_published", str(path))
+    assert AuditEvent.objects.filter(verb="imported").count() == 1
+    path.write_text(json.dumps(paper("later", mid=2.0)))
+    with pytest.raises(
+        CommandError, match=r"'later' of test is there with another scores; expected the same"
+    ):
+        call_command("import_published", str(path))
+    assert on_board()["Later"] == 1.0
+    call_command("import_published", str(path), replace=True)
+    assert on_board()["Later"] == 2.0
+    assert PublishedResult.objects.filter(slug="later").count() == 2
+
+
+@pytest.mark.usefixtures("benchmark")
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        ({"results": {"nowhere": {"later": [1.0] * 10}}}, "There is no split 'nowhere'"),
+        ({"results": {"test": {"later": [1.0] * 9}}}, "has it in another form"),
+        ({"results": {"test": {"later": [float("nan")] * 10}}}, "are no ten numbers from 0"),
+        ({"results": {"test": {"other": [1.0] * 10}}}, "lacks 'other'"),
+        ({"results": {}}, "has no rows"),
+        ({"columns": ["mid"] * 10}, "are no ten numbers from 0"),
+        ({"methods": "none"}, "has it in another form"),
+    ],
+)
+def test_a_document_that_is_none_is_refused_in_words(
+    tmp_path: Path, change: dict[str, Any], sentence: str
+) -> None:
+    path = tmp_path / "paper.json"
+    path.write_text(json.dumps(paper() | change))
+    n_before = PublishedResult.objects.count()
+    with pytest.raises(CommandError, match=sentence):
+        call_command("import_published", str(path))
+    assert PublishedResult.objects.count() == n_before
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_the_database_holds_one_standing_row_of_a_name_in_the_order_of_time() -> None:
+    row = PublishedResult.objects.filter(split="test").latest("pk")
+    with pytest.raises(IntegrityError), transaction.atomic():
+        PublishedResult.objects.filter(pk=row.pk).update(replaced_at=SINCE_EVER - A_DAY)
+    copy = {field.attname: getattr(row, field.attname) for field in row._meta.fields if field.name != "id"}
+    with pytest.raises(IntegrityError), transaction.atomic():
+        PublishedResult.objects.create(**copy)
+    assert Split.objects.get(pk="test").published_results.count() == 5
