@@ -14,6 +14,10 @@ from evaluator.escaping import latex, latex_comment, markdown
 from evaluator.protocol import INTERVAL_NAMES, METRICS
 
 ABSENT: Final = "–"
+BRACKETS: Final = (
+    "[low, high]: 95 % confidence interval, bootstrap over recordings. (2-4) behind a rank: rank range "
+    "at 95 %."
+)
 _SYMBOLS: Final = {"mid": "MiD", "rte": "RTE"}
 _LATEX_UNITS: Final = {"mid": r"$\times 10^{-4}$", "rte": r"\%"}
 _UNITS: Final = {"mid": "×10⁻⁴", "rte": "%"}
@@ -138,7 +142,8 @@ def columns(metrics: Sequence[str] = METRICS) -> tuple[str, ...]:
 def as_latex(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str] = METRICS) -> str:
     r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined.
 
-    `about` are lines of comment above it. With intervals, they stand small behind their values.
+    `about` are lines of comment above it. With intervals, they stand small behind their values, and a comment
+    says what the brackets are.
     """
     n = len(INTERVAL_NAMES)
     groups = [
@@ -148,7 +153,7 @@ def as_latex(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str
     rules = [rf"\cmidrule(lr){{{4 + i * n}-{3 + (i + 1) * n}}}" for i in range(len(metrics))]
     return "\n".join(
         [
-            *map(latex_comment, about),
+            *map(latex_comment, [*about, *_caption(rows)]),
             r"% It needs \usepackage{booktabs}.",
             rf"\begin{{tabular}}{{rll{'r' * n * len(metrics)}}}",
             r"\toprule",
@@ -162,6 +167,11 @@ def as_latex(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str
             "",
         ]
     )
+
+
+def _caption(rows: Sequence[Row]) -> tuple[str, ...]:
+    """What the brackets are, in a table that has some."""
+    return (BRACKETS,) if any(cell.low and cell.high for row in rows for cell in row.cells) else ()
 
 
 def latex_row(row: Row) -> str:
@@ -200,7 +210,7 @@ def as_markdown(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[
         "",
         f"{units}; lower is better. Best of a column **bold**, second *italic*.",
     ]
-    for line in about:
+    for line in (*_caption(rows), *about):
         lines += ["", markdown(line)]
     return "\n".join([*lines, ""])
 

@@ -39,7 +39,9 @@ if TYPE_CHECKING:
     help="What to print.",
 )
 @click.option("--mine", is_flag=True, help="With your own team's private and anonymous methods, marked.")
-@click.option("--intervals", "has_intervals", is_flag=True, help="With the 95 % interval of each value.")
+@click.option(
+    "--intervals", "has_intervals", is_flag=True, help="With the 95 % confidence interval of each value."
+)
 @click.option(
     "--edition",
     type=click.IntRange(min=1),
@@ -127,6 +129,11 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
         lines = _table(found, texts=(), scores=("mid", "rte"))
         lines += ["", "Too narrow for all columns; a pipe or --json gets them."]
     yield from lines
+    if any(entry.intervals for entry in found.entries):
+        from evaluator.layouts import BRACKETS  # noqa: PLC0415 -- only for a board with intervals
+
+        yield ""
+        yield BRACKETS
 
 
 def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:
