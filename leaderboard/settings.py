@@ -294,7 +294,10 @@ ACCOUNT_EMAIL_VERIFICATION = "mandatory" if env.str("TSTTC_EMAIL_URL", default="
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
-ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key"}
+ACCOUNT_ADAPTER = "leaderboard.web.accounts.AccountAdapter"
+ACCOUNT_FORMS = {"signup": "leaderboard.web.accounts.SignupForm"}
+# Wrong passwords; the keys are an account at an address, and an account (see leaderboard/web/accounts.py).
+ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
 
 # --- API -------------------------------------------------------------------------------------------------
 

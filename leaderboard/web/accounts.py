@@ -1,0 +1,101 @@
+"""Accounts where allauth's own way says too much or locks out the wrong person.
+
+Mails: every link begins with the configured address of the site, whatever `Host` a request names.
+Wrong passwords are counted three ways (`ACCOUNT_RATE_LIMITS`): by address; by account and address, so that
+somebody who guesses from one address never locks out the owner at another; and slowly by account alone, for
+guesses from many addresses. The last count does not hold where the account has signed in from before.
+Sign-up hashes the password also where the address has an account, so that both take the same time.
+"""
+
+import hashlib
+from typing import Any
+from urllib.parse import urlsplit, urlunsplit
+
+from allauth.account import forms
+from allauth.account.adapter import DefaultAccountAdapter
+from allauth.core.internal import ratelimit
+from django.conf import settings
+from django.contrib.auth.hashers import make_password
+from django.contrib.sites.requests import RequestSite
+from django.core.cache import cache
+from django.http import HttpRequest
+
+KNOWN_ADDRESS_S = 90 * 24 * 3600
+
+
+class ConfiguredSite(RequestSite):
+    """The site that mails speak of: the configured one, not the one that a request names."""
+
+    def __init__(self) -> None:
+        self.name = settings.SITE_NAME
+        self.domain = urlsplit(settings.SITE_URL).netloc
+
+
+class AccountAdapter(DefaultAccountAdapter):
+    """Sends mails, and decides whether somebody may try a password."""
+
+    def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
+        """Send a mail whose links lead to the configured site."""
+        links = {name: _on_our_site(value) for name, value in context.items() if _is_address(value)}
+        super().send_mail(template_prefix, email, {**context, "current_site": ConfiguredSite(), **links})
+
+    def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
+        """Count one try. Raises allauth's validation error once there were too many wrong ones."""
+        super().pre_authenticate(request, **credentials)
+        login = _login_of(credentials)
+        if cache.get(_known_address_key(login, ratelimit.get_ip(request))):
+            return
+        usage = ratelimit.consume(request, app="allauth.account", action="login_failed_anywhere", key=login)
+        if not usage:
+            self._rollback_login_failed_rl_usage()
+            raise self.validation_error("too_many_login_attempts")
+        # A password that turns out to be right takes back all that was counted for it.
+        self._login_failed_rl_usage.usage.extend(usage.usage)
+
+    def authenticate(self, request: HttpRequest, **credentials: Any) -> Any:
+        """The account that these credentials open, or None. The address is known to it from now on."""
+        user = super().authenticate(request, **credentials)
+        if user:
+            address = ratelimit.get_ip(request)
+            cache.set(
+                _known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S
+            )
+        return user
+
+    def _get_login_attempts_cache_key(self, request: HttpRequest, **credentials: Any) -> str:
+        return f"{_login_of(credentials)}:{ratelimit.get_ip(request)}"
+
+    def _delete_login_attempts_cached_email(self, request: HttpRequest, **credentials: Any) -> None:
+        """A reset password opens the account again, from everywhere."""
+        super()._delete_login_attempts_cached_email(request, **credentials)
+        ratelimit.clear(
+            request, app="allauth.account", action="login_failed_anywhere", key=_login_of(credentials)
+        )
+
+
+class SignupForm(forms.SignupForm):
+    """Signs up; an address that has an account already gets a mail, and the same answer."""
+
+    def try_save(self, request: HttpRequest) -> Any:
+        """Make the account, or answer as if it had been made, after as much work."""
+        if self.account_already_exists:
+            make_password(self.cleaned_data["password1"])
+        return super().try_save(request)
+
+
+def _login_of(credentials: dict[str, Any]) -> str:
+    return str(credentials.get("email") or credentials.get("username") or "").lower()
+
+
+def _known_address_key(login: str, address: str) -> str:
+    # A hash: who signs in from where is nobody's business in a table of the database.
+    return "known-address:" + hashlib.sha256(f"{login}\n{address}".encode()).hexdigest()
+
+
+def _is_address(value: object) -> bool:
+    return isinstance(value, str) and urlsplit(value).scheme in {"http", "https"}
+
+
+def _on_our_site(address: str) -> str:
+    parts = urlsplit(address)
+    return settings.SITE_URL + urlunsplit(("", "", parts.path, parts.query, parts.fragment))
