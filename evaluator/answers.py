@@ -103,7 +103,10 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Board(msgspec.Struct, frozen=True, kw_only=True):
-    """The ranked entries of a split in an edition; `document` is the server's answer unabridged."""
+    """The ranked entries of a split in an edition; `document` is the server's answer unabridged.
+
+    `floor` are the scores of the ground truth itself; None where the server does not say them.
+    """
 
     split: str
     entries: list[BoardEntry]
@@ -113,6 +116,7 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     ground_truth: str | None = None
     n_sequences: int | None = None
     n_recordings: int | None = None
+    floor: dict[str, float | None] | None = None
     at: str | None = None
     updated_at: str | None = None
 

@@ -15,7 +15,7 @@ import structlog
 from django.conf import settings
 from numpy.typing import NDArray
 
-from evaluator import GroundTruth, Predictions
+from evaluator import GroundTruth, Predictions, floors, published
 from evaluator.protocol import SCORE_NAMES, get_protocol
 from evaluator.report import BagSums
 from evaluator.scoring import Scorer
@@ -96,6 +96,13 @@ def predictions_of(edition: Edition, *, digest: str) -> Predictions:
 def counts_of(edition: Edition) -> Floats:
     """Sequences per recording in every column, (G, 10). Raises `OSError` without access to the values."""
     return _scorer(edition.ground_truth_id, edition.protocol).bag_counts
+
+
+def floor_of(edition: Edition) -> dict[str, float | None]:
+    """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
+    floor = floors.floor_of(ground_truth.load(edition.ground_truth_id), protocol=edition.protocol)
+    decimals = get_protocol(edition.protocol).decimals
+    return {name: published(value, decimals=decimals) for name, value in floor.items()}
 
 
 @lru_cache(maxsize=2)

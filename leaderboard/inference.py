@@ -137,7 +137,12 @@ def _is_stale(edition: Edition, *, now: datetime) -> bool:
     rows = standing(edition)
     rest = min(PATIENCE, len(rows) ** 2 * REST_PER_PAIR)
     is_new = edition.inferred_at is not None and now - edition.inferred_at < rest
-    return not is_new and edition.inference_digest != digest_of(edition, rows)
+    return not is_new and not _holds(edition, digest=digest_of(edition, rows))
+
+
+def _holds(edition: Edition, *, digest: str) -> bool:
+    """Whether all that workers make of an edition beside its scores is there, and of these entries."""
+    return edition.floor is not None and edition.inference_digest == digest
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
@@ -152,7 +157,7 @@ def infer(*, edition: Edition, now: datetime, between: Callable[[], None] = lamb
     with _alone(edition) as is_alone:
         rows = standing(edition)
         digest = digest_of(edition, rows)
-        if not is_alone or digest == edition.inference_digest:
+        if not is_alone or _holds(edition, digest=digest):
             return False
         inferred = _inferred(edition, rows, between=between)
         is_written = _write(edition, digest=digest, inferred=inferred, rows=rows, now=now)
@@ -297,6 +302,7 @@ def _write(
 ) -> bool:
     """Write what was made, all or nothing, if the entries are still the same."""
     shown = {row.evaluation_id for row in rows if row.is_shown}
+    floor = bags.floor_of(edition)
     with transaction.atomic():
         present = (
             Edition.objects.select_for_update(of=("self",)).select_related("ground_truth").get(pk=edition.pk)
@@ -308,10 +314,10 @@ def _write(
         table = _Table(present)
         changed = [(*values, pk) for pk, values in inferred.items() if table.before.get(pk, values) != values]
         bulk.update(Score, COLUMNS, changed)
-        Edition.objects.filter(pk=edition.pk).update(inferred_at=now, inference_digest=digest)
+        Edition.objects.filter(pk=edition.pk).update(inferred_at=now, inference_digest=digest, floor=floor)
         ids = {i: pk for pk, i in table.row_of.items()}
         # Whose rows only their own team sees, changes nothing that anybody else is shown.
-        is_seen = any(ids[table.cells[row[-1]][0]] in shown for row in changed)
+        is_seen = floor != present.floor or any(ids[table.cells[row[-1]][0]] in shown for row in changed)
         if is_seen and present.published_at is not None:
             boards.changed(present.split_id)
     return True

@@ -134,6 +134,11 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
 
         yield ""
         yield BRACKETS
+    if found.floor:
+        from evaluator.floors import floor_sentence  # noqa: PLC0415 -- loads numpy
+
+        yield ""
+        yield floor_sentence(found.floor)
 
 
 def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:

@@ -206,6 +206,13 @@ class BoardSerializer(serializers.Serializer[Board]):
     n_recordings = serializers.IntegerField(
         source="edition.ground_truth.n_recordings", default=None, allow_null=True
     )
+    floor = ScoresSerializer(
+        source="edition.floor",
+        default=None,
+        allow_null=True,
+        help_text="The scores of the ground truth itself, submitted as predictions: no file scores lower, "
+        "because the protocol truncates predictions and not the ground truth. Null: not computed yet.",
+    )
     at = serializers.DateTimeField(allow_null=True, help_text="The time that was asked for, if any.")
     updated_at = serializers.DateTimeField(allow_null=True)
     is_open = serializers.BooleanField(help_text="Whether its split takes submissions.")

@@ -105,6 +105,11 @@ class Edition(models.Model):
     # The entries whose intervals and rank ranges stand beside their scores; another set makes them stale.
     inferred_at = models.DateTimeField(null=True, blank=True)
     inference_digest = models.CharField(max_length=80, blank=True)
+    floor = models.JSONField(
+        null=True,
+        blank=True,
+        help_text="By score name: what the ground truth itself scores, as published. A worker computes it.",
+    )
 
     class Meta:
         ordering = ["split", "number"]

@@ -11,6 +11,7 @@ from typing import Final
 from django.core.paginator import Page, Paginator
 from django.utils.safestring import SafeString
 
+from evaluator.floors import floor_sentence
 from evaluator.protocol import INTERVALS, SCORE_NAMES
 from evaluator.protocol import Interval as TimeInterval
 from evaluator.report import format_published
@@ -136,6 +137,7 @@ class BoardTable:
     has_intervals: bool
     can_compare: bool
     reason: str  # why there are no intervals; empty where there are
+    floor: str  # what the ground truth itself scores, in words; empty where that is not known
 
     @property
     def has_private_rows(self) -> bool:
@@ -177,6 +179,7 @@ def board_table(board: Board, *, query: BoardQuery) -> BoardTable:
         has_intervals=bool(scales),
         can_compare=_is_present(board) and sum(row.can_be_compared for row in rows) > 1,
         reason=_reason(board, has_intervals=bool(scales)),
+        floor=floor_sentence(board.edition.floor) if board.edition else "",
     )
 
 

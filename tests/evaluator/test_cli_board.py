@@ -225,6 +225,17 @@ def test_board_is_shown_in_an_edition_as_of_a_time_and_with_intervals(
     assert len(site.requests) == 2
 
 
+def test_board_says_below_what_the_ground_truth_itself_scores(tsttc: Tsttc, site: RecordedSite) -> None:
+    floor = {"mid": 0.36, "mid_crucial": 0.0, "mid_negative": None, "rte": 0.73}
+    site.put(BOARD, Reply(BOARD_DOCUMENT), Reply(BOARD_DOCUMENT | {"floor": floor}))
+    plain = tsttc("board").stdout
+    said = tsttc("board").stdout
+    assert said.startswith(
+        f"{plain}\nFloor: the ground truth itself, submitted as predictions, scores MiD 0.36, "
+    )
+    assert json.loads(tsttc("board", "--json").stdout)["floor"] == floor
+
+
 def test_moment_that_is_none_is_wrong_usage_in_the_server_s_words(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(BOARD, Reply(problem("'soon' is no date or time.", code="bad-moment", where="at"), 400))
     result = tsttc("board", "--at", "soon")
