@@ -7,6 +7,7 @@ from collections import Counter
 
 import numpy as np
 
+from evaluator.alignment import ZERO_MESSAGE
 from evaluator.documents import Document, Members, Unit, kind_of, parse, read_document
 from evaluator.problems import Findings, listed, pointer, quoted
 from evaluator.scale import (
@@ -62,9 +63,34 @@ def convert(
         to_frame_gap = N_FRAMES - 1
     new_hz = to_fps_hz if to_fps_hz is not None else FRAME_RATE_HZ / _gap(to_frame_gap)
     ratios = ttc_to_scale_ratio(ttc_s, fps_hz=new_hz)
+    _require_ratios(ratios, ttc_s, document, names, fps_hz=new_hz)
     return write_predictions(
         keys=names, scale_ratio=ratios, fps_hz=to_fps_hz, frame_gap=to_frame_gap, meta=meta
     )
+
+
+def _require_ratios(
+    ratios: Floats, ttc_s: Floats, document: Document, names: list[str], *, fps_hz: float
+) -> None:
+    """Raise `Rejected` for times that no scale ratio at this rate can say, and name a gap at which one can.
+
+    An object that moves away and was at the observer's plane within the gap has no size in the reference
+    frame: α > 0 needs τ > 0, or τ < −1 / f.
+    """
+    findings = Findings()
+    limit_s = 1 / fps_hz
+    for row in np.flatnonzero(~(ratios > 0)).tolist():
+        value = float(ttc_s[row])
+        gaps = [gap for gap in range(1, N_FRAMES) if value < -gap / FRAME_RATE_HZ]
+        fits = f"--to-frame-gap {gaps[-1]} (or less) has one" if gaps else "no frame gap has one"
+        message = (
+            f"The time to contact is {value:g} s, which has no scale ratio at {fps_hz:g} Hz: an object that "
+            f"moves away needs more than {limit_s:g} s, the time between both frames; {fits}."
+            if value
+            else ZERO_MESSAGE
+        )
+        findings.add("not-positive" if value else "zero", message, document.pointer(names[row]))
+    findings.raise_if_any()
 
 
 def _require_one_rate(document: Document, fps_hz: float | None, frame_gap: int | None) -> None:

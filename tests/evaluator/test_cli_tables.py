@@ -211,6 +211,24 @@ def test_convert_writes_a_file_that_scores_the_same(tsttc: Tsttc, tmp_path: Path
     assert piped.rstrip() == convert(original.read_bytes())
 
 
+def test_times_without_a_scale_ratio_are_named_with_a_gap_that_has_one(tsttc: Tsttc, tmp_path: Path) -> None:
+    path = tmp_path / "times.json"
+    path.write_text(json.dumps({"0": -0.3, "1": 2.0, "2": -0.07}))
+    refused = tsttc("convert", path, "--to", "scale_ratio")
+    assert refused.exit_code == 1
+    assert (
+        "The time to contact is -0.3 s, which has no scale ratio at 2 Hz: an object that moves away needs "
+        "more than 0.5 s, the time between both frames; --to-frame-gap 2 (or less) has one."
+    ) in refused.stderr
+    assert "is -0.07 s, which has no scale ratio at 2 Hz" in refused.stderr
+    assert "no frame gap has one." in refused.stderr
+    path.write_text(json.dumps({"0": -0.3, "1": 2.0}))
+    ratios = tsttc("convert", path, "--to", "scale_ratio", "--to-frame-gap", 2)
+    assert ratios.exit_code == 0
+    back = json.loads(convert(ratios.stdout.encode()))
+    assert back == pytest.approx({"0": -0.3, "1": 2.0})
+
+
 @pytest.mark.parametrize(
     "options",
     [
