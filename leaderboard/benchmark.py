@@ -122,7 +122,7 @@ def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) ->
             return "unchanged"
         if not is_replacing:
             raise Refused(
-                "published-row-differs",
+                "bad-value",
                 f"The row {row['slug']!r} of {row['split_id']} is there with another {', '.join(changed)}; "
                 "expected the same, or --replace.",
             )
@@ -137,7 +137,7 @@ def _sound_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
         rows = list(_rows_of(document))
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         raise Refused(
-            "bad-document",
+            "bad-value",
             f"The document lacks {error} or has it in another form; expected one such as those in "
             "leaderboard/published/.",
         ) from None
@@ -161,7 +161,7 @@ def _sound_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
             said = error.message_dict[field][0]
             raise Refused("bad-value", f"The row {row['slug']!r}: the field {field!r}: {said}") from None
     if not rows:
-        raise Refused("bad-document", "The document has no rows; expected some under 'results'.")
+        raise Refused("bad-value", "The document has no rows; expected some under 'results'.")
     return rows
 
 

@@ -39,7 +39,7 @@ API_CODES: Final[dict[str, str]] = {
     "token-revoked": "The token was revoked.",
     "account-closed": "The account that the token belongs to is closed.",
     "token-scope": "The token is not good for this.",
-    "token-split": "The token is good for another split alone.",
+    "token-split": "The token is good for another split alone, or for one, and this would change all.",
     "permission-denied": "The account may not do this.",
     "not-maintainer": "Only maintainers may do this.",
     "not-yours": "Only the team that sent a submission may do this.",

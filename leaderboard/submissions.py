@@ -23,6 +23,10 @@ class TooLarge(Refused):
     """The file is over the size limit."""
 
 
+class TokenSplit(Refused):
+    """The token is good for one split, and details of a method stand on every split."""
+
+
 @dataclass(frozen=True)
 class Submitted:
     """The answer to a submission; `is_new` is False when the same bytes had come before."""
@@ -33,11 +37,20 @@ class Submitted:
 
 @dataclass(frozen=True)
 class MethodDetails:
-    """What a team says of a method when it names it for the first time, or says anew."""
+    """Details of a method that come with a file; an empty one says nothing, and changes nothing."""
 
     description: str = ""
     paper_url: str = ""
     code_url: str = ""
+
+    @property
+    def given(self) -> dict[str, str]:
+        """Those that are not empty."""
+        return {name: value for name, value in vars(self).items() if value}
+
+    def changes_of(self, method: Method) -> dict[str, str]:
+        """Those that are not empty and differ from the method's own."""
+        return {name: value for name, value in self.given.items() if getattr(method, name) != value}
 
 
 def submit(
@@ -54,11 +67,14 @@ def submit(
     code_url: str = "",
     note: str = "",
     commit: str = "",
+    may_edit: bool = True,
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
-    The same bytes again, for the same split and method, are answered with the first submission and cost
-    nothing. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
+    The same bytes again, for the same split and method, are answered with the first submission, cost nothing
+    and change nothing. With a new file, details that differ from the method's own replace them, through
+    `methods.edit`; without `may_edit` they are refused. Raises `Refused` or `quotas.QuotaExceeded` (nothing
+    is kept then).
     """
     split = _open_split(split_name, now=now)
     name = clean_name("method", method_name)
@@ -71,6 +87,8 @@ def submit(
     commit = clean_text("commit", commit, limit=64, required=False)
     upload = _checked(upload)
     first = _before_the_quota(user=user, split=split, method_name=name, upload=upload, now=now)
+    if first is None and not may_edit:
+        first = _before_an_edit(user=user, split=split, method_name=name, upload=upload, details=details)
     if first is not None:
         return Submitted(submission=first, is_new=False)
     kept = files.keep_predictions(upload, now=now)
@@ -78,12 +96,14 @@ def submit(
     with transaction.atomic():
         quotas.hold(team=team)
         teams.require_member(team, user)
-        method, is_told_anew = _method(team=team, name=name, details=details, now=now)
+        method = _method(team=team, name=name, details=details, now=now)
         standing = Submission.objects.standing().filter(split=split, method=method, digest=kept.digest)
         first = standing.first()
         if first is not None:
-            boards.changed_by_methods([method.pk] * is_told_anew)
             return Submitted(submission=first, is_new=False)
+        changes = details.changes_of(method)
+        if changes and not may_edit:
+            raise _token_split(method, changes)
         quotas.require(team=team, user=user, split=split, now=now)
         try:
             with transaction.atomic():
@@ -103,7 +123,8 @@ def submit(
             # The same bytes came twice at once, and the other request was first.
             return Submitted(submission=standing.get(), is_new=False)
         _queue(submission)
-        boards.changed_by_methods([method.pk] * is_told_anew)
+        if changes:
+            submission.method = methods.edit(method=method, changes=changes, actor=user)
         audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
     log.info(
         "submission_received",
@@ -161,6 +182,35 @@ def _before_the_quota(
     return None
 
 
+def _before_an_edit(
+    *, user: User, split: Split, method_name: str, upload: "File[bytes]", details: MethodDetails
+) -> Submission | None:
+    """Of who may not change the method, the submission that had these bytes before. None: there is no change.
+
+    So that a file that cannot be taken is not written first. Raises `Refused`.
+    """
+    method = Method.objects.filter(team=teams.present_team_of(user=user), name=method_name).first()
+    changes = details.changes_of(method) if method is not None else {}
+    if method is None or not changes:
+        return None
+    same = {"split": split, "method": method, "digest": files.measure(upload).digest}
+    first = Submission.objects.standing().filter(**same).first()
+    if first is None:
+        raise _token_split(method, changes)
+    return first
+
+
+def _token_split(method: Method, changes: Mapping[str, str]) -> TokenSplit:
+    first = next(iter(changes))
+    return TokenSplit(
+        "token-split",
+        f"The token is good for one split alone, and the field{'s' if len(changes) > 1 else ''} "
+        f"{', '.join(map(repr, changes))} would change the method {method.name!r} on every split; expected "
+        "what stands there, nothing, or a token for every split.",
+        field=first,
+    )
+
+
 def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload is None:
         raise Refused(
@@ -179,25 +229,19 @@ def too_large(*, found_bytes: int) -> str:
     )
 
 
-def _method(*, team: Team, name: str, details: MethodDetails, now: datetime) -> tuple[Method, bool]:
-    """The team's method of that name, made if new; what is said of it replaces what was said.
+def _method(*, team: Team, name: str, details: MethodDetails, now: datetime) -> Method:
+    """The team's method of that name, as it is; a new one is made with these details, and is private.
 
-    Returns as well whether everybody reads something new of it. A new one is private. Raises `Refused` for a
-    name that looks like another one of the team's.
+    Raises `Refused` for a name that looks like another one of the team's.
     """
-    said = {key: value for key, value in vars(details).items() if value}
     method = Method.objects.filter(team=team, name=name).first()
     if method is None:
         teams.locked(team)
         method = Method.objects.filter(team=team, name=name).first()
     if method is None:
         methods.require_own_look(name, team=team, field="method")
-        return Method.objects.create(team=team, name=name, created_at=now, **said), False
-    if all(getattr(method, key) == value for key, value in said.items()):
-        return method, False
-    Method.objects.filter(pk=method.pk).update(**said)
-    # Asked anew, now that its row is held: it may have been shown since it was read.
-    return method, Method.objects.shown().filter(pk=method.pk).exists()
+        return Method.objects.create(team=team, name=name, created_at=now, **details.given)
+    return method
 
 
 def _clean_filename(name: str) -> str:

@@ -87,6 +87,8 @@ def _of_a_verb(exc: Exception) -> Response | None:
             status = 413 if isinstance(exc, submissions.TooLarge) else 422
             if exc.code in {"split-not-open", "split-closed"}:
                 status = 409
+            if isinstance(exc, submissions.TokenSplit):
+                status = 403
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
         case quotas.QuotaExceeded():
             retry_after_s = exc.quota.retry_after_s(now=timezone.now())

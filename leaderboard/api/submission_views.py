@@ -22,7 +22,7 @@ from rest_framework.views import APIView
 
 from leaderboard import files, idempotency, method_ids, outcomes, quotas, submissions, waiting
 from leaderboard.api import listing
-from leaderboard.api.authentication import require_split
+from leaderboard.api.authentication import require_split, split_of
 from leaderboard.api.problems import BadValue
 from leaderboard.api.serializers import ErrorSerializer, absolute
 from leaderboard.api.submission_shapes import (
@@ -168,7 +168,8 @@ def _submit(request: Request, form: QueryDict) -> idempotency.Answer:
     user, now = cast("User", request.user), timezone.now()
     upload = request.FILES.get("file")
     header = request.headers.get("Idempotency-Key")
-    submit = partial(_take, user=user, form=form, upload=upload, now=now)
+    may_edit = split_of(request.auth) is None
+    submit = partial(_take, user=user, form=form, upload=upload, now=now, may_edit=may_edit)
     if header is None:
         return idempotency.Answer(submit(), is_replayed=False)
     key = idempotency.parse(header)
@@ -180,7 +181,7 @@ def _submit(request: Request, form: QueryDict) -> idempotency.Answer:
 
 
 def _take(
-    *, user: User, form: QueryDict, upload: UploadedFile | None, now: datetime
+    *, user: User, form: QueryDict, upload: UploadedFile | None, now: datetime, may_edit: bool
 ) -> submissions.Submitted:
     return submissions.submit(
         user=user,
@@ -190,6 +191,7 @@ def _take(
         via=Submission.Via.API,
         now=now,
         filename=getattr(upload, "name", "") or "",
+        may_edit=may_edit,
         **{name: str(form.get(name, "")) for name in TEXT_FIELDS},
     )
 

@@ -7,7 +7,7 @@ import pytest
 from django.core.files.base import ContentFile
 from django.utils import timezone
 
-from leaderboard import files, submissions
+from leaderboard import boards, files, quotas, submissions
 from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Split, Status, Submission, Team, User
 from tests import builders
 
@@ -79,6 +79,29 @@ def test_what_is_said_of_a_method_later_replaces_what_was_said(edition: Edition,
     builders.submit(owner, builders.predictions(edition, factor=1.2), description="new")
     method = Method.objects.get()
     assert (method.description, method.code_url) == ("new", "https://example.org/c")
+    [event] = AuditEvent.objects.filter(noun="Method", verb="edited")
+    assert (event.actor, event.noun_id) == (owner, str(method.pk))
+    assert event.details == {"fields": ["description"]}
+
+
+def test_bytes_that_are_there_change_nothing_of_the_method(edition: Edition, owner: User) -> None:
+    first = builders.submit(owner, builders.predictions(edition), description="old")
+    number, n_events = boards.number("test"), AuditEvent.objects.count()
+    again = builders.submit(
+        owner, builders.predictions(edition), description="new", paper_url="https://x.org"
+    )
+    assert again == first
+    method = Method.objects.get()
+    assert (method.description, method.paper_url) == ("old", "")
+    assert (boards.number("test"), AuditEvent.objects.count()) == (number, n_events)
+
+
+def test_a_refused_file_changes_nothing_of_the_method(edition: Edition, owner: User) -> None:
+    builders.submit(owner, builders.predictions(edition), description="old")
+    Split.objects.filter(pk="test").update(quota_limit=1)
+    with pytest.raises(quotas.QuotaExceeded):
+        builders.submit(owner, builders.predictions(edition, factor=1.2), description="new")
+    assert Method.objects.get().description == "old"
 
 
 @pytest.mark.parametrize(

@@ -3,8 +3,10 @@
 from datetime import timedelta
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
+from django.core.files.base import ContentFile
 from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
@@ -12,7 +14,7 @@ from pytest_django import DjangoAssertNumQueries
 from rest_framework.test import APIClient
 
 from leaderboard import tokens
-from leaderboard.models import ApiToken, AuditEvent, Edition, Submission, User
+from leaderboard.models import ApiToken, AuditEvent, Edition, Method, Submission, User
 from tests import builders
 from tests.leaderboard.test_api_submissions import post
 
@@ -264,3 +266,60 @@ def test_secret_scanners_are_told_what_a_token_looks_like_and_where_to_end_it() 
     told = (Path(__file__).resolve().parents[2] / "SECURITY.md").read_text()
     assert f"    {tokens.PATTERN.pattern}\n" in told
     assert f"POST {REVOKE}" in told
+
+
+# --- one split ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def public(edition: Edition, owner: User) -> Method:
+    """A public method whose description everybody reads, on every split."""
+    return builders.submit(owner, builders.predictions(edition), description="What it does.").method
+
+
+def send(client: APIClient, data: bytes, **fields: str) -> tuple[int, dict[str, Any]]:
+    file = ContentFile(data, name="p.json")
+    answer = client.post("/api/v1/submissions", {"split": "test", "method": "Foo", "file": file, **fields})
+    return answer.status_code, answer.json()
+
+
+@pytest.mark.parametrize("is_known", [True, False])
+def test_a_token_for_one_split_changes_nothing_of_a_method(
+    edition: Edition, owner: User, public: Method, is_known: bool
+) -> None:
+    client = client_with(builders.token(owner, split_name="test"))
+    before, n_events = Method.objects.values().get(), AuditEvent.objects.count()
+    data = builders.predictions(edition, factor=1.1 if is_known else 1.3)
+    status, answer = send(client, data, description="DEFACED", code_url="https://evil.example/")
+    assert Method.objects.values().get() == before
+    assert (Submission.objects.count(), AuditEvent.objects.count()) == (1, n_events)
+    if is_known:
+        assert (status, answer["id"]) == (200, str(public.submissions.get().pk))
+    else:
+        assert (status, answer["code"], answer["problems"][0]["where"]) == (403, "token-split", "description")
+        assert answer["detail"] == (
+            "The token is good for one split alone, and the fields 'description', 'code_url' would "
+            "change the method 'Foo' on every split; expected what stands there, nothing, or a token for "
+            "every split."
+        )
+
+
+def test_a_token_for_one_split_sends_with_the_details_that_stand_and_makes_new_methods(
+    edition: Edition, owner: User, public: Method
+) -> None:
+    client = client_with(builders.token(owner, split_name="test"))
+    data = builders.predictions(edition, factor=1.3)
+    assert send(client, data, description="What it does.")[0] == 201
+    assert send(client, data, method="Bar", description="Another.")[0] == 201
+    assert Method.objects.get(name="Bar").description == "Another."
+    assert not AuditEvent.objects.filter(verb="edited").exists()
+
+
+def test_a_token_for_every_split_changes_a_method_as_its_page_does(
+    edition: Edition, owner: User, public: Method
+) -> None:
+    client = client_with(builders.token(owner))
+    assert send(client, builders.predictions(edition, factor=1.3), description="More.")[0] == 201
+    public.refresh_from_db()
+    assert public.description == "More."
+    assert AuditEvent.objects.get(verb="edited").details == {"fields": ["description"]}
