@@ -40,6 +40,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     method_id: str | None = None
     url: str | None = None
     visibility: str = ""
+    notice: str = ""
     scores: dict[str, float | None] | None = None
     intervals: dict[str, Interval] = {}
     awaits_intervals: bool = False
@@ -59,12 +60,16 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Method(msgspec.Struct, frozen=True, kw_only=True):
-    """A method as one may see it; `document` is the server's answer unabridged."""
+    """A method as one may see it; `document` is the server's answer unabridged.
+
+    `notice` says who sees its results, where others than its team do.
+    """
 
     id: str
     name: str
     document: JSON
     visibility: str = ""
+    notice: str = ""
     pseudonym: str | None = None
     reveal_at: str | None = None
     url: str = ""

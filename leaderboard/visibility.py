@@ -178,6 +178,21 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
         )
 
 
+def notice_of(method: Method) -> str:
+    """Who sees the results of a method, in a sentence, for whoever is about to send one; empty if private.
+
+    A method is shown on every split at once, so a file for another split is seen as soon as it is scored.
+    """
+    if method.visibility == Visibility.PUBLIC:
+        return f"{method.name} is public: everybody sees its results on every split."
+    if method.visibility == Visibility.ANONYMOUS:
+        return (
+            f"{method.name} is anonymous: everybody sees its results on every split, under the name "
+            f"{method.pseudonym}."
+        )
+    return ""
+
+
 def reveal_due(*, now: datetime) -> int:
     """Make public what was to be public by now. Returns how many; of two that do this at once, one does."""
     due = Method.objects.filter(visibility=Visibility.ANONYMOUS, reveal_at__lte=now)

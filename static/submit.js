@@ -25,6 +25,18 @@ function judge() {
 input.addEventListener("change", judge);
 judge();
 
+// Of a method that others see, its own sentence alone; of a new one none.
+const method = form.querySelector("input[name=method]");
+const notices = document.getElementById("notices");
+const allNotices = [...notices.children];
+
+method.addEventListener("input", () => {
+  const found = [...document.querySelectorAll("#methods option")].find((option) => option.value === method.value.trim());
+  const told = document.createElement("p");
+  told.textContent = found?.dataset.notice ?? "";
+  notices.replaceChildren(...(method.value.trim() ? [told] : allNotices));
+});
+
 // Beside the field a browser would open the file, and what was written on the page would be gone.
 const hasFile = (event) => event.dataTransfer.types.includes("Files");
 const mark = (isOver) => form.classList.toggle("dropping", isOver);

@@ -93,8 +93,9 @@ def submit(
     """Send PREDICTIONS, a JSON file or - for standard input, to the leaderboard.
 
     The file is checked here first, by the server's own code, so that a bad one costs nothing. Sending the
-    same file again is harmless: the server answers with the first submission. A gate (--fail-if…) waits for
-    the scores as --wait does.
+    same file again is harmless: the server answers with the first submission. If others than your team see
+    the method's results, the command says so before it sends. A gate (--fail-if…) waits for the scores as
+    --wait does.
 
     \b
     Examples:
@@ -113,6 +114,8 @@ def submit(
                 rival = gates.rival(
                     client, split=split, method=worse_than, own=method, is_significant_only=significant
                 )
+            notice = _notice_of(client, method)
+            _warn(notice, err=as_json)
             submission = sent(
                 client,
                 file,
@@ -125,6 +128,8 @@ def submit(
         is_waiting = wait or bool(fail_if) or bool(worse_than)
         if is_waiting or not as_json:
             _announce(submission, site=url, err=as_json)
+        if submission.notice != notice:  # a token that may only submit learns it now
+            _warn(submission.notice, err=as_json)
         if is_waiting and not submission.is_final:
             submission = followed(client, submission.id, timeout_s=timeout_s)
 
@@ -176,6 +181,22 @@ def _require_rival(worse_than: str | None, significant: bool) -> None:
         raise click.UsageError(
             "--significant says how to judge --fail-if-worse-than METHOD, which is missing."
         )
+
+
+def _notice_of(client: Client, method: str) -> str:
+    """Who will see the results, in the server's words; empty where only the team will, or nobody may say."""
+    from evaluator.answers import Refused  # noqa: PLC0415 -- loads msgspec
+
+    try:
+        found = client.own_method(method)
+    except Refused:  # a token that may only submit; the answer to the file says it
+        return ""
+    return found.notice if found is not None else ""
+
+
+def _warn(notice: str, *, err: bool) -> None:
+    if notice:
+        click.echo(printable(notice), err=err)
 
 
 def _name_to_send(path: Path) -> str:

@@ -8,7 +8,7 @@ from rest_framework import serializers
 from leaderboard import methods
 from leaderboard.api.serializers import DetailsSerializer, EntrySerializer, absolute
 from leaderboard.models import BoxSource, Cameras, Method, Visibility
-from leaderboard.visibility import Moved, Preview, Sight
+from leaderboard.visibility import Moved, Preview, Sight, notice_of
 
 
 class MethodSerializer(serializers.Serializer[Method]):
@@ -26,6 +26,10 @@ class MethodSerializer(serializers.Serializer[Method]):
     details = DetailsSerializer()
     shown_at = serializers.DateTimeField(allow_null=True, help_text="For its team alone.")
     reveal_at = serializers.DateTimeField(allow_null=True, help_text="For its team alone.")
+    notice = serializers.CharField(
+        allow_blank=True,
+        help_text="Who sees its results, in a sentence; empty if it is private. For its team alone.",
+    )
     url = serializers.URLField(help_text="The method's page.")
     api_url = serializers.URLField()
 
@@ -47,6 +51,7 @@ class MethodSerializer(serializers.Serializer[Method]):
             "details": asdict(profile.details),
             "shown_at": instance.shown_at if is_own else None,
             "reveal_at": instance.reveal_at if is_own else None,
+            "notice": notice_of(instance) if is_own else "",
             "url": absolute("method", instance.pk),
             "api_url": absolute("api-method", instance.pk),
         }

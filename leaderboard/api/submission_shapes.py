@@ -16,6 +16,7 @@ from leaderboard.api.serializers import (
 )
 from leaderboard.models import Status, Visibility
 from leaderboard.outcomes import Outcome
+from leaderboard.visibility import notice_of
 
 
 class QueueSerializer(serializers.Serializer[Any]):
@@ -50,6 +51,9 @@ class SubmissionSerializer(serializers.Serializer[Outcome]):
     team = serializers.CharField()
     visibility = serializers.ChoiceField(
         choices=Visibility.choices, help_text="Who sees the method, and so this result on the board."
+    )
+    notice = serializers.CharField(
+        allow_blank=True, help_text="Who sees the method's results, in a sentence; empty if it is private."
     )
     url = serializers.URLField(help_text="The submission's page.")
     api_url = serializers.URLField()
@@ -98,6 +102,7 @@ class SubmissionSerializer(serializers.Serializer[Outcome]):
             "method_id": str(method.pk),
             "team": method.team.name,
             "visibility": method.visibility,
+            "notice": notice_of(method),
             "url": absolute("submission", submission.pk),
             "api_url": absolute("api-submission", submission.pk),
             "submitted_at": submission.submitted_at,

@@ -10,7 +10,7 @@ from django.conf import settings
 from django.http import HttpRequest
 from django.utils import timezone
 
-from leaderboard import deadlines, names, teams
+from leaderboard import deadlines, names, teams, visibility
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.quotas import QuotaExceeded
 from leaderboard.submissions import Refused
@@ -114,6 +114,18 @@ class SubmissionForm(forms.Form):
         chosen = request.GET.get("split") or (open_names[0] if len(open_names) == 1 else "")
         methods = Method.objects.filter(team__memberships__user=user).order_by("name")
         return cls(*sent, offers=offers, methods=list(methods), initial={"split": chosen})
+
+    @property
+    def notices(self) -> list[str]:
+        """Which of the team's methods others see, each in a sentence; of a chosen one that alone."""
+        chosen = [method for method in self.methods if method.name == self["method"].value()]
+        told = (visibility.notice_of(method) for method in chosen or self.methods)
+        return [sentence for sentence in told if sentence]
+
+    @property
+    def options(self) -> list[tuple[str, str]]:
+        """The names of the team's methods to choose from, and what is to be told of each."""
+        return [(method.name, visibility.notice_of(method)) for method in self.methods]
 
     @property
     def has_details(self) -> bool:

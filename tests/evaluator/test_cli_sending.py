@@ -26,6 +26,7 @@ ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
 QUEUED: dict[str, Any] = {"id": ID, "state": "QUEUED", "split": "val", "method": "Foo++"}
 POST = "POST /api/v1/submissions"
 EDITIONS = "GET /api/v1/splits/val/editions"
+METHODS = "GET /api/v1/methods"
 TABLE = "GET /api/v1/splits/val/manifest"
 
 
@@ -66,8 +67,8 @@ def test_manifest_is_fetched_once_as_anybody_and_kept_under_its_digest(
 ) -> None:
     put_manifest(site)
     assert [submit(tsttc).exit_code for _ in range(2)] == [0, 0]
-    assert paths(site) == [EDITIONS, TABLE, POST, EDITIONS, POST]
-    public = [request for request in site.requests if request.method == "GET"]
+    assert paths(site) == [EDITIONS, TABLE, METHODS, POST, EDITIONS, METHODS, POST]
+    public = [request for request in site.requests if "/splits/" in request.path]
     assert [request.headers["Authorization"] for request in public] == [None] * 3
     (kept,) = places.rglob("*.csv")
     assert kept.read_bytes() == MANIFEST.read_bytes()
@@ -162,6 +163,34 @@ def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, 
     for _ in range(2):
         again = submit(tsttc)
         assert (again.exit_code, "private" in again.output) == (0, False)
+
+
+NOTICE = "Foo++ is public: everybody sees its results on every split."
+PUBLIC = {"id": "m1", "name": "Foo++", "visibility": "PUBLIC", "notice": NOTICE}
+
+
+def test_public_method_is_told_to_be_so_before_the_file_is_sent(tsttc: Tsttc, site: RecordedSite) -> None:
+    put_manifest(site)
+    site.put(METHODS, Reply([PUBLIC]))
+    result = submit(tsttc)
+    assert result.stdout.splitlines()[0] == NOTICE
+    asked = paths(site)
+    assert asked.index(METHODS) < asked.index(POST)
+
+
+def test_public_method_is_told_in_json_and_beside_it(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(POST, Reply(QUEUED | {"notice": NOTICE}, status=201))
+    site.put(METHODS, Reply([PUBLIC]))
+    result = submit(tsttc, "predictions.json", "--json")
+    assert (json.loads(result.stdout)["notice"], result.stderr) == (NOTICE, f"{NOTICE}\n")
+
+
+def test_token_that_may_only_submit_learns_from_the_answer_who_sees_the_results(
+    tsttc: Tsttc, site: RecordedSite
+) -> None:
+    site.put(POST, Reply(QUEUED | {"notice": NOTICE}, status=201))
+    site.put(METHODS, Reply(problem("Not for reading.", code="token-scope"), status=403))
+    assert submit(tsttc).stdout.splitlines()[1] == NOTICE
 
 
 def test_terminal_shows_a_bar_and_a_pipe_does_not(site: RecordedSite, tmp_path: Path) -> None:

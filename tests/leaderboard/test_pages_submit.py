@@ -85,6 +85,37 @@ def test_own_teams_methods_are_offered_and_nobody_elses(
     assert [option.attributes["value"] for option in offered] == ["Mine"]
 
 
+@pytest.mark.parametrize(
+    ("visibility", "said"),
+    [
+        ("PRIVATE", ""),
+        ("ANONYMOUS", "Mine is anonymous: everybody sees its results on every split, under the name "),
+        ("PUBLIC", "Mine is public: everybody sees its results on every split."),
+    ],
+)
+def test_page_and_api_say_who_will_see_the_result_before_anything_is_sent(
+    signed_in: Client, edition: Edition, owner: User, visibility: str, said: str
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Mine", visibility=visibility)
+    told = pages.page(signed_in.get("/submit/")).one("div", id="notices").text
+    assert (said in told, bool(told)) == (True, bool(said))
+    [method] = signed_in.get("/api/v1/methods").json()
+    answer = signed_in.get(f"/api/v1/submissions/{sent.pk}").json()
+    assert method["notice"] == answer["notice"] == told
+    builders.submit(owner, builders.predictions(edition), method="Another")
+    refused = pages.page(send(signed_in, None, method="Mine"))
+    assert refused.one("div", id="notices").text == told
+
+
+def test_who_sees_a_method_is_told_to_its_own_team_alone(
+    client: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    made = builders.submit(owner, builders.predictions(edition), method="Mine").method
+    client.force_login(stranger)
+    assert client.get(f"/api/v1/methods/{made.pk}").json()["notice"] == ""
+    assert "Mine is public" not in client.get("/submit/").text
+
+
 def test_the_only_open_split_is_chosen_and_closed_ones_cannot_be(signed_in: Client, edition: Edition) -> None:
     choices = pages.page(signed_in.get("/submit/")).all("input", type="radio")
     assert [c.attributes["value"] for c in choices if "checked" in c.attributes] == ["test"]
