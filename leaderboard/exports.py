@@ -17,6 +17,7 @@ from evaluator.protocol import METRICS, SCORE_NAMES
 from evaluator.report import format_published
 from leaderboard.entries import Details, Entry, Interval
 from leaderboard.filters import BadFilter
+from leaderboard.keeping import one_of
 from leaderboard.standings import Board
 
 short_authors = layouts.short_authors
@@ -46,6 +47,7 @@ def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -
 
 
 WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
+YES_OR_NO: Final = one_of("", *WITH_INTERVALS)
 
 
 def has_intervals(text: str) -> bool:

@@ -9,6 +9,7 @@ from decimal import Decimal
 from typing import TypeVar
 
 from leaderboard.entries import Entry
+from leaderboard.keeping import ANYTHING, Parameters, one_of
 from leaderboard.models import BoxSource, Cameras
 
 NAMES = (
@@ -26,6 +27,16 @@ _FRAMES = {str(n): n for n in range(2, 7)}
 # Nobody writes "25000000" by hand; without a letter it is the number itself.
 _COUNT = re.compile(r"([0-9]{1,16}(?:\.[0-9]{1,6})?) ?([kmb]?)", re.ASCII | re.IGNORECASE)
 _TIMES = {"": 1, "k": 10**3, "m": 10**6, "b": 10**9}
+
+
+PARAMETERS: Parameters = {
+    **{name: one_of("", *_YES_NO) for name in ("nerf", "extra", "code", "paper")},
+    "frames": one_of("", *_FRAMES),
+    "cameras": one_of("", *_CAMERAS),
+    "boxes": one_of("", *_BOXES),
+    **dict.fromkeys(("pretraining", "parameters", "latency", "hardware", "q"), ANYTHING),
+}
+"""Which of their values are worth remembering a board for: choices are few, texts and limits are not."""
 
 
 class BadFilter(ValueError):

@@ -2,7 +2,9 @@
 says what is known already.
 """
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Final, ParamSpec, TypeVar
 
@@ -12,10 +14,55 @@ from django.utils.http import parse_etags
 P = ParamSpec("P")
 R = TypeVar("R")
 _MARK: Final = "is_kept"
+_PARAMETERS: Final = "query_parameters"
 
 
-def kept(view: Callable[P, R]) -> Callable[P, R]:
-    """What this view answers anybody depends on its address and on what the boards' numbers count alone."""
+@dataclass(frozen=True)
+class Parameter:
+    """A query parameter that a view reads, and which texts of it are worth remembering an answer for.
+
+    To be worth it an empty text has to mean the same as none at all.
+    """
+
+    is_worth_it: Callable[[str], bool]
+    is_list: bool = False  # the view reads every one of that name, in their order; else the last one
+
+
+Parameters = Mapping[str, Parameter]
+NOTHING: Final[Parameters] = {}
+
+
+def one_of(*texts: str) -> Parameter:
+    """Worth remembering: these texts, exactly."""
+    return Parameter(frozenset(texts).__contains__)
+
+
+def matching(pattern: str, *, is_list: bool = False) -> Parameter:
+    """Worth remembering: texts like this, of which the view answers few with 200."""
+    wanted = re.compile(pattern)
+    return Parameter(lambda text: wanted.fullmatch(text) is not None, is_list=is_list)
+
+
+ANYTHING: Final = matching("")
+"""A parameter of which anybody can think of any number of texts: remembered is only where it is empty."""
+
+NEVER: Final = one_of()
+"""The same, where an empty text is not the same as none."""
+
+
+def takes(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
+    """A view that reads these query parameters and no others: what else an address names is dropped."""
+    setattr(view, _PARAMETERS, parameters)
+    return view
+
+
+def parameters_of(view: object) -> Parameters | None:
+    """The query parameters that it reads; None for a view that does not say."""
+    return getattr(view, _PARAMETERS, None)
+
+
+def kept(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
+    """What this view answers anybody depends on its path, on these parameters and on the boards' numbers."""
 
     @wraps(view)
     def marked(*args: P.args, **kwargs: P.kwargs) -> R:
@@ -23,7 +70,7 @@ def kept(view: Callable[P, R]) -> Callable[P, R]:
         setattr(response, _MARK, True)
         return response
 
-    return marked
+    return takes(marked, parameters)
 
 
 def is_kept(response: Any) -> bool:

@@ -45,6 +45,8 @@ __all__ = ["Board", "Entry", "board", "everybodys", "flat_scores", "scores_in", 
 
 TEXT_COLUMNS = ("rank", "method", "team", "date")
 SORTABLE = (*TEXT_COLUMNS, *SCORE_NAMES)
+SORTS = (*SORTABLE, *(f"-{name}" for name in SORTABLE))
+"""Every order that an address can ask for."""
 
 
 class UnknownColumn(ValueError):

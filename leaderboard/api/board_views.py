@@ -10,6 +10,7 @@ from rest_framework.views import APIView
 
 from leaderboard import exports, filters, snapshots, standings
 from leaderboard.api.serializers import BoardSerializer, ErrorSerializer
+from leaderboard.keeping import NEVER, one_of
 
 SORT = OpenApiParameter("sort", str, description="A column's name; '-' before it reverses.")
 AT = OpenApiParameter("at", str, description="A date or time: the board as it stood then.")
@@ -38,6 +39,12 @@ INTERVALS = OpenApiParameter(
     enum=list(exports.WITH_INTERVALS),
     description="Whether to tell the 95 % interval of each value as well.",
 )
+PARAMETERS = {
+    "sort": one_of(*standings.SORTS),
+    "at": NEVER,
+    "intervals": exports.YES_OR_NO,
+    **filters.PARAMETERS,
+}
 FILTERS = [OpenApiParameter(name, str, description=_MEANINGS[name]) for name in filters.NAMES]
 
 

@@ -13,10 +13,12 @@ from drf_spectacular.utils import OpenApiParameter
 from rest_framework.request import Request
 
 from leaderboard.api.problems import BadValue
+from leaderboard.keeping import NEVER
 
 Row = TypeVar("Row", bound=Model)
 MOST = 100
 
+QUERY = {"limit": NEVER, "after": NEVER}
 PARAMETERS = [
     OpenApiParameter("limit", int, description=f"Rows of a page, 1 to {MOST}; without it {MOST}."),
     OpenApiParameter(

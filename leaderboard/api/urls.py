@@ -8,6 +8,7 @@ from leaderboard.api import (
     board_views,
     compare_views,
     edition_views,
+    listing,
     method_views,
     receipt_views,
     schema_views,
@@ -33,12 +34,20 @@ urlpatterns = [
     path("tokens/revoke", account_views.RevokeView.as_view(), name="api-revoke-token"),
     path("compare", compare_views.CompareView.as_view(), name="api-compare"),
     path("splits", kept(views.SplitsView.as_view()), name="api-splits"),
-    path("splits/<slug:split>/board", kept(board_views.BoardView.as_view()), name="api-board"),
+    path(
+        "splits/<slug:split>/board",
+        kept(board_views.BoardView.as_view(), board_views.PARAMETERS),
+        name="api-board",
+    ),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),
-    path("splits/<slug:split>/editions", kept(edition_views.EditionsView.as_view()), name="api-editions"),
+    path(
+        "splits/<slug:split>/editions",
+        kept(edition_views.EditionsView.as_view(), listing.QUERY),
+        name="api-editions",
+    ),
     path(
         "splits/<slug:split>/editions/<int:number>/board",
-        kept(board_views.EditionBoardView.as_view()),
+        kept(board_views.EditionBoardView.as_view(), board_views.PARAMETERS),
         name="api-edition-board",
     ),
     path(
@@ -51,7 +60,11 @@ urlpatterns = [
         edition_views.PreviewView.as_view(),
         name="api-edition-preview",
     ),
-    path("splits/<slug:split>/changelog", kept(edition_views.ChangelogView.as_view()), name="api-changelog"),
+    path(
+        "splits/<slug:split>/changelog",
+        kept(edition_views.ChangelogView.as_view(), listing.QUERY),
+        name="api-changelog",
+    ),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
     path("schema", schema_views.SchemaView.as_view(), name="api-schema"),
     path(

@@ -8,11 +8,20 @@ from urllib.parse import urlencode
 
 from leaderboard import filters, standings
 from leaderboard.filters import Filters
+from leaderboard.keeping import NEVER, Parameters, one_of
 
 PER_PAGE: Final = 100
 COLUMNS: Final[Mapping[str, tuple[str, ...]]] = {"both": ("mid", "rte"), "mid": ("mid",), "rte": ("rte",)}
 _NAMES: Final = ("at", "sort", "columns", *filters.NAMES, "page")
 _MAX_PAGE_DIGITS: Final = 6
+PARAMETERS: Final[Parameters] = {
+    "at": NEVER,
+    "sort": one_of("", *standings.SORTS),
+    "columns": one_of("", *COLUMNS),
+    **filters.PARAMETERS,
+    "page": one_of("", *map(str, range(1, 51))),
+}
+"""What a view of a board reads of its address."""
 
 
 class BadView(ValueError):

@@ -1,5 +1,6 @@
 """The page that sets two to five methods side by side."""
 
+from typing import Final
 from uuid import UUID
 
 from django.http import HttpRequest, HttpResponse
@@ -8,12 +9,16 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard import comparisons, snapshots
-from leaderboard.keeping import kept
+from leaderboard.keeping import kept, matching
 from leaderboard.models import Split
 from leaderboard.web import compare_tables
 from leaderboard.web.context import splits_of
 from leaderboard.web.views import HOME_SPLIT
 
+PARAMETERS: Final = {
+    "split": matching(r"[a-zA-Z0-9_-]{0,32}"),
+    "m": matching(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", is_list=True),
+}
 NOT_FOUND, UNPROCESSABLE = 404, 400
 # What the page offers to choose from; the board itself offers all.
 MAX_OFFERED = 50

@@ -29,6 +29,7 @@ from leaderboard.web.context import split_or_404
 # What of a page's address changes what is taken along; a page of it is no table of its own.
 _NOT_OURS: Final = ("page",)
 _NAMES: Final = {"csv": "CSV", "json": "JSON", "tex": "LaTeX", "md": "Markdown", "bib": "BibTeX"}
+PARAMETERS: Final = {**board_query.PARAMETERS, "intervals": exports.YES_OR_NO, "mine": exports.YES_OR_NO}
 NOBODYS: Final = (
     "The address asks for your own rows as well (mine=1), and nobody is signed in; expected a session, or "
     "the address without it."

@@ -5,6 +5,11 @@ number of some split's boards (`leaderboard/boards.py`), so one statement tells 
 none is ever old. A view says with `keeping.kept` that this is so of what it answers. The middleware stands
 before sessions and accounts, so that anybody's question costs neither.
 
+An answer is remembered under its path and the query parameters that its view reads, each once, in one order;
+what else an address names is dropped before the view is asked, so that no page repeats it. Texts that anybody
+can make up any number of (a search, a limit, a time) are answered and not remembered, and answers to queries
+have a shelf of their own: however many are asked for, they push out no plain page.
+
 Answers carry a strong ETag, the digest of their bytes, and are compressed for whoever takes gzip. There is no
 secret of the reader in them, so that their compressed length betrays none.
 """
@@ -17,19 +22,26 @@ import threading
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Final
+from urllib.parse import urlencode
 
 from django.conf import settings
 from django.contrib.messages.storage.cookie import CookieStorage
-from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
+from django.http import HttpRequest, HttpResponse, HttpResponseNotModified, QueryDict
+from django.urls import Resolver404, resolve
 
 from leaderboard import boards
-from leaderboard.keeping import is_kept, is_known
+from leaderboard.keeping import Parameters, is_kept, is_known, parameters_of
 from leaderboard.web.context import splits_of
 
 Next = Callable[[HttpRequest], HttpResponse]
 
-MAX_REMEMBERED_BYTES: Final = 48_000_000
+MAX_PLAIN_BYTES: Final = 32_000_000
+MAX_QUERIES_BYTES: Final = 16_000_000
+# What is remembered of an address is what view answers it; a longer one is looked up each time.
+MAX_PATHS: Final = 4096
+MAX_PATH: Final = 200
 # What an answer costs beside its bytes: its headers, and its place in memory.
 OVERHEAD_BYTES: Final = 2000
 MIN_COMPRESSED_BYTES: Final = 1000
@@ -108,7 +120,7 @@ class Answer:
         return response
 
 
-class Memory:
+class Shelf:
     """Answers by address, each with the state of the boards as of which it holds; bounded in bytes."""
 
     def __init__(self, *, limit_bytes: int) -> None:
@@ -116,6 +128,10 @@ class Memory:
         self._lock = threading.Lock()
         self._answers: OrderedDict[str, tuple[int, Answer]] = OrderedDict()
         self._n_bytes = 0
+
+    def __len__(self) -> int:
+        """How many answers stand on it."""
+        return len(self._answers)
 
     def get(self, address: str) -> tuple[int, Answer] | None:
         """The last answer of this address, and the state as of which it held."""
@@ -150,13 +166,69 @@ class Memory:
         return sys.getsizeof(address) + answer.n_bytes
 
 
-memory = Memory(limit_bytes=MAX_REMEMBERED_BYTES)
+class Memory:
+    """What is remembered: plain pages on one shelf, answers to queries on another."""
+
+    def __init__(self, *, plain_bytes: int, queries_bytes: int) -> None:
+        self.plain = Shelf(limit_bytes=plain_bytes)
+        self.queries = Shelf(limit_bytes=queries_bytes)
+
+    def shelf_of(self, address: str) -> Shelf:
+        """Where the answer of this address stands."""
+        return self.queries if "?" in address else self.plain
+
+    def get(self, address: str) -> tuple[int, Answer] | None:
+        """The last answer of this address, and the state as of which it held."""
+        return self.shelf_of(address).get(address)
+
+    def put(self, address: str, state: int, answer: Answer) -> None:
+        """Remember it; what was not asked for longest on its shelf is forgotten."""
+        self.shelf_of(address).put(address, state, answer)
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self.plain.clear()
+        self.queries.clear()
+
+
+memory = Memory(plain_bytes=MAX_PLAIN_BYTES, queries_bytes=MAX_QUERIES_BYTES)
+
+
+def _read_by_view(path: str) -> Parameters | None:
+    """The query parameters that the view of this path reads; None where nothing is remembered."""
+    return _resolved(path) if len(path) > MAX_PATH else _remembered(path)
+
+
+def _resolved(path: str) -> Parameters | None:
+    try:
+        return parameters_of(resolve(path).func)
+    except Resolver404:
+        return None
+
+
+_remembered = lru_cache(maxsize=MAX_PATHS)(_resolved)
+
+
+def _normalise(request: HttpRequest, parameters: Parameters) -> bool:
+    """Leave of the query what the view reads, in one order; whether its answer is worth remembering."""
+    pairs: list[tuple[str, str]] = []
+    is_worth_it = True
+    for name, parameter in parameters.items():
+        texts = request.GET.getlist(name)
+        for text in texts if parameter.is_list else texts[-1:]:
+            is_known = parameter.is_worth_it(text)
+            is_worth_it = is_worth_it and is_known
+            if text or not is_known:
+                pairs.append((name, text))
+    request.GET = QueryDict(urlencode(pairs), encoding=request.encoding)
+    request.META["QUERY_STRING"] = request.GET.urlencode()
+    return is_worth_it
 
 
 class KeptMiddleware:
     """Answers anybody from memory where that holds, and remembers what views of that kind answer."""
 
-    # Where such views are; elsewhere not even the state is asked for.
+    # Where such views are; elsewhere not even the path is looked up.
     PREFIXES: Final = ("/board/", "/methods/", "/compare/", "/feed", "/api/v1/splits", "/api/v1/methods/")
 
     def __init__(self, get_response: Next) -> None:
@@ -167,8 +239,8 @@ class KeptMiddleware:
         path = request.path_info
         if path != "/" and not path.startswith(self.PREFIXES):
             return self._get_response(request)
-        # A board of the past is made for its one reader: there is no end of times to ask for.
-        if not is_anybodys(request) or "at" in request.GET:
+        parameters = _read_by_view(path) if is_anybodys(request) else None
+        if parameters is None or not _normalise(request, parameters):
             return self._get_response(request)
         address = request.get_full_path_info()
         found = memory.get(address)

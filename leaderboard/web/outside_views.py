@@ -1,5 +1,6 @@
 """What stands elsewhere: a badge in a README, a feed in a reader; both show what everybody sees."""
 
+from typing import Final
 from uuid import UUID
 
 from django.conf import settings
@@ -9,9 +10,12 @@ from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from leaderboard import badges, feeds, snapshots
+from leaderboard.keeping import matching
 from leaderboard.models import Method, Split
 from leaderboard.web.context import split_or_404, splits_of
 from leaderboard.web.views import HOME_SPLIT
+
+PARAMETERS: Final = {"split": matching(r"[a-zA-Z0-9_-]{0,32}")}
 
 
 @require_safe

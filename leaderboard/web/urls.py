@@ -3,10 +3,11 @@
 from django.urls import include, path, register_converter
 from django.views.generic import RedirectView
 
-from leaderboard.keeping import kept
+from leaderboard.keeping import kept, takes
 from leaderboard.web import (
     analysis_views,
     audit_views,
+    board_query,
     chart_views,
     compare_views,
     edition_views,
@@ -34,11 +35,15 @@ MAINTAINED_EDITION = [
     path("discard/", maintainer_views.discard, name="maintain_discard"),
 ]
 urlpatterns = [
-    path("", kept(views.home), name="home"),
-    path("board/<slug:split>/", kept(views.board), name="board"),
+    path("", kept(views.home, board_query.PARAMETERS), name="home"),
+    path("board/<slug:split>/", kept(views.board, board_query.PARAMETERS), name="board"),
     path("board/<slug:split>/charts/", kept(chart_views.board_charts), name="charts"),
     path("board/<slug:split>/editions/", kept(edition_views.editions), name="editions"),
-    path("board/<slug:split>/editions/<int:number>/", kept(edition_views.edition), name="edition"),
+    path(
+        "board/<slug:split>/editions/<int:number>/",
+        kept(edition_views.edition, board_query.PARAMETERS),
+        name="edition",
+    ),
     # The API's own document, with the same query: there is one shape of a board.
     path(
         "board/<slug:split>.json", RedirectView.as_view(**SAME_QUERY, pattern_name="api-board"), name="json"
@@ -48,15 +53,23 @@ urlpatterns = [
         RedirectView.as_view(**SAME_QUERY, pattern_name="api-edition-board"),
         name="edition_json",
     ),
-    path("board/<slug:split>.<board_form:form>", kept(export_views.board), name="export"),
+    path(
+        "board/<slug:split>.<board_form:form>",
+        kept(export_views.board, export_views.PARAMETERS),
+        name="export",
+    ),
     path(
         "board/<slug:split>/editions/<int:number>.<board_form:form>",
-        kept(export_views.edition),
+        kept(export_views.edition, export_views.PARAMETERS),
         name="edition_export",
     ),
     path("board/<slug:split>/feed.atom", kept(outside_views.feed), name="feed"),
     path("feed.atom", kept(outside_views.feed), name="feed_of_all"),
-    path("methods/<uuid:method_id>/badge.svg", kept(outside_views.badge), name="badge"),
+    path(
+        "methods/<uuid:method_id>/badge.svg",
+        kept(outside_views.badge, outside_views.PARAMETERS),
+        name="badge",
+    ),
     path("submit/", views.submit, name="submit"),
     path("submissions/", views.submissions, name="submissions"),
     path("submissions/<uuid:submission_id>/", views.submission, name="submission"),
@@ -65,7 +78,7 @@ urlpatterns = [
     path("submissions/<uuid:submission_id>/receipt.json", receipt_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", views.withdraw, name="withdraw"),
     path("methods/<uuid:method_id>/", kept(views.method), name="method"),
-    path("compare/", compare_views.compare, name="compare"),
+    path("compare/", takes(compare_views.compare, compare_views.PARAMETERS), name="compare"),
     path("methods/<uuid:method_id>/edit/", method_views.edit, name="method_edit"),
     path("methods/<uuid:method_id>/visibility/", method_views.visibility, name="method_visibility"),
     path("team/", team_views.team, name="team"),
