@@ -21,6 +21,7 @@ Unit = Literal["ttc", "scale_ratio"]
 
 MAX_DEPTH: Final = 32
 MAX_META_BYTES: Final = 64 * 1024
+_MARKS_PER_MEMBER: Final = 4  # a key and a text of two quotation marks each
 FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 
 # Also matches a text that never ends, or looking for its end would begin anew at every mark inside it.
@@ -51,7 +52,8 @@ class Document:
 def parse(data: bytes, *, max_members: int | None = None) -> object:
     """The JSON value in `data`, objects as `Members`; raises `Rejected` unless it is UTF-8, shallow and JSON.
 
-    Text with more than `max_members` members and items is refused before it takes memory.
+    Text with more than `max_members` members and items, or with more texts than these can have, is refused
+    before it takes memory.
     A byte order mark and Python's `NaN`, `Infinity` and `-Infinity` are accepted. Numbers beyond the range of
     float64 are ±Infinity, as in IEEE 754.
     """
@@ -66,6 +68,13 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
     n_members = body.count(b",") + 1
     if max_members is not None and n_members > max_members:
         message = f"The file has up to {n_members:,} members and items; expected at most {max_members:,}."
+        raise reject("too-many-members", message)
+    n_marks = body.count(b'"')
+    if max_members is not None and n_marks > _MARKS_PER_MEMBER * max_members:
+        message = (
+            f"The file has {n_marks:,} quotation marks; "
+            f"expected at most {_MARKS_PER_MEMBER * max_members:,}, four for each member."
+        )
         raise reject("too-many-members", message)
     if _depth(body) > MAX_DEPTH:
         raise reject(
@@ -231,7 +240,7 @@ def _depth(body: bytes) -> int:
     """Depth of nesting, exact for every JSON prefix, so that the recursive parser cannot be driven deep."""
     if body.count(b"{") + body.count(b"[") <= MAX_DEPTH:
         return 0
-    brackets = _STRING.sub(b"", body).translate(None, delete=_NO_BRACKETS)
+    brackets = _brackets(body)
     depth = deepest = 0
     for start in range(0, len(brackets), _CHUNK):
         levels = depth + np.cumsum(_STEP[np.frombuffer(brackets[start : start + _CHUNK], dtype=np.uint8)])
@@ -241,7 +250,23 @@ def _depth(body: bytes) -> int:
     return deepest
 
 
-_CHUNK: Final = 1 << 20
+def _brackets(body: bytes) -> bytearray:
+    """The brackets of a text that stand outside of its strings.
+
+    They are copied from between the strings, match by match: to remove millions of strings at once would take
+    eighty bytes for each piece that is left.
+    """
+    found, end = bytearray(), 0
+    for string in _STRING.finditer(body):
+        start = string.start()
+        if start > end:
+            found += body[end:start].translate(None, delete=_NO_BRACKETS)
+        end = string.end()
+    found += body[end:].translate(None, delete=_NO_BRACKETS)
+    return found
+
+
+_CHUNK: Final = 1 << 16
 _NO_BRACKETS: Final = bytes(set(range(256)) - set(b"[]{}"))
 _STEP: Final = np.zeros(256, dtype=np.int64)
 _STEP[list(b"[{")] = 1

@@ -1,10 +1,12 @@
 """Every fault of a prediction file: its code, its place, its words. Wording is part of the interface."""
 
 import math
+import tracemalloc
 
 import pytest
 
 from evaluator import PROBLEM_CODES, Manifest, Problem, Rejected, read_predictions
+from evaluator.documents import parse
 from tests.evaluator.faulty_files import CASES, GOOD, MANIFEST
 from tests.evaluator.worlds import flat, make_truth
 
@@ -105,3 +107,27 @@ def test_every_code_of_prediction_files_has_a_case_here() -> None:
     codes = list(PROBLEM_CODES)
     of_predictions = set(codes[: codes.index("undefined-error")])
     assert of_predictions == here
+
+
+HOSTILE_STRINGS = b"\xef\xbb\xbf" + '["\U0001f600",'.encode() + b'""[' * 100_000
+
+
+def test_a_file_of_strings_and_brackets_takes_a_few_times_its_size() -> None:
+    tracemalloc.start()
+    try:
+        with pytest.raises(Rejected) as rejected:
+            parse(HOSTILE_STRINGS)
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert [problem.code for problem in rejected.value.problems] == ["too-deep"]
+    assert peak_bytes < 10 * len(HOSTILE_STRINGS)
+
+
+def test_a_file_with_more_quotation_marks_than_its_members_can_have_is_refused_before_it_is_read() -> None:
+    data = b'["a"' + b'""' * 200_100 + b"]"
+    problem = rejection(data).problems[0]
+    assert problem == Problem(
+        "too-many-members",
+        "The file has 400,202 quotation marks; expected at most 400,032, four for each member.",
+    )
