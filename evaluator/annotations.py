@@ -1,22 +1,21 @@
-"""The toolkit's annotation folders: pickles from strangers, read without running them.
+"""The toolkit's annotation files: pickles from strangers, read without running them.
 
 An annotation file holds a list of dictionaries, one per camera: timestamp -> list of attribute-dicts with
 `bag_stamp, box2d, cam_id, id, occ_ratio, same_lane, ts, ttc_imu`. A sequence is six frames of one id, exactly
 0.1 s apart, cut without overlap; its target is the last frame.
 
-anno_ids are numbered from 0 over the files **sorted by their path** inside the folder. The toolkit numbers
-in the order in which the file system lists them, which differs between machines; within a file the order is
-the same.
+How the files of a folder are found and numbered, `annotation_folders` says.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from pathlib import Path
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from typing import Final, cast
 
-from evaluator.pickles import Attributes, load_plain
+from evaluator.pickles import load_plain
+from evaluator.plain_values import Attributes
 from evaluator.problems import Findings, quoted, reject
 from evaluator.scale import N_FRAMES
 from evaluator.tables import Table, name_fault
@@ -24,35 +23,39 @@ from evaluator.tables import Table, name_fault
 Camera = dict[float, list[Attributes]]
 """The objects that one camera sees, by timestamp."""
 
+
+@dataclass(frozen=True, slots=True)
+class AnnotatedFiles:
+    """The sequences of some files, in their order: a row for each, and how many each file has."""
+
+    table: Table
+    n_sequences: list[int]
+
+
 FRAME_STEP_NS: Final = 100_000_000
-MAX_FILE_BYTES: Final = 128 * 1024 * 1024
 MAX_OBJECTS: Final = 2_000_000
-"""Limits for one annotation file, far above those of a recording of minutes."""
+"""A limit for one annotation file, far above that of a recording of minutes."""
+
+_MAX_STAMP: Final = 4_096
 
 
-def read_annotations(folder: Path, *, with_ttc: bool) -> Table:
-    """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
+def read_files(files: Iterable[tuple[str, bytes]], *, with_ttc: bool) -> AnnotatedFiles:
+    """Cut the sequences out of annotation files, given by name and content; one row each, from its target.
 
     Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
     Raises `Rejected` for pickles that ask for foreign code and for files of another structure.
     """
-    files = sorted(
-        (p for p in folder.rglob("*.pkl") if p.is_file()), key=lambda p: p.relative_to(folder).parts
-    )
-    if not files:
-        raise reject(
-            "unreadable", "The folder has no annotation files; expected at least one *.pkl.", folder.name
-        )
-    table, findings, places = Table(), Findings(), list[str]()
-    for file in files:
-        name = file.relative_to(folder).as_posix()
-        for camera in _read_file(file, name):
+    table, findings, places, n_sequences = Table(), Findings(), list[str](), list[int]()
+    for name, data in files:
+        first = len(places)
+        for camera in _cameras(data, name):
             for sequence in cut_sequences(camera):
                 places.append(f"{name}, sequence {len(places)}")
                 _add_row(table, sequence[-1], findings, places[-1], with_ttc=with_ttc)
+        n_sequences.append(len(places) - first)
     findings.raise_if_any()
     table.places = places
-    return table
+    return AnnotatedFiles(table, n_sequences)
 
 
 def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[Attributes]]:
@@ -73,15 +76,8 @@ def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[
             yield open_tracks.pop(track_id)
 
 
-def _read_file(file: Path, name: str) -> list[Camera]:
+def _cameras(data: bytes, name: str) -> list[Camera]:
     """The cameras of one annotation file, with their structure checked."""
-    try:
-        size = file.stat().st_size
-        data = file.read_bytes() if size <= MAX_FILE_BYTES else b""
-    except OSError as error:
-        raise reject("unreadable", f"The file cannot be read: {error.strerror}.", name) from None
-    if size > MAX_FILE_BYTES:
-        raise reject("too-large", f"The file has {size:,} bytes; expected at most {MAX_FILE_BYTES:,}.", name)
     cameras = load_plain(data, where=name)
     fault = _structure_fault(cameras)
     if fault:
@@ -121,13 +117,21 @@ def _object_fault(seen: object) -> str | None:
     for name in ("bag_stamp", "cam_id", "id", "ts"):
         if name not in seen:
             return f"an object without {name}"
-    if not isinstance(seen["bag_stamp"], str):
-        return "an object whose bag_stamp is no text"
+    if fault := _stamp_fault(seen["bag_stamp"]):
+        return fault
     for name in ("cam_id", "id"):
         if not isinstance(seen[name], str) and not _is_whole(seen[name]):
             return f"an object whose {name} is neither a whole number nor a text"
     if not _is_whole(seen["ts"]) or seen["ts"] < 0:
         return "an object whose ts is no whole number of nanoseconds"
+    return None
+
+
+def _stamp_fault(stamp: object) -> str | None:
+    if not isinstance(stamp, str):
+        return "an object whose bag_stamp is no text"
+    if len(stamp) > _MAX_STAMP:  # a part of it is copied for each sequence
+        return f"an object whose bag_stamp is longer than {_MAX_STAMP:,} characters"
     return None
 
 

@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.annotations import read_annotations
+from evaluator.annotation_folders import read_annotations
 from evaluator.metrics import exact_log
 from evaluator.problems import Findings, quoted, reject
 from evaluator.protocol import INTERVALS
@@ -234,7 +234,7 @@ def read_truth(path: str | Path) -> GroundTruth:
     path = Path(path)
     if path.suffix == ".npz" and path.is_file():
         return GroundTruth.load(path)
-    table = read_annotations(path, with_ttc=True) if path.is_dir() else read_csv(path, with_ttc=True)
+    table = read_annotations(path, with_ttc=True).table if path.is_dir() else read_csv(path, with_ttc=True)
     return GroundTruth.from_table(table)
 
 
@@ -243,7 +243,7 @@ def read_manifest(path: str | Path) -> Manifest:
     path = Path(path)
     if path.suffix == ".npz" and path.is_file():
         return Manifest.load(path)
-    table = read_annotations(path, with_ttc=False) if path.is_dir() else read_csv(path, with_ttc=False)
+    table = read_annotations(path, with_ttc=False).table if path.is_dir() else read_csv(path, with_ttc=False)
     return Manifest.from_table(table)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from django.conf import settings
 
 from evaluator import Manifest, Predictions, Problem, Rejected
-from evaluator.quarantine import EXIT_OUT_OF_MEMORY, READY
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY
 
 
 class ChildDied(Exception):

@@ -14,7 +14,7 @@ import numpy as np
 
 import evaluator
 from evaluator import Rejected, published
-from evaluator.quarantine import READY
+from evaluator.limits import READY
 from tests.chaos.processes import REPOSITORY
 
 BOMB_ENTRIES = 3_150_000

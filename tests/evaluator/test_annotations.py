@@ -21,6 +21,12 @@ from tests.evaluator.toolkit_folders import (
 SIX = list(range(6))
 
 
+@pytest.fixture(autouse=True)
+def _without_a_child(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Read here, as where a process has no limits; `test_annotation_folders` reads in the child."""
+    monkeypatch.setattr("evaluator.annotation_folders.HAS_LIMITS", False)
+
+
 def last_frames(folder: Path) -> list[tuple[str, int]]:
     """Track and frame of every target."""
     manifest = read_truth(folder).manifest
@@ -158,7 +164,7 @@ def without(name: str) -> list[dict[int, list[Any]]]:
         ([{0: [seen(frame=0, ts=10**30)]}], "an object whose ts is no whole number of nanoseconds"),
         ([{0: [seen(frame=0, ts=-1)]}], "an object whose ts is no whole number of nanoseconds"),
         (
-            [{10**400: [seen(frame=0, id=10**5000)]}],
+            [{10**18: [seen(frame=0, id=10**5000)]}],
             "an object whose id is neither a whole number nor a text",
         ),
     ],

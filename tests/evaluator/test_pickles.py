@@ -15,7 +15,8 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from evaluator import Rejected
-from evaluator.pickles import Attributes, load_plain
+from evaluator.pickles import load_plain
+from evaluator.plain_values import Attributes
 
 
 class Calls:

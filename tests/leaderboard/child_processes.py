@@ -4,6 +4,8 @@ import signal
 from contextlib import suppress
 from pathlib import Path
 
+READERS = ("evaluator.quarantine", "evaluator.annotation_child")
+
 
 def children() -> set[int]:
     """Readers of untrusted files that this process has started and not yet buried.
@@ -14,7 +16,7 @@ def children() -> set[int]:
     for task in Path("/proc/self/task").iterdir():
         # A thread that has ended meanwhile has no children.
         found |= {int(pid) for pid in kernel_says("self", f"task/{task.name}/children").split()}
-    return {pid for pid in found if "evaluator.quarantine" in kernel_says(pid, "cmdline")}
+    return {pid for pid in found if any(module in kernel_says(pid, "cmdline") for module in READERS)}
 
 
 def kernel_says(pid: int | str, name: str) -> str:

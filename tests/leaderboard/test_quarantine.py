@@ -21,8 +21,8 @@ import pytest
 from pytest_django import Settings
 
 from evaluator import Manifest, Rejected, read_predictions, read_truth, write_predictions
+from evaluator.limits import READY
 from evaluator.predictions import Predictions
-from evaluator.quarantine import READY
 from leaderboard import quarantine
 from leaderboard.quarantine import ChildDied, ChildNotReady, LeaseLost
 from tests import builders
@@ -187,7 +187,7 @@ def test_child_may_open_nothing_write_nothing_and_start_nothing(read: Read, sett
 
 
 def test_processor_time_that_is_used_up_ends_the_child() -> None:
-    burn = "import time; from evaluator.quarantine import limit; limit(memory_bytes=1 << 40, cpu_s=1)\n"
+    burn = "import time; from evaluator.limits import limit; limit(memory_bytes=1 << 40, cpu_s=1)\n"
     burn += "while time.process_time() < 3: pass"
     assert subprocess.run([sys.executable, "-c", burn], check=False).returncode == -signal.SIGXCPU
 

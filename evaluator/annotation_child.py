@@ -1,0 +1,73 @@
+"""The child process in which annotation files are read: `python -m evaluator.annotation_child`.
+
+It writes `READY` to its standard output. Its standard input then gives it files, each as a line of JSON
+(`name`, `n_bytes`) and its content; it answers each with an empty line. At the end of its input it writes
+the sequences of all of them as one line of JSON; a file that is at fault ends it with such a line that lists
+the problems. Like the child that reads prediction files it gives up everything else first; memory is bounded
+by the largest file, time by the size of each.
+"""
+
+import codecs
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import IO, Final
+
+from evaluator.annotations import read_files
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, allow_cpu, limit, obey_the_parent_alone
+from evaluator.problems import Rejected
+
+BASE_CPU_S: Final = 10
+BYTES_PER_CPU_S: Final = 500_000
+"""A sixth of what a slow core reads."""
+MAX_CPU_S: Final = 24 * 3600
+CODECS: Final = ("ascii", "latin-1", "raw-unicode-escape", "unicode-escape", "utf-8")
+"""Those of the texts in a pickle."""
+
+
+def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes]]:
+    """The files that come in, each answered when the next is asked for."""
+    while line := source.readline():
+        header = json.loads(line)
+        n_bytes = int(header["n_bytes"])
+        allow_cpu(BASE_CPU_S + n_bytes // BYTES_PER_CPU_S)
+        yield header["name"], source.read(n_bytes)
+        answers.write(b"\n")
+        answers.flush()
+    allow_cpu(MAX_CPU_S)
+
+
+def warm_up() -> None:
+    """Run every branch that imports late, since nothing can be opened afterwards."""
+    for name in CODECS:
+        codecs.lookup(name)
+    try:
+        read_files([("", b"cos\nsystem\n.")], with_ttc=True)
+    except Rejected as rejected:
+        json.dumps(rejected.as_dict())
+
+
+def main() -> None:
+    """Arguments: memory limit in bytes, and 1 where true times are read, else 0."""
+    obey_the_parent_alone()
+    warm_up()
+    memory_bytes, with_ttc = int(sys.argv[1]), sys.argv[2] == "1"
+    limit(memory_bytes=memory_bytes, cpu_s=MAX_CPU_S)
+    answers = sys.stdout.buffer
+    answers.write(READY)
+    answers.flush()
+    try:
+        found = read_files(files_of(sys.stdin.buffer, answers), with_ttc=with_ttc)
+        answer = {"table": asdict(found.table), "n_sequences": found.n_sequences}
+        line = json.dumps(answer).encode()
+    except Rejected as rejected:
+        line = json.dumps(rejected.as_dict()).encode()
+    except MemoryError:
+        sys.exit(EXIT_OUT_OF_MEMORY)
+    answers.write(line + b"\n")
+    answers.flush()
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,209 @@
+"""Folders of annotation files: which files there are, in which order, and their sequences.
+
+anno_ids are numbered from 0 over the files **sorted by their path** inside the folder. The toolkit numbers
+them in the order in which the file system lists the files, which differs between machines; within a file the
+order is the same.
+
+On Linux the pickles are read by a child process that has little memory and time, and may open nothing
+(`annotation_child`). Elsewhere they are read here: what a pickle may do is bounded in any case.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any, Final
+
+from evaluator.annotations import AnnotatedFiles, read_files
+from evaluator.problems import Problem, Rejected, reject
+from evaluator.tables import Table
+
+MAX_FILE_BYTES: Final = 128 * 1024 * 1024
+"""The largest annotation file that is read, far above that of a recording of minutes."""
+
+HAS_LIMITS: Final = sys.platform == "linux" and bool(sys.executable)
+"""Whether a child process can be given less than its parent has."""
+
+_BASE_BYTES: Final = 512 * 1024 * 1024
+_BYTES_PER_BYTE: Final = 32
+_EXTENSION: Final = ".pkl"
+
+
+@dataclass(frozen=True, slots=True)
+class AnnotationFolder:
+    """The sequences of a folder in the order of its sorted files, numbered so.
+
+    `n_sequences` counts those of each file, and `listed` is the order in which the file system lists the
+    files: indices of the sorted ones.
+    """
+
+    table: Table
+    n_sequences: list[int]
+    listed: list[int]
+
+
+def read_annotations(folder: Path, *, with_ttc: bool) -> AnnotationFolder:
+    """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
+
+    Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
+    Raises `Rejected` for a folder without such files, for files that cannot be read or ask for more memory or
+    time than their size warrants, for pickles that ask for foreign code and for files of another structure.
+    """
+    listed = list_files(folder)
+    if not listed:
+        raise reject(
+            "unreadable", "The folder has no annotation files; expected at least one *.pkl.", folder.name
+        )
+    files = sorted(listed, key=lambda path: path.relative_to(folder).parts)
+    place = {path: index for index, path in enumerate(files)}
+    read = _read_apart if HAS_LIMITS else _read_here
+    found = read(folder, files, with_ttc=with_ttc)
+    return AnnotationFolder(found.table, found.n_sequences, [place[path] for path in listed])
+
+
+def list_files(folder: Path) -> list[Path]:
+    """The annotation files below `folder`, in the order in which the toolkit would read them here."""
+
+    def cannot_list(error: OSError) -> None:
+        where = Path(error.filename).name if error.filename else folder.name
+        raise reject("unreadable", f"The folder cannot be listed: {error.strerror}.", where) from None
+
+    paths = [
+        Path(directory, name)
+        for directory, _folders, names in os.walk(folder, onerror=cannot_list)
+        for name in names
+        if os.path.splitext(name)[1] == _EXTENSION  # noqa: PTH122 -- the toolkit's own question
+    ]
+    return [path for path in paths if path.is_file()]
+
+
+def _contents(folder: Path, files: Sequence[Path]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of each file, one at a time."""
+    for path in files:
+        name = path.relative_to(folder).as_posix()
+        try:
+            size = path.stat().st_size
+            data = path.read_bytes() if size <= MAX_FILE_BYTES else b""
+        except OSError as error:
+            raise reject("unreadable", f"The file cannot be read: {error.strerror}.", name) from None
+        if size > MAX_FILE_BYTES:
+            message = f"The file has {size:,} bytes; expected at most {MAX_FILE_BYTES:,}."
+            raise reject("too-large", message, name)
+        yield name, data
+
+
+def _read_here(folder: Path, files: Sequence[Path], *, with_ttc: bool) -> AnnotatedFiles:
+    return read_files(_contents(folder, files), with_ttc=with_ttc)
+
+
+# --- the child's parent ----------------------------------------------------------------------------------
+
+
+def _read_apart(folder: Path, files: Sequence[Path], *, with_ttc: bool) -> AnnotatedFiles:
+    """The same by a child process, which gets one file after the other."""
+    largest = max(path.stat().st_size for path in files)
+    memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * min(largest, MAX_FILE_BYTES)
+    command = [
+        sys.executable,
+        "-P",
+        "-m",
+        "evaluator.annotation_child",
+        str(memory_bytes),
+        str(int(with_ttc)),
+    ]
+    environment = {
+        "PATH": os.defpath,
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).resolve().parents[1]), *filter(None, sys.path)]),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "OPENBLAS_NUM_THREADS": "1",
+    }
+    try:
+        child = subprocess.Popen(  # noqa: S603 - our own interpreter and module, nothing of the files
+            command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            env=environment,
+        )
+    except OSError as error:
+        raise _not_started(folder, error.strerror or str(error)) from None
+    with child:
+        try:
+            return _asked(child, folder, files, memory_bytes=memory_bytes)
+        finally:
+            child.kill()  # it has answered, or never will
+
+
+def _asked(
+    child: subprocess.Popen[bytes], folder: Path, files: Sequence[Path], *, memory_bytes: int
+) -> AnnotatedFiles:
+    from evaluator.limits import READY  # noqa: PLC0415 -- nothing of it is on Windows
+
+    asking, answering = _pipes(child)
+    if answering.readline() != READY:
+        raise _not_started(folder, _last_words(child))
+    for name, data in _contents(folder, files):
+        try:
+            asking.write(json.dumps({"name": name, "n_bytes": len(data)}).encode() + b"\n")
+            asking.write(data)
+            asking.flush()
+        except BrokenPipeError:
+            pass  # it died of this file, or has refused it: the next line says which
+        line = answering.readline()
+        if not line:
+            raise reject(*_end_of(child, memory_bytes=memory_bytes), name)
+        if line.strip():
+            return _decoded(line)
+    asking.close()
+    line = answering.readline()
+    if not line:
+        raise reject(*_end_of(child, memory_bytes=memory_bytes), folder.name)
+    return _decoded(line)
+
+
+def _pipes(child: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
+    if child.stdin is None or child.stdout is None:
+        raise RuntimeError("the reading process was started without pipes")
+    return child.stdin, child.stdout
+
+
+def _not_started(folder: Path, cause: str) -> Rejected:
+    return reject("unreadable", f"The process that reads the files did not start: {cause}.", folder.name)
+
+
+def _last_words(child: subprocess.Popen[bytes]) -> str:
+    _, complaint = child.communicate()
+    last_line = complaint[-2000:].decode(errors="replace").strip().rpartition("\n")[2]
+    return f"exit code {child.returncode}, {last_line[:200]}"
+
+
+def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, str]:
+    """Why the child ended, as code and message."""
+    import signal  # noqa: PLC0415 -- as READY
+
+    from evaluator.limits import EXIT_OUT_OF_MEMORY  # noqa: PLC0415 -- as READY
+
+    last_words = _last_words(child)
+    expected = "expected annotations of the toolkit"
+    if child.returncode == EXIT_OUT_OF_MEMORY:
+        return "too-large", f"Reading the file needs more than {memory_bytes >> 20:,} MiB; {expected}."
+    if child.returncode == -signal.SIGXCPU:
+        return "too-large", f"Reading the file takes too long for its size; {expected}."
+    if child.returncode < 0:
+        message = f"Reading the file ended its process with signal {-child.returncode}; {expected}."
+        return "bad-annotations", message
+    return "bad-annotations", f"Reading the file failed ({last_words}); {expected}."
+
+
+def _decoded(line: bytes) -> AnnotatedFiles:
+    """The child's answer; raises `Rejected` when that is what it says."""
+    answer: dict[str, Any] = json.loads(line)
+    if "problems" in answer:
+        problems = [Problem(**problem) for problem in answer["problems"]]
+        raise Rejected(problems, n_problems=answer["n_problems"])
+    return AnnotatedFiles(Table(**answer["table"]), answer["n_sequences"])
