@@ -265,7 +265,7 @@ def placed(entry: Entry, rank: int | None) -> Entry:
         return replace(entry, rank=rank)
     if found.rank_low <= rank <= found.rank_high:
         return replace(entry, rank=rank)
-    unplaced = replace(found, rank_low=None, rank_high=None)
+    unplaced = replace(found, rank_low=None, rank_high=None, is_with_best=None)
     return replace(entry, rank=rank, intervals={**entry.intervals, "mid": unplaced})
 
 

@@ -37,7 +37,7 @@ INTERVALS = OpenApiParameter(
     "intervals",
     str,
     enum=list(exports.WITH_INTERVALS),
-    description="Whether to tell the 95 % interval of each value as well.",
+    description="Whether to include the 95 % confidence interval of each value.",
 )
 PARAMETERS = {
     "sort": one_of(*standings.SORTS),

@@ -133,16 +133,17 @@ class DetailsSerializer(serializers.Serializer[Details]):
 
 
 class UncertaintySerializer(serializers.Serializer[Interval]):
-    """How sure one value is, at 95 %; null where it is not known."""
+    """The confidence interval of one value and its rank range, at 95 %; null where they are not known."""
 
-    low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95 % interval.")
+    low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95 % confidence interval.")
     high = serializers.FloatField(allow_null=True, help_text="Its upper end.")
     rank_low = serializers.IntegerField(
-        allow_null=True, help_text="The best rank in this column that the data allow."
+        allow_null=True, help_text="The rank range in this column: its best rank."
     )
-    rank_high = serializers.IntegerField(allow_null=True, help_text="The worst one.")
+    rank_high = serializers.IntegerField(allow_null=True, help_text="Its worst rank.")
     is_with_best = serializers.BooleanField(
-        allow_null=True, help_text="Not significantly worse than the best of the column."
+        allow_null=True,
+        help_text="May be the best of the column at 95 %: `rank_low` is 1, rows quoted from papers counted.",
     )
 
 

@@ -54,7 +54,7 @@ class ResultGroup:
 
     @property
     def has_with_best(self) -> bool:
-        """Whether any is marked as not significantly worse than the best: else that needs no explanation."""
+        """Whether any is marked as one that may be the best: else the mark needs no explanation."""
         return any(column.cell.is_with_best for column in self.columns)
 
 

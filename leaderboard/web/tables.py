@@ -29,6 +29,7 @@ METRIC_UNITS: Final = {"mid": "×10⁻⁴", "rte": "%"}
 SCORED_DECIMALS: Final = 2
 ABSENT: Final = "–"
 NOTHING: Final = SafeString("")
+MARKED: Final = "may be the best of its column at 95 %"
 _INTERVALS: Final = {interval.name: interval for interval in INTERVALS}
 
 
@@ -65,10 +66,19 @@ class Cell:
     css: str = ""
     is_best: bool = False
     is_second: bool = False
-    is_with_best: bool = False  # not significantly worse than the best
+    is_with_best: bool = False  # may be the best of its column at 95 %: its rank range begins at 1
     interval: str = ""  # in words
     whisker: SafeString = NOTHING
     has_room: bool = False  # for a whisker: its column has one, though this value may have none
+
+    @property
+    def hint(self) -> str:
+        """The interval and the mark, for whoever points at the number."""
+        hints = (
+            f"95 % confidence interval: {self.interval}" if self.interval else "",
+            MARKED * self.is_with_best,
+        )
+        return "; ".join(filter(None, hints))
 
     @property
     def ends(self) -> list[str]:
@@ -280,7 +290,7 @@ def score_cells(
                 css=_cell_css(name, value, decimals),
                 is_best=name in best,
                 is_second=name in second,
-                is_with_best=bool(found.is_with_best) and name not in best,
+                is_with_best=found.rank_low == 1,
                 interval=interval_words(found),
                 has_room=scale is not None,
                 whisker=drawing.whisker(scale, value, found.low, found.high)

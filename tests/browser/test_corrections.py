@@ -72,7 +72,7 @@ def rows(page: Page) -> list[str]:
 
 def have_intervals(site: Site, *methods: str) -> bool:
     """Whether these methods' rows are complete: intervals come after the scores."""
-    found = [row for row in get(site.url + BOARD).text.split("<tr") if "95 % interval: " in row]
+    found = [row for row in get(site.url + BOARD).text.split("<tr") if "95 % confidence interval: " in row]
     return all(any(f">{method}</a>" in row for row in found) for method in methods)
 
 

@@ -1,4 +1,4 @@
-"""How sure a board's numbers are, and the ways to look at it: columns, filters, search, pages."""
+"""Confidence intervals, rank ranges and marks of a board, and the ways to look at it: columns, filters."""
 
 from pathlib import Path
 
@@ -37,13 +37,13 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     low, high = (float(end) for end in cell.one("span", class_="spoken").text.split(" to "))
     assert low < float(row.all("td", class_="primary")[0].text.split()[0]) < high
     assert cell.one("svg").attributes["aria-hidden"] == "true"
-    assert cell.attributes["title"] == f"95 % interval: {low:.2f} to {high:.2f}"
+    assert cell.attributes["title"] == f"95 % confidence interval: {low:.2f} to {high:.2f}"
     assert row.one("td", class_="rank").one("span", class_="range").text.endswith(")")
     assert all("title" in each.attributes for each in row.all("td", class_="wide") if each.all("svg"))
     for cell in root.one("tbody").all("td", class_="with-best"):
-        assert "not significantly worse than the best" in cell.text
+        assert ", may be the best of its column at 95 %" in cell.text
     legend = root.one("div", class_="legend").text
-    assert "Lines are 95 % intervals" in legend
+    assert "Lines are 95 % confidence intervals (bootstrap over recordings)" in legend
     assert "Published rows (rings) have no interval, because papers print no values per recording." in legend
     published = row_of(root, "Deep Scale")
     assert "quoted from a paper" in published.one("td", class_="interval").attributes["title"]

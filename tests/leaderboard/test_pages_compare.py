@@ -119,7 +119,7 @@ def test_too_few_recordings_are_said_and_no_p_is_shown(
     builders.infer_all()
     root = get(client, *ids)
     assert "this ground truth has 12; expected at least 20" in words(root)
-    assert "95 % interval" not in [head.text for head in root.one("table", class_="differences").all("th")]
+    assert "95 % CI" not in [head.text for head in root.one("table", class_="differences").all("th")]
     assert root.all("p", class_="others") == []
     board = pages.page(client.get("/board/test/"))
     assert "this ground truth has 12; expected at least 20" in board.one("main").text

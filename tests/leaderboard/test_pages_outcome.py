@@ -115,25 +115,25 @@ def test_what_the_present_edition_left_out_stands_nowhere(
     assert look(signed_in, inferred[0]).all("p", class_="standing") == []
 
 
-def test_what_is_not_worse_than_the_best_is_marked_as_on_the_board(
+def test_what_may_be_the_best_is_marked_as_on_the_board(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
     Score.objects.filter(evaluation__submission=inferred[1], metric="mid", interval="overall").update(
-        is_with_best=True
+        rank_low=1
     )
     builders.board_changed("test")
     for address in (PAGE.format(inferred[1].pk), f"/methods/{inferred[1].method_id}/"):
         root = pages.page(signed_in.get(address))
         cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
         assert "with-best" in cell.classes
-        assert cell.text.endswith("not significantly worse than the best")
+        assert cell.text.endswith(", may be the best of its column at 95 %")
         assert "≈ and tinted" in root.one("main").text
 
 
-def test_no_mark_and_no_word_of_it_where_nothing_is_with_the_best(
+def test_no_mark_and_no_word_of_it_where_nothing_may_be_the_best(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
-    Score.objects.update(is_with_best=False)
+    Score.objects.update(rank_low=2)
     builders.board_changed("test")
     root = look(signed_in, inferred[3])
     assert root.all("td", class_="with-best") == []
