@@ -6,11 +6,16 @@ new; moving it on and refusing are one conditional INSERT, so that no two proces
 """
 
 import hashlib
+import math
+import re
 import threading
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from ipaddress import IPv6Address, ip_address, ip_network
+from typing import Any, Final
 
 from django.db import connection
+from rest_framework.throttling import BaseThrottle
 
 from leaderboard.models import Allowance, CachedValue
 
@@ -24,6 +29,8 @@ RETURNING free_at_s
 # Rounding of a float of today's seconds, which must not cost anybody a request.
 _TOLERANCE_S = 1e-5
 _MOST_IN_MEMORY = 10_000
+_PERIODS_S: Final = {"s": 1, "m": 60, "h": 3600, "d": 86400}
+_RATE: Final = re.compile(r"(?P<n>\d+)/(?P<period>[smhd])[a-z]*")
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,35 @@ class Rate:
     def step_s(self) -> float:
         """What one request costs, in seconds."""
         return self.period_s / self.n
+
+
+def rate_of(text: str) -> Rate:
+    """A rate as the settings have it.
+
+    >>> rate_of("600/min")
+    Rate(n=600, period_s=60)
+    """
+    found = _RATE.fullmatch(text)
+    if found is None:
+        raise ValueError(f"{text!r} is no rate; expected one such as '600/min'")
+    return Rate(n=int(found["n"]), period_s=_PERIODS_S[found["period"]])
+
+
+def address_of(request: Any) -> str:
+    """Where a request comes from. Who has an IPv6 address has 2⁶⁴ of them: they count as one.
+
+    It is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one that our own proxy wrote down.
+    """
+    try:
+        found = ip_address(BaseThrottle().get_ident(request))
+    except ValueError:
+        return "unknown"
+    return str(ip_network((found, 64), strict=False) if isinstance(found, IPv6Address) else found)
+
+
+def refusal(wait_s: float) -> str:
+    """What is said to who asked too often, on pages and in the API."""
+    return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,8 @@ MIDDLEWARE = [
     "django.contrib.messages.middleware.MessageMiddleware",
     "allauth.account.middleware.AccountMiddleware",
     "django_htmx.middleware.HtmxMiddleware",
-    # Last on the way in: its page needs the rest, and nothing before it reads the body.
+    # Last on the way in: their pages need the rest, and nothing before them reads the body.
+    "leaderboard.web.limits.RateLimitMiddleware",
     "leaderboard.web.limits.UploadLimitMiddleware",
 ]
 ROOT_URLCONF = "leaderboard.urls"
@@ -319,8 +320,10 @@ API_RATES: dict[str, str | None] = {
     "revoke": "10/min",
     "refused": "60/min",
 }
+# What somebody sends on pages, and pages that one address has drawn anew by one process.
+PAGE_RATES: dict[str, str | None] = {"send": "60/min", "draw": "300/min"}
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
-    API_RATES = dict.fromkeys(API_RATES)
+    API_RATES, PAGE_RATES = dict.fromkeys(API_RATES), dict.fromkeys(PAGE_RATES)
 SPECTACULAR_SETTINGS = openapi.SPECTACULAR_SETTINGS
 # Waiters that a web process holds at once; gunicorn has as many threads for them (deploy/gunicorn.conf.py).
 WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)

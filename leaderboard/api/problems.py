@@ -1,6 +1,5 @@
 """Errors of the API, in one shape: RFC 9457 `application/problem+json`."""
 
-import math
 from typing import Any, NoReturn
 
 from django.core.exceptions import BadRequest, PermissionDenied, RequestDataTooBig, SuspiciousOperation
@@ -20,6 +19,7 @@ from leaderboard import (
     outages,
     problem_codes,
     quotas,
+    rates,
     receipts,
     rescoring,
     standings,
@@ -137,7 +137,7 @@ def _of_the_framework(exc: Exception, context: dict[str, Any]) -> Response | Non
 def _sentence(exc: Exception) -> str:
     if isinstance(exc, exceptions.Throttled):
         wait_s: float = getattr(exc, "wait", None) or 0
-        return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
+        return rates.refusal(wait_s)
     detail = getattr(exc, "detail", "")
     text = (
         str(detail)

@@ -5,10 +5,8 @@ The address is the one that the connection comes from, or with `TSTTC_TRUSTED_PR
 proxy wrote down; what a visitor puts into X-Forwarded-For before that counts for nothing.
 """
 
-import re
 import time
 from dataclasses import dataclass
-from ipaddress import IPv6Address, ip_address, ip_network
 from typing import TYPE_CHECKING
 
 from django.conf import settings
@@ -20,21 +18,6 @@ from leaderboard import rates
 
 if TYPE_CHECKING:  # views make their classes with these
     from rest_framework.views import APIView
-
-PERIODS_S = {"s": 1, "m": 60, "h": 3600, "d": 86400}
-RATE = re.compile(r"(?P<n>\d+)/(?P<period>[smhd])[a-z]*")
-
-
-def rate_of(text: str) -> rates.Rate:
-    """A rate as the settings have it.
-
-    >>> rate_of("600/min")
-    Rate(n=600, period_s=60)
-    """
-    found = RATE.fullmatch(text)
-    if found is None:
-        raise ValueError(f"{text!r} is no rate; expected one such as '600/min'")
-    return rates.Rate(n=int(found["n"]), period_s=PERIODS_S[found["period"]])
 
 
 @dataclass(frozen=True)
@@ -63,7 +46,7 @@ class Throttle(BaseThrottle):
         text: str | None = settings.API_RATES[self.scope]
         identity = self.identity(request) if text else None
         if text and identity is not None:
-            rate = rate_of(text)
+            rate = rates.rate_of(text)
             self.answer = self.take(f"{self.scope}:{identity}", rate)
             counted(request._request).append(Counted(self.scope, rate, self.answer))
         return self.answer is None or self.answer.is_allowed
@@ -79,14 +62,6 @@ class Throttle(BaseThrottle):
     def identity(self, request: Request) -> object | None:
         """Who is counted; None: not this throttle's concern."""
         raise NotImplementedError
-
-    def address(self, request: Request) -> str:
-        """Where a request comes from. Who has an IPv6 address has 2⁶⁴ of them: they count as one."""
-        try:
-            found = ip_address(self.get_ident(request))
-        except ValueError:
-            return "unknown"
-        return str(ip_network((found, 64), strict=False) if isinstance(found, IPv6Address) else found)
 
 
 class SignedInThrottle(Throttle):
@@ -106,7 +81,7 @@ class VisitorThrottle(Throttle):
 
     def identity(self, request: Request) -> object | None:
         """The address."""
-        return None if request.user.is_authenticated else self.address(request)
+        return None if request.user.is_authenticated else rates.address_of(request)
 
 
 class SubmitThrottle(SignedInThrottle):
@@ -126,7 +101,7 @@ class RevokeThrottle(Throttle):
 
     def identity(self, request: Request) -> object | None:
         """The address, also of who is signed in."""
-        return self.address(request)
+        return rates.address_of(request)
 
 
 # --- requests that are turned away before any view ----------------------------------------------------------

@@ -1,0 +1,103 @@
+"""How often one may send and draw pages: the same rates, counts and words as the API's."""
+
+import pytest
+from django.test import Client
+from pytest_django import DjangoAssertNumQueries, Settings
+
+from leaderboard import teams
+from leaderboard.models import Edition, Team, User
+from leaderboard.web.limits import RateLimitMiddleware
+from tests import pages
+from tests.leaderboard.test_api_submissions import client_of
+
+ATTACKER, ELSEWHERE = "203.0.113.9", "192.0.2.3"
+
+
+@pytest.fixture(autouse=True)
+def rates(settings: Settings, benchmark: None) -> None:
+    """Three of everything, counted from nothing: the next comes after longer than any test takes."""
+    RateLimitMiddleware.drawn.forget()
+    settings.PAGE_RATES = {"send": "3/hour", "draw": "3/hour"}
+
+
+def signed_in(user: User) -> Client:
+    client = Client()
+    client.force_login(user)
+    return client
+
+
+def test_one_page_too_many_is_refused_in_words_with_a_time_and_a_way_back(
+    owner: User, settings: Settings
+) -> None:
+    client = signed_in(owner)
+    found = [client.post("/tokens/", {"name": f"token {n}", "scope": "read"}).status_code for n in range(3)]
+    assert 429 not in found
+    refused = client.post("/tokens/", {"name": "one too many"}, HTTP_REFERER="http://testserver/tokens/?a=b")
+    assert refused.status_code == 429
+    assert 1 <= int(refused.headers["Retry-After"]) <= 1200
+    main = pages.page(refused).one("main")
+    assert main.text.startswith("Too many tries")
+    assert "Too many requests in a short time; the next one is answered in " in main.text
+    assert "Nothing was changed" in main.text
+    assert [link.attributes["href"] for link in main.all("a")] == ["/tokens/?a=b", "/"]
+
+
+def test_a_way_back_leads_to_no_other_site(owner: User) -> None:
+    client = signed_in(owner)
+    for _ in range(4):
+        refused = client.post("/tokens/", {}, HTTP_REFERER="https://evil.example/")
+    assert refused.status_code == 429
+    assert b"evil.example" not in refused.content
+
+
+def test_an_account_is_counted_wherever_it_sends_from_and_no_other_with_it(
+    owner: User, stranger: User
+) -> None:
+    client = signed_in(owner)
+    found = [client.post("/tokens/", {}, REMOTE_ADDR=f"192.0.2.{n}").status_code for n in range(4)]
+    assert found[-1] == 429
+    assert 429 not in found[:3]
+    assert signed_in(stranger).post("/tokens/", {}).status_code != 429
+
+
+def test_visitors_are_counted_by_address_whatever_they_write_into_headers(db: None) -> None:
+    form = {"login": "nobody@example.org", "password": "wrong"}
+    found = [
+        Client()
+        .post("/accounts/login/", form, REMOTE_ADDR=ATTACKER, HTTP_X_FORWARDED_FOR=f"10.0.0.{n}")
+        .status_code
+        for n in range(4)
+    ]
+    assert found == [200, 200, 200, 429]
+    assert Client().post("/accounts/login/", form, REMOTE_ADDR=ELSEWHERE).status_code == 200
+
+
+def test_renaming_in_a_loop_ends(owner: User, settings: Settings) -> None:
+    teams.team_of(user=owner)
+    client = signed_in(owner)
+    found = {client.post("/team/", {"name": f"Owls {n}"}).status_code for n in range(6)}
+    assert 429 in found
+    assert not Team.objects.filter(name="Owls 5").exists()
+
+
+def test_boards_answered_from_memory_are_not_counted_and_others_are(edition: Edition) -> None:
+    visitor = Client(REMOTE_ADDR=ATTACKER)
+    assert {visitor.get("/board/test/").status_code for _ in range(10)} == {200}
+    found = [visitor.get(f"/board/test/?q={n}").status_code for n in range(5)]
+    assert found == [200, 200, 429, 429, 429]
+    assert Client(REMOTE_ADDR=ELSEWHERE).get("/board/test/?q=1").status_code == 200
+    # What is remembered goes on being answered.
+    assert visitor.get("/board/test/").status_code == 200
+
+
+def test_monitoring_and_the_api_are_not_counted_as_pages(owner: User) -> None:
+    client = client_of(owner)
+    assert {Client().get("/healthz").status_code for _ in range(6)} == {200}
+    assert {client.get("/api/v1/quota").status_code for _ in range(6)} == {200}
+
+
+def test_counting_what_is_drawn_asks_the_database_nothing(
+    settings: Settings, django_assert_num_queries: DjangoAssertNumQueries
+) -> None:
+    with django_assert_num_queries(0):
+        assert Client().get("/docs/api/").status_code == 200
