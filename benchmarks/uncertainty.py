@@ -15,7 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.evaluator import best_s, figure
-from evaluator import uncertainty
+from evaluator import differences, ranges, uncertainty
 
 N_ENTRIES = 200
 N_COLUMNS = 10
@@ -44,22 +44,22 @@ def main(sizes: Sequence[int] = (100, 300, 700)) -> None:
         def intervals(sums: np.ndarray = sums, own: uncertainty.Bootstrap = bootstrap) -> None:
             own.intervals(sums)
 
-        def ranges(sums: np.ndarray = sums, own: uncertainty.Bootstrap = bootstrap) -> None:
+        def places(sums: np.ndarray = sums, own: uncertainty.Bootstrap = bootstrap) -> None:
             signs = uncertainty.generator_of(DIGEST, purpose="signs")
-            uncertainty.rank_ranges(sums, published=own.means(sums), usable=own.usable, rng=signs)
+            ranges.rank_ranges(sums, published=own.means(sums), usable=own.usable, rng=signs)
 
         def everything(sums: np.ndarray = sums) -> None:
             own = weights()
             intervals(sums, own)
-            ranges(sums, own)
+            places(sums, own)
 
-        def pair(sums: np.ndarray = sums, own: uncertainty.Bootstrap = bootstrap) -> None:
+        def pair(sums: np.ndarray = sums, counts: np.ndarray = counts) -> None:
             signs = uncertainty.generator_of(DIGEST, purpose="signs")
-            uncertainty.difference(sums[0], sums[1], bootstrap=own, signs=signs)
+            differences.difference(sums[0], sums[1], counts, signs=signs)
 
         figure("uncertainty", n_bags, "weights", best_s(weights) * 1e3, "ms")
         figure("uncertainty", n_bags, "intervals_of_200", best_s(intervals), "s")
-        figure("uncertainty", n_bags, "rank_ranges_of_200", best_s(ranges), "s")
+        figure("uncertainty", n_bags, "rank_ranges_of_200", best_s(places), "s")
         figure("uncertainty", n_bags, "everything_of_200", best_s(everything), "s")
         figure("uncertainty", n_bags, "one_comparison", best_s(pair) * 1e3, "ms")
 

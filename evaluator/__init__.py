@@ -11,24 +11,26 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from evaluator.differences import Difference, compare_predictions
     from evaluator.predictions import Predictions, read_predictions
     from evaluator.problems import PROBLEM_CODES, Problem, Rejected
     from evaluator.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
     from evaluator.report import IntervalScore, Report, format_published, published
     from evaluator.scoring import evaluate, evaluate_many
     from evaluator.truth import GroundTruth, Manifest, read_manifest, read_truth
-    from evaluator.uncertainty import Difference, compare_predictions, confidence_intervals
+    from evaluator.uncertainty import confidence_intervals
     from evaluator.writing import write_predictions
 else:
     # Each name is imported when it is first asked for: `tsttc --help` then answers without loading numpy.
     _HOMES = {
+        "differences": ("Difference", "compare_predictions"),
         "predictions": ("Predictions", "read_predictions"),
         "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
         "protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
         "report": ("IntervalScore", "Report", "format_published", "published"),
         "scoring": ("evaluate", "evaluate_many"),
         "truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
-        "uncertainty": ("Difference", "compare_predictions", "confidence_intervals"),
+        "uncertainty": ("confidence_intervals",),
         "writing": ("write_predictions",),
     }
     _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}

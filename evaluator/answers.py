@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 
 from evaluator.problems import Problem
+from evaluator.significance import p_below
 
 FINAL_STATES = frozenset({"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"})
 
@@ -162,13 +163,23 @@ class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
 class Difference(msgspec.Struct, frozen=True, kw_only=True):
     """First minus second in one column: below 0 the first is better.
 
-    `low` and `high` are its 95 % interval, `p` that of the two-sided test; None for too few recordings.
+    `low` and `high` are its 95 % interval, `p` that of the two-sided test, `p_below` the smallest of 0.001,
+    0.01 and 0.05 that p is below, else 1; None for too few recordings. Where p is None, as on a hidden split,
+    `p_below` judges alone; an older server gives p alone. `n_effective` is the effective number of
+    recordings.
     """
 
     difference: float
     low: float | None = None
     high: float | None = None
     p: float | None = None
+    p_below: float | None = None
+    n_effective: float | None = None
+
+    def __post_init__(self) -> None:
+        """Give `p_below` where only p was given."""
+        if self.p_below is None and self.p is not None:
+            msgspec.structs.force_setattr(self, "p_below", p_below(self.p))
 
 
 class Pair(msgspec.Struct, frozen=True, kw_only=True):

@@ -6,13 +6,16 @@ from collections.abc import Mapping
 from typing import Final, Protocol
 
 from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
+from evaluator.significance import (
+    SIGNIFICANT,
+    detectable_difference,
+    is_significant,
+    too_few_recordings,
+)
 
-SIGNIFICANT: Final = 0.05
 _INTERVAL_WORDS: Final = {"overall": "", **{name: f" on {name}" for name in INTERVAL_NAMES[1:]}}
 _METRIC_WORDS: Final = {"mid": ("MiD", ""), "rte": ("RTE", " percentage points")}
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
-# Of the normal distribution's 97.5 % point: what a difference must be to be found with a power of 80 %.
-_DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 
 
 class Found(Protocol):
@@ -37,36 +40,34 @@ class Found(Protocol):
     def p(self) -> float | None:
         """Of the two-sided test."""
 
+    @property
+    def p_below(self) -> float | None:
+        """The smallest of 0.001, 0.01 and 0.05 that p is below, else 1: what judges."""
 
-def is_significant(found: Found) -> bool:
-    """Whether p is below 5 %: of this column alone, whatever else was looked at."""
-    return found.p is not None and found.p < SIGNIFICANT
+    @property
+    def n_effective(self) -> float | None:
+        """The effective number of recordings."""
 
 
-def p_text(p: float) -> str:
+def p_text(p: float | None, below: float | None = None) -> str:
     """A p-value in words: all four decimals, so that none is rounded to the 0.05 that it lies below.
+
+    Where p itself is not told, its class: the smallest of 0.001, 0.01 and 0.05 that it is below.
 
     >>> p_text(0.0496), p_text(0.3), p_text(1.0)
     ('p = 0.0496', 'p = 0.3000', 'p = 1')
+    >>> p_text(None, 0.01), p_text(None, 1.0)
+    ('p < 0.01', 'p ≥ 0.05')
     """
+    if p is None:
+        return f"p ≥ {SIGNIFICANT:g}" if below is None or below > SIGNIFICANT else f"p < {below:g}"
     return "p = 1" if p == 1 else f"p = {p:.4f}"
-
-
-def detectable_difference(found: Found) -> float | None:
-    """The smallest difference that four of five such tests would have found (80 % power).
-
-    1.43 half widths of the 95 % confidence interval: (z of 97.5 % + z of 80 %) / z of 97.5 %. None for a
-    difference that is significant, and where there is no interval.
-    """
-    if found.low is None or found.high is None or is_significant(found):
-        return None
-    return _DETECTABLE * (found.high - found.low) / 2
 
 
 def sentence(first: str, second: str, *, name: str, found: Found, decimals: int = 2) -> str:
     """What a difference in one column means, in words; `decimals` are those in which values are published.
 
-    >>> from evaluator.uncertainty import Difference
+    >>> from evaluator.differences import Difference
     >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
     "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
     >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
@@ -85,10 +86,10 @@ That is not significant. A difference above 2.0 would have been found in four of
         f"{_of(first)} {column} is {_amount(found.difference, digits)}{unit} "
         f"{_direction(found.difference)} than {_of(second)}"
     )
-    if found.low is None or found.high is None or found.p is None:
-        return f"{gap}; there are too few recordings to say whether that is significant."
+    if found.low is None or found.high is None or found.p_below is None:
+        return f"{gap}; there are {too_few_recordings(found.n_effective)} to say whether that is significant."
     ends = _ends(found.difference, found.low, found.high, digits)
-    told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p)})."
+    told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p, found.p_below)})."
     detectable = detectable_difference(found)
     if detectable is None:
         return told
@@ -143,14 +144,14 @@ def others(
     A look through nine columns finds some by chance, so the first text says how many columns were tested and
     what that means. It is empty where no column has a p.
 
-    >>> from evaluator.uncertainty import Difference
+    >>> from evaluator.differences import Difference
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
     >>> others("A", "B", {"mid": far, "mid_small": alike})
     ('No other column differs significantly.', ())
     >>> others("A", "B", {"mid": alike, "mid_small": far, "rte": alike})[0]
     'Of 2 other columns 1 differs significantly, each by itself (of twenty columns of equals, one does):'
     """
-    tested = [name for name in SCORE_NAMES[1:] if name in found and found[name].p is not None]
+    tested = [name for name in SCORE_NAMES[1:] if name in found and found[name].p_below is not None]
     told = [name for name in tested if is_significant(found[name])]
     if not told:
         return ("No other column differs significantly." if tested else ""), ()

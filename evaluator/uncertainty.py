@@ -1,4 +1,4 @@
-"""How sure a mean is, and a difference, and a rank: resampling whole recordings.
+"""How sure a mean is: resampling whole recordings.
 
 Sequences of one recording ("bag") resemble each other, so 28,600 of them know less than 28,600 independent
 ones would. What is drawn anew here is therefore the recording, never the sequence. With S_g and n_g the sum
@@ -8,8 +8,7 @@ of an error and the number of sequences of recording g, a published mean is θ =
 
 is what it might have been (a Bayesian bootstrap of recordings). An Exp(1) weight is never 0, so no interval
 of the ground truth runs empty. One matrix of weights belongs to a ground truth and is shared by all that is
-scored against it: the difference of two entries is then taken resample by resample, and what both find hard
-cancels.
+scored against it. `evaluator.differences` compares two entries, `evaluator.ranges` all of a board.
 
 Everything is a function of the sums and of the seed: the same numbers give the same answer, in whatever order
 they come. Arrays have one row for each recording and one column for each score name.
@@ -18,8 +17,6 @@ they come. Arrays have one row for each recording and one column for each score 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
-from dataclasses import dataclass
 from functools import cached_property
 from statistics import NormalDist
 from typing import Final
@@ -32,28 +29,14 @@ from evaluator.protocol import DEFAULT_PROTOCOL, SCORE_NAMES, Protocol, get_prot
 from evaluator.report import BagSums
 from evaluator.scale import Floats
 from evaluator.scoring import Scorer
+from evaluator.significance import MIN_DEGREES
 from evaluator.truth import GroundTruth
-
-MIN_BAGS: Final = 20
-"""Below this many recordings nothing is resampled: too few to stand for what could have been recorded."""
 
 CONFIDENCE: Final = 0.95
 N_RESAMPLES: Final = 10_000
-N_SIGN_FLIPS: Final = 9_999
-N_RANK_FLIPS: Final = 2_000
-"""Ranks compare all pairs at once, 19,900 of 200 entries; their critical value is read from so many draws."""
-
-_BLOCK: Final = 1_000
-# So many float32 are a megabyte.
-_CACHED: Final = 1 << 18
 # So many entries at once make one product large enough to be fast.
 BATCH: Final = 8
-# Beside an entry's own sum of squares, what is below this is left of rounding: the pair is alike.
-_ALIKE: Final = 1e-12
-_NO_SUM: Final = 1e-12
-
 Weights = NDArray[np.float32]
-Integers = NDArray[np.int64]
 Booleans = NDArray[np.bool_]
 
 
@@ -63,35 +46,22 @@ def generator_of(digest: str, *, purpose: str) -> np.random.Generator:
     return np.random.default_rng(int.from_bytes(seed))
 
 
+def degrees_of(counts: Floats) -> Floats:
+    """The degrees of freedom of each column of `counts` (G, columns): its effective number of recordings.
+
+        (Σn²)² / Σn⁴
+
+    Satterthwaite's for a variance that is a sum of one square for each recording, with weights n². Recordings
+    of equal size count as many as they are; a few long ones among many short ones as little more than the
+    few. 0 for a column without sequences.
+    """
+    squares, fourths = (counts**2).sum(axis=0), (counts**4).sum(axis=0)
+    return np.asarray(np.divide(squares**2, fourths, out=np.zeros_like(squares), where=fourths > 0))
+
+
 def usable_columns(counts: Floats) -> Booleans:
-    """Which columns of `counts` (G, columns) have sequences in enough recordings."""
-    return np.asarray((counts > 0).sum(axis=0) >= MIN_BAGS)
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """First minus second in one column: below 0 the first is better.
-
-    `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where fewer
-    than 20 of the recordings have sequences of that interval.
-    """
-
-    difference: float
-    low: float | None
-    high: float | None
-    p: float | None
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class RankRanges:
-    """Where each of N entries may stand in each of the columns, int64 (N, columns); 0 where there is none.
-
-    `is_with_best` says which are not significantly worse than the best of their column.
-    """
-
-    low: Integers
-    high: Integers
-    is_with_best: Booleans
+    """Which columns of `counts` (G, columns) have enough recordings: at least 8 degrees of freedom."""
+    return np.asarray(degrees_of(counts) >= MIN_DEGREES)
 
 
 class Bootstrap:
@@ -111,18 +81,19 @@ class Bootstrap:
 
     @cached_property
     def usable(self) -> Booleans:
-        """Which columns have sequences in enough recordings."""
+        """Which columns have enough recordings."""
         return usable_columns(self._counts)
 
     @cached_property
     def _tails(self) -> Floats:
         """What lies beyond either end of an interval, of every column: less than 2.5 % for few recordings.
 
-        They count as (Σn)² / Σn² recordings of equal size.
+        They count as (Σn)² / Σn² recordings of equal size for the mean, and as `degrees_of` for its error.
         """
         squares = (self._counts**2).sum(axis=0)
         effective = np.divide(self._n**2, squares, out=np.ones_like(squares), where=squares > 0)
-        return np.array([_tail(value) for value in effective.tolist()])
+        pairs = zip(effective.tolist(), degrees_of(self._counts).tolist(), strict=True)
+        return np.array([_tail(n, degrees=degrees) for n, degrees in pairs])
 
     @cached_property
     def _inverse_counts(self) -> Weights:
@@ -173,20 +144,39 @@ class Bootstrap:
         return low, high
 
 
-def _tail(n_effective: float) -> float:
+def _tail(n_effective: float, *, degrees: float) -> float:
     """The share of resamples beyond either end of a 95 % interval of so many recordings of equal size.
 
     Bare percentiles are those of a normal distribution whose variance is known, and n recordings scatter a
-    little less about their own mean than about the true one: Φ(−t_{n−1}(97.5 %) · √(n / (n − 1))), the
-    expanded percentiles of Hesterberg (The American Statistician 69, 2015).
+    little less about their own mean than about the true one: Φ(−t(97.5 %) · √(n / (n − 1))), the expanded
+    percentiles of Hesterberg (The American Statistician 69, 2015), with Student's t of the degrees of freedom
+    that the variance is known by. Both are taken as 3 at least; below 8 degrees there is no interval anyway.
 
-    >>> round(_tail(1e9), 4), round(_tail(100.0), 4), round(_tail(20.0), 4)
-    (0.025, 0.0231, 0.0159)
+    >>> round(_tail(1e9, degrees=1e9), 4), round(_tail(100.0, degrees=99.0), 4)
+    (0.025, 0.0231)
+    >>> round(_tail(20.0, degrees=10.0), 4)
+    0.0111
     """
-    z, degrees = NormalDist().inv_cdf((1 + CONFIDENCE) / 2), max(n_effective, 3.0) - 1
-    # Student's quantile from the normal one (Fisher and Cornish 1960); 2.093 at 19 degrees, as it should be.
-    t = z + (z**3 + z) / (4 * degrees) + (5 * z**5 + 16 * z**3 + 3 * z) / (96 * degrees**2)
-    return NormalDist().cdf(-t * ((degrees + 1) / degrees) ** 0.5)
+    n = max(n_effective, 3.0)
+    return NormalDist().cdf(-_student(max(degrees, 3.0)) * (n / (n - 1)) ** 0.5)
+
+
+def _student(degrees: float) -> float:
+    """The 97.5 % point of Student's distribution, right to 0.00003 from 8 degrees of freedom on.
+
+    From the normal one by the expansion of Fisher and Cornish (Technometrics 2, 1960) to the fourth order.
+
+    >>> round(_student(8.0), 4), round(_student(19.0), 4)
+    (2.306, 2.093)
+    """
+    z = NormalDist().inv_cdf((1 + CONFIDENCE) / 2)
+    orders = (
+        (z**3 + z) / 4,
+        (5 * z**5 + 16 * z**3 + 3 * z) / 96,
+        (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / 384,
+        (79 * z**9 + 776 * z**7 + 1482 * z**5 - 1920 * z**3 - 945 * z) / 92_160,
+    )
+    return z + sum(order / degrees**power for power, order in enumerate(orders, 1))
 
 
 def _ends(deviations: Weights, *, tail: float) -> Floats:
@@ -201,147 +191,6 @@ def _ends(deviations: Weights, *, tail: float) -> Floats:
         lower, upper = parted[:, i].astype(np.float64), parted[:, min(i + 1, last)].astype(np.float64)
         found.append(lower + (upper - lower) * (place - i))
     return np.stack(found)
-
-
-def rank_ranges(
-    sums: Floats,
-    *,
-    published: Floats,
-    usable: Booleans,
-    rng: np.random.Generator,
-    between: Callable[[], None] = lambda: None,
-) -> RankRanges:
-    """Rank ranges at 95 % of N entries by their `sums` (N, G, columns), of the columns that are `usable`.
-
-    `published` (N, columns) are their values as they are ranked, NaN where an entry has none. In each column
-    all pairs are compared at once: step-down max-t over the paired differences, from 1 + (how many are
-    significantly better) to N − (how many are significantly worse), after Mogstad, Romano, Shaikh and Wilhelm
-    (Review of Economic Studies 91, 2024). With 95 % probability every range of a column holds its entry's
-    true rank. A difference is studentised by its own recordings, t = ΣD_g / √ΣD_g², and what chance makes of
-    the largest t is read from turning the recordings' signs, as `sign_flip_p` does for one pair.
-
-    Values that are published alike are never told apart, so a range holds the published rank as well.
-    `between` is called every fraction of a second.
-    """
-    low = np.zeros(published.shape, dtype=np.int64)
-    high, is_with_best = low.copy(), np.zeros(low.shape, dtype=np.bool_)
-    shape = (N_RANK_FLIPS, sums.shape[1])
-    signs = rng.integers(0, 2, size=shape, dtype=np.int8).astype(np.float32) * 2 - 1
-    for column in np.flatnonzero(usable).tolist():
-        present = np.flatnonzero(np.isfinite(published[:, column]))
-        if not present.size:
-            continue
-        rows = present[np.argsort(published[present, column], kind="stable")]
-        is_worse = _worse(sums[rows, :, column], published[rows, column], signs, between)
-        low[rows, column] = 1 + is_worse.sum(axis=1)
-        high[rows, column] = len(rows) - is_worse.sum(axis=0)
-        is_with_best[rows, column] = ~is_worse[:, 0]
-    return RankRanges(low, high, is_with_best)
-
-
-def _worse(sums: Floats, values: Floats, signs: Weights, between: Callable[[], None]) -> Booleans:
-    """For entries in ascending order, (N, N): whether the row's is significantly worse than the column's.
-
-    The family are the one-sided hypotheses θ_b ≤ θ_a of all ordered pairs. Those with b above a can never be
-    rejected and stay in it at every step (`down`); the others leave it as they are rejected (`up`).
-    """
-    # What all have in common is in no difference, and would cost the products their digits.
-    own = sums - sums.mean(axis=0)
-    inverse = _inverse_error(own)
-    totals = own.sum(axis=1)
-    t = np.where(values[:, None] > values[None, :], (totals[:, None] - totals[None, :]) * inverse, 0.0)
-    turned = own.astype(np.float32) @ signs.T
-    rejected = np.zeros(t.shape, dtype=np.bool_)
-    single = inverse.astype(np.float32)
-    up, down = _extremes(turned, single, rejected, between)
-    while True:
-        critical = float(np.quantile(np.maximum(up, down), CONFIDENCE, method="higher"))
-        found = t > critical
-        if not (found & ~rejected).any():
-            return rejected
-        rejected |= found
-        up, _ = _extremes(turned, single, rejected, between)
-
-
-def _inverse_error(sums: Floats) -> Floats:
-    """1 / √ΣD² of every pair, (N, N), with ΣD² = Q_aa + Q_bb − 2 Q_ab; 0 for pairs that are alike."""
-    products = sums @ sums.T
-    own = np.diag(products)
-    squares = own[:, None] + own[None, :] - 2 * products
-    is_alike = squares <= _ALIKE * np.maximum(own[:, None], own[None, :])
-    return np.where(is_alike, 0.0, 1 / np.sqrt(np.where(is_alike, 1.0, squares)))
-
-
-def _extremes(
-    turned: Weights, inverse: Weights, left_out: Booleans, between: Callable[[], None]
-) -> tuple[Weights, Weights]:
-    """In every draw the largest studentised rise and fall over pairs a < b, without pairs left out.
-
-    One a and a block of draws at a time, which stay in the processor's cache: all pairs at once, 19,900 ×
-    2,000, would be 160 MB.
-    """
-    n_entries, n_draws = turned.shape
-    up, down = np.zeros((2, n_draws), dtype=np.float32)
-    partners = [a + 1 + np.flatnonzero(~left_out[a + 1 :, a]) for a in range(n_entries - 1)]
-    size = max(_CACHED // n_entries, 1)
-    buffer = np.empty((n_entries, size), dtype=np.float32)
-    for start in range(0, n_draws, size):
-        between()
-        block = slice(start, min(start + size, n_draws))
-        part = np.ascontiguousarray(turned[:, block])
-        for a, rows in enumerate(partners):
-            if rows.size:
-                is_run = rows[-1] - rows[0] + 1 == rows.size
-                chosen = part[rows[0] : rows[-1] + 1] if is_run else part[rows]
-                rises = buffer[: rows.size, : part.shape[1]]
-                np.subtract(chosen, part[a], out=rises)
-                np.multiply(rises, inverse[a, rows, None], out=rises)
-                np.maximum(up[block], rises.max(axis=0), out=up[block])
-                np.maximum(down[block], -rises.min(axis=0), out=down[block])
-    return up, down
-
-
-def sign_flip_p(differences: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS) -> Floats:
-    """Two-sided p of every column of `differences` (G, columns) by the cluster sign-flip test.
-
-        p = (1 + #{|Σ ±D_g| ≥ |Σ D_g|}) / (R + 1)
-
-    D_g = S_g of the first − S_g of the second entry: since both have the same sequences, ΣD_g / n is the
-    difference of their means, and no ratio has to be linearised. If neither is better, D_g is as likely to be
-    −D_g; a recording is turned as a whole, since its sequences are not independent. Recordings without
-    sequences in an interval have D_g = 0 and change nothing. Without any difference p is 1.
-    """
-    observed = np.abs(differences.sum(axis=0))
-    # Sums of the same numbers in another order differ by rounding, and are still as large.
-    at_least = observed - _NO_SUM * np.abs(differences).sum(axis=0)
-    n_as_large = np.zeros(differences.shape[1], dtype=np.int64)
-    for start in range(0, n_flips, _BLOCK):
-        n = min(_BLOCK, n_flips - start)
-        signs = rng.integers(0, 2, size=(n, len(differences)), dtype=np.int8) * 2.0 - 1.0
-        n_as_large += (np.abs(signs @ differences) >= at_least).sum(axis=0)
-    return np.asarray((1 + n_as_large) / (n_flips + 1))
-
-
-def difference(
-    first: Floats,
-    second: Floats,
-    *,
-    bootstrap: Bootstrap,
-    signs: np.random.Generator,
-    n_flips: int = N_SIGN_FLIPS,
-) -> dict[str, Difference]:
-    """Compare the sums of two entries, (G, 10) each; a column without sequences is absent."""
-    gaps = first - second
-    means = bootstrap.means(gaps)
-    low, high = (ends[0] for ends in bootstrap.intervals(gaps[None]))
-    p = sign_flip_p(gaps, rng=signs, n_flips=n_flips)
-    return {
-        name: Difference(float(means[i]), float(low[i]), float(high[i]), float(p[i]))
-        if bootstrap.usable[i]
-        else Difference(float(means[i]), None, None, None)
-        for i, name in enumerate(SCORE_NAMES)
-        if np.isfinite(means[i])
-    }
 
 
 def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
@@ -369,26 +218,3 @@ def confidence_intervals(
         name: (float(low[i]), float(high[i])) if np.isfinite(low[i]) else None
         for i, name in enumerate(SCORE_NAMES)
     }
-
-
-def compare_predictions(
-    first: Predictions,
-    second: Predictions,
-    truth: GroundTruth,
-    *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
-    n_flips: int = N_SIGN_FLIPS,
-) -> dict[str, Difference]:
-    """Compare two sets of predictions of the same sequences: first minus second under each score name.
-
-    The random numbers belong to the ground truth's revision, so these are the numbers of the board's own
-    comparison. A column without sequences is absent. Raises as `evaluator.evaluate` does.
-    """
-    one, other = (bag_sums(each, truth, protocol=protocol) for each in (first, second))
-    return difference(
-        one.sums,
-        other.sums,
-        bootstrap=bootstrap_of(truth.digest, one.counts),
-        signs=generator_of(truth.digest, purpose="signs"),
-        n_flips=n_flips,
-    )

@@ -7,7 +7,7 @@ the answer is complete.
 
 import itertools
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import datetime
 from functools import partial
 from uuid import UUID
@@ -16,7 +16,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
 from django.db.models import QuerySet
 
-from evaluator import published, sentences, uncertainty
+from evaluator import Difference, differences, sentences
 from evaluator.protocol import SCORE_NAMES, get_protocol
 from leaderboard import bags, broker, entries, inference, snapshots, standings
 from leaderboard.models import Comparison, Edition, Method, Split, User
@@ -46,25 +46,6 @@ class NotOnTheBoard(BadComparison):
     """The split has no board, or the method no scored submission on it."""
 
     code = "not-on-the-board"
-
-
-@dataclass(frozen=True)
-class Difference:
-    """First minus second in one column: below 0 the first is better. All in published decimals.
-
-    `low` and `high` are the 95 % interval of the difference, `p` is the two-sided cluster sign-flip test's;
-    all three are None where there are too few recordings.
-    """
-
-    difference: float
-    low: float | None
-    high: float | None
-    p: float | None
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether p is below 5 %."""
-        return sentences.is_significant(self)
 
 
 @dataclass(frozen=True)
@@ -191,20 +172,13 @@ def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
     if row is None or row.differences is None:
         return Pair(first, second, None)
     is_turned = row.first_id != first.evaluation_id
-    differences = {
-        name: _turned(found) if is_turned else found
+    shown = {
+        name: found.turned() if is_turned else found
         for name in SCORE_NAMES
         if name in row.differences
         for found in [Difference(**row.differences[name])]
     }
-    return Pair(first, second, differences)
-
-
-def _turned(found: Difference) -> Difference:
-    """The same seen from the other side."""
-    low = None if found.high is None else 0.0 - found.high
-    high = None if found.low is None else 0.0 - found.low
-    return Difference(0.0 - found.difference, low, high, found.p)
+    return Pair(first, second, shown)
 
 
 def _n_methods(n: int) -> str:
@@ -230,33 +204,17 @@ def compute(row: Comparison, *, now: datetime) -> None:
     edition = row.edition
     digests = (row.first.submission.digest, row.second.submission.digest)
     first, second = (bags.sums_of(edition, digest=digest) for digest in digests)
-    found = uncertainty.difference(
-        first,
-        second,
-        bootstrap=inference.bootstrap_of(edition),
-        signs=uncertainty.generator_of(edition.ground_truth_id, purpose="signs"),
+    found = differences.difference(
+        first, second, bags.counts_of(edition), signs=inference.generator_of(edition, purpose="signs")
     )
     values = [entries.flat_scores(each.scores.all()) for each in (row.first, row.second)]
     decimals = get_protocol(edition.protocol).decimals
-    differences = {
-        name: _rounded(gap, values[0][name], values[1][name], decimals) for name, gap in found.items()
+    shown = {
+        name: differences.rounded_difference(
+            gap, first=values[0][name], second=values[1][name], decimals=decimals
+        )
+        for name, gap in found.items()
     }
-    Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=differences, computed_at=now)
-
-
-def _rounded(
-    gap: uncertainty.Difference, first: float | None, second: float | None, decimals: int
-) -> dict[str, float | None]:
-    """As it is shown: the difference of the two published values, whatever lies behind their last digits.
-
-    The test knows no unit, and would tell of differences of any size: what is published alike is not told
-    apart by its p either.
-    """
-    value = gap.difference if first is None or second is None else first - second
-    shown = published(value, decimals=decimals)
-    return {
-        "difference": shown,
-        "low": published(gap.low, decimals=decimals),
-        "high": published(gap.high, decimals=decimals),
-        "p": None if gap.p is None else 1.0 if shown == 0 else float(f"{gap.p:.2g}"),
-    }
+    Comparison.objects.filter(pk=row.pk, computed_at=None).update(
+        differences={name: asdict(gap) for name, gap in shown.items()}, computed_at=now
+    )

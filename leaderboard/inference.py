@@ -23,14 +23,16 @@ from numpy.typing import NDArray
 
 from evaluator import published, uncertainty
 from evaluator.protocol import SCORE_NAMES, get_protocol
-from leaderboard import bags, boards, bulk
+from evaluator.ranges import Quoted, rank_ranges
+from evaluator.significance import MIN_DEGREES, cut_off, too_few_recordings
+from leaderboard import bags, boards, bulk, exports
 from leaderboard.models import Edition, Evaluation, PublishedResult, Score, Status, Visibility
 
 log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
-# Part of every digest: raised when the way changes in which intervals or ranges are made.
-METHOD = "1"
+# Every digest begins with it. Raised when intervals or ranges are made in another way: all are made anew.
+METHOD = "2"
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
 PATIENCE = timedelta(minutes=1)
 # All pairs are compared, so the work grows with their number: two seconds of rest for 200 entries.
@@ -54,14 +56,34 @@ class Standing:
 
 
 def why_no_interval(edition: Edition) -> str:
-    """Why nothing in this edition has an interval, a rank range or a p-value; "" where they have."""
-    n = edition.ground_truth.n_recordings
-    if n >= uncertainty.MIN_BAGS:
+    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
+
+    A worker finds out how many recordings an edition effectively has, and writes it beside the edition; until
+    then only an edition with too few recordings in all is known to have none.
+    """
+    known = [edition.n_effective.get(name, 0.0) for name in SCORE_NAMES] if edition.n_effective else []
+    most = max(known, default=float(edition.ground_truth.n_recordings))
+    if most >= MIN_DEGREES:
         return ""
-    return (
-        f"There are no intervals: they are made by drawing recordings anew, and this ground truth has {n}; "
-        f"expected at least {uncertainty.MIN_BAGS}."
-    )
+    return f"There are no intervals: they would be made of {too_few_recordings(most)}."
+
+
+def why_no_interval_of(edition: Edition, name: str) -> str:
+    """Why one column of this edition has none: `too few recordings (…)`; "" if it has, or is not known."""
+    n_effective = edition.n_effective.get(name)
+    if n_effective is None or n_effective >= MIN_DEGREES:
+        return ""
+    return too_few_recordings(n_effective)
+
+
+def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
+    """The random numbers of an edition: everything that is drawn for it comes from here."""
+    return uncertainty.generator_of(seed_of(edition), purpose=purpose)
+
+
+def seed_of(edition: Edition) -> str:
+    """What the random numbers of an edition are made of; each purpose then has its own."""
+    return edition.ground_truth_id
 
 
 # --- which entries ---------------------------------------------------------------------------------------
@@ -103,8 +125,8 @@ def digest_of(edition: Edition, rows: Sequence[Standing]) -> str:
     rivals = {row.evaluation_id for row in ranked(rows)}
     lines = sorted(f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in rows)
     printed = sorted(map(repr, _printed(edition)))
-    text = "\n".join([METHOD, edition.ground_truth_id, edition.protocol, *printed, *lines])
-    return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+    text = "\n".join([edition.ground_truth_id, edition.protocol, *printed, *lines])
+    return f"{METHOD} sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 
 def _printed(edition: Edition) -> list[tuple[float, ...]]:
@@ -186,10 +208,12 @@ def _inferred(
 ) -> Mapping[int, Values]:
     """What is to stand beside each score of the edition, by the score's id."""
     table = _Table(edition)
-    if why_no_interval(edition):
-        return dict.fromkeys(table.before, NOTHING)
-    usable = uncertainty.usable_columns(bags.counts_of(edition))
+    counts = bags.counts_of(edition)
+    usable = uncertainty.usable_columns(counts)
     low, high = table.low, table.high
+    if not edition.inference_digest.startswith(f"{METHOD} "):
+        low[[table.row_of[row.evaluation_id] for row in rows]] = np.nan
+    low[:, ~usable], high[:, ~usable] = np.nan, np.nan
     missing = [
         row
         for row in rows
@@ -205,22 +229,16 @@ def _inferred(
     rivals = ranked(rows)
     places = [table.row_of[row.evaluation_id] for row in rivals]
     rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)
-    is_with_best = np.zeros(table.value.shape, bool)
     if rivals:
-        ranges = uncertainty.rank_ranges(
+        ranges = rank_ranges(
             np.stack([bags.sums_of(edition, digest=row.digest) for row in rivals]),
             published=table.value[places],
             usable=usable,
-            rng=uncertainty.generator_of(edition.ground_truth_id, purpose="signs"),
+            rng=generator_of(edition, purpose="signs"),
+            quoted=_quoted(edition, counts),
             between=between,
         )
-        above, beside = _among_printed(
-            _printed(edition), table.value[places], low=low[places], high=high[places]
-        )
-        has_range = ranges.low > 0
-        rank_low[places] = np.where(has_range, ranges.low + above, 0)
-        rank_high[places] = np.where(has_range, ranges.high + above + beside, 0)
-        is_with_best[places] = ranges.is_with_best
+        rank_low[places], rank_high[places] = ranges.low, ranges.high
     decimals = get_protocol(edition.protocol).decimals
     return {
         pk: (
@@ -228,7 +246,7 @@ def _inferred(
             _published(high[i, j], decimals),
             int(rank_low[i, j]) or None,
             int(rank_high[i, j]) or None,
-            bool(is_with_best[i, j]) if rank_low[i, j] else None,
+            bool(rank_low[i, j] == 1) if rank_low[i, j] else None,
         )
         for pk, (i, j) in table.cells.items()
     }
@@ -260,21 +278,20 @@ class _Table:
             )
 
 
-def _among_printed(
-    printed: Sequence[tuple[float, ...]], value: Floats, *, low: Floats, high: Floats
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Of rows printed in papers, how many are surely above each value, and how many may be either.
+def _n_effective(edition: Edition) -> dict[str, float]:
+    """The effective number of recordings of each column, as it is published."""
+    degrees = uncertainty.degrees_of(bags.counts_of(edition))
+    return {name: cut_off(n) for name, n in zip(SCORE_NAMES, degrees.tolist(), strict=True)}
 
-    A paper has no recordings to compare by. Its number is taken as exact: it is above an entry whose whole
-    interval is larger, below one whose whole interval is smaller, and may be either within. So a board's
-    rank, which counts these rows, lies within the range that stands beside it.
-    """
-    # Ranked are published values, and a narrow interval may end between one and what it was rounded from.
-    low, high = np.fmin(low, value), np.fmax(high, value)
-    others = np.array(printed).reshape(-1, 1, len(SCORE_NAMES))
-    above = (others < low).sum(axis=0)
-    beside = ((others >= low) & (others <= high)).sum(axis=0)
-    return above, beside
+
+def _quoted(edition: Edition, counts: Floats) -> Quoted | None:
+    """The rows quoted from papers, each value as exact as it was printed: 14.8 is 14.75 to 14.85."""
+    values = np.array(_printed(edition)).reshape(-1, len(SCORE_NAMES))
+    if not len(values):
+        return None
+    decimals = [exports.printed_decimals(v for v in row if not np.isnan(v)) for row in values.tolist()]
+    half_widths = 0.5 * 10.0 ** -np.array(decimals)[:, None]
+    return Quoted(values, np.where(np.isnan(values), np.nan, half_widths), counts)
 
 
 def _published(value: float, decimals: int) -> float | None:
@@ -283,13 +300,13 @@ def _published(value: float, decimals: int) -> float | None:
 
 def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
     """The weights of the edition's ground truth. Raises `OSError` without access to its values."""
-    return _bootstrap(edition.ground_truth_id, edition.protocol, bags.counts_of(edition).tobytes())
+    return _bootstrap(seed_of(edition), bags.counts_of(edition).tobytes())
 
 
 @lru_cache(maxsize=1)
-def _bootstrap(truth_digest: str, protocol: str, counts: bytes) -> uncertainty.Bootstrap:
+def _bootstrap(seed: str, counts: bytes) -> uncertainty.Bootstrap:
     table = np.frombuffer(counts).reshape(-1, len(SCORE_NAMES))
-    return uncertainty.bootstrap_of(truth_digest, table)
+    return uncertainty.bootstrap_of(seed, table)
 
 
 def _write(
@@ -302,7 +319,7 @@ def _write(
 ) -> bool:
     """Write what was made, all or nothing, if the entries are still the same."""
     shown = {row.evaluation_id for row in rows if row.is_shown}
-    floor = bags.floor_of(edition)
+    floor, n_effective = bags.floor_of(edition), _n_effective(edition)
     with transaction.atomic():
         present = (
             Edition.objects.select_for_update(of=("self",)).select_related("ground_truth").get(pk=edition.pk)
@@ -314,10 +331,14 @@ def _write(
         table = _Table(present)
         changed = [(*values, pk) for pk, values in inferred.items() if table.before.get(pk, values) != values]
         bulk.update(Score, COLUMNS, changed)
-        Edition.objects.filter(pk=edition.pk).update(inferred_at=now, inference_digest=digest, floor=floor)
+        Edition.objects.filter(pk=edition.pk).update(
+            inferred_at=now, inference_digest=digest, floor=floor, n_effective=n_effective
+        )
         ids = {i: pk for pk, i in table.row_of.items()}
         # Whose rows only their own team sees, changes nothing that anybody else is shown.
-        is_seen = floor != present.floor or any(ids[table.cells[row[-1]][0]] in shown for row in changed)
+        is_seen = (floor, n_effective) != (present.floor, present.n_effective) or any(
+            ids[table.cells[row[-1]][0]] in shown for row in changed
+        )
         if is_seen and present.published_at is not None:
             boards.changed(present.split_id)
     return True

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator import uncertainty
+from evaluator import differences, ranges, uncertainty
 
 Floats = NDArray[np.float64]
 N_BAGS = (100, 300, 700)
@@ -77,7 +77,7 @@ def errors_of_the_tests(world: World, *, n: int, n_flips: int, rng: np.random.Ge
             difference, is_called = _two_methods(world, sizes[:, column].astype(int), rng)
             gaps[:, column] = difference
             n_by_sequence += is_called
-        p = uncertainty.sign_flip_p(gaps, rng=rng, n_flips=n_flips)
+        p = differences.sign_flip_p(gaps, rng=rng, n_flips=n_flips)
         n_by_recording += int((p < 0.05).sum())
     return Errors(n_by_recording / n, n_by_sequence / n)
 
@@ -108,9 +108,10 @@ def coverage_of_intervals(world: World, *, n: int, n_resamples: int, rng: np.ran
         sizes = world.sizes(chunk, rng)
         first, second = world.sums(sizes, rng, n_methods=2)
         bootstrap = uncertainty.Bootstrap(sizes, rng=rng, n_resamples=n_resamples)
-        low, high = bootstrap.intervals(np.stack([first, first - second]))
-        true = np.array([[world.mean], [0.0]])
-        held += ((low <= true) & (true <= high)).sum(axis=1)
+        low, high = (ends[0] for ends in bootstrap.intervals(first[None]))
+        held[0] += ((low <= world.mean) & (world.mean <= high)).sum()
+        found = differences.sign_flips(first - second, sizes, rng=rng, n_flips=n_resamples - 1)
+        held[1] += ((found.low <= 0) & (found.high >= 0)).sum()
     return Coverage(*(held / n).tolist())
 
 
@@ -139,7 +140,7 @@ def coverage_of_ranks(world: World, levels: tuple[float, ...], *, n: int, rng: n
         sums = world.sums(sizes, rng, n_methods=len(means)) + means[:, None, None] * sizes
         published = sums.sum(axis=1) / sizes.sum(axis=0)
         usable = np.ones(chunk, dtype=bool)
-        found = uncertainty.rank_ranges(sums, published=published, usable=usable, rng=rng)
+        found = ranges.rank_ranges(sums, published=published, usable=usable, rng=rng)
         # Who is truly tied may stand anywhere among their equals; the range must leave room for all of it.
         held = (found.low <= lowest) & (found.high >= highest)
         n_all += held.all(axis=0).sum()
@@ -156,7 +157,7 @@ def main(n: int = 2_000) -> None:
     say("| of a difference |\n|---|---|---|---|---|---|\n")
     for world in worlds():
         rng = np.random.default_rng([world.n_bags, int(100 * world.correlation)])
-        errors = errors_of_the_tests(world, n=n, n_flips=uncertainty.N_SIGN_FLIPS, rng=rng)
+        errors = errors_of_the_tests(world, n=n, n_flips=differences.N_SIGN_FLIPS, rng=rng)
         coverage = coverage_of_intervals(world, n=n, n_resamples=uncertainty.N_RESAMPLES, rng=rng)
         say(f"| {world.n_bags} | {world.correlation} | {errors.by_recording:.1%} | {errors.by_sequence:.1%} ")
         say(f"| {coverage.of_mean:.1%} | {coverage.of_difference:.1%} |\n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -98,7 +99,13 @@ def _others(names: tuple[str, str], found: Mapping[str, Found]) -> Iterator[str]
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool) -> None:
-    from evaluator import compare_predictions, evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy
+    from evaluator import (  # noqa: PLC0415 -- numpy
+        compare_predictions,
+        evaluate,
+        published,
+        read_predictions,
+        read_truth,
+    )
 
     with naming(truth_path):
         truth = read_truth(truth_path)
@@ -111,8 +118,12 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
     found = compare_predictions(read[0], read[1], truth)
     if as_json:
         differences = {
-            name: {"difference": d.difference, "low": d.low, "high": d.high, "p": d.p}
-            for name, d in found.items()
+            name: {
+                **asdict(gap),
+                "is_significant": gap.is_significant,
+                "detectable_difference": published(gap.detectable_difference),
+            }
+            for name, gap in found.items()
         }
         echo_json(
             {

@@ -18,7 +18,8 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
 from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import SIGNIFICANT, p_text
+from evaluator.sentences import p_text
+from evaluator.significance import SIGNIFICANT, is_significant, too_few_recordings
 
 if TYPE_CHECKING:
     from evaluator.answers import Board, BoardEntry, Difference
@@ -215,9 +216,10 @@ def judge_against(
             hint="Send it under another method's name, or compare files: tsttc compare A B --truth TRUTH",
         )
     difference = client.compare(split, [method_id, found.entry.method_id]).differences().get("mid")
-    if difference is None or difference.p is None:
-        raise undecided("there are too few recordings to tell a difference from chance")
-    if difference.p < SIGNIFICANT:
+    if difference is None or difference.p_below is None:
+        few = too_few_recordings(None if difference is None else difference.n_effective)
+        raise undecided(f"there are {few} to tell a difference from chance")
+    if is_significant(difference):
         raise _worse(f"{words}; {in_numbers(difference)}")
 
 
@@ -228,9 +230,10 @@ def in_numbers(found: Difference) -> str:
     >>> in_numbers(Difference(difference=1.2, low=0.4, high=2.0, p=0.003))
     '+1.20 [+0.40, +2.00], p = 0.0030'
     """
-    if found.low is None or found.high is None or found.p is None:
+    if found.low is None or found.high is None or found.p_below is None:
         return f"{found.difference:+.2f}"
-    return f"{found.difference:+.2f} [{found.low:+.2f}, {found.high:+.2f}], {p_text(found.p)}"
+    words = p_text(found.p, found.p_below)
+    return f"{found.difference:+.2f} [{found.low:+.2f}, {found.high:+.2f}], {words}"
 
 
 def _worse(words: str) -> Failure:

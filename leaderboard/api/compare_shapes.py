@@ -5,10 +5,10 @@ from typing import Any
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 
-from evaluator import published, sentences
+from evaluator import Difference, published, sentences
 from evaluator.protocol import SCORE_NAMES
 from leaderboard.api.serializers import EntrySerializer
-from leaderboard.comparisons import Compared, Difference, Pair
+from leaderboard.comparisons import Compared, Pair
 
 
 class DifferenceSerializer(serializers.Serializer[Difference]):
@@ -22,10 +22,20 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         allow_null=True, help_text="Upper end of its 95 % interval; null: too few recordings."
     )
     p = serializers.FloatField(
-        allow_null=True, help_text="Of the two-sided cluster sign-flip test; null: too few recordings."
+        allow_null=True,
+        help_text="Of the two-sided cluster sign-flip test, four decimals; null: too few recordings.",
+    )
+    p_below = serializers.FloatField(
+        allow_null=True,
+        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few recordings.",
+    )
+    n_effective = serializers.FloatField(
+        allow_null=True,
+        help_text="Effective number of recordings in this column; below 8 there is no interval and no p.",
     )
     is_significant = serializers.BooleanField(
-        help_text="Whether p is below 0.05; of ten columns and several pairs, some are by chance."
+        help_text="Whether p, as it was computed, is below 0.05; of ten columns and several pairs, some are "
+        "by chance."
     )
     detectable_difference = serializers.SerializerMethodField(
         help_text="The smallest difference that four of five such tests would have found (80 % power); null: "
@@ -37,7 +47,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
 
     def get_detectable_difference(self, found: Difference) -> float | None:
         """Rounded as differences are."""
-        return published(sentences.detectable_difference(found))
+        return published(found.detectable_difference)
 
     def get_sentence(self, found: Difference) -> str:
         """Of this column."""

@@ -110,6 +110,11 @@ class Edition(models.Model):
         blank=True,
         help_text="By score name: what the ground truth itself scores, as published. A worker computes it.",
     )
+    n_effective = models.JSONField(
+        default=dict,
+        blank=True,
+        help_text="Effective number of recordings by score name: the degrees of freedom of its interval.",
+    )
 
     class Meta:
         ordering = ["split", "number"]

@@ -19,7 +19,9 @@ class Comparison(models.Model):
     asked_at = models.DateTimeField(default=timezone.now)
     computed_at = models.DateTimeField(null=True, blank=True)
     differences = models.JSONField(
-        null=True, blank=True, help_text="By score name: first minus second, its 95 % interval, and p."
+        null=True,
+        blank=True,
+        help_text="By score name: first minus second, its 95 % interval, p and what it is below.",
     )
 
     class Meta:

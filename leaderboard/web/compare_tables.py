@@ -7,9 +7,10 @@ from typing import Final
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
+from evaluator import Difference
 from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
-from leaderboard.comparisons import Compared, Difference, Pair
+from leaderboard.comparisons import Compared, Pair
 from leaderboard.standings import Entry
 from leaderboard.web import charts, drawing
 from leaderboard.web.charts import Chart

@@ -4,8 +4,9 @@ import re
 
 import pytest
 
-from evaluator.sentences import detectable_difference, others, sentence
-from evaluator.uncertainty import Difference
+from evaluator.differences import Difference
+from evaluator.sentences import others, sentence
+from evaluator.significance import detectable_difference
 
 FAR = Difference(-4.1, -5.3, -2.9, 0.0003)
 

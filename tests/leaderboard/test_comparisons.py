@@ -9,9 +9,9 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from evaluator import SCORE_NAMES, compare_predictions, published, read_predictions
+from evaluator import SCORE_NAMES, Difference, compare_predictions, published, read_predictions
 from leaderboard import backlog, bags, comparisons, files, ground_truth, submissions
-from leaderboard.comparisons import BadComparison, Difference, NotOnTheBoard, UnknownMethod
+from leaderboard.comparisons import BadComparison, NotOnTheBoard, UnknownMethod
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
 from tests import builders
 from tests.editions import ANYBODY
@@ -191,7 +191,7 @@ def test_what_cannot_be_computed_keeps_nothing_else_waiting(
 
 
 def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: User, tmp_path: Path) -> None:
-    edition = builders.import_truth(tmp_path, n_recordings=10)
+    edition = builders.import_truth(tmp_path, n_recordings=7)
     sent = [
         builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
         for factor in (1.1, 1.2)
@@ -200,10 +200,10 @@ def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: U
     ask(*sent)
     builders.infer_all()
     answer = ask(*sent)
-    assert "this ground truth has 10" in answer.reason
+    assert "too few recordings (effective number 6.9; at least 8 needed)" in answer.reason
     found = known(answer.pairs[0])["mid"]
     assert (found.low, found.high, found.p, found.is_significant) == (None, None, None, False)
-    assert answer.pairs[0].sentence().endswith("too few recordings to say whether that is significant.")
+    assert answer.pairs[0].sentence().endswith("at least 8 needed) to say whether that is significant.")
 
 
 def test_an_equal_file_makes_no_difference(
@@ -214,7 +214,9 @@ def test_an_equal_file_makes_no_difference(
     ask(entries[0], same)
     builders.infer_all()
     (pair,) = ask(entries[0], same).pairs
-    assert all(found == Difference(0.0, 0.0, 0.0, 1.0) for found in known(pair).values() if found.p)
+    for found in known(pair).values():
+        if found.p is not None:
+            assert found == Difference(0.0, 0.0, 0.0, 1.0, n_effective=found.n_effective)
     assert pair.sentence() == "M1.05 and Same have the same MiD to two decimals."
 
 
@@ -227,8 +229,11 @@ def test_what_is_published_alike_is_not_told_apart_by_its_p(
     builders.infer_all()
     (pair,) = ask(entries[0], nearly).pairs
     assert nearly.digest != entries[0].digest
-    assert all(found == Difference(0.0, 0.0, 0.0, 1.0) for found in known(pair).values() if found.p)
     assert known(pair)["mid"].p == 1.0
+    for found in known(pair).values():
+        if found.p is not None:
+            assert (found.difference, found.p, found.p_below) == (0.0, 1.0, 1.0)
+            assert found.low <= 0 <= found.high
     assert pair.sentence() == "M1.05 and Nearly have the same MiD to two decimals."
 
 

@@ -46,7 +46,7 @@ def test_verdict_comes_first_then_every_difference_with_interval_and_p(
     assert f"lower than {far.method.name}'s (95 % confidence interval: " in verdict
     lead = root.one("p", class_="others").text
     others = [item.text for item in root.one("ul", class_="others").all("li")]
-    assert lead.startswith("Of 1 other column 1 differs significantly"), "the others have too few recordings"
+    assert lead.startswith("Of 5 other columns 5 differ significantly"), "the others have too few recordings"
     assert len(others) == len(root.one("table", class_="differences").all("tr", class_="significant")) - 1
     assert all(f"{near.method.name}'s " in other and " lower; p = 0." in other for other in others)
     rows = [
@@ -108,7 +108,7 @@ def test_without_methods_it_offers_those_of_the_board(client: Client, entries: l
 def test_too_few_recordings_are_said_and_no_p_is_shown(
     client: Client, benchmark: None, owner: User, tmp_path: pytest.TempPathFactory
 ) -> None:
-    edition = builders.import_truth(tmp_path, n_recordings=12)
+    edition = builders.import_truth(tmp_path, n_recordings=7)
     sent = [
         builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
         for factor in (1.1, 1.5)
@@ -118,11 +118,11 @@ def test_too_few_recordings_are_said_and_no_p_is_shown(
     get(client, *ids)
     builders.infer_all()
     root = get(client, *ids)
-    assert "this ground truth has 12; expected at least 20" in words(root)
+    assert "too few recordings (effective number 6.9; at least 8 needed)" in words(root)
     assert "95 % CI" not in [head.text for head in root.one("table", class_="differences").all("th")]
     assert root.all("p", class_="others") == []
     board = pages.page(client.get("/board/test/"))
-    assert "this ground truth has 12; expected at least 20" in board.one("main").text
+    assert "too few recordings (effective number 6.9; at least 8 needed)" in board.one("main").text
     assert board.all("svg", class_="whisker") == []
 
 

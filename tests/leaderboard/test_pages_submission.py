@@ -161,7 +161,7 @@ def test_polling_ends_at_once_where_there_are_too_few_recordings(
     few = builders.import_truth(tmp_path, n_recordings=6)
     sent = builders.submit(owner, builders.predictions(few))
     builders.score_all()
-    assert "this ground truth has 6; expected at least 20" in stops(signed_in, sent)
+    assert "too few recordings (effective number 6.0; at least 8 needed)" in stops(signed_in, sent)
 
 
 def test_polling_ends_at_once_for_what_was_withdrawn(

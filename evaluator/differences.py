@@ -1,0 +1,268 @@
+"""Whether two entries differ by more than chance: a test, and the interval that belongs to it.
+
+Both come from the same random signs. D_g is the sum of errors of recording g of the first entry less that of
+the second, n_g the number of its sequences. Signs split the recordings into two halves, + and −; were neither
+entry better, whatever stands in one half could as well stand in the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Final
+
+import numpy as np
+
+from evaluator.predictions import Predictions
+from evaluator.protocol import DEFAULT_PROTOCOL, SCORE_NAMES, Protocol, get_protocol
+from evaluator.report import published
+from evaluator.scale import Floats
+from evaluator.scoring import Scorer
+from evaluator.significance import SIGNIFICANT, cut_off, detectable_difference, is_significant, p_below
+from evaluator.truth import GroundTruth
+from evaluator.uncertainty import degrees_of, generator_of, usable_columns
+
+N_SIGN_FLIPS: Final = 9_999
+P_DECIMALS: Final = 4
+"""As many as a p of so many flips has."""
+PUBLISHED_DECIMALS: Final = get_protocol(DEFAULT_PROTOCOL).decimals
+
+_BLOCK: Final = 1_000
+# Beside the sum of the differences' sizes, what is below this is left of rounding.
+_NO_SUM: Final = 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """First minus second in one column: below 0 the first is better.
+
+    `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
+    are too few recordings. `p_below` is the smallest of 0.001, 0.01 and 0.05 that p is below, else 1: it is
+    what judges, and follows from p where it is not given. `n_effective` is the effective number of
+    recordings.
+    """
+
+    difference: float
+    low: float | None
+    high: float | None
+    p: float | None
+    p_below: float | None = None
+    n_effective: float | None = None
+
+    def __post_init__(self) -> None:
+        """Give `p_below` where p says it."""
+        if self.p_below is None and self.p is not None:
+            object.__setattr__(self, "p_below", p_below(self.p))
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether p is below 5 %: of this column alone, whatever else was looked at."""
+        return is_significant(self)
+
+    @property
+    def detectable_difference(self) -> float | None:
+        """The smallest difference that four of five such tests would have found; None for one found."""
+        return detectable_difference(self)
+
+    def turned(self) -> Difference:
+        """The same seen from the other side: second minus first."""
+        low = None if self.high is None else 0.0 - self.high
+        high = None if self.low is None else 0.0 - self.low
+        return Difference(0.0 - self.difference, low, high, self.p, self.p_below, self.n_effective)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SignFlips:
+    """What turning signs says of every column: float64 (columns,) each.
+
+    0 lies outside the interval from `low` to `high` exactly where `p` is below 0.05.
+    """
+
+    p: Floats
+    low: Floats
+    high: Floats
+
+
+def sign_flips(
+    differences: Floats, counts: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS
+) -> SignFlips:
+    """Test and interval of every column of `differences` by their `counts`, (G, columns) both.
+
+    The p of a difference δ is that of the test of D_g − δ n_g. With a sum of S₊ over n₊ sequences in the one
+    half, S₋ over n₋ in the other, a vector of signs counts against δ if its two halves disagree about it,
+
+        |Σ ±(D_g − δ n_g)| ≥ |Σ (D_g − δ n_g)|   ⇔   δ lies between S₊ / n₊ and S₋ / n₋,
+
+    and every δ whose p is at least 0.05 belongs to the interval (Hartigan, JASA 64, 1969). All these
+    stretches hold the observed difference, so the interval begins at the k-th smallest of the lower ends and
+    ends at the k-th largest of the upper ones, with k the smallest number for which (1 + k) / (R + 1) ≥ 0.05.
+    A half without any sequence says nothing: its vector of signs counts against every δ.
+
+    Where no δ is excluded, as in a column without sequences or with very few recordings, the ends are −∞
+    and ∞.
+    """
+    n_columns = differences.shape[1]
+    both = np.concatenate([differences, counts], axis=1)
+    total, nothing = both.sum(axis=0), np.zeros(2 * n_columns)
+    nothing[:n_columns] = _NO_SUM * np.abs(differences).sum(axis=0)
+    lower, upper = np.empty((2, n_columns, n_flips))
+    for start in range(0, n_flips, _BLOCK):
+        block = slice(start, min(start + _BLOCK, n_flips))
+        size = (block.stop - start, len(differences))
+        turned = (rng.integers(0, 2, size=size, dtype=np.int8) * 2.0 - 1.0) @ both
+        plus, minus = (_nothing_left(total + turned, nothing), _nothing_left(total - turned, nothing))
+        lower[:, block], upper[:, block] = _stretches(plus.T, minus.T)
+    n_as_large = ((lower <= 0) & (upper >= 0)).sum(axis=1)
+    low, high = _ends(lower, upper)
+    with np.errstate(invalid="ignore"):
+        observed = total[:n_columns] / total[n_columns:]
+    # An end may lie beyond what was observed by rounding alone, where all recordings differ by the same.
+    p = np.asarray((1 + n_as_large) / (n_flips + 1))
+    return SignFlips(p, np.fmin(low, observed), np.fmax(high, observed))
+
+
+def _nothing_left(twice: Floats, nothing: Floats) -> Floats:
+    """Sums of the same numbers in another order differ by rounding: what is left of nothing is 0."""
+    twice[np.abs(twice) <= nothing] = 0.0
+    return twice
+
+
+def _stretches(plus: Floats, minus: Floats) -> tuple[Floats, Floats]:
+    """Between which differences two halves disagree, from sums over numbers, (2 columns, n) each."""
+    n_columns = len(plus) // 2
+    is_empty = (plus[n_columns:] == 0) | (minus[n_columns:] == 0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        one, other = plus[:n_columns] / plus[n_columns:], minus[:n_columns] / minus[n_columns:]
+    lower, upper = np.minimum(one, other), np.maximum(one, other)
+    return np.where(is_empty, -np.inf, lower), np.where(is_empty, np.inf, upper)
+
+
+def _ends(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
+    """Where the interval of every column begins and ends, (columns,) each, by its stretches (columns, R)."""
+    n_flips = lower.shape[1]
+    k = next(k for k in range(n_flips + 1) if (1 + k) / (n_flips + 1) >= SIGNIFICANT)
+    if k == 0:
+        return np.full(len(lower), -np.inf), np.full(len(upper), np.inf)
+    low = np.partition(lower, k - 1, axis=1)[:, k - 1]
+    return low, np.partition(upper, n_flips - k, axis=1)[:, n_flips - k]
+
+
+def sign_flip_p(differences: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS) -> Floats:
+    """Two-sided p of every column of `differences` (G, columns) by the cluster sign-flip test.
+
+        p = (1 + #{|Σ ±D_g| ≥ |Σ D_g|}) / (R + 1)
+
+    Since both entries have the same sequences, ΣD_g / n is the difference of their means, and no ratio has to
+    be linearised. The test assumes that D_g is symmetric where neither is better, as likely to be −D_g. A
+    recording is turned as a whole, since its sequences are not independent. Recordings without sequences in
+    an interval have D_g = 0 and change nothing. Without any difference p is 1.
+    """
+    return sign_flips(differences, np.ones_like(differences), rng=rng, n_flips=n_flips).p
+
+
+def difference(
+    first: Floats,
+    second: Floats,
+    counts: Floats,
+    *,
+    signs: np.random.Generator,
+    n_flips: int = N_SIGN_FLIPS,
+) -> dict[str, Difference]:
+    """Compare the sums of two entries over the same sequences, (G, 10) each; nothing is rounded.
+
+    A column without sequences is absent.
+    """
+    gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
+    found = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
+    # With 8 degrees of freedom there are 8 recordings, and an end is missing after a few dozen flips alone.
+    is_known = usable_columns(counts) & np.isfinite(found.low) & np.isfinite(found.high)
+    return {
+        name: Difference(
+            float(gaps[:, i].sum() / n[i]),
+            low=float(found.low[i]) if is_known[i] else None,
+            high=float(found.high[i]) if is_known[i] else None,
+            p=float(found.p[i]) if is_known[i] else None,
+            n_effective=float(degrees[i]),
+        )
+        for i, name in enumerate(SCORE_NAMES)
+        if n[i] > 0
+    }
+
+
+def rounded_difference(
+    found: Difference, *, first: float | None, second: float | None, decimals: int
+) -> Difference:
+    """A difference as it is published, by the two values that it is between; these may be rounded already.
+
+    - It is the difference of the two published values, whatever lies behind their last digits.
+    - Values that are published alike are not told apart: p is 1, and the interval holds 0.
+    - Else 0 is outside the published interval exactly where p is below 0.05: an end that would round to 0
+      is published as one unit of the last digit on its own side.
+    - The interval holds the published difference.
+    - p keeps the four decimals that it has, and is judged as it was computed.
+
+    Without one of the values the difference itself is rounded.
+
+    >>> rounded_difference(Difference(0.41, 0.003, 0.82, 0.0496), first=1.41, second=1.0, decimals=2)
+    Difference(difference=0.41, low=0.01, high=0.82, p=0.0496, p_below=0.05, n_effective=None)
+    >>> rounded_difference(Difference(0.003, 0.001, 0.005, 0.0002), first=1.0, second=1.0, decimals=2)
+    Difference(difference=0.0, low=0.0, high=0.01, p=1.0, p_below=1.0, n_effective=None)
+    """
+    if first is None or second is None:
+        shown = _rounded(found.difference, decimals)
+    else:
+        shown = _rounded(_rounded(first, decimals) - _rounded(second, decimals), decimals)
+    if found.n_effective is not None:
+        found = replace(found, n_effective=cut_off(found.n_effective))
+    if found.low is None or found.high is None or found.p_below is None:
+        return replace(found, difference=shown)
+    low, high = _rounded(found.low, decimals), _rounded(found.high, decimals)
+    if shown == 0:
+        return replace(
+            found, difference=shown, low=min(low, 0.0), high=max(high, 0.0), p=1.0, p_below=p_below(1.0)
+        )
+    if found.is_significant:
+        unit = _rounded(10.0**-decimals, decimals)
+        low, high = (max(low, unit), high) if found.difference > 0 else (low, min(high, -unit))
+    p = None if found.p is None else _rounded(found.p, P_DECIMALS)
+    return replace(found, difference=shown, low=min(low, shown), high=max(high, shown), p=p)
+
+
+def _rounded(value: float, decimals: int) -> float:
+    rounded = published(value, decimals=decimals)
+    assert rounded is not None  # noqa: S101 - for the type checker: a number stays one
+    return rounded
+
+
+def compare_predictions(
+    first: Predictions,
+    second: Predictions,
+    truth: GroundTruth,
+    *,
+    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    n_flips: int = N_SIGN_FLIPS,
+    decimals: int | None = PUBLISHED_DECIMALS,
+) -> dict[str, Difference]:
+    """Compare two sets of predictions of the same sequences: first minus second under each score name.
+
+    The random numbers belong to the ground truth's revision, so these are the numbers of an open board's own
+    comparison, rounded as there to so many `decimals` (None: not at all). A column without sequences is
+    absent. Raises as `evaluator.evaluate` does.
+    """
+    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
+    one, other = (Scorer(truth, rules).report(each, keep_bags=True) for each in (first, second))
+    assert one.bags is not None  # noqa: S101 - they were asked for
+    assert other.bags is not None  # noqa: S101 - they were asked for
+    found = difference(
+        one.bags.sums,
+        other.bags.sums,
+        one.bags.counts,
+        signs=generator_of(truth.digest, purpose="signs"),
+        n_flips=n_flips,
+    )
+    if decimals is None:
+        return found
+    values = one.flat(), other.flat()
+    return {
+        name: rounded_difference(gap, first=values[0][name], second=values[1][name], decimals=decimals)
+        for name, gap in found.items()
+    }

@@ -1,0 +1,230 @@
+"""The sign-flip test and its interval against plain loops and scipy, and how both are published."""
+
+import itertools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import stats
+
+from evaluator import compare_predictions, confidence_intervals, evaluate
+from evaluator.differences import Difference, rounded_difference, sign_flip_p, sign_flips
+from tests.evaluator.recordings import Floats, predictions, world
+
+
+def test_p_is_that_of_scipys_permutation_test() -> None:
+    rng = np.random.default_rng(11)
+    for shift in (0.0, 0.3, 0.6):
+        gaps = rng.normal(shift, 1, 30)
+        expected = stats.permutation_test(
+            (gaps,),
+            lambda x, axis: x.sum(axis=axis),
+            permutation_type="samples",
+            n_resamples=9_999,
+            vectorized=True,
+            rng=np.random.default_rng(0),
+        ).pvalue
+        found = sign_flip_p(gaps[:, None], rng=np.random.default_rng(1))[0]
+        assert found == pytest.approx(expected, abs=0.015)
+
+
+def test_p_of_a_few_recordings_is_that_of_all_ways_to_turn_them() -> None:
+    gaps = np.array([1.0, 2.0, -0.5, 3.0, 0.25, 1.0])
+    turned = [abs(np.dot(signs, gaps)) for signs in itertools.product([-1, 1], repeat=6)]
+    exact = np.mean(np.array(turned) >= abs(gaps.sum()) - 1e-12)
+    assert sign_flip_p(gaps[:, None], rng=np.random.default_rng(2))[0] == pytest.approx(exact, abs=0.01)
+
+
+def test_sums_that_differ_by_rounding_alone_count_as_equally_large() -> None:
+    gaps = np.array([[0.1], [0.2], [0.3]] * 2 + [[0.0]] * 30)
+    turned_over = sign_flip_p(gaps[::-1], rng=np.random.default_rng(2))[0]
+    assert turned_over == pytest.approx(2 / 2**6, abs=0.006)
+    assert sign_flip_p(np.zeros((25, 1)), rng=np.random.default_rng(2)).tolist() == [1.0]
+
+
+def test_recordings_without_sequences_in_an_interval_change_nothing_of_its_p() -> None:
+    gaps = np.random.default_rng(3).normal(0.4, 1, (30, 1))
+    with_empty = np.concatenate([gaps, np.zeros((50, 1))])
+    one, other = (sign_flip_p(each, rng=np.random.default_rng(4))[0] for each in (gaps, with_empty))
+    assert one == pytest.approx(other, abs=0.01)
+
+
+# --- the interval ----------------------------------------------------------------------------------------
+
+
+def by_a_loop(gaps: Floats, counts: Floats, *, seed: int, n_flips: int) -> tuple[float, float, float]:
+    """p, low and high of one column, one vector of signs after the other; all are integers."""
+    signs = np.random.default_rng(seed).integers(0, 2, (n_flips, len(gaps)), dtype=np.int8)
+    n_as_large = 0
+    lows: list[float] = []
+    highs: list[float] = []
+    for row in signs:
+        plus, minus = row == 1, row == 0
+        n_as_large += abs(gaps[plus].sum() - gaps[minus].sum()) >= abs(gaps.sum())
+        if not counts[plus].sum() or not counts[minus].sum():
+            lows, highs = [*lows, -np.inf], [*highs, np.inf]
+            continue
+        means = gaps[plus].sum() / counts[plus].sum(), gaps[minus].sum() / counts[minus].sum()
+        lows, highs = [*lows, min(means)], [*highs, max(means)]
+    allowed = [k for k in range(n_flips + 1) if (1 + k) / (n_flips + 1) >= 0.05]
+    low, high = sorted(lows)[allowed[0] - 1], sorted(highs, reverse=True)[allowed[0] - 1]
+    return (1 + n_as_large) / (n_flips + 1), low, high
+
+
+@pytest.mark.parametrize("n_flips", [199, 999])
+@pytest.mark.parametrize("shift", [0, 2, 6])
+def test_p_and_interval_are_those_of_a_plain_loop(shift: int, n_flips: int) -> None:
+    rng = np.random.default_rng([shift, n_flips])
+    counts = rng.integers(0, 30, (24, 3)).astype(float)
+    counts[:9, 2] = 0
+    gaps = rng.integers(-90 + shift * 5, 100 + shift * 5, counts.shape) * (counts > 0)
+    found = sign_flips(gaps.astype(float), counts, rng=np.random.default_rng(7), n_flips=n_flips)
+    for column in range(3):
+        p, low, high = by_a_loop(gaps[:, column], counts[:, column], seed=7, n_flips=n_flips)
+        assert found.p[column] == p
+        assert (found.low[column], found.high[column]) == (low, high)
+
+
+def some_gaps(kind: str, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Differences and counts, (recordings, 40 columns), near the border of what is significant."""
+    n_bags = int(rng.choice([8, 12, 20, 35, 80]))
+    counts = rng.integers(0 if kind == "holes" else 1, 40, (n_bags, 40)).astype(float)
+    shift = rng.normal(0, 2.2, 40) / n_bags**0.5
+    if kind == "integers":
+        return np.round(rng.normal(0, 1.5, counts.shape) + shift), counts
+    if kind == "alike":
+        return np.where(rng.random(counts.shape) < 0.8, 0, rng.normal(0, 1, counts.shape) + 2 * shift), counts
+    if kind == "constant":
+        return shift * counts, counts
+    if kind == "tenths":  # sums that are equal but for their rounding
+        return np.round(rng.normal(0, 3, counts.shape) + 3 * shift) / 10, counts
+    return (rng.standard_t(2, counts.shape) + shift) * counts, counts
+
+
+@pytest.mark.parametrize("kind", ["integers", "alike", "constant", "tenths", "holes", "heavy"])
+def test_0_is_outside_the_interval_exactly_where_p_is_below_5_percent(kind: str) -> None:
+    n_significant = n_not = 0
+    for seed in range(6):
+        gaps, counts = some_gaps(kind, np.random.default_rng([seed, len(kind)]))
+        for n_flips in (499, 1_999):
+            found = sign_flips(gaps, counts, rng=np.random.default_rng(seed), n_flips=n_flips)
+            is_outside = (found.low > 0) | (found.high < 0)
+            assert (is_outside == (found.p < 0.05)).all()
+            p = sign_flip_p(gaps, rng=np.random.default_rng(seed), n_flips=n_flips)
+            assert (p == found.p).all()
+            n_significant += int(is_outside.sum())
+            n_not += int((~is_outside).sum())
+    assert n_significant >= 10
+    assert n_not >= 10 or kind == "constant"
+
+
+def test_the_interval_holds_exactly_what_the_same_test_does_not_reject() -> None:
+    gaps, counts = some_gaps("integers", np.random.default_rng(5))
+    gaps, counts = gaps[:, :1], counts[:, :1]
+    found = sign_flips(gaps, counts, rng=np.random.default_rng(0))
+    for end, outwards in ((found.low[0], -1), (found.high[0], 1)):
+        for step, is_held in ((1e-6, False), (-1e-6, True)):
+            shifted = gaps - (end + outwards * step) * counts
+            p = sign_flip_p(shifted, rng=np.random.default_rng(0))[0]
+            assert (p >= 0.05) == is_held
+
+
+def test_few_recordings_exclude_no_difference() -> None:
+    gaps = np.array([[3.0], [4.0], [5.0], [6.0]])
+    found = sign_flips(gaps, np.ones_like(gaps), rng=np.random.default_rng(0))
+    assert (found.low[0], found.high[0]) == (-np.inf, np.inf)
+    assert found.p[0] > 0.05
+    nothing = sign_flips(np.zeros((30, 1)), np.zeros((30, 1)), rng=np.random.default_rng(0))
+    assert (nothing.p[0], nothing.low[0], nothing.high[0]) == (1.0, -np.inf, np.inf)
+
+
+# --- as it is published ----------------------------------------------------------------------------------
+
+
+@settings(max_examples=300)
+@given(
+    first=st.floats(0, 50),
+    gap=st.floats(-3, 3),
+    below=st.floats(0, 3),
+    above=st.floats(0, 3),
+    decimals=st.integers(1, 2),
+    scale=st.sampled_from([1.0, 0.01]),
+)
+def test_what_is_published_says_the_same_of_0_as_p(
+    first: float, gap: float, below: float, above: float, decimals: int, scale: float
+) -> None:
+    gap, low, high = scale * gap, scale * (gap - below), scale * (gap + above)
+    p = 0.0496 if low > 0 or high < 0 else 0.05
+    found = rounded_difference(
+        Difference(gap, low, high, p), first=first + gap, second=first, decimals=decimals
+    )
+    assert found.low <= found.difference <= found.high
+    assert found.is_significant == (found.low > 0 or found.high < 0)
+    assert found.difference == pytest.approx(round(first + gap, decimals) - round(first, decimals))
+    if found.difference == 0:
+        assert (found.p, found.p_below) == (1.0, 1.0)
+    else:
+        assert (found.p, found.p_below) == (p, 0.05 if p < 0.05 else 1.0)
+        assert abs(found.low - low) <= 10**-decimals + 1e-9 or found.low == found.difference
+        assert abs(found.high - high) <= 10**-decimals + 1e-9 or found.high == found.difference
+
+
+def test_p_is_judged_as_it_was_computed_and_not_as_it_is_rounded() -> None:
+    assert [Difference(1.0, 0.1, 2.0, p).is_significant for p in (0.0496, 0.04999999, 0.05)] == [
+        True,
+        True,
+        False,
+    ]
+    found = rounded_difference(Difference(1.0, 0.1, 2.0, 0.04999999), first=1.0, second=0.0, decimals=2)
+    assert (found.p, found.p_below, found.is_significant) == (0.05, 0.05, True)
+    hidden = Difference(1.0, 0.1, 2.0, None, 0.01)
+    assert hidden.is_significant
+    assert hidden.turned() == Difference(-1.0, -2.0, -0.1, None, 0.01)
+
+
+def test_what_is_detectable_is_found_four_times_in_five() -> None:
+    rng = np.random.default_rng(4)
+    counts = np.full((100, 200), 10.0)
+    noise = 10 * rng.normal(0, 1, counts.shape)
+    found = sign_flips(noise, counts, rng=rng, n_flips=999)
+    detectable = [
+        Difference(0.0, low, high, 1.0).detectable_difference
+        for low, high in zip(found.low, found.high, strict=True)
+    ]
+    shift = float(np.mean([value for value in detectable if value is not None]))
+    again = 10 * rng.normal(shift, 1, counts.shape)
+    assert (sign_flip_p(again, rng=rng, n_flips=999) < 0.05).mean() == pytest.approx(0.8, abs=0.08)
+    assert Difference(0.0, None, None, None).detectable_difference is None
+
+
+# --- two files -------------------------------------------------------------------------------------------
+
+
+def test_comparing_two_files_is_paired_symmetric_and_repeatable() -> None:
+    truth = world(12)
+    first, second = predictions(truth, 1), predictions(truth, 2, noise=0.3)
+    found = compare_predictions(first, second, truth, decimals=None)
+    assert found == compare_predictions(first, second, truth, decimals=None)
+    means = [evaluate(each, truth).flat() for each in (first, second)]
+    turned = compare_predictions(second, first, truth, decimals=None)
+    for name, gap in found.items():
+        assert gap.difference == pytest.approx(means[0][name] - means[1][name], rel=1e-9)
+        assert (gap.low is None) == (gap.p is None) == (gap.n_effective < 8)
+        if gap.p is not None:
+            assert gap.low <= gap.difference <= gap.high
+            assert turned[name].turned() == gap
+    own = [confidence_intervals(each, truth)["mid"] or (0.0, 0.0) for each in (first, second)]
+    assert found["mid"].high - found["mid"].low < sum(high - low for low, high in own)
+
+
+def test_two_files_are_compared_as_a_board_publishes_it() -> None:
+    truth = world(12)
+    first, second = predictions(truth, 1), predictions(truth, 2, noise=0.3)
+    exact = compare_predictions(first, second, truth, decimals=None)
+    means = [evaluate(each, truth).flat() for each in (first, second)]
+    for name, gap in compare_predictions(first, second, truth).items():
+        assert gap == rounded_difference(exact[name], first=means[0][name], second=means[1][name], decimals=2)
+    same = compare_predictions(first, first, truth)["mid"]
+    assert (same.difference, same.low, same.high, same.p) == (0, 0, 0, 1)
+    assert not same.is_significant
