@@ -8,7 +8,7 @@ from django.contrib.admin.models import LogEntry
 from django.contrib.auth.admin import UserAdmin as DjangoUserAdmin
 from django.db import transaction
 from django.db.models import Model, QuerySet, URLField
-from django.http import HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse
 from django.utils import timezone
 
 from leaderboard import audit, boards, lifecycle, quotas, tokens
@@ -192,17 +192,20 @@ class QuotaOverrideAdmin(admin.ModelAdmin):
 
     def save_model(self, request: HttpRequest, obj: QuotaOverride, form: Any, change: bool) -> None:
         """Give the team these rules."""
-        row = quotas.override(
-            team=obj.team,
-            split=obj.split,
-            limit=obj.quota_limit,
-            window=obj.quota_window,
-            min_gap=obj.quota_min_gap,
-            rejected_limit=obj.quota_rejected_limit,
-            reason=obj.reason,
-            actor=cast("User", request.user),
-            now=timezone.now(),
-        )
+        try:
+            row = quotas.override(
+                team=obj.team,
+                split=obj.split,
+                limit=obj.quota_limit,
+                window=obj.quota_window,
+                min_gap=obj.quota_min_gap,
+                rejected_limit=obj.quota_rejected_limit,
+                reason=obj.reason,
+                actor=cast("User", request.user),
+                now=timezone.now(),
+            )
+        except Team.DoesNotExist:
+            raise Http404 from None  # it has just ended
         obj.pk = row.pk
 
     def delete_model(self, request: HttpRequest, obj: QuotaOverride) -> None:

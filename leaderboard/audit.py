@@ -1,8 +1,8 @@
 """The audit trail: who did what to what, when. Each event is bound to the one before it by its hash.
 
 Of two transactions that write events the second waits for the end of the first, whose hash it has to know.
-A verb therefore records last of all that it writes: the wait is then as long as a COMMIT, and nobody waits
-for a row while others wait for the chain.
+A verb therefore records last of all that it writes: the wait is then as long as a COMMIT. And nobody who has
+the chain waits for a row that somebody has who waits for the chain: see `hold`.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -20,6 +20,7 @@ from leaderboard.models.audit import GENESIS
 
 # Names the chain among PostgreSQL's advisory locks: "audit" in ASCII.
 _LOCK = 0x6175646974
+_CHECK_AND_LOCK = f"SET CONSTRAINTS ALL IMMEDIATE; SELECT pg_advisory_xact_lock({_LOCK})"
 _CHUNK = 2000
 MAX_BREAKS = 20
 
@@ -58,7 +59,7 @@ def _chained(
     """The deeds as events that follow the last one, to be written before the transaction ends."""
     if not deeds:
         return []
-    previous_hash = _locked_tip()
+    previous_hash = _locked_tip(actor)
     at = timezone.now()
     events = []
     for verb, noun, noun_id, details in deeds:
@@ -76,17 +77,25 @@ def _chained(
     return events
 
 
-def hold() -> None:
-    """Let nobody else record until the transaction ends; to be called where it ends soon."""
-    if connection.vendor == "postgresql":
-        with connection.cursor() as cursor:
-            cursor.execute("SELECT pg_advisory_xact_lock(%s)", [_LOCK])
-    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+def hold(actor: User | None = None) -> None:
+    """Let nobody else record until the transaction ends; to be called where it ends soon.
+
+    Foreign keys that are checked at COMMIT would wait there, with the chain in hand, for whoever holds a row
+    that they name. So those of all rows written until now are checked here, before the chain is taken; and
+    that of the events to come is held: their `actor`.
+    """
+    if connection.vendor != "postgresql":
+        # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+        return
+    with connection.cursor() as cursor:
+        if actor is not None:
+            cursor.execute("SELECT 1 FROM leaderboard_user WHERE id = %s FOR KEY SHARE", [actor.pk])
+        cursor.execute(_CHECK_AND_LOCK)
 
 
-def _locked_tip() -> str:
+def _locked_tip(actor: User | None) -> str:
     """The hash of the last event, which stays the last until the transaction ends."""
-    hold()
+    hold(actor)
     return AuditEvent.objects.order_by("-pk").values_list("hash", flat=True).first() or GENESIS
 
 

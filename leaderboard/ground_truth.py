@@ -38,7 +38,7 @@ def import_truth(
     get_protocol(protocol)
     with transaction.atomic():
         row = add(split_name=split_name, path=path, now=now, actor=actor)
-        split = Split.objects.select_for_update().get(pk=split_name)
+        split = Split.objects.select_for_update(no_key=True).get(pk=split_name)
         existing = Edition.objects.filter(split=split, ground_truth=row, protocol=protocol).first()
         if existing is not None:
             return existing
@@ -77,7 +77,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     with transaction.atomic():
         # The split before the audit trail, as every verb takes them: two that did it the other way round
         # could wait for each other.
-        Split.objects.select_for_update().get(pk=split.pk)
+        Split.objects.select_for_update(no_key=True).get(pk=split.pk)
         row, is_new = GroundTruth.objects.get_or_create(
             digest=truth.digest,
             defaults={

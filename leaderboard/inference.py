@@ -322,7 +322,9 @@ def _write(
     floor, n_effective = bags.floor_of(edition), _n_effective(edition)
     with transaction.atomic():
         present = (
-            Edition.objects.select_for_update(of=("self",)).select_related("ground_truth").get(pk=edition.pk)
+            Edition.objects.select_for_update(of=("self",), no_key=True)
+            .select_related("ground_truth")
+            .get(pk=edition.pk)
         )
         if present.inference_digest != edition.inference_digest or digest != digest_of(
             present, standing(present)

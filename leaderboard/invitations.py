@@ -144,7 +144,7 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
         raise _nothing()
     with transaction.atomic():
         membership = teams.present_membership(user, seen.team)
-        invitation = Invitation.objects.select_for_update().filter(pk=seen.pk).first()
+        invitation = Invitation.objects.select_for_update(no_key=True).filter(pk=seen.pk).first()
         if invitation is None:
             raise _nothing()  # its team has ended meanwhile
         _require_standing(invitation, now=now)

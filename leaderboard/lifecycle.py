@@ -151,7 +151,7 @@ def claim(
     token = token or uuid.uuid4()
     with transaction.atomic():
         # SQLite has one writer, and skips nothing.
-        due = Evaluation.objects.due().select_for_update(skip_locked=True)
+        due = Evaluation.objects.due().select_for_update(skip_locked=True, no_key=True)
         due = due if held is None else due.scorable(held)
         waiting = due.values_list("pk", "attempt", "priority", "edition")
         rows = list(waiting[:limit])
@@ -257,7 +257,7 @@ def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
     With each the present time, by the database's clock.
     """
     rows = (
-        Evaluation.objects.select_for_update()
+        Evaluation.objects.select_for_update(no_key=True)
         .filter(pk__in=[lease.evaluation_id for lease in leases], status=Status.RUNNING)
         .order_by("pk")  # every batch locks in the same order, so that two cannot wait for each other
         .values_list("pk", "attempt", "lease_token", Now())
@@ -272,11 +272,9 @@ def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) 
     Raises `LostRace` if the lease is no longer valid.
     """
     with transaction.atomic():
-        evaluation = _held(lease).select_for_update().first()
+        evaluation = _held(lease).select_for_update(no_key=True).first()
         if evaluation is None:
-            raise LostRace(
-                f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer the valid one"
-            )
+            raise LostRace(f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer valid")
         return _strike(evaluation, strike=strike, reason=reason, rng=rng)
 
 
@@ -287,9 +285,8 @@ def hand_back(leases: Sequence[Lease]) -> int:
     """
     with transaction.atomic():
         held = _locked(leases)
-        return Evaluation.objects.filter(pk__in=held, status=Status.RUNNING).update(
-            status=Status.QUEUED, leased_until=None
-        )
+        rows = Evaluation.objects.filter(pk__in=held, status=Status.RUNNING)
+        return rows.update(status=Status.QUEUED, leased_until=None)
 
 
 # --- the sweeper's verbs ---------------------------------------------------------------------------------
@@ -303,7 +300,7 @@ def release_expired(*, rng: random.Random) -> int:
     """
     with transaction.atomic():
         expired = list(
-            Evaluation.objects.select_for_update(skip_locked=True)
+            Evaluation.objects.select_for_update(skip_locked=True, no_key=True)
             .filter(status=Status.RUNNING, leased_until__lt=Now())
             .annotate(overran=Q(leased_until__gte=F("deadline_at")))
         )
@@ -365,20 +362,23 @@ def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.
 
 def cancel_edition(*, edition: Edition) -> int:
     """Cancel what is not decided yet in an edition that was given up. Returns how many that were."""
-    return Evaluation.objects.filter(edition=edition, status__in=[Status.QUEUED, Status.RUNNING]).update(
-        status=Status.CANCELLED, finished_at=Now()
-    )
+    return _cancel(Evaluation.objects.filter(edition=edition))
 
 
 def cancel(*, submission: Submission, actor: User) -> int:
     """Cancel what is not decided yet of a submission. Returns how many evaluations that were."""
     with transaction.atomic():
-        n_cancelled = Evaluation.objects.filter(
-            submission=submission, status__in=[Status.QUEUED, Status.RUNNING]
-        ).update(status=Status.CANCELLED, finished_at=Now())
+        n_cancelled = _cancel(Evaluation.objects.filter(submission=submission))
         if n_cancelled:
             audit.record(verb="cancelled", noun="Submission", noun_id=submission.pk, actor=actor)
     return n_cancelled
+
+
+def _cancel(evaluations: QuerySet[Evaluation]) -> int:
+    undecided = evaluations.filter(status__in=[Status.QUEUED, Status.RUNNING])
+    # In the order in which a batch is locked, so that neither has what the other waits for.
+    rows = undecided.order_by("pk").select_for_update(no_key=True).values_list("pk", flat=True)
+    return undecided.filter(pk__in=list(rows)).update(status=Status.CANCELLED, finished_at=Now())
 
 
 def retry(*, evaluation: Evaluation, actor: User, reason: str = "") -> None:

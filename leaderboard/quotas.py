@@ -106,13 +106,14 @@ def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quot
     return _state(team=team, user=user, split=split, rules=rules, now=now)
 
 
-def hold(*, team: Team) -> None:
+def hold(*, team: Team) -> bool:
     """Let what else the team does wait until this transaction ends, so that two cannot take one slot.
 
-    To be called before anything is looked up that `require` or an answer depends on.
+    To be called before anything is looked up that `require` or an answer depends on. Returns whether the team
+    is still there.
     """
     # SQLite has one writer at a time, and takes no notice.
-    Team.objects.select_for_update(no_key=True).filter(pk=team.pk).first()
+    return Team.objects.select_for_update(no_key=True).filter(pk=team.pk).first() is not None
 
 
 def require(*, team: Team | None, user: User, split: Split, now: datetime) -> None:
@@ -272,7 +273,7 @@ def override(
 ) -> QuotaOverride:
     """Give a team rules of its own on a split, in place of any it had. `actor` None is the command line.
 
-    Raises `NotMaintainer`.
+    Raises `NotMaintainer`, and `Team.DoesNotExist` if the team has just ended.
     """
     _require_maintainer(actor)
     rules = {
@@ -282,6 +283,9 @@ def override(
         "quota_rejected_limit": rejected_limit,
     }
     with transaction.atomic():
+        # Before the row that names it: whoever ends the team holds it, and waits for the audit trail.
+        if not hold(team=team):
+            raise Team.DoesNotExist(f"The team {team.name!r} has just ended; expected one that is there.")
         row, _ = QuotaOverride.objects.update_or_create(
             team=team, split=split, defaults={**rules, "reason": reason, "set_by": actor, "set_at": now}
         )

@@ -86,7 +86,7 @@ def open_edition(
     else:
         row = _imported(split, digest)
     with transaction.atomic():
-        split = Split.objects.select_for_update().get(pk=split.pk)
+        split = Split.objects.select_for_update(no_key=True).get(pk=split.pk)
         edition = split.editions.filter(ground_truth=row, protocol=protocol, discarded_at=None).first()
         if edition is None:
             edition = ground_truth.new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
@@ -208,7 +208,7 @@ def roll_back(
     _require_maintainer(actor)
     reason = _reason(reason)
     with transaction.atomic():
-        split = Split.objects.select_for_update().get(pk=split_name)
+        split = Split.objects.select_for_update(no_key=True).get(pk=split_name)
         _require_same_board(split, replaces)
         former = predecessor(split)
         if former is None:
@@ -259,7 +259,7 @@ def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None)
 
 def _locked(edition: Edition) -> tuple[Edition, Split]:
     """The edition and its split as they are now, the split locked."""
-    split = Split.objects.select_for_update().get(pk=edition.split_id)
+    split = Split.objects.select_for_update(no_key=True).get(pk=edition.split_id)
     edition = Edition.objects.get(pk=edition.pk)
     edition.split = split
     return edition, split

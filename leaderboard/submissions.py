@@ -92,8 +92,10 @@ def submit(
     if first is not None:
         return Submitted(submission=first, is_new=False)
     kept = files.keep_predictions(upload, now=now)
-    team = teams.team_of(user=user)
     with transaction.atomic():
+        # First of all: whoever founds a team has the audit trail from then on, and waits for nothing more.
+        split = Split.objects.lock_shared(split.pk)
+        team = teams.team_of(user=user)
         quotas.hold(team=team)
         teams.require_member(team, user)
         method = _method(team=team, name=name, details=details, now=now)
@@ -122,7 +124,7 @@ def submit(
         except IntegrityError:
             # The same bytes came twice at once, and the other request was first.
             return Submitted(submission=standing.get(), is_new=False)
-        _queue(submission)
+        _queue(submission, split)
         if changes:
             submission.method = methods.edit(method=method, changes=changes, actor=user)
         audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
@@ -137,9 +139,8 @@ def submit(
     return Submitted(submission=submission, is_new=True)
 
 
-def _queue(submission: Submission) -> None:
+def _queue(submission: Submission, split: Split) -> None:
     """Queue the submission for the published edition, and for any that is being prepared beside it."""
-    split = Split.objects.lock_shared(submission.split_id)
     in_preparation = Q(published_at=None, discarded_at=None)
     for edition in split.editions.filter(in_preparation | Q(pk=split.published_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
@@ -263,7 +264,7 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
             return False
         lifecycle.cancel(submission=submission, actor=actor)
         # Before looking who is private: whoever shows a method holds this until it is shown.
-        audit.hold()
+        audit.hold(actor)
         if Method.objects.shown().filter(pk=submission.method_id).exists():
             boards.changed(submission.split_id)
         audit.record(verb="withdrawn", noun="Submission", noun_id=submission.pk, actor=actor)

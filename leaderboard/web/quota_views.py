@@ -6,7 +6,7 @@ from uuid import UUID
 from django.conf import settings
 from django.contrib import messages
 from django.core.paginator import Paginator
-from django.http import HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
@@ -60,7 +60,10 @@ def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     form = OverrideForm.asked(request, initial=OverrideForm.filled_with(own or found))
     if form.is_valid():
         actor, now = _maintainer(request), timezone.now()
-        verbs.override(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
+        try:
+            verbs.override(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
+        except Team.DoesNotExist:
+            raise Http404 from None  # it has just ended
         messages.success(request, f"{team.name} has rules of its own on {split}.")
         return redirect("maintain_team_quotas", team.pk)
     return _form(request, "maintainers/quota_override.html", form, team=team, split=found, own=own)

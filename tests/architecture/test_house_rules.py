@@ -129,6 +129,30 @@ def test_the_rule_about_statuses_sees_every_way_to_write_one(source: str) -> Non
     assert status_writes(ast.parse(source)) == [1]
 
 
+# --- a row that others name by a foreign key is locked without its key -------------------------------------
+
+
+def locks_with_the_key(module: ast.Module) -> list[int]:
+    """Lines that lock rows FOR UPDATE: a COMMIT elsewhere that checks a foreign key then waits for it.
+
+    Who deletes a row has it FOR UPDATE by the deletion itself.
+    """
+    return [
+        node.lineno
+        for node in ast.walk(module)
+        if isinstance(node, ast.Call)
+        and isinstance(node.func, ast.Attribute)
+        and node.func.attr == "select_for_update"
+        and "no_key" not in {keyword.arg for keyword in node.keywords}
+    ]
+
+
+def test_no_row_is_locked_with_its_key() -> None:
+    found = {path: locks_with_the_key(tree(path)) for path in written_by_hand("leaderboard")}
+    assert {path: lines for path, lines in found.items() if lines} == {}
+    assert locks_with_the_key(ast.parse("Split.objects.select_for_update(of=('self',)).get()")) == [1]
+
+
 # --- models <- verbs <- doors ------------------------------------------------------------------------------
 
 DOORS = {"admin", "api", "management", "tasks", "web"}

@@ -1,0 +1,278 @@
+"""Every verb that takes locks, ready to be done once in a scene that all of them share."""
+
+import uuid
+from collections.abc import Callable, Mapping
+from datetime import timedelta
+from functools import partial
+from typing import Any
+
+from django.core.files.base import ContentFile
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import (
+    boards,
+    clock,
+    ground_truth,
+    idempotency,
+    inference,
+    invitations,
+    lifecycle,
+    methods,
+    quotas,
+    rescoring,
+    submissions,
+    teams,
+    tokens,
+    visibility,
+)
+from leaderboard.models import (
+    Edition,
+    Evaluation,
+    Invitation,
+    Method,
+    QuotaOverride,
+    Split,
+    Submission,
+    Team,
+    User,
+)
+from tests import builders
+from tests.leaderboard import queue_rows
+from tests.locking_scene import DAY, Scene
+
+Deed = Callable[[], object]
+RULES: dict[str, Any] = {
+    "limit": None,
+    "window": timedelta(days=1),
+    "min_gap": timedelta(0),
+    "rejected_limit": None,
+}
+
+
+def _submission(scene: Scene, user: User) -> Callable[[], submissions.Submitted]:
+    name = "Public" if user == scene.owner else "New"
+    return partial(
+        submissions.submit,
+        user=user,
+        split_name=scene.world.edition.split_id,
+        method_name=name,
+        upload=ContentFile(uuid.uuid4().bytes, name="p.json"),
+        via=Submission.Via.API,
+        now=timezone.now(),
+        description="What it is." if user == scene.owner else "",
+    )
+
+
+def _first_submission(scene: Scene) -> Deed:
+    """Of somebody whose team is founded with it."""
+    return partial(
+        idempotency.once,
+        user=scene.newcomer,
+        key=uuid.uuid4().hex,
+        digest="sha256:0",
+        submit=_submission(scene, scene.newcomer),
+        now=timezone.now(),
+    )
+
+
+def _leases(n: int) -> list[lifecycle.Lease]:
+    """Of what is most urgent, whoever has claimed it."""
+    lifecycle.claim(lease_s=60, wall_s=300, limit=n)
+    rows = Evaluation.objects.filter(status="RUNNING").order_by("priority", "pk")
+    return [lifecycle.Lease(row.pk, row.attempt, row.lease_token) for row in rows[:n] if row.lease_token]
+
+
+def _finalise(scene: Scene, *, n: int) -> Deed:
+    return partial(lifecycle.finalise_many, [(lease, queue_rows.SCORED) for lease in _leases(n)])
+
+
+def _give_back(scene: Scene) -> Deed:
+    [lease] = _leases(1)
+    Evaluation.objects.filter(pk=lease.evaluation_id).update(n_poison_strikes=2)
+    return partial(queue_rows.give_back, lease, lifecycle.Strike.POISON)
+
+
+def _hand_back(scene: Scene) -> Deed:
+    return partial(lifecycle.hand_back, _leases(9))
+
+
+def _release(scene: Scene) -> Deed:
+    for lease in _leases(9):
+        queue_rows.expire(lease)
+    Evaluation.objects.update(n_infrastructure_strikes=9)
+    return queue_rows.release_expired
+
+
+def _infer(scene: Scene) -> Deed:
+    edition = Edition.objects.select_related("ground_truth").get(pk=scene.world.edition.pk)
+    return partial(inference.infer, edition=edition, now=timezone.now())
+
+
+def _by_maintainer(scene: Scene) -> dict[str, Any]:
+    return {"actor": scene.world.maintainer, "now": timezone.now()}
+
+
+def _publish(scene: Scene) -> Deed:
+    return partial(
+        rescoring.publish,
+        edition=scene.prepared,
+        reason="Corrected.",
+        replaces=1,
+        leave_out=True,
+        **_by_maintainer(scene),
+    )
+
+
+def _roll_back(scene: Scene) -> Deed:
+    if not scene.prepared.publications.exists():
+        _publish(scene)()
+    split = scene.world.edition.split_id
+    return partial(
+        rescoring.roll_back, split_name=split, reason="Wrong.", replaces=2, **_by_maintainer(scene)
+    )
+
+
+def _discard(scene: Scene) -> Deed:
+    return partial(rescoring.discard, edition=scene.prepared, reason="Wrong.", **_by_maintainer(scene))
+
+
+def _open(scene: Scene) -> Deed:
+    split, digest = scene.world.edition.split_id, scene.truth.pk
+    return partial(rescoring.open_edition, split_name=split, digest=digest, **_by_maintainer(scene))
+
+
+def _import(scene: Scene) -> Deed:
+    split = scene.world.edition.split_id
+    path = builders.truth_csv(scene.world.folder / "truth.csv", n=40, n_recordings=10, seed=1)
+    return partial(ground_truth.add, split_name=split, path=path, **_by_maintainer(scene))
+
+
+def _override(scene: Scene, team: Team) -> Deed:
+    split = scene.world.edition.split
+    return partial(
+        quotas.override, team=team, split=split, reason="A study.", **RULES, **_by_maintainer(scene)
+    )
+
+
+def _end_override(scene: Scene) -> Deed:
+    if not scene.team.quota_overrides.exists():
+        _override(scene, scene.team)()
+    row = QuotaOverride.objects.get(team=scene.team)
+    return partial(quotas.end_override, row=row, actor=scene.world.maintainer)
+
+
+def _token(scene: Scene) -> Deed:
+    split = scene.world.edition.split_id
+    return partial(tokens.create, user=scene.owner, name="CI", now=timezone.now(), split_name=split)
+
+
+def _leave_alone(scene: Scene) -> Deed:
+    """The last one goes, and the team with them."""
+    Evaluation.objects.filter(submission__method__team=_alone(scene)).delete()
+    Submission.objects.filter(method__team=_alone(scene)).delete()
+    Method.objects.filter(team=_alone(scene)).delete()
+    return partial(teams.leave, user=scene.loner)
+
+
+def _alone(scene: Scene) -> Team:
+    return Team.objects.get(memberships__user=scene.loner)
+
+
+def _remove(scene: Scene) -> Deed:
+    return partial(teams.remove, team=scene.team, member=_reader(scene), actor=scene.owner)
+
+
+def _reader(scene: Scene) -> User:
+    """The member of the team with nothing else to do."""
+    return User.objects.filter(membership__team=scene.team).latest("pk")
+
+
+def _accept(scene: Scene, user: User) -> Deed:
+    return partial(invitations.accept, secret=scene.secret, user=user, now=timezone.now())
+
+
+def _revoke_invitation(scene: Scene) -> Deed:
+    row = Invitation.objects.get(team=scene.team)
+    return partial(invitations.revoke, invitation=row, actor=scene.owner, now=timezone.now())
+
+
+def _show(scene: Scene) -> Deed:
+    return partial(
+        visibility.change, method=scene.private, visibility="PUBLIC", actor=scene.owner, now=timezone.now()
+    )
+
+
+def _edit(scene: Scene, method: Method, changes: Mapping[str, str]) -> Deed:
+    return partial(methods.edit, method=method, changes=changes, actor=scene.owner)
+
+
+def _other_address(scene: Scene) -> Deed:
+    """A maintainer gives somebody another e-mail address, which is a key of their row."""
+    browser = Client()
+    browser.force_login(scene.world.maintainer)
+    joined = {"date_joined_0": "2026-01-01", "date_joined_1": "00:00:00"}
+    form = {"email": f"{uuid.uuid4()}@example.org", "name": "", "is_active": "on", **joined}
+
+    def change() -> None:
+        answer = browser.post(f"/admin/leaderboard/user/{scene.owner.pk}/change/", form)
+        assert answer.status_code == 302, answer.status_code
+
+    return change
+
+
+def _times_passed(scene: Scene) -> Deed:
+    Split.objects.filter(pk=scene.world.edition.split_id).update(opens_at=timezone.now() - DAY)
+    return partial(boards.times_passed, now=clock.database_now())
+
+
+VERBS: Mapping[str, Callable[[Scene], Deed]] = {
+    "submit": lambda scene: _submission(scene, scene.owner),
+    "submit for the first time": _first_submission,
+    "withdraw": lambda scene: partial(
+        submissions.withdraw, submission=scene.sent, actor=scene.owner, now=timezone.now()
+    ),
+    "claim": lambda scene: partial(lifecycle.claim, lease_s=60, wall_s=300, limit=9),
+    "finalise": partial(_finalise, n=1),
+    "finalise a batch": partial(_finalise, n=9),
+    "strike": _give_back,
+    "hand back": _hand_back,
+    "release expired": _release,
+    "retry": lambda scene: partial(
+        lifecycle.retry, evaluation=scene.failed, actor=scene.world.maintainer, reason="Mended."
+    ),
+    "infer": _infer,
+    "import a ground truth": _import,
+    "open an edition": _open,
+    "publish": _publish,
+    "roll back": _roll_back,
+    "discard": _discard,
+    "times passed": _times_passed,
+    "override a quota": lambda scene: _override(scene, scene.team),
+    "override a loner's quota": lambda scene: _override(scene, _alone(scene)),
+    "end an override": _end_override,
+    "make a token": _token,
+    "revoke a token": lambda scene: partial(
+        tokens.revoke, token=scene.token, now=timezone.now(), actor=scene.owner
+    ),
+    "change an address": _other_address,
+    "found a team": lambda scene: partial(
+        teams.create, user=scene.newcomer, name=uuid.uuid4().hex, now=timezone.now()
+    ),
+    "rename the team": lambda scene: partial(
+        teams.rename, team=scene.team, name=uuid.uuid4().hex, actor=scene.owner
+    ),
+    "leave": lambda scene: partial(teams.leave, user=scene.member),
+    "leave alone": _leave_alone,
+    "remove a member": _remove,
+    "hand over": lambda scene: partial(teams.hand_over, team=scene.team, to=scene.member, actor=scene.owner),
+    "appoint": lambda scene: partial(teams.appoint, team=scene.team, to=scene.member, reason="Gone."),
+    "invite": lambda scene: partial(invitations.make, team=scene.team, actor=scene.owner, now=timezone.now()),
+    "revoke an invitation": _revoke_invitation,
+    "join": lambda scene: _accept(scene, scene.newcomer),
+    "join with methods": lambda scene: _accept(scene, scene.loner),
+    "show a method": _show,
+    "reveal": lambda scene: partial(visibility.reveal_due, now=timezone.now()),
+    "edit a method": lambda scene: _edit(scene, scene.public, {"description": uuid.uuid4().hex}),
+    "rename a method": lambda scene: _edit(scene, scene.private, {"name": uuid.uuid4().hex}),
+}
