@@ -45,7 +45,7 @@ API_CODES: Final[dict[str, str]] = {
     "not-yours": "Only the team that sent a submission may do this.",
     # how often, and how much
     "throttled": "Too many requests in a short time; `Retry-After` says when to come back.",
-    "quota-exceeded": "The team has no submission left on this split; `Retry-After` says for how long.",
+    "quota-exceeded": "The team has no submission, or too few bytes, left; `Retry-After` says for how long.",
     # submitting
     "no-file": "No prediction file was sent.",
     "too-large": "The file is larger than the limit.",

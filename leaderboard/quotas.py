@@ -3,7 +3,9 @@
 Nothing is counted up or down. What is spent follows from the submissions and what came of them, so no counter
 can drift: a submission costs a slot while it waits or runs, and for good once it is scored. Rejected,
 cancelled or failed by our fault it costs none. Rejected and cancelled files have a limit of their own: all of
-them are kept, and whoever could send any number of them would fill the disk.
+them are kept, and whoever could send any number of them would fill the disk. So have files that stopped the
+process that read them, until a maintainer has had them read again: that is our fault, and each costs minutes.
+All files that a team sends within a day, whatever came of them, have a number of bytes in common.
 
 Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
 have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people.
@@ -11,18 +13,19 @@ have sent, from wherever. So nobody gets more by changing teams, nor a team by c
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 from django.conf import settings
 from django.db import transaction
 from django.db.models import Exists, OuterRef, Q
 
-from leaderboard import audit
+from leaderboard import audit, lifecycle
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
 from leaderboard.models.quotas import QuotaRules
 
 REJECTED_WINDOW = timedelta(hours=24)
+BYTES_WINDOW = timedelta(hours=24)
 
 
 class QuotaExceeded(Exception):
@@ -116,12 +119,16 @@ def hold(*, team: Team) -> bool:
     return Team.objects.select_for_update(no_key=True).filter(pk=team.pk).first() is not None
 
 
-def require(*, team: Team | None, user: User, split: Split, now: datetime) -> None:
-    """Raise `QuotaExceeded` unless a slot is open. What it says is certain for whoever has called `hold`."""
-    rules = rules_of(team=team, split=split)
-    if rules.are_none:
+def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now: datetime) -> None:
+    """Raise `QuotaExceeded` unless a slot is open for a file of this size.
+
+    What it says is certain for whoever has called `hold`.
+    """
+    if not settings.QUOTAS:
         return
-    quota = _state(team=team, user=user, split=split, rules=rules, now=now)
+    quota = state(team=team, user=user, split=split, now=now)
+    if quota.is_open and settings.MAX_TEAM_BYTES_PER_DAY:
+        quota = _with_bytes(quota, team=team, user=user, size_bytes=size_bytes, now=now)
     if not quota.is_open:
         raise QuotaExceeded(quota)
 
@@ -149,33 +156,64 @@ def _spent(
     *, team: Team | None, user: User, split: Split, rules: Rules, now: datetime
 ) -> tuple[list[datetime], list[datetime]]:
     """When the team and its people sent what costs a slot, and what was rejected or cancelled, in order."""
-    theirs = Q(submitted_by=user)
-    if team is not None:
-        people = Membership.objects.filter(team=team).values("user")
-        theirs = Q(method__team=team) | Q(submitted_by__in=people)
     since = now - max(rules.window, rules.min_gap, REJECTED_WINDOW)
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
     # Scoring anew after a correction costs nothing and gives nothing back.
     live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
     rows = (
-        Submission.objects.filter(theirs, split=split, submitted_at__gt=since)
+        Submission.objects.filter(_theirs(team, user), split=split, submitted_at__gt=since)
         .annotate(
             is_scored=Exists(evaluations.filter(status=Status.SCORED)),
             is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),
             is_rejected=Exists(live.filter(status=Status.REJECTED)),
+            is_poison=Exists(
+                live.filter(status=Status.SYSTEM_ERROR, n_poison_strikes__gte=lifecycle.MAX_POISON_STRIKES)
+            ),
             # By its team: those of an edition that was given up are cancelled as well.
             is_cancelled=Exists(live.filter(status=Status.CANCELLED, submission__withdrawn_at__isnull=False)),
         )
         .order_by("submitted_at")
-        .values_list("submitted_at", "is_scored", "is_pending", "is_rejected", "is_cancelled")
+        .values_list("submitted_at", "is_scored", "is_pending", "is_rejected", "is_cancelled", "is_poison")
     )
     spent, rejected = [], []
-    for submitted_at, is_scored, is_pending, is_rejected, is_cancelled in rows:
+    for submitted_at, is_scored, is_pending, *is_one_too_many in rows:
         if is_scored or is_pending:
             spent.append(submitted_at)
-        elif is_rejected or is_cancelled:
+        elif any(is_one_too_many):
             rejected.append(submitted_at)
     return spent, rejected
+
+
+def _theirs(team: Team | None, user: User) -> Q:
+    """What the team got from anybody, and what its people sent to anybody."""
+    if team is None:
+        return Q(submitted_by=user)
+    people = Membership.objects.filter(team=team).values("user")
+    return Q(method__team=team) | Q(submitted_by__in=people)
+
+
+def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int, now: datetime) -> Quota:
+    """The quota, closed if this file is more than the team's bytes of a day leave room for."""
+    limit: int = settings.MAX_TEAM_BYTES_PER_DAY
+    rows = Submission.objects.filter(_theirs(team, user), submitted_at__gt=now - BYTES_WINDOW)
+    sent = list(rows.order_by("submitted_at").values_list("submitted_at", "size_bytes"))
+    n_sent = sum(n_bytes for _, n_bytes in sent)
+    if n_sent + size_bytes <= limit:
+        return quota
+    opens_at, n_excess = None, n_sent + size_bytes - limit
+    for submitted_at, n_bytes in sent:
+        n_excess -= n_bytes
+        if n_excess <= 0:
+            opens_at = submitted_at + BYTES_WINDOW
+            break
+    then = f"; there is room for it at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC" if opens_at else ""
+    return replace(
+        quota,
+        is_open=False,
+        next_slot_at=opens_at,
+        sentence=f"Your team has sent {n_sent:,} bytes within 24 hours, and this file has {size_bytes:,}; "
+        f"expected at most {limit:,} bytes together{then}.",
+    )
 
 
 def weigh(
@@ -183,7 +221,8 @@ def weigh(
 ) -> Quota:
     """The quota of a team that sent at these times, oldest first, what costs a slot and what was `rejected`.
 
-    Among these are those that the team cancelled before they were scored.
+    Among these are those that the team cancelled before they were scored, and those that stopped the process
+    that read them.
     """
     in_window = [at for at in spent if at > now - rules.window]
     rejected = [at for at in rejected if at > now - REJECTED_WINDOW]
@@ -202,7 +241,7 @@ def weigh(
             f"{span(rules.window)}",
             gap_until: f"Submissions of a team to {split.pk} are at least {span(rules.min_gap)} apart",
             rejected_until: f"{len(rejected)} files that your team sent to {split.pk} within 24 hours were "
-            f"rejected or cancelled, and no more are taken",
+            f"rejected or cancelled, or stopped the process that read them, and no more are taken",
         }
         sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
     return Quota(

@@ -191,6 +191,8 @@ FILE_UPLOAD_HANDLERS = ["leaderboard.web.uploads.UnnamedFileUploadHandler"]
 
 # Whether teams have quotas (see leaderboard/quotas.py).
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
+# Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
+MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
 
 # --- the life of an evaluation (seconds; see leaderboard/lifecycle.py) ----------------------------------
 

@@ -106,7 +106,7 @@ def submit(
         changes = details.changes_of(method)
         if changes and not may_edit:
             raise _token_split(method, changes)
-        quotas.require(team=team, user=user, split=split, now=now)
+        quotas.require(team=team, user=user, split=split, size_bytes=kept.size_bytes, now=now)
         try:
             with transaction.atomic():
                 submission = Submission.objects.create(
@@ -171,7 +171,7 @@ def _before_the_quota(
     team = teams.present_team_of(user=user)
     named = Method.objects.filter(team=team, name=method_name)
     try:
-        quotas.require(team=team, user=user, split=split, now=now)
+        quotas.require(team=team, user=user, split=split, size_bytes=upload.size, now=now)
     except quotas.QuotaExceeded:
         same = {"split": split, "method__in": named, "digest": files.measure(upload).digest}
         first = Submission.objects.standing().filter(**same).first()
@@ -356,9 +356,11 @@ def _sentence(evaluation: Evaluation) -> str:
             return f"The file is at fault: {found}, so nothing of it was scored."
         case Status.SYSTEM_ERROR:
             tries = f"{n_failed} times" if n_failed != 1 else "once"
+            is_poison = evaluation.n_poison_strikes >= lifecycle.MAX_POISON_STRIKES
+            counts = " Until then it counts among the files rejected within 24 hours." if is_poison else ""
             return (
                 f"The fault is ours, not the file's: scoring it failed {tries}. The file is kept; the "
-                "maintainers see it and can have it scored again."
+                f"maintainers see it and can have it scored again.{counts}"
             )
         case Status.CANCELLED:
             return "Its team cancelled it before it was scored."

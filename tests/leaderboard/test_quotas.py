@@ -39,10 +39,12 @@ def limit(split: str = "test", **rules: object) -> None:
     Split.objects.filter(pk=split).update(**{f"quota_{name}": value for name, value in rules.items()})
 
 
-def send(user: User, data: bytes, *, at: datetime = NOW, method: str = "Foo") -> submissions.Submitted:
+def send(
+    user: User, data: bytes, *, at: datetime = NOW, method: str = "Foo", split: str = "test"
+) -> submissions.Submitted:
     return submissions.submit(
         user=user,
-        split_name="test",
+        split_name=split,
         method_name=method,
         upload=ContentFile(data, name="p.json"),
         via=Submission.Via.API,
@@ -258,8 +260,8 @@ def test_rejected_files_have_a_limit_of_their_own(edition: Edition, owner: User)
     with pytest.raises(QuotaExceeded) as caught:
         send(owner, other(edition, 1), at=NOW + 2 * HOUR)
     assert str(caught.value) == (
-        "2 files that your team sent to test within 24 hours were rejected or cancelled, and no more are "
-        "taken; "
+        "2 files that your team sent to test within 24 hours were rejected or cancelled, or stopped the "
+        "process that read them, and no more are taken; "
         "the next slot opens at 2026-11-21 12:00 UTC."
     )
     assert caught.value.quota.left == 50
