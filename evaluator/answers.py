@@ -43,6 +43,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     visibility: str = ""
     notice: str = ""
     scores: dict[str, float | None] | None = None
+    decimals: int = 2
     intervals: dict[str, Interval] = {}
     awaits_intervals: bool = False
     rank: int | None = None
@@ -88,11 +89,14 @@ class Interval(msgspec.Struct, frozen=True, kw_only=True):
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One row of a board: scores by their ten names, None where an interval has no value.
 
+    `decimals` are those that its values are printed with; None from a server that does not say.
+
     `pseudonym` is that of an anonymous row of one's own team, which others see under it; else None.
     """
 
     method: str
     scores: dict[str, float | None]
+    decimals: int | None = None
     method_id: str | None = None
     rank: int | None = None
     team: str | None = None
@@ -102,6 +106,15 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     pseudonym: str | None = None
     withdrawn_at: str | None = None
     intervals: dict[str, Interval] = {}
+
+    @property
+    def n_decimals(self) -> int:
+        """Those that it is printed with: of a paper's row as many as were printed, else two."""
+        if self.decimals is not None:
+            return self.decimals
+        known = [value for value in self.scores.values() if value is not None]
+        is_short = self.kind == "published" and all(round(value, 1) == value for value in known)
+        return 1 if is_short else 2
 
     def interval(self, score: str) -> Interval:
         """That of one score; without ends where it was not asked for, or is not known."""
@@ -119,6 +132,7 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     document: JSON
     edition: Any = None
     protocol: str | None = None
+    decimals: int | None = None
     ground_truth: str | None = None
     n_sequences: int | None = None
     n_recordings: int | None = None
@@ -200,6 +214,7 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
     edition: Any = None
     entries: list[BoardEntry] = []
     pairs: list[Pair] = []
+    decimals: int = 2
     is_complete: bool = True
     reason: str = ""
 

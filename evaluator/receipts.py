@@ -2,7 +2,7 @@
 
 A receipt is one JSON object. What is signed (Ed25519) is `PREFIX` and the canonical form of the object
 without its `signature`: keys sorted, no space between tokens, UTF-8, as RFC 8785 has it. Scores are decimal
-texts with the protocol's decimals (`"15.03"`), so that no two programs can print one number differently.
+texts with the edition's decimals (`"15.03"`), so that no two programs can print one number differently.
 
 The site's keys are a JSON Web Key Set (RFC 7517, RFC 8037) at `/.well-known/tsttc-receipt-keys.json`, each
 named by its RFC 7638 thumbprint. Retired keys stay in the set: what they signed still verifies.
@@ -67,6 +67,7 @@ class Verified:
     scores: Mapping[str, float | None]
     counts: Mapping[str, int]
     scored_at: str
+    decimals: int = 2  # of its scores
 
 
 # --- the form --------------------------------------------------------------------------------------------
@@ -256,6 +257,9 @@ def verify(receipt: bytes, keys: Mapping[str, bytes]) -> Verified:
         },
         counts={name: document["counts"][name] for name in INTERVAL_NAMES},
         scored_at=document["scored_at"],
+        decimals=max(
+            (len(text.partition(".")[2]) for text in document["scores"].values() if text), default=0
+        ),
     )
 
 

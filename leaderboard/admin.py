@@ -153,7 +153,7 @@ class SubmissionAdmin(ReadOnlyAdmin):
 
 @admin.register(Split)
 class SplitAdmin(AuditedAdmin):
-    """A split's texts, times and quotas. Its published edition changes by publishing only."""
+    """A split's texts, times, quotas and decimals. Its published edition changes by publishing only."""
 
     list_display = ["name", "title", "is_hidden", "published_edition", "opens_at", "closes_at", "quota_limit"]
     audited_fields = (
@@ -163,6 +163,7 @@ class SplitAdmin(AuditedAdmin):
         "quota_window",
         "quota_min_gap",
         "quota_rejected_limit",
+        "decimals",
     )
     readonly_fields = ["name", "published_edition", "is_hidden", "is_simulated"]
 

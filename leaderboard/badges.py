@@ -25,7 +25,7 @@ def words(entry: Entry | None) -> str:
     if entry.scores["mid"] is None:
         return "no MiD"
     rank = f"rank {entry.rank}, " if entry.rank is not None else ""
-    return f"{rank}MiD {format_published(entry.scores['mid'])}"
+    return f"{rank}MiD {format_published(entry.scores['mid'], decimals=entry.decimals)}"
 
 
 def svg(*, label: str, text: str) -> str:

@@ -101,8 +101,7 @@ def counts_of(edition: Edition) -> Floats:
 def floor_of(edition: Edition) -> dict[str, float | None]:
     """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
     floor = floors.floor_of(ground_truth.load(edition.ground_truth_id), protocol=edition.protocol)
-    decimals = get_protocol(edition.protocol).decimals
-    return {name: published(value, decimals=decimals) for name, value in floor.items()}
+    return {name: published(value, decimals=edition.decimals) for name, value in floor.items()}
 
 
 @lru_cache(maxsize=2)

@@ -27,6 +27,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "description": "The hidden test set: the numbers that papers quote.",
         "position": 0,
         "is_hidden": True,
+        "decimals": 1,
         "quota_limit": 3,
         "quota_window": timedelta(days=30),
         "quota_min_gap": timedelta(hours=24),
@@ -37,6 +38,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "description": "The validation set, whose ground truth comes with the dataset.",
         "position": 1,
         "is_hidden": False,
+        "decimals": 2,
         "quota_limit": 50,
     },
     {
@@ -46,6 +48,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "position": 2,
         "is_hidden": False,
         "is_simulated": True,
+        "decimals": 2,
         "quota_limit": 20,
     },
 )

@@ -17,7 +17,7 @@ from django.db import transaction
 from django.db.models import QuerySet
 
 from evaluator import Difference, differences, sentences
-from evaluator.protocol import SCORE_NAMES, get_protocol
+from evaluator.protocol import SCORE_NAMES
 from leaderboard import bags, broker, entries, inference, snapshots, standings
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.standings import Entry
@@ -64,11 +64,15 @@ class Pair:
         if self.differences is None or name not in self.differences:
             return ""
         first, second = self.first.method, self.second.method
-        return sentences.sentence(first, second, name=name, found=self.differences[name])
+        return sentences.sentence(
+            first, second, name=name, found=self.differences[name], decimals=self.first.decimals
+        )
 
     def others(self) -> tuple[str, tuple[str, ...]]:
         """Of the columns beside overall MiD: how many differ significantly, and a sentence for each."""
-        return sentences.others(self.first.method, self.second.method, self.differences or {})
+        return sentences.others(
+            self.first.method, self.second.method, self.differences or {}, decimals=self.first.decimals
+        )
 
 
 @dataclass(frozen=True)
@@ -208,10 +212,9 @@ def compute(row: Comparison, *, now: datetime) -> None:
         first, second, bags.counts_of(edition), signs=inference.generator_of(edition, purpose="signs")
     )
     values = [entries.flat_scores(each.scores.all()) for each in (row.first, row.second)]
-    decimals = get_protocol(edition.protocol).decimals
     shown = {
         name: differences.rounded_difference(
-            gap, first=values[0][name], second=values[1][name], decimals=decimals
+            gap, first=values[0][name], second=values[1][name], decimals=edition.decimals
         )
         for name, gap in found.items()
     }

@@ -112,7 +112,9 @@ def rescored(submission: Submission) -> Rescored | None:
         evaluation.edition_id: evaluation
         for evaluation in submission.evaluations.filter(
             edition__in=[publication.edition_id, publication.replaced_id]
-        ).prefetch_related("scores")
+        )
+        .select_related("edition")
+        .prefetch_related("scores")
     }
     return Rescored(
         publication=publication,

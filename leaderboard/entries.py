@@ -69,6 +69,7 @@ class Entry:
     team: str
     scores: Mapping[str, float | None]
     description: str = ""
+    decimals: int = 2  # of its values: the edition's, or as many as the paper printed
     rank: int | None = None
     date: datetime | None = None
     year: int | None = None
@@ -142,6 +143,7 @@ def published_entry(result: PublishedResult) -> Entry:
         team=result.authors,
         description=result.description,
         scores={name: result.scores.get(name) for name in SCORE_NAMES},
+        decimals=printed_decimals(result.scores.values()),
         year=result.year,
         paper_url=result.source_url,
         code_url=result.code_url,
@@ -150,6 +152,16 @@ def published_entry(result: PublishedResult) -> Entry:
         details=Details(uses_nerf=result.uses_nerf, latency_ms=result.latency_ms, hardware=result.hardware),
         shown_at=result.added_at if result.added_at > SINCE_EVER else None,
     )
+
+
+def printed_decimals(values: Iterable[float | None]) -> int:
+    """With how many decimals a row was printed: one, or two where any of its values has two.
+
+    >>> printed_decimals([14.8, 55.0]), printed_decimals([14.82, 55.0])
+    (1, 2)
+    """
+    known = [value for value in values if value is not None]
+    return 1 if all(round(value, 1) == value for value in known) else 2
 
 
 def named(profile: Profile) -> dict[str, Any]:
@@ -165,15 +177,17 @@ def submitted_entry(
     scored: "Scored",
     *,
     profile: Profile,
+    decimals: int,
     withdrawn_at: datetime | None = None,
     unscorable: str = "",
 ) -> Entry:
-    """The row of a submission, as `profile` tells of its method."""
+    """The row of a submission, as `profile` tells of its method; its edition publishes with `decimals`."""
     submission = evaluation.submission
     method = submission.method
     return Entry(
         kind="submission",
         **named(profile),
+        decimals=decimals,
         scores=flat_scores([]) if withdrawn_at else scored.values,
         intervals={} if withdrawn_at else scored.intervals,
         date=days.told(submission.submitted_at, is_masked=method.is_masked),

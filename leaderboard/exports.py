@@ -21,7 +21,6 @@ from leaderboard.keeping import one_of
 from leaderboard.standings import Board
 
 short_authors = layouts.short_authors
-DECIMALS: Final = 2
 _DETAILS: Final = tuple(field.name for field in fields(Details))
 CSV_COLUMNS: Final = (
     *("rank", "rank_low", "rank_high", "kind", "method", "team", "date"),
@@ -70,20 +69,6 @@ def mark_of(entry: Entry) -> str:
 # --- a board ---------------------------------------------------------------------------------------------
 
 
-def printed_decimals(values: Iterable[float | None]) -> int:
-    """With how many decimals a row was printed: one, or two where any of its values has two.
-
-    >>> printed_decimals([14.8, 55.0]), printed_decimals([14.82, 55.0])
-    (1, 2)
-    """
-    known = [value for value in values if value is not None]
-    return 1 if all(round(value, 1) == value for value in known) else DECIMALS
-
-
-def _decimals(entry: Entry) -> int:
-    return printed_decimals(entry.scores.values()) if entry.kind == "published" else DECIMALS
-
-
 def board_csv(board: Board, *, has_intervals: bool = False) -> str:
     """Every row of a board, as it is shown: one line for each, empty cells where nothing is known."""
     columns = (*CSV_COLUMNS, *(INTERVAL_COLUMNS if has_intervals else ()))
@@ -92,7 +77,6 @@ def board_csv(board: Board, *, has_intervals: bool = False) -> str:
 
 
 def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
-    decimals = _decimals(entry)
     ranks = entry.intervals.get("mid", Interval())
     row: dict[str, object] = {
         "rank": entry.rank,
@@ -100,7 +84,10 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
         "rank_high": ranks.rank_high,
         **{name: getattr(entry, name) for name in ("kind", "method", "team", "n_attempts")},
         "date": entry.date_text,
-        **{name: format_published(entry.scores[name], decimals=decimals, missing="") for name in SCORE_NAMES},
+        **{
+            name: format_published(entry.scores[name], decimals=entry.decimals, missing="")
+            for name in SCORE_NAMES
+        },
         **asdict(entry.details),
         **{name: getattr(entry, name) for name in ("description", "paper_url", "code_url", "source")},
         "method_id": entry.method_id,
@@ -110,8 +97,8 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
     if has_intervals:
         for name in SCORE_NAMES:
             found = entry.intervals.get(name, Interval())
-            row[f"{name}_low"] = format_published(found.low, missing="")
-            row[f"{name}_high"] = format_published(found.high, missing="")
+            row[f"{name}_low"] = format_published(found.low, decimals=entry.decimals, missing="")
+            row[f"{name}_high"] = format_published(found.high, decimals=entry.decimals, missing="")
     return row
 
 
@@ -182,9 +169,9 @@ def _rank(entry: Entry, *, has_range: bool) -> str:
 def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:
     found = entry.intervals.get(name, Interval()) if has_interval else Interval()
     return layouts.Cell(
-        text=format_published(entry.scores[name], decimals=_decimals(entry), missing=layouts.ABSENT),
-        low=format_published(found.low, missing=""),
-        high=format_published(found.high, missing=""),
+        text=format_published(entry.scores[name], decimals=entry.decimals, missing=layouts.ABSENT),
+        low=format_published(found.low, decimals=entry.decimals, missing=""),
+        high=format_published(found.high, decimals=entry.decimals, missing=""),
         is_best=name in entry.best,
         is_second=name in entry.second,
     )

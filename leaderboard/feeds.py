@@ -61,12 +61,12 @@ def _entry(feed: ET.Element, item: Item) -> None:
     entry = item.entry
     element = ET.SubElement(feed, "entry")
     _text(element, "id", item.id.urn)
-    _text(element, "title", f"{entry.method} on {item.split.pk}: MiD {format_published(entry.scores['mid'])}")
+    mid, rte = (format_published(entry.scores[name], decimals=entry.decimals) for name in ("mid", "rte"))
+    _text(element, "title", f"{entry.method} on {item.split.pk}: MiD {mid}")
     _text(element, "updated", _moment(item.at))
     _text(ET.SubElement(element, "author"), "name", entry.team)
     ET.SubElement(element, "link", rel="alternate", type="text/html", href=item.address)
     rank = f"Rank {entry.rank}. " if entry.rank is not None else ""
-    mid, rte = format_published(entry.scores["mid"]), format_published(entry.scores["rte"])
     _text(element, "summary", f"{rank}MiD {mid} ×10⁻⁴, RTE {rte} %; lower is better.")
 
 

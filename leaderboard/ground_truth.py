@@ -119,12 +119,27 @@ def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> dict[str
 
 
 def new_edition(
-    *, split: Split, row: GroundTruth, protocol: str, now: datetime, actor: User | None
+    *,
+    split: Split,
+    row: GroundTruth,
+    protocol: str,
+    now: datetime,
+    actor: User | None,
+    decimals: int | None = None,
 ) -> Edition:
-    """The next edition of a split whose row the caller has locked; not yet its board."""
+    """The next edition of a split whose row the caller has locked; not yet its board.
+
+    It publishes with the split's decimals of this moment, or with `decimals`, for ever.
+    """
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(
-        split=split, number=last + 1, ground_truth=row, protocol=protocol, opened_at=now, opened_by=actor
+        split=split,
+        number=last + 1,
+        ground_truth=row,
+        protocol=protocol,
+        decimals=split.decimals if decimals is None else decimals,
+        opened_at=now,
+        opened_by=actor,
     )
     audit.record(
         verb="opened", noun="Edition", noun_id=edition.pk, actor=actor, details={"edition": str(edition)}

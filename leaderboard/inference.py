@@ -22,10 +22,11 @@ from django.db.models import Exists, OuterRef
 from numpy.typing import NDArray
 
 from evaluator import published, uncertainty
-from evaluator.protocol import SCORE_NAMES, get_protocol
+from evaluator.protocol import SCORE_NAMES
 from evaluator.ranges import Quoted, rank_ranges
 from evaluator.significance import MIN_DEGREES, cut_off, too_few_recordings
-from leaderboard import bags, boards, bulk, exports
+from leaderboard import bags, boards, bulk
+from leaderboard.entries import printed_decimals
 from leaderboard.models import Edition, Evaluation, PublishedResult, Score, Status, Visibility
 
 log = structlog.get_logger(__name__)
@@ -225,7 +226,9 @@ def _inferred(
         some = missing[start : start + uncertainty.BATCH]
         sums = np.stack([bags.sums_of(edition, digest=row.digest) for row in some])
         places = [table.row_of[row.evaluation_id] for row in some]
-        low[places], high[places] = bootstrap_of(edition).intervals(sums)
+        ends = bootstrap_of(edition).intervals(sums)
+        # As they are kept: ranges must not depend on which of them were made before.
+        low[places], high[places] = (np.round(each, edition.decimals) for each in ends)
     rivals = ranked(rows)
     places = [table.row_of[row.evaluation_id] for row in rivals]
     rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)
@@ -239,7 +242,7 @@ def _inferred(
             between=between,
         )
         rank_low[places], rank_high[places] = ranges.low, ranges.high
-    decimals = get_protocol(edition.protocol).decimals
+    decimals = edition.decimals
     return {
         pk: (
             _published(low[i, j], decimals),
@@ -289,7 +292,7 @@ def _quoted(edition: Edition, counts: Floats) -> Quoted | None:
     values = np.array(_printed(edition)).reshape(-1, len(SCORE_NAMES))
     if not len(values):
         return None
-    decimals = [exports.printed_decimals(v for v in row if not np.isnan(v)) for row in values.tolist()]
+    decimals = [printed_decimals(v for v in row if not np.isnan(v)) for row in values.tolist()]
     half_widths = 0.5 * 10.0 ** -np.array(decimals)[:, None]
     return Quoted(values, np.where(np.isnan(values), np.nan, half_widths), counts)
 

@@ -215,7 +215,10 @@ def teams_best_other(submission: Submission, place: Place) -> Entry | None:
         Evaluation.objects.select_related("submission__method__team").prefetch_related("scores").get(pk=found)
     )
     return submitted_entry(
-        evaluation, scored_of(evaluation.scores.all()), profile=profile_of(evaluation.submission.method)
+        evaluation,
+        scored_of(evaluation.scores.all()),
+        profile=profile_of(evaluation.submission.method),
+        decimals=place.edition.decimals,
     )
 
 

@@ -99,6 +99,7 @@ class Quoted:
 class Past:
     """All that everybody may know of an edition's boards at any time."""
 
+    decimals: int  # the edition's
     quoted: tuple[Quoted, ...]  # the rows of papers
     methods: tuple[Shown, ...]
     runs: tuple[Run, ...]
@@ -114,6 +115,7 @@ def facts(edition: Edition) -> Past:
     shown = Method.objects.shown().filter(pk__in=counted).select_related("team").order_by("pk")
     methods = tuple(_shown(method, counted[method.pk]) for method in shown)
     return Past(
+        decimals=edition.decimals,
         quoted=_quoted(edition),
         methods=methods,
         runs=_runs(edition, {method.method_id: i for i, method in enumerate(methods)}),
@@ -226,7 +228,9 @@ def everybodys(past: Past, *, at: datetime) -> tuple[Entry, ...]:
         if rival is None or place < rival[0]:
             best[run.method] = place, run
     attempts = _attempts(past, at)
-    rows = [_entry(run, past.methods[run.method], at) for _, run in best.values()]
+    rows = [
+        replace(_entry(run, past.methods[run.method], at), decimals=past.decimals) for _, run in best.values()
+    ]
     quoted = [row.entry for row in past.quoted if row.stood(at)]
     return in_ranks([*quoted, *(replace(row, n_attempts=attempts.of(row)) for row in rows)])
 

@@ -39,6 +39,8 @@ class Change:
     new_rank: int | None
     problems: tuple[Mapping[str, str], ...] = ()
     n_problems: int = 0
+    old_decimals: int = 2
+    new_decimals: int = 2
 
     @property
     def delta(self) -> dict[str, float | None]:
@@ -160,6 +162,7 @@ def document(found: Preview) -> dict[str, Any]:
 class _Side:
     """One edition of a comparison: evaluations and ranks by submission, values by evaluation."""
 
+    edition: Edition
     evaluations: Mapping[UUID, Evaluation]
     scores: Mapping[UUID, Mapping[str, float | None]]
     ranks: Mapping[UUID, int | None]
@@ -180,6 +183,7 @@ def _side(edition: Edition) -> _Side:
     board = standings.board(split=edition.split, edition=edition, viewer=AnonymousUser())
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
     return _Side(
+        edition=edition,
         evaluations={evaluation.submission_id: evaluation for evaluation in rows},
         scores=standings.scores_in(edition),
         ranks={entry.submission_id: entry.rank for entry in board.entries if entry.submission_id},
@@ -201,9 +205,11 @@ def _change(submission: Submission, old: _Side, new: _Side) -> Change:
         new_rank=new.ranks.get(submission.pk),
         problems=tuple(evaluation.problems) if evaluation else (),
         n_problems=evaluation.n_problems if evaluation else 0,
+        old_decimals=old.edition.decimals,
+        new_decimals=new.edition.decimals,
     )
 
 
 def _difference(old: float | None, new: float | None) -> float | None:
-    # Both have two decimals; the subtraction of binary fractions must not show more.
+    # Both have two decimals at most; the subtraction of binary fractions must not show more.
     return None if old is None or new is None else round(new - old, 2)

@@ -13,7 +13,7 @@ from django.core.checks import CheckMessage, Error
 from django.core.exceptions import ImproperlyConfigured
 
 from evaluator import receipts
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES, get_protocol
+from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
 from leaderboard import standings, submissions
 from leaderboard.models import Evaluation, Status, Submission
 
@@ -35,7 +35,6 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> dic
     edition = evaluation.edition
     scores = standings.flat_scores(evaluation.scores.all())
     counts = (evaluation.report or {})["counts"]
-    decimals = get_protocol(edition.protocol).decimals
     assert evaluation.finished_at is not None  # noqa: S101 - for the type checker: what is scored is finished
     document = {
         "site": settings.SITE_URL,
@@ -46,7 +45,7 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> dic
         "ground_truth": edition.ground_truth_id,
         "file": submission.digest,
         "method": {"id": str(submission.method_id), "name": submission.method.name},
-        "scores": {name: receipts.decimal(scores[name], decimals=decimals) for name in SCORE_NAMES},
+        "scores": {name: receipts.decimal(scores[name], decimals=edition.decimals) for name in SCORE_NAMES},
         "counts": {name: counts[name] for name in INTERVAL_NAMES},
         "scored_at": f"{evaluation.finished_at:%Y-%m-%dT%H:%M:%SZ}",
     }

@@ -133,7 +133,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
             if predictions is not None:
                 report = scorer.report(predictions, keep_bags=True)
                 bags.keep(edition, digest=predictions.digest, bags=report.bags)
-                outcomes.append((lease, scored(report)))
+                outcomes.append((lease, scored(report, decimals=edition.decimals)))
                 continue
         except (Rejected, *FAULTS_OF_THE_FILE) as fault:
             # Worded, or struck, when it is read again from the file, alone.
@@ -235,7 +235,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
     except OSError as fault:
         # They only make re-scoring quicker; without them it reads the file again.
         log.warning("values_not_kept", submission_id=str(evaluation.submission_id), reason=_in_words(fault))
-    return scored(report)
+    return scored(report, decimals=edition.decimals)
 
 
 def _announce(edition: Edition) -> None:
@@ -257,9 +257,8 @@ def _in_words(fault: Exception) -> str:
     return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
-def scored(report: Report) -> Outcome:
-    """A report as it is published: values rounded by the protocol, counts, and nothing finer."""
-    decimals = get_protocol(report.protocol).decimals
+def scored(report: Report, *, decimals: int) -> Outcome:
+    """A report as its edition publishes it: values with so many decimals, counts, and nothing finer."""
     values = {}
     for interval, scores in report.scores.items():
         for metric, value in (("mid", scores.mid), ("rte", scores.rte)):

@@ -234,6 +234,7 @@ def _best_of_each(
             evaluation,
             scored.get(evaluation.pk) or Scored(),
             profile=profile_of(method, is_masked=method.is_masked),
+            decimals=edition.decimals,
             withdrawn_at=withdrawn_at,
             unscorable=unscorable.get(evaluation.submission_id, ""),
         )

@@ -299,6 +299,7 @@ class Progress:
     is_final: bool = False
     edition_number: int | None = None
     protocol: str = ""
+    decimals: int = 2  # of its values
 
 
 def evaluation_of(submission: Submission) -> Evaluation:
@@ -342,6 +343,7 @@ def progress(submission: Submission) -> Progress:
         sentence=_sentence(evaluation),
         is_final=evaluation.is_final,
         edition_number=evaluation.edition.number,
+        decimals=evaluation.edition.decimals,
         protocol=evaluation.edition.protocol,
     )
 

@@ -82,8 +82,8 @@ def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int 
             metric=metric,
             interval=interval,
             value=value,
-            low=round(value * 0.95, 2),
-            high=round(value * 1.05, 2),
+            low=round(value * 0.95, edition.decimals),
+            high=round(value * 1.05, edition.decimals),
             rank_low=max(1, i - 3),
             rank_high=i + 4,
             is_with_best=i < 3,
@@ -91,5 +91,5 @@ def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int 
         for i, evaluation in enumerate(evaluations)
         for metric in METRICS
         for interval in INTERVAL_NAMES
-        for value in [round(rng.uniform(8, 80), 2)]
+        for value in [round(rng.uniform(8, 80), edition.decimals)]
     )

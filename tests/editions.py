@@ -91,7 +91,8 @@ def board_now() -> standings.Board:
     return standings.board(split=split, viewer=ANYBODY)
 
 
-def offline(submission: Submission, truth: GroundTruth) -> dict[str, float | None]:
+def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) -> dict[str, float | None]:
     with scoring.files.opened_predictions(submission.digest) as kept:
         predictions = read_predictions(kept.read(), manifest=truth.manifest)
-    return {name: published(value) for name, value in evaluate(predictions, truth).flat().items()}
+    values = evaluate(predictions, truth).flat()
+    return {name: published(value, decimals=decimals) for name, value in values.items()}

@@ -69,7 +69,9 @@ def compare(*, first: str, second: str, split: str, truth_path: Path | None, url
         echo_json(found.document)
         return
     for line in _server_s_words(
-        found, names=(entries[0].method, entries[1].method), scores=(entries[0].scores, entries[1].scores)
+        found,
+        names=(entries[0].method, entries[1].method),
+        scores=(entries[0].scores, entries[1].scores),
     ):
         click.echo(line)
 
@@ -81,17 +83,17 @@ def _server_s_words(
     yield printable(f"{found.split}{edition}")
     yield UNITS
     yield ""
-    yield from table(names, scores, found.differences())
+    yield from table(names, scores, found.differences(), decimals=found.decimals)
     said = found.pairs[0].sentence if found.pairs else ""
     if said or found.reason:
         yield ""
         yield printable(said or found.reason)
-    yield from _others(names, found.differences())
+    yield from _others(names, found.differences(), decimals=found.decimals)
 
 
-def _others(names: tuple[str, str], found: Mapping[str, Found]) -> Iterator[str]:
+def _others(names: tuple[str, str], found: Mapping[str, Found], *, decimals: int = 2) -> Iterator[str]:
     """What the columns beside overall MiD say."""
-    lead, said = others(*names, found)
+    lead, said = others(*names, found, decimals=decimals)
     if lead:
         yield lead
     for each in said:
@@ -144,23 +146,31 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
         click.echo(line)
 
 
-def table(names: tuple[str, str], scores: tuple[Scores, Scores], found: Mapping[str, Found]) -> list[str]:
+def table(
+    names: tuple[str, str],
+    scores: tuple[Scores, Scores],
+    found: Mapping[str, Found],
+    *,
+    decimals: int = 2,
+) -> list[str]:
     """Both results, and below them the difference of each column with its interval and p."""
     from evaluator.report import format_published, published  # noqa: PLC0415 -- loads numpy
 
     rows = [[Cell(""), *(Cell(short_name(name), is_bold=True) for name in SCORE_NAMES)]]
     for name, values in zip(names, scores, strict=True):
-        texts = [format_published(values.get(score), missing=NO_VALUE) for score in SCORE_NAMES]
+        texts = [
+            format_published(values.get(score), decimals=decimals, missing=NO_VALUE) for score in SCORE_NAMES
+        ]
         rows.append([Cell(printable(name)), *map(Cell, texts)])
 
-    def column(kind: str, decimals: int, sign: str = "+") -> list[Cell]:
-        values = [published(getattr(found.get(name), kind, None), decimals=decimals) for name in SCORE_NAMES]
-        return [Cell(NO_VALUE if value is None else f"{value:{sign}.{decimals}f}") for value in values]
+    def column(kind: str, n: int, sign: str = "+") -> list[Cell]:
+        values = [published(getattr(found.get(name), kind, None), decimals=n) for name in SCORE_NAMES]
+        return [Cell(NO_VALUE if value is None else f"{value:{sign}.{n}f}") for value in values]
 
     rows += [
-        [Cell("difference", is_bold=True), *column("difference", 2)],
-        [Cell("95 % from"), *column("low", 2)],
-        [Cell("95 % to"), *column("high", 2)],
+        [Cell("difference", is_bold=True), *column("difference", decimals)],
+        [Cell("95 % from"), *column("low", decimals)],
+        [Cell("95 % to"), *column("high", decimals)],
         [Cell("p"), *column("p", 4, sign="")],
     ]
     return aligned(rows, align="<" + "." * len(SCORE_NAMES))

@@ -55,16 +55,17 @@ def rank_text(entry: BoardEntry) -> str:
     return layouts.rank_text(entry.rank, low=found.rank_low, high=found.rank_high)
 
 
-def end_text(value: float | None) -> str:
+def end_text(value: float | None, *, decimals: int) -> str:
     """The end of an interval; empty where there is none."""
     from evaluator.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    return format_published(value, missing="")
+    return format_published(value, decimals=decimals, missing="")
 
 
 def interval_text(entry: BoardEntry, name: str) -> str:
     """Where one of its values may lie, to stand behind it; empty where that is not known."""
-    low, high = end_text(entry.interval(name).low), end_text(entry.interval(name).high)
+    found = entry.interval(name)
+    low, high = (end_text(end, decimals=entry.n_decimals) for end in (found.low, found.high))
     return f" [{low}, {high}]" if low and high else ""
 
 
@@ -85,7 +86,9 @@ def _number(value: int | None) -> str:
 def _ends(entry: BoardEntry) -> list[str]:
     ranks = entry.interval("mid")
     intervals = [entry.interval(name) for name in SCORE_NAMES]
-    ends = [end_text(end) for found in intervals for end in (found.low, found.high)]
+    ends = [
+        end_text(end, decimals=entry.n_decimals) for found in intervals for end in (found.low, found.high)
+    ]
     return [_number(ranks.rank_low), _number(ranks.rank_high), *ends]
 
 
@@ -99,8 +102,8 @@ def _rows(board: Board) -> list[layouts.Row]:
             cells=tuple(
                 layouts.Cell(
                     text=text,
-                    low=end_text(entry.interval(name).low),
-                    high=end_text(entry.interval(name).high),
+                    low=end_text(entry.interval(name).low, decimals=entry.n_decimals),
+                    high=end_text(entry.interval(name).high, decimals=entry.n_decimals),
                     is_best=i in marks[name][0],
                     is_second=i in marks[name][1],
                 )

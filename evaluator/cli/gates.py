@@ -103,13 +103,13 @@ def _conditions(
         raise click.BadParameter(f"{fault}.") from None
 
 
-def judge(conditions: Sequence[Condition], scores: Scores | None) -> None:
+def judge(conditions: Sequence[Condition], scores: Scores | None, *, decimals: int = 2) -> None:
     """Raise Failure if one of the conditions holds, or cannot be told: no value is no pass."""
     known: Scores = scores or {}
     missing = [condition for condition in conditions if condition.holds(known) is None]
     holding = [condition for condition in conditions if condition.holds(known)]
     if holding:
-        said = "; ".join(f"{c.name} is {known[c.name]:.2f}, and {c} was to fail" for c in holding)
+        said = "; ".join(f"{c.name} is {known[c.name]:.{decimals}f}, and {c} was to fail" for c in holding)
         raise Failure(f"The gate fails: {said}.", exit_code=Exit.GATE, code="gate-failed")
     if missing:
         names = ", ".join(dict.fromkeys(condition.name for condition in missing))
@@ -196,7 +196,13 @@ def rival(client: Client, *, split: str, method: str, own: str, is_significant_o
 
 
 def judge_against(
-    client: Client, found: Rival, *, split: str, method_id: str | None, mid: float | None
+    client: Client,
+    found: Rival,
+    *,
+    split: str,
+    method_id: str | None,
+    mid: float | None,
+    decimals: int = 2,
 ) -> None:
     """Raise Failure if MiD is worse than the other method's; by more than chance, if only that counts."""
     other, name = found.entry.scores["mid"], printable(found.entry.method)
@@ -204,7 +210,7 @@ def judge_against(
         raise undecided("there is no value for mid")
     if mid <= other:
         return
-    words = f"MiD is {mid:.2f}, and {name} has {other:.2f}"
+    words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.entry.n_decimals}f}"
     if not found.is_significant_only:
         raise _worse(words)
     if method_id is None or found.entry.method_id is None:
@@ -220,10 +226,10 @@ def judge_against(
         few = too_few_recordings(None if difference is None else difference.n_effective)
         raise undecided(f"there are {few} to tell a difference from chance")
     if is_significant(difference):
-        raise _worse(f"{words}; {in_numbers(difference)}")
+        raise _worse(f"{words}; {in_numbers(difference, decimals=decimals)}")
 
 
-def in_numbers(found: Difference) -> str:
+def in_numbers(found: Difference, *, decimals: int = 2) -> str:
     """`+1.20 [+0.40, +2.00], p = 0.0030`: a difference, its 95 % interval, and p.
 
     >>> from evaluator.answers import Difference
@@ -231,9 +237,9 @@ def in_numbers(found: Difference) -> str:
     '+1.20 [+0.40, +2.00], p = 0.0030'
     """
     if found.low is None or found.high is None or found.p_below is None:
-        return f"{found.difference:+.2f}"
-    words = p_text(found.p, found.p_below)
-    return f"{found.difference:+.2f} [{found.low:+.2f}, {found.high:+.2f}], {words}"
+        return f"{found.difference:+.{decimals}f}"
+    value, low, high = (f"{each:+.{decimals}f}" for each in (found.difference, found.low, found.high))
+    return f"{value} [{low}, {high}], {p_text(found.p, found.p_below)}"
 
 
 def _worse(words: str) -> Failure:

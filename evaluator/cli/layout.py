@@ -100,9 +100,10 @@ def result_in_words(
     counts: Mapping[str, int],
     n_out_of_range: int,
     truncated: Mapping[str, int],
+    decimals: int = 2,
 ) -> Iterator[str]:
     """One result as lines: the table, its units, and what was counted and truncated."""
-    yield from score_table(scores, counts=counts)
+    yield from score_table(scores, counts=counts, decimals=decimals)
     yield ""
     yield UNITS
     outside = f", {n_out_of_range:,} of them with |τ| > 20 s, which count in MiD and RTE alone"
@@ -111,8 +112,10 @@ def result_in_words(
     yield f"Truncated predictions: {', '.join(cut) or 'none'}."
 
 
-def score_table(scores: Mapping[str, float | None], *, counts: Mapping[str, int]) -> list[str]:
-    """One result in the paper's column order with two decimals, the counts of its intervals below it."""
+def score_table(
+    scores: Mapping[str, float | None], *, counts: Mapping[str, int], decimals: int = 2
+) -> list[str]:
+    """One result in the paper's column order, the counts of its intervals below it."""
     from evaluator.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     n_by_interval = [f"{counts[name]:,}" if name in counts else NO_VALUE for name in INTERVAL_NAMES]
@@ -120,7 +123,10 @@ def score_table(scores: Mapping[str, float | None], *, counts: Mapping[str, int]
         [Cell(""), *(Cell(short_name(name), is_bold=True) for name in SCORE_NAMES)],
         [
             Cell("error"),
-            *(Cell(format_published(scores.get(name), missing=NO_VALUE)) for name in SCORE_NAMES),
+            *(
+                Cell(format_published(scores.get(name), decimals=decimals, missing=NO_VALUE))
+                for name in SCORE_NAMES
+            ),
         ],
         [Cell("count"), *map(Cell, n_by_interval * 2)],
     ]

@@ -113,6 +113,6 @@ def _in_words(found: Verified) -> Iterator[str]:
     for name, text in facts.items():
         yield printable(f"{name:<12} {text}")
     yield ""
-    yield from score_table(found.scores, counts=found.counts)
+    yield from score_table(found.scores, counts=found.counts, decimals=found.decimals)
     yield ""
     yield UNITS

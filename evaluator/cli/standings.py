@@ -138,7 +138,7 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
         from evaluator.floors import floor_sentence  # noqa: PLC0415 -- loads numpy
 
         yield ""
-        yield floor_sentence(found.floor)
+        yield floor_sentence(found.floor, decimals=found.decimals or 2)
 
 
 def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:

@@ -134,10 +134,17 @@ def submit(
             submission = followed(client, submission.id, timeout_s=timeout_s)
 
         def judge() -> None:
-            gates.judge(fail_if, submission.scores)
+            gates.judge(fail_if, submission.scores, decimals=submission.decimals)
             if rival is not None:
                 mid = (submission.scores or {}).get("mid")
-                gates.judge_against(client, rival, split=split, method_id=submission.method_id, mid=mid)
+                gates.judge_against(
+                    client,
+                    rival,
+                    split=split,
+                    method_id=submission.method_id,
+                    mid=mid,
+                    decimals=submission.decimals,
+                )
 
         conclude(submission, as_json=as_json, judge=judge)
         if not as_json:
@@ -173,7 +180,11 @@ def status(
             if watch
             else client.submission(submission_id)
         )
-    conclude(submission, as_json=as_json, judge=lambda: gates.judge(fail_if, submission.scores))
+    conclude(
+        submission,
+        as_json=as_json,
+        judge=lambda: gates.judge(fail_if, submission.scores, decimals=submission.decimals),
+    )
 
 
 def _require_rival(worse_than: str | None, significant: bool) -> None:
@@ -255,6 +266,7 @@ def _show(submission: Submission, named: str) -> None:
             counts=submission.counts or {},
             n_out_of_range=submission.n_out_of_range or 0,
             truncated=submission.truncated or {},
+            decimals=submission.decimals,
         ):
             click.echo(line)
 

@@ -22,12 +22,10 @@ def authors_or_team(entry: BoardEntry, *, mark: str = " (published)") -> str:
 
 
 def texts_of(entry: BoardEntry, *, missing: str, scores: tuple[str, ...] = SCORE_NAMES) -> list[str]:
-    """A submission's scores with two decimals, a published row's with as many as were printed."""
+    """A submission's scores as its edition publishes them, a published row's as they were printed."""
     from evaluator.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    known = [value for value in entry.scores.values() if value is not None]
-    is_short = entry.kind == "published" and all(round(value, 1) == value for value in known)
-    decimals = 1 if is_short else 2
+    decimals = entry.n_decimals
     return [format_published(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
 
 
@@ -45,7 +43,12 @@ def in_short(submission: Submission) -> Iterator[str]:
         text
         for name, label in (("mid", "MiD"), ("rte", "RTE"))
         if (
-            text := _interval_text(label, (submission.scores or {}).get(name), submission.intervals.get(name))
+            text := _interval_text(
+                label,
+                (submission.scores or {}).get(name),
+                submission.intervals.get(name),
+                decimals=submission.decimals,
+            )
         )
     ]
     if errors:
@@ -65,10 +68,10 @@ def range_text(low: int | None, high: int | None) -> str:
     return f" ({low})" if low == high else f" ({low}–{high})"
 
 
-def _interval_text(label: str, value: float | None, found: Interval | None) -> str:
+def _interval_text(label: str, value: float | None, found: Interval | None, *, decimals: int) -> str:
     from evaluator.report import format_published  # noqa: PLC0415 -- as above
 
     if value is None or found is None or found.low is None or found.high is None:
         return ""
-    low, high = format_published(found.low), format_published(found.high)
-    return f"{label} {format_published(value)} ({low}–{high})"
+    text, low, high = (format_published(each, decimals=decimals) for each in (value, found.low, found.high))
+    return f"{label} {text} ({low}–{high})"

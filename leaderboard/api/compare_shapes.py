@@ -47,11 +47,16 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
 
     def get_detectable_difference(self, found: Difference) -> float | None:
         """Rounded as differences are."""
-        return published(found.detectable_difference)
+        return published(found.detectable_difference, decimals=self.context["decimals"])
 
     def get_sentence(self, found: Difference) -> str:
         """Of this column."""
-        return sentences.sentence(**self.context["names"], name=self.field_name or "", found=found)
+        return sentences.sentence(
+            **self.context["names"],
+            name=self.field_name or "",
+            found=found,
+            decimals=self.context["decimals"],
+        )
 
 
 class DifferencesSerializer(serializers.Serializer[Any]):
@@ -82,7 +87,8 @@ class PairSerializer(serializers.Serializer[Pair]):
             return None
         found = {name: pair.differences.get(name) for name in SCORE_NAMES}
         names = {"first": pair.first.method, "second": pair.second.method}
-        return dict(DifferencesSerializer(found, context={"names": names}).data)
+        context = {"names": names, "decimals": pair.first.decimals}
+        return dict(DifferencesSerializer(found, context=context).data)
 
     def get_sentence(self, pair: Pair) -> str:
         """Of the overall MiD."""
@@ -94,6 +100,9 @@ class ComparedSerializer(serializers.Serializer[Compared]):
 
     split = serializers.CharField(source="split.name", help_text="Name of the split.")
     edition = serializers.IntegerField(source="edition.number", help_text="Number of the edition.")
+    decimals = serializers.IntegerField(
+        source="edition.decimals", help_text="With how many decimals the edition publishes."
+    )
     is_complete = serializers.BooleanField(
         help_text="Whether every pair is computed; if not, ask again after Retry-After seconds."
     )

@@ -12,7 +12,7 @@ class ReceiptScoresSerializer(serializers.Serializer[Any]):
 
     def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
         """One nullable text for each of the ten names."""
-        text = "With the protocol's decimals; null where the interval has no sequence."
+        text = "With the edition's decimals; null where the interval has no sequence."
         return {name: serializers.CharField(allow_null=True, help_text=text) for name in SCORE_NAMES}
 
 

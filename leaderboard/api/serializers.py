@@ -15,6 +15,8 @@ from leaderboard.models import Edition, Publication, Split, Visibility
 from leaderboard.quotas import Quota
 from leaderboard.standings import Board
 
+_DECIMALS = "With how many decimals the edition publishes values, intervals and differences."
+
 
 class ScoresSerializer(serializers.Serializer[Any]):
     """The ten published numbers: MiD in 10⁻⁴, RTE in percent."""
@@ -106,6 +108,9 @@ class SplitSerializer(serializers.Serializer[Split]):
     is_simulated = serializers.BooleanField()
     edition = serializers.IntegerField(source="published_edition.number", default=None, allow_null=True)
     protocol = serializers.CharField(source="published_edition.protocol", default=None, allow_null=True)
+    decimals = serializers.IntegerField(
+        source="published_edition.decimals", default=None, allow_null=True, help_text=_DECIMALS
+    )
     ground_truth = serializers.CharField(
         source="published_edition.ground_truth_id", default=None, allow_null=True
     )
@@ -178,6 +183,10 @@ class EntrySerializer(serializers.Serializer[Entry]):
         help_text="Scored submissions of the team's public methods to the split; anonymous: its own.",
     )
     scores = ScoresSerializer()
+    decimals = serializers.IntegerField(
+        help_text="With how many decimals its values are printed: those of a paper as they were, all others "
+        "and their intervals as the edition publishes."
+    )
     intervals = serializers.DictField(
         child=UncertaintySerializer(),
         help_text="By the names of the scores, where they are computed; empty unless `intervals=1`.",
@@ -200,6 +209,9 @@ class BoardSerializer(serializers.Serializer[Board]):
     split = serializers.CharField(source="split.name")
     edition = serializers.IntegerField(source="edition.number", default=None, allow_null=True)
     protocol = serializers.CharField(source="edition.protocol", default=None, allow_null=True)
+    decimals = serializers.IntegerField(
+        source="edition.decimals", default=None, allow_null=True, help_text=_DECIMALS
+    )
     ground_truth = serializers.CharField(source="edition.ground_truth_id", default=None, allow_null=True)
     n_sequences = serializers.IntegerField(
         source="edition.ground_truth.n_sequences", default=None, allow_null=True
@@ -229,6 +241,7 @@ class EditionSerializer(serializers.Serializer[Edition]):
     split = serializers.CharField(source="split_id")
     edition = serializers.IntegerField(source="number")
     protocol = serializers.CharField()
+    decimals = serializers.IntegerField(help_text=_DECIMALS)
     ground_truth = serializers.CharField(source="ground_truth_id")
     manifest = serializers.CharField(source="ground_truth.manifest_digest")
     n_sequences = serializers.IntegerField(source="ground_truth.n_sequences")

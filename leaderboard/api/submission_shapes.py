@@ -68,6 +68,9 @@ class SubmissionSerializer(serializers.Serializer[Outcome]):
     commit = serializers.CharField(allow_blank=True)
     queue = QueueSerializer(allow_null=True)
     scores = ScoresSerializer(allow_null=True)
+    decimals = serializers.IntegerField(
+        help_text="With how many decimals its edition publishes values and intervals."
+    )
     intervals = serializers.DictField(
         child=UncertaintySerializer(),
         help_text="By the names of the scores, as on boards; empty until they are computed. A private method "
@@ -116,6 +119,7 @@ class SubmissionSerializer(serializers.Serializer[Outcome]):
             "commit": submission.commit,
             "queue": {"ahead": progress.n_ahead, "estimate_s": progress.estimate_s} if is_waiting else None,
             "scores": progress.scores,
+            "decimals": progress.decimals,
             "intervals": {
                 name: asdict(instance.intervals[name]) for name in SCORE_NAMES if name in instance.intervals
             },

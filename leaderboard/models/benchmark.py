@@ -43,6 +43,11 @@ class Split(QuotaRules):
     is_simulated = models.BooleanField(default=False, help_text="Ground truth made by a simulation.")
     opens_at = models.DateTimeField(null=True, blank=True)
     closes_at = models.DateTimeField(null=True, blank=True)
+    decimals = models.PositiveSmallIntegerField(
+        default=1,
+        choices=[(1, "one"), (2, "two")],
+        help_text="With how many decimals its next edition publishes. Each one tells more of hidden values.",
+    )
     published_edition = models.ForeignKey(
         "Edition", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
     )
@@ -51,6 +56,9 @@ class Split(QuotaRules):
 
     class Meta:
         ordering = ["position", "name"]
+        constraints = [
+            models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="split_decimals_one_or_two")
+        ]
 
     def __str__(self) -> str:
         return self.name
@@ -92,12 +100,16 @@ class GroundTruth(models.Model):
 
 
 class Edition(models.Model):
-    """Ground truth and protocol of a split: the frame in which a ranking lives."""
+    """Ground truth, protocol and decimals of a split: the frame in which a ranking lives."""
 
     split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="editions")
     number = models.PositiveIntegerField()
     ground_truth = models.ForeignKey(GroundTruth, on_delete=models.PROTECT, related_name="editions")
     protocol = models.CharField(max_length=32)
+    decimals = models.PositiveSmallIntegerField(
+        default=1,
+        help_text="With how many decimals everything of it is published; the split's when it was opened.",
+    )
     opened_at = models.DateTimeField(default=timezone.now)
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
     published_at = models.DateTimeField(null=True, blank=True, help_text="When it first was the board.")
@@ -121,10 +133,11 @@ class Edition(models.Model):
         constraints = [
             models.UniqueConstraint(fields=["split", "number"], name="edition_number_once_per_split"),
             models.UniqueConstraint(
-                fields=["split", "ground_truth", "protocol"],
+                fields=["split", "ground_truth", "protocol", "decimals"],
                 condition=models.Q(discarded_at=None),
                 name="one_edition_per_ground_truth_and_protocol",
             ),
+            models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="decimals_one_or_two"),
             models.CheckConstraint(
                 condition=models.Q(published_at=None) | models.Q(discarded_at=None),
                 name="published_editions_stay",

@@ -17,7 +17,7 @@ from django.utils.safestring import SafeString
 from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
 from leaderboard.entries import Interval
-from leaderboard.exports import printed_decimals, short_authors
+from leaderboard.exports import short_authors
 from leaderboard.present import Attempt
 from leaderboard.standings import Entry
 from leaderboard.web.chart_frames import Frame, decade_ticks, log_ground
@@ -25,7 +25,6 @@ from leaderboard.web.drawing import round_ticks
 from leaderboard.web.tables import (
     METRIC_SYMBOLS,
     METRIC_UNITS,
-    SCORED_DECIMALS,
     figure_css,
     interval_words,
     rank_range,
@@ -49,6 +48,7 @@ class Point:
     x: float | None = None
     y: float | None = None
     label: str = ""
+    decimals: int = 2  # of y
     is_marked: bool = False  # on the line: the best until then, or on the front
 
 
@@ -103,14 +103,17 @@ def profile(entries: Sequence[Entry]) -> Chart:
         (f"{symbol}, {METRIC_UNITS[metric]}", _profile_panel(metric, shown))
         for metric, symbol in METRIC_SYMBOLS.items()
     )
-    # As if all had two decimals: those of papers keep the room of the missing one.
-    css = figure_css(format_published(entry.scores[name]) for entry in shown for name in SCORE_NAMES)
+    # As if all had the most decimals: the others keep the room of the missing one.
+    most = max(entry.decimals for entry in shown)
+    css = figure_css(
+        format_published(entry.scores[name], decimals=most) for entry in shown for name in SCORE_NAMES
+    )
     points = tuple(
         Point(
             (
                 METRIC_SYMBOLS[name[:3]],
                 name[4:] or "overall",
-                *(_value_cell(entry, name, css) for entry in shown),
+                *(_value_cell(entry, name, css, most) for entry in shown),
             )
         )
         for name in SCORE_NAMES
@@ -130,36 +133,30 @@ def _series_label(entry: Entry) -> str:
 
 
 def _value_words(entry: Entry, name: str) -> str:
-    words = interval_words(entry.intervals.get(name, Interval()))
-    value = format_published(entry.scores[name], decimals=_decimals(entry))
+    words = interval_words(entry.intervals.get(name, Interval()), decimals=entry.decimals)
+    value = format_published(entry.scores[name], decimals=entry.decimals)
     return f"{value} ({words})" if words else value
 
 
-def _value_cell(entry: Entry, name: str, css: str) -> SafeString:
+def _value_cell(entry: Entry, name: str, css: str, most: int) -> SafeString:
     """The same for a table; `css` gives what stands before the interval its width."""
-    words = interval_words(entry.intervals.get(name, Interval()))
+    words = interval_words(entry.intervals.get(name, Interval()), decimals=entry.decimals)
     return format_html(
         '<span class="{}{}">{}</span>{}',
         css,
-        _decimals_css(entry),
-        format_published(entry.scores[name], decimals=_decimals(entry)),
+        _decimals_css(entry, most),
+        format_published(entry.scores[name], decimals=entry.decimals),
         f" ({words})" if words else "",
     )
 
 
-def _decimals(entry: Entry) -> int:
-    """With how many decimals its values are written: those of papers as they are printed."""
-    return printed_decimals(entry.scores.values()) if entry.kind == "published" else SCORED_DECIMALS
+def _decimals_css(entry: Entry, most: int) -> str:
+    return "" if entry.decimals == most else f" d{entry.decimals}"
 
 
-def _decimals_css(entry: Entry) -> str:
-    decimals = _decimals(entry)
-    return "" if decimals == SCORED_DECIMALS else f" d{decimals}"
-
-
-def _mid_cell(entry: Entry, value: float) -> SafeString:
-    text = format_published(value, decimals=_decimals(entry))
-    return format_html('<span class="{}">{}</span>', _decimals_css(entry).strip(), text)
+def _mid_cell(entry: Entry, value: float, most: int) -> SafeString:
+    text = format_published(value, decimals=entry.decimals)
+    return format_html('<span class="{}">{}</span>', _decimals_css(entry, most).strip(), text)
 
 
 def _profile_panel(metric: str, shown: Sequence[Entry]) -> SafeString:
@@ -230,7 +227,7 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
     dated.sort(key=lambda item: item[:2])
     if not dated:
         return Chart(kind="progress", panels=(), columns=(), points=())
-    best = math.inf
+    best, most = math.inf, max(entry.decimals for _, _, entry in dated)
     points = []
     for day, value, entry in dated:
         is_record, best = value < best, min(best, value)
@@ -240,11 +237,12 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
                     _day_text(day, entry),
                     entry.method,
                     _team(entry),
-                    _mid_cell(entry, value),
+                    _mid_cell(entry, value, most),
                     "yes" if is_record else "",
                 ),
                 x=datetime(day.year, day.month, day.day, tzinfo=UTC).timestamp(),
                 y=value,
+                decimals=entry.decimals,
                 label=f"{entry.method}, {_day_text(day, entry)}",
                 is_marked=is_record,
             )
@@ -309,7 +307,7 @@ def latency(entries: Sequence[Entry]) -> Chart:
     )
     if not known:
         return Chart(kind="latency", panels=(), columns=(), points=())
-    best = math.inf
+    best, most = math.inf, max(entry.decimals for _, _, entry in known)
     points = []
     for found, value, entry in known:
         is_on_front, best = value < best, min(best, value)
@@ -320,11 +318,12 @@ def latency(entries: Sequence[Entry]) -> Chart:
                     _team(entry),
                     f"{found:g}",
                     entry.details.hardware or "not said",
-                    _mid_cell(entry, value),
+                    _mid_cell(entry, value, most),
                     "yes" if is_on_front else "",
                 ),
                 x=found,
                 y=value,
+                decimals=entry.decimals,
                 label=f"{entry.method}, {found:g} ms",
                 is_marked=is_on_front,
             )
@@ -372,5 +371,5 @@ def _trace(
             "dot" if point.is_marked else "ring",
             x,
             y,
-            f"{point.label}: {format_published(point.y)}",
+            f"{point.label}: {format_published(point.y, decimals=point.decimals)}",
         )

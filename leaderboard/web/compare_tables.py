@@ -92,7 +92,7 @@ def verdict(compared: Compared) -> str:
     worse, alike = _told_apart(best, compared.pairs)
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
-        f"{format_published(best.scores['mid'])}."
+        f"{format_published(best.scores['mid'], decimals=best.decimals)}."
     )
     if compared.reason:
         return f"{head} There are too few recordings to say what the differences mean."
@@ -151,7 +151,7 @@ def _difference_group(
         if end is not None
     ]
     scale = drawing.zero_scale(ends, width_px=_DIFFERENCE_PX)
-    css = figure_css(map(signed, ends))
+    css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
     rows = tuple(
         _difference_row(name, pair, differences[name], scale, css) for name in names if name in differences
     )
@@ -159,17 +159,18 @@ def _difference_group(
 
 
 def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css: str) -> DifferenceRow:
+    decimals = pair.first.decimals  # both are of one edition
     return DifferenceRow(
         heading=score_heading(name),
-        first=format_published(pair.first.scores[name]),
-        second=format_published(pair.second.scores[name]),
-        difference=signed(found.difference),
+        first=format_published(pair.first.scores[name], decimals=pair.first.decimals),
+        second=format_published(pair.second.scores[name], decimals=pair.second.decimals),
+        difference=signed(found.difference, decimals=decimals),
         interval=""
         if found.low is None or found.high is None
         else format_html(
             '<span class="{css}">{}</span> to <span class="{css}">{}</span>',
-            signed(found.low),
-            signed(found.high),
+            signed(found.low, decimals=decimals),
+            signed(found.high, decimals=decimals),
             css=css,
         ),
         p="" if found.p is None else p_text(found.p),
@@ -178,13 +179,13 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css:
     )
 
 
-def signed(value: float) -> str:
+def signed(value: float, *, decimals: int = 2) -> str:
     """A difference with its sign, and a minus that is one.
 
-    >>> signed(-4.1), signed(0.204), signed(-0.001)
-    ('−4.10', '+0.20', '0.00')
+    >>> signed(-4.1), signed(0.204), signed(-0.001), signed(-4.1, decimals=1)
+    ('−4.10', '+0.20', '0.00', '−4.1')
     """
-    text = format_published(abs(value))
+    text = format_published(abs(value), decimals=decimals)
     if not float(text):
         return text
     return f"{'−' if value < 0 else '+'}{text}"

@@ -155,7 +155,10 @@ def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str
 
 
 def _mid(evaluation: Evaluation | None) -> str:
-    return format_published(flat_scores(evaluation.scores.all())["mid"] if evaluation else None)
+    if evaluation is None:
+        return NO_VALUE
+    mid = flat_scores(evaluation.scores.all())["mid"]
+    return format_published(mid, decimals=evaluation.edition.decimals)
 
 
 @dataclass(frozen=True)
@@ -291,14 +294,14 @@ def _difference(name: str, change: Change) -> Difference:
     delta = change.delta[name]
     css = {"mid": "primary first", "rte": "overall first"}.get(name, "")
     return Difference(
-        old=format_published(change.old[name]),
-        new=format_published(change.new[name]),
-        delta=delta_words(delta),
+        old=format_published(change.old[name], decimals=change.old_decimals),
+        new=format_published(change.new[name], decimals=change.new_decimals),
+        delta=delta_words(delta, decimals=max(change.old_decimals, change.new_decimals)),
         css=css if delta else f"{css} same".strip(),
     )
 
 
-def delta_words(delta: float | None) -> str:
+def delta_words(delta: float | None, *, decimals: int = 2) -> str:
     """A difference with its sign.
 
     >>> delta_words(0.09), delta_words(-1.5), delta_words(0.0), delta_words(None)
@@ -306,7 +309,7 @@ def delta_words(delta: float | None) -> str:
     """
     if delta is None:
         return ""
-    return f"{delta:+.2f}".replace("-", "−") if delta else "0.00"
+    return f"{delta:+.{decimals}f}".replace("-", "−") if delta else f"{0:.{decimals}f}"
 
 
 def _rank(rank: int | None) -> str:

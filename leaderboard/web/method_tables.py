@@ -44,6 +44,7 @@ def preview_table(preview: Preview | None) -> PreviewTable | None:
                     sight.entry.scores,
                     {"overall": sight.edition.ground_truth.n_sequences, **sight.edition.ground_truth.counts},
                     intervals=sight.entry.intervals,
+                    decimals=sight.entry.decimals,
                     best=sight.entry.best,
                     second=sight.entry.second,
                 ),

@@ -14,7 +14,7 @@ from leaderboard.quotas import Quota
 from leaderboard.submissions import Progress
 from leaderboard.web.compare_tables import signed
 from leaderboard.web.result_tables import ResultGroup, result_groups
-from leaderboard.web.tables import SCORED_DECIMALS, rank_range
+from leaderboard.web.tables import rank_range
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,7 @@ def outcome_table(
         method=submission.method.name,
         team=submission.method.team.name,
         scores=progress.scores,
+        decimals=progress.decimals,
         intervals=outcomes.shown_intervals(progress, place),
         method_id=submission.method_id,
         submission_id=submission.pk,
@@ -71,6 +72,7 @@ def outcome_table(
             progress.scores,
             progress.counts,
             intervals=entry.intervals,
+            decimals=entry.decimals,
             best=entry.best,
             second=entry.second,
         ),
@@ -108,17 +110,15 @@ def _beside(
 
 
 def _beside_row(entry: Entry, other: Entry, *, href: str, about: str, compare_href: str = "") -> BesideRow:
-    is_printed = other.kind == "published"
-    decimals = exports.printed_decimals(other.scores.values()) if is_printed else SCORED_DECIMALS
     return BesideRow(
         label=other.method,
         href=href,
         about=about,
-        mid=format_published(other.scores["mid"], decimals=decimals),
+        mid=format_published(other.scores["mid"], decimals=other.decimals),
         mid_gap=_gap(entry, other, "mid"),
-        rte=format_published(other.scores["rte"], decimals=decimals),
+        rte=format_published(other.scores["rte"], decimals=other.decimals),
         rte_gap=_gap(entry, other, "rte"),
-        css="" if decimals == SCORED_DECIMALS else f" d{decimals}",
+        css="" if other.decimals >= entry.decimals else f" d{other.decimals}",
         source=other.source,
         compare_href=compare_href,
     )
@@ -126,7 +126,11 @@ def _beside_row(entry: Entry, other: Entry, *, href: str, about: str, compare_hr
 
 def _gap(entry: Entry, other: Entry, name: str) -> str:
     mine, theirs = entry.scores[name], other.scores[name]
-    return "" if mine is None or theirs is None else signed(mine - theirs)
+    return (
+        ""
+        if mine is None or theirs is None
+        else signed(mine - theirs, decimals=max(entry.decimals, other.decimals))
+    )
 
 
 def _compare_href(submission: Submission, place: Place, other: Entry) -> str:

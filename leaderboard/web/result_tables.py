@@ -95,12 +95,13 @@ def result_groups(
     counts: Mapping[str, int],
     *,
     intervals: Mapping[str, Interval] = MappingProxyType({}),
+    decimals: int,
     best: frozenset[str] = frozenset(),
     second: frozenset[str] = frozenset(),
 ) -> tuple[ResultGroup, ...]:
     """The ten numbers of one result, with the number of sequences behind each."""
     headings = [score_heading(name) for name in SCORE_NAMES]
-    cells = score_cells(scores, intervals=intervals, best=best, second=second)
+    cells = score_cells(scores, intervals=intervals, decimals=decimals, best=best, second=second)
     columns = [
         ResultColumn(heading, cell, grouped(counts.get(heading.caption)))
         for heading, cell in zip(headings, cells, strict=True)
@@ -122,6 +123,7 @@ def method_results(results: Iterable[Result]) -> tuple[MethodResult, ...]:
                 result.entry.scores,
                 {"overall": result.edition.ground_truth.n_sequences, **result.edition.ground_truth.counts},
                 intervals=result.entry.intervals,
+                decimals=result.entry.decimals,
                 best=result.entry.best,
                 second=result.entry.second,
             ),
@@ -129,8 +131,8 @@ def method_results(results: Iterable[Result]) -> tuple[MethodResult, ...]:
             attempts=tuple(
                 AttemptRow(
                     at=attempt.at,
-                    mid=format_published(attempt.mid),
-                    rte=format_published(attempt.rte),
+                    mid=format_published(attempt.mid, decimals=result.entry.decimals),
+                    rte=format_published(attempt.rte, decimals=result.entry.decimals),
                     is_best=attempt.submission_id == result.entry.submission_id,
                 )
                 for attempt in result.attempts
@@ -156,10 +158,6 @@ def submission_rows(submissions: Iterable[Submission]) -> tuple[SubmissionRow, .
     for submission in submissions:
         evaluation = evaluation_of(submission)
         scores = flat_scores(evaluation.scores.all())
-        cells = [
-            cell for name, cell in zip(SCORE_NAMES, score_cells(scores), strict=True) if name in METRIC_TITLES
-        ]
-        rows.append(
-            SubmissionRow(submission, evaluation.status, Status(evaluation.status).label, tuple(cells))
-        )
+        cells = score_cells(scores, names=tuple(METRIC_TITLES), decimals=evaluation.edition.decimals)
+        rows.append(SubmissionRow(submission, evaluation.status, Status(evaluation.status).label, cells))
     return tuple(rows)

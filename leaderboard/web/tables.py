@@ -17,7 +17,7 @@ from evaluator.protocol import Interval as TimeInterval
 from evaluator.report import format_published
 from leaderboard import inference
 from leaderboard.entries import Interval
-from leaderboard.exports import printed_decimals, short_authors
+from leaderboard.exports import short_authors
 from leaderboard.standings import PRIMARY, Board, Entry
 from leaderboard.web import drawing
 from leaderboard.web.board_query import PER_PAGE, BoardQuery
@@ -189,7 +189,7 @@ def board_table(board: Board, *, query: BoardQuery) -> BoardTable:
         has_intervals=bool(scales),
         can_compare=_is_present(board) and sum(row.can_be_compared for row in rows) > 1,
         reason=_reason(board, has_intervals=bool(scales)),
-        floor=floor_sentence(board.edition.floor) if board.edition else "",
+        floor=floor_sentence(board.edition.floor, decimals=board.edition.decimals) if board.edition else "",
     )
 
 
@@ -291,7 +291,7 @@ def score_cells(
                 is_best=name in best,
                 is_second=name in second,
                 is_with_best=found.rank_low == 1,
-                interval=interval_words(found),
+                interval=interval_words(found, decimals=decimals),
                 has_room=scale is not None,
                 whisker=drawing.whisker(scale, value, found.low, found.high)
                 if scale and value is not None
@@ -301,15 +301,18 @@ def score_cells(
     return tuple(cells)
 
 
-def interval_words(found: Interval) -> str:
+def interval_words(found: Interval, *, decimals: int = SCORED_DECIMALS) -> str:
     """From where to where a value may lie; empty where that is not known.
 
     >>> interval_words(Interval(low=13.9, high=14.523)), interval_words(Interval())
     ('13.90 to 14.52', '')
+    >>> interval_words(Interval(low=13.9, high=14.5), decimals=1)
+    '13.9 to 14.5'
     """
     if found.low is None or found.high is None:
         return ""
-    return f"{format_published(found.low)} to {format_published(found.high)}"
+    low, high = (format_published(end, decimals=decimals) for end in (found.low, found.high))
+    return f"{low} to {high}"
 
 
 def figure_css(texts: Iterable[str]) -> str:
@@ -378,7 +381,7 @@ def _row(
             names=names,
             intervals=entry.intervals,
             scales=scales,
-            decimals=printed_decimals(entry.scores.values()) if is_published else SCORED_DECIMALS,
+            decimals=entry.decimals,
             best=entry.best,
             second=entry.second,
         ),

@@ -53,6 +53,6 @@ def test_readers_see_the_floor_beside_the_rows_and_never_as_one(
     root = pages.page(client.get("/board/test/"))
     assert len(root.one("table", class_="board").one("tbody").all("tr")) == len(rows)
     assert (
-        f"Floor: the ground truth itself, submitted as predictions, scores MiD {floor['mid']:.2f}, RTE"
+        f"Floor: the ground truth itself, submitted as predictions, scores MiD {floor['mid']:.1f}, RTE"
         in (root.one("div", class_="legend").text)
     )

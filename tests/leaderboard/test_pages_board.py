@@ -80,11 +80,15 @@ def test_submissions_are_ranked_among_published_rows(client: Client, edition: Ed
     assert pages.column(root, RANK) == [str(1 + sum(v < w for v in values)) for w in values]
 
 
-def test_submitted_values_have_two_decimals(client: Client, edition: Edition, owner: User) -> None:
-    builders.submit(owner, builders.predictions(edition), method="Foo")
+@pytest.mark.parametrize("decimals", [1, 2])
+def test_submitted_values_have_the_decimals_of_their_edition(
+    client: Client, benchmark: None, tmp_path: Path, owner: User, decimals: int
+) -> None:
+    Split.objects.filter(pk="test").update(decimals=decimals)
+    builders.submit(owner, builders.predictions(builders.import_truth(tmp_path)), method="Foo")
     builders.score_all()
     cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:-1]
-    assert all(len(cell.partition(".")[2]) == 2 for cell in cells), cells
+    assert all(len(cell.partition(".")[2]) == decimals for cell in cells), cells
 
 
 def test_values_of_fewer_decimals_keep_the_room_of_the_missing_one(client: Client, benchmark: None) -> None:

@@ -151,13 +151,13 @@ def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
     root = look(signed_in, inferred[1])
     own, published = beside(root)
     assert own[0].startswith("M1.05 your team’s best other, 20")
-    gap = round(mid(inferred[1]) - mid(inferred[0]), 2)
+    gap = round(mid(inferred[1]) - mid(inferred[0]), 1)
     assert gap > 0
-    assert own[1:3] == [f"{mid(inferred[0]):.2f}", f"+{gap:.2f}"]
+    assert own[1:3] == [f"{mid(inferred[0]):.1f}", f"+{gap:.1f}"]
     assert published[0].startswith(f"{nearest.method} nearest published, Shi et al.")
     assert nearest.scores["mid"] is not None
-    gap = round(mid(inferred[1]) - nearest.scores["mid"], 2)
-    assert published[2] == (f"+{gap:.2f}" if gap > 0 else f"−{-gap:.2f}")
+    gap = round(mid(inferred[1]) - nearest.scores["mid"], 1)
+    assert published[2] == (f"+{gap:.1f}" if gap > 0 else f"−{-gap:.1f}")
     assert PAGE.format(inferred[0].pk) in [a.attributes["href"] for a in root.all("a")]
 
 

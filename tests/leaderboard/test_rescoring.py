@@ -55,7 +55,7 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
             Evaluation.objects.get(submission=submission, edition=edition).scores.all()
         )
         values = Predictions.from_arrays(ttc_s=old.ttc_s * factor, manifest=truth.manifest)
-        assert found == {name: published(v) for name, v in evaluate(values, truth).flat().items()}
+        assert found == {name: published(v, decimals=1) for name, v in evaluate(values, truth).flat().items()}
 
 
 def test_new_uploads_meanwhile_are_scored_in_both(

@@ -16,7 +16,7 @@ def good_object(edition: Edition) -> dict[str, float]:
     return json.loads(builders.predictions(edition))
 
 
-def test_scores_are_the_evaluators_own_at_two_decimals(edition: Edition, owner: User) -> None:
+def test_scores_are_the_evaluators_own_with_the_editions_decimals(edition: Edition, owner: User) -> None:
     data = builders.predictions(edition, factor=1.3)
     submission = builders.submit(owner, data)
     assert scoring.run_next(rng=random.Random(0))
@@ -24,7 +24,8 @@ def test_scores_are_the_evaluators_own_at_two_decimals(edition: Edition, owner: 
     offline = evaluate(read_predictions(data, manifest=truth.manifest), truth)
     progress = submissions.progress(submission)
     assert progress.state == Status.SCORED
-    assert progress.scores == {name: published(value) for name, value in offline.flat().items()}
+    assert edition.decimals == progress.decimals == 1
+    assert progress.scores == {name: published(value, decimals=1) for name, value in offline.flat().items()}
     assert progress.counts == {name: score.count for name, score in offline.scores.items()}
     assert progress.truncated == dict(offline.truncated)
     assert progress.n_out_of_range == 1
@@ -33,7 +34,7 @@ def test_scores_are_the_evaluators_own_at_two_decimals(edition: Edition, owner: 
 def test_nothing_finer_than_published_is_in_the_database(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition, factor=1.3))
     builders.score_all()
-    assert all(value == round(value, 2) for value in Score.objects.values_list("value", flat=True))
+    assert all(value == round(value, 1) for value in Score.objects.values_list("value", flat=True))
     assert "mid" not in json.dumps(Evaluation.objects.get().report)
 
 

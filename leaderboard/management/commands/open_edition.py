@@ -28,6 +28,12 @@ class Command(BaseCommand):
         parser.add_argument("split")
         parser.add_argument("--truth", type=Path, help="CSV file or annotation folder; default: unchanged")
         parser.add_argument("--protocol", choices=sorted(PROTOCOLS), help="default: unchanged")
+        parser.add_argument(
+            "--decimals",
+            type=int,
+            choices=[1, 2],
+            help="with how many decimals it publishes; default: as the split says now",
+        )
         parser.add_argument("--wait", action="store_true", help="show progress until all are decided")
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -37,6 +43,7 @@ class Command(BaseCommand):
                 split_name=options["split"],
                 path=options["truth"],
                 protocol=options["protocol"],
+                decimals=options["decimals"],
                 now=timezone.now(),
                 actor=None,
             )
@@ -48,7 +55,8 @@ class Command(BaseCommand):
             raise CommandError(str(refused)) from refused
         truth = edition.ground_truth
         self.stdout.write(
-            f"{edition}: ground truth {truth.digest}, protocol {edition.protocol}; "
+            f"{edition}: ground truth {truth.digest}, protocol {edition.protocol}, "
+            f"decimals {edition.decimals}; "
             f"{truth.n_added} sequences added, {truth.n_removed} removed, {truth.n_changed} changed."
         )
         if options["wait"]:

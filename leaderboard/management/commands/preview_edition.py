@@ -48,11 +48,12 @@ class Command(BaseCommand):
         )
         self.stdout.write(line(found.progress))
         for change in found.changes:
-            delta = change.delta["mid"]
+            delta, decimals = change.delta["mid"], max(change.old_decimals, change.new_decimals)
             self.stdout.write(
                 f"{_rank(change.old_rank)} → {_rank(change.new_rank)}  {change.method} ({change.team})  "
-                f"MiD {_value(change.old['mid'])} → {_value(change.new['mid'])} "
-                f"({'–' if delta is None else f'{delta:+.2f}'})  {change.new_status}"
+                f"MiD {_value(change.old['mid'], change.old_decimals)} → "
+                f"{_value(change.new['mid'], change.new_decimals)} "
+                f"({'–' if delta is None else f'{delta:+.{decimals}f}'})  {change.new_status}"
             )
             for problem in change.problems[:1]:
                 self.stdout.write(f"       {problem['message']}")
@@ -62,5 +63,5 @@ def _rank(rank: int | None) -> str:
     return f"{rank or '–':>4}"
 
 
-def _value(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}"
+def _value(value: float | None, decimals: int) -> str:
+    return "–" if value is None else f"{value:.{decimals}f}"
