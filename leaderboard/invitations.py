@@ -158,6 +158,9 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
             if refusal:
                 raise Refused("cannot-join", refusal)
             if is_alone:
+                if Method.objects.filter(team=former, visibility=Visibility.PUBLIC).exists():
+                    # Under this team's name everybody sees them from now on.
+                    teams.show_name(team)
                 moved = _bring_methods(former, team)
             Membership.objects.filter(pk=membership.pk).update(team=team, is_owner=False, joined_at=now)
             teams.end_invitations(former, of=user)

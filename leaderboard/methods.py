@@ -3,10 +3,12 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import datetime
 from typing import Any
 
 from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
+from django.utils import timezone
 
 from leaderboard import audit, boards, snapshots, standings, teams
 from leaderboard.entries import Entry, Profile, profile_of
@@ -22,7 +24,7 @@ from leaderboard.models import (
     User,
     Visibility,
 )
-from leaderboard.names import clean_name, like
+from leaderboard.names import clean_name, like, require_rename_possible
 from leaderboard.present import Attempt
 from leaderboard.texts import Refused, clean_text, clean_url
 
@@ -100,7 +102,9 @@ def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
 # --- what its team says ----------------------------------------------------------------------------------
 
 
-def edit(*, method: Method, changes: Mapping[str, object], actor: User) -> Method:
+def edit(
+    *, method: Method, changes: Mapping[str, object], actor: User, now: datetime | None = None
+) -> Method:
     """Say something else of a method; what `changes` does not name stays. Returns it as it is now.
 
     Values are texts as people fill them in, or what they mean; None or an empty text takes back what was
@@ -121,9 +125,13 @@ def edit(*, method: Method, changes: Mapping[str, object], actor: User) -> Metho
         if not changed:
             return row
         _require_sound(row, changed)
+        if "name" in changed:
+            renamed_at = now or timezone.now()
+            require_rename_possible(renamed_at=row.renamed_at, now=renamed_at)
+            row.renamed_at = renamed_at
         for name, value in changed.items():
             setattr(row, name, value)
-        row.save(update_fields=list(changed))
+        row.save(update_fields=[*changed, *(["renamed_at"] if "name" in changed else [])])
         audit.record(
             verb="edited",
             noun="Method",

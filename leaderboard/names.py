@@ -6,10 +6,12 @@ folded to what it is taken for. The list says nothing of case, and has a few gap
 
 import unicodedata
 from collections.abc import Iterable, Mapping
+from datetime import datetime, timedelta
 from functools import cache
 from typing import Any
 
 from confusable_homoglyphs.confusables import confusables_data
+from django.conf import settings
 
 from leaderboard.texts import Refused, clean_text
 
@@ -76,6 +78,21 @@ def clean_name(field: str, text: str) -> str:
             field=field,
         )
     return text
+
+
+def require_rename_possible(*, renamed_at: datetime | None, now: datetime) -> None:
+    """Raise `texts.Refused` for what was renamed lately: each new name voids what is remembered."""
+    if renamed_at is None or now >= renamed_at + settings.RENAME_AFTER:
+        return
+    again_at = renamed_at + settings.RENAME_AFTER
+    # The minute that has begun by then, so that whoever comes back at it is in time.
+    again_at += timedelta(minutes=1) - timedelta(seconds=again_at.second, microseconds=again_at.microsecond)
+    raise Refused(
+        "renamed-lately",
+        f"The name was changed at {renamed_at:%Y-%m-%d %H:%M} UTC; expected the next change after "
+        f"{again_at:%Y-%m-%d %H:%M} UTC.",
+        field="name",
+    )
 
 
 def like(name: str, others: Iterable[str]) -> str | None:

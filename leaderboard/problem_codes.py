@@ -65,6 +65,7 @@ API_CODES: Final[dict[str, str]] = {
     "bad-name": "The name has nothing that a reader could tell it by.",
     "reserved-name": "The name reads as what methods and teams without a name are called.",
     "name-taken": "There is one already whose name looks like it.",
+    "renamed-lately": "The name was changed lately; the sentence says when it can be changed again.",
     "public-name": "A public method keeps its name.",
     "shown-for-good": "A public method stays public.",
     "not-confirmed": "What cannot be taken back was not confirmed.",

@@ -189,6 +189,8 @@ DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is strea
 DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
 FILE_UPLOAD_HANDLERS = ["leaderboard.web.uploads.UnnamedFileUploadHandler"]
 
+# How long after a renaming a team or a method can be renamed again; 0: at once.
+RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
 # Whether teams have quotas (see leaderboard/quotas.py).
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.

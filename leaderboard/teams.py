@@ -12,7 +12,7 @@ from django.db.models.functions import Now
 
 from leaderboard import audit, boards
 from leaderboard.models import Invitation, Membership, Method, QuotaOverride, Team, User
-from leaderboard.names import MAX_NAME, clean_name, look
+from leaderboard.names import MAX_NAME, clean_name, look, require_rename_possible
 from leaderboard.texts import Refused
 
 _ROOM_FOR_A_NUMBER = 10
@@ -42,26 +42,24 @@ def create(*, user: User, name: str, now: datetime) -> Team:
     if present_team_of(user=user) is not None:
         raise Refused("in-a-team", "You are in a team already; expected somebody who is in none.")
     with transaction.atomic():
-        try:
-            with transaction.atomic():
-                team = Team.objects.create(name=name, look=look(name), created_at=now)
-        except IntegrityError:
-            raise _taken(name) from None
-        return _founded(team, user)
+        _require_free(name)
+        return _founded(Team.objects.create(name=name, look=look(name), created_at=now), user)
 
 
-def rename(*, team: Team, name: str, actor: User) -> Team:
-    """Call the team something else, on every board at once. Its owner does. Raises `Refused`."""
+def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
+    """Call the team something else, on every board at once. Its owner does, once a day. Raises `Refused`."""
     name = clean_name("name", name)
     with transaction.atomic():
         row = locked(team)[0]
         require_owner(row, actor, doing="renames it")
         if row.name == name:
             return row
-        before, row.name, row.look = row.name, name, look(name)
+        require_rename_possible(renamed_at=row.renamed_at, now=now)
+        _require_free(name, but=row)
+        before, row.name, row.look, row.renamed_at = row.name, name, look(name), now
         try:
             with transaction.atomic():
-                row.save(update_fields=["name", "look"])
+                row.save(update_fields=["name", "look", "renamed_at"])
         except IntegrityError:
             raise _taken(name) from None
         audit.record(
@@ -69,6 +67,42 @@ def rename(*, team: Team, name: str, actor: User) -> Team:
         )
         boards.changed_by_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
     return row
+
+
+def show_name(team: Team) -> None:
+    """Note that everybody reads the team's name from now on, for good; for whoever has its row locked.
+
+    Until then others may be called the same. Raises `Refused` where one of them was shown first.
+    """
+    if team.is_shown:
+        return
+    require_showable(team)
+    try:
+        with transaction.atomic():
+            Team.objects.filter(pk=team.pk).update(is_shown=True)
+    except IntegrityError:
+        raise _taken_first(team.name) from None
+
+
+def show_name_in_any_case(team: Team) -> None:
+    """The same where nobody is there to choose another name: a number is added to a name that is taken."""
+    number = 1
+    name = team.name
+    while _shown_twin(name, but=team):
+        number += 1
+        name = f"{team.name[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
+    if name != team.name:
+        details = {"from": team.name, "to": name, "reason": "another team was shown under this name first"}
+        Team.objects.filter(pk=team.pk).update(name=name, look=look(name))
+        audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details)
+        team.name = name
+    show_name(team)
+
+
+def require_showable(team: Team) -> None:
+    """Raise `Refused` where everybody would take the team's name for that of another team."""
+    if not team.is_shown and _shown_twin(team.name, but=team):
+        raise _taken_first(team.name)
 
 
 def leave(*, user: User) -> Team:
@@ -199,17 +233,34 @@ def _taken(name: str) -> Refused:
     )
 
 
+def _taken_first(name: str) -> Refused:
+    return Refused(
+        "name-taken",
+        f"There is a team on the boards whose name looks like {name!r}, which was shown first; expected your "
+        "team to be renamed before everybody sees its name.",
+        field="visibility",
+    )
+
+
+def _shown_twin(name: str, *, but: Team | None = None) -> bool:
+    """Whether a team that everybody sees has a name like it. Other teams take no name."""
+    shown = Team.objects.filter(look=look(name), is_shown=True)
+    return (shown.exclude(pk=but.pk) if but is not None else shown).exists()
+
+
+def _require_free(name: str, *, but: Team | None = None) -> None:
+    if _shown_twin(name, but=but):
+        raise _taken(name)
+
+
 def _named(wanted: str) -> Team:
-    """A new team of that name, numbered if others have it."""
+    """A new team of that name, numbered if a team that everybody sees has it."""
     wanted = wanted[: MAX_NAME - _ROOM_FOR_A_NUMBER]
-    for number in range(1, 10_000):
-        name = wanted if number == 1 else f"{wanted} {number}"
-        try:
-            with transaction.atomic():
-                return Team.objects.create(name=name, look=look(name))
-        except IntegrityError:
-            continue
-    raise RuntimeError(f"ten thousand teams are called {wanted!r}")
+    name, number = wanted, 1
+    while _shown_twin(name):
+        number += 1
+        name = f"{wanted} {number}"
+    return Team.objects.create(name=name, look=look(name))
 
 
 def _founded(team: Team, user: User) -> Team:

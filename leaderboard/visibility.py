@@ -17,10 +17,10 @@ from uuid import UUID
 import structlog
 from django.db import transaction
 
-from leaderboard import audit, boards, standings
+from leaderboard import audit, boards, standings, teams
 from leaderboard.entries import Entry, Profile, profile_of
 from leaderboard.methods import require_team
-from leaderboard.models import Edition, Method, Split, User, Visibility
+from leaderboard.models import Edition, Method, Split, Team, User, Visibility
 from leaderboard.texts import Refused
 
 log = structlog.get_logger(__name__)
@@ -128,6 +128,7 @@ def change(
     moment, or none. Raises `Refused`.
     """
     with transaction.atomic():
+        teams.locked(method.team)
         row = Method.objects.select_for_update(no_key=True).get(pk=method.pk)
         require_team(row, actor)
         require_possible(row, visibility=visibility, reveal_at=reveal_at, now=now)
@@ -135,6 +136,8 @@ def change(
         row.visibility, row.reveal_at = visibility, reveal_at
         if before == {"visibility": row.visibility, "reveal_at": row.reveal_at}:
             return row
+        if visibility == Visibility.PUBLIC:
+            teams.show_name(row.team)
         row.shown_at = row.shown_at or now
         row.save(update_fields=["visibility", "reveal_at", "shown_at"])
         audit.record(
@@ -165,6 +168,8 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
         raise Refused(
             "shown-for-good", f"The method {method.name!r} is public, for good.", field="visibility"
         )
+    if visibility == Visibility.PUBLIC:
+        teams.require_showable(method.team)
     if reveal_at is None:
         return
     if visibility != Visibility.ANONYMOUS:
@@ -199,8 +204,11 @@ def reveal_due(*, now: datetime) -> int:
     n_revealed = 0
     for method_id in list(due.values_list("pk", flat=True)):
         with transaction.atomic():
+            teams.locked(*Team.objects.filter(methods=method_id))
             if not due.filter(pk=method_id).update(visibility=Visibility.PUBLIC, reveal_at=None):
                 continue
+            # Read only now: the method may have moved to another team until it was locked.
+            teams.show_name_in_any_case(Team.objects.get(methods=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
             boards.changed_by_methods([method_id])

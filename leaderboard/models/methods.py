@@ -98,6 +98,7 @@ class Method(models.Model):
     shown_at = models.DateTimeField(null=True, blank=True, help_text="When it first left private.")
     reveal_at = models.DateTimeField(null=True, blank=True, help_text="When an anonymous one turns public.")
     created_at = models.DateTimeField(default=timezone.now)
+    renamed_at = models.DateTimeField(null=True, blank=True)
 
     objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 

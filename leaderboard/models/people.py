@@ -52,11 +52,23 @@ class Team(models.Model):
     """Who competes. A person alone is a team of one."""
 
     id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
-    name = models.CharField(max_length=80, unique=True)
-    # What the name looks like once confusable characters are folded: no two teams may look the same.
-    look = models.CharField(max_length=320, unique=True)
+    name = models.CharField(max_length=80)
+    # What the name looks like once confusable characters are folded: no two teams that show it look the same.
+    look = models.CharField(max_length=320, db_index=True)
+    is_shown = models.BooleanField(
+        default=False, help_text="Whether everybody has been shown its name, with a public method."
+    )
+    renamed_at = models.DateTimeField(null=True, blank=True)
     created_at = models.DateTimeField(default=timezone.now)
     members = models.ManyToManyField(User, through="Membership", related_name="teams")
+
+    class Meta:
+        constraints = [
+            # A hidden team takes nobody's name: that it is there would be told by the refusal.
+            models.UniqueConstraint(
+                fields=["look"], condition=models.Q(is_shown=True), name="shown_teams_look_different"
+            ),
+        ]
 
     def __str__(self) -> str:
         return self.name

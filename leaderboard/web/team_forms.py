@@ -14,7 +14,8 @@ class NameForm(RefusableForm):
     """The team's name."""
 
     name = forms.CharField(
-        help_text="As boards show it. No two teams may have names that look alike.",
+        help_text="As boards show it, once a method of yours is public. No two teams on the boards may have "
+        "names that look alike. A name can be changed once a day.",
         widget=forms.TextInput(attrs={"maxlength": 80, "autocomplete": "organization"}),
         error_messages={"required": "The team has no name; expected one."},
     )

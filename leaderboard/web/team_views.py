@@ -56,7 +56,7 @@ def team(request: HttpRequest) -> HttpResponse:
             if own is None:
                 verbs.create(user=user, name=name, now=timezone.now())
             else:
-                verbs.rename(team=own, name=name, actor=user)
+                verbs.rename(team=own, name=name, actor=user, now=timezone.now())
             return redirect("team")
         except Refused as refusal:
             form.refuse(refusal)

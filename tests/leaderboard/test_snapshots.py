@@ -348,7 +348,7 @@ def test_a_method_is_nowhere_until_it_is_shown_and_told_of_as_it_is_then(
     assert client.get(address).json()["details"]["n_frames"] == 3
     visibility.change(method=method, visibility="PUBLIC", actor=owner, now=timezone.now())
     assert client.get(address).json()["name"] == "Secret"
-    teams.rename(team=method.team, name="Eagle Owls", actor=owner)
+    teams.rename(team=method.team, name="Eagle Owls", actor=owner, now=timezone.now())
     assert client.get(address).json()["team"] == "Eagle Owls"
 
 

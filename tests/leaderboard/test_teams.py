@@ -1,5 +1,7 @@
 """Teams: founding, renaming, handing over, removing, leaving; and the page for it."""
 
+import re
+from datetime import timedelta
 from io import StringIO
 from uuid import UUID
 
@@ -8,7 +10,7 @@ from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import invitations, quotas, teams
+from leaderboard import invitations, methods, quotas, teams, visibility
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Membership, Method, Team, User
 from leaderboard.texts import Refused
 from tests import builders, pages
@@ -41,14 +43,118 @@ def test_somebody_founds_one_team_and_owns_it(owner: User) -> None:
     assert Team.objects.count() == 1
 
 
-def test_a_name_that_looks_like_another_teams_is_refused(owner: User, stranger: User, team: Team) -> None:
+def shown(team: Team) -> Method:
+    """A public method of the team, shown as its owner does."""
+    method = Method.objects.create(team=team, name=f"Net of {team.name}")
+    visibility.change(method=method, visibility="PUBLIC", actor=owners(team)[0], now=timezone.now())
+    return method
+
+
+def test_a_name_that_looks_like_that_of_a_team_on_the_boards_is_refused(
+    owner: User, stranger: User, team: Team
+) -> None:
+    shown(team)
     with refused("name-taken"):
         teams.create(user=stranger, name="ОWLS", now=timezone.now())
     other = teams.team_of(user=stranger)
     with refused("name-taken"):
-        teams.rename(team=other, name="0wls", actor=stranger)
+        teams.rename(team=other, name="0wls", actor=stranger, now=timezone.now())
     assert Team.objects.get(pk=other.pk).name == "Strangers"
-    assert teams.rename(team=team, name="OWLS", actor=owner).name == "OWLS"
+    assert teams.rename(team=team, name="OWLS", actor=owner, now=timezone.now()).name == "OWLS"
+
+
+def test_nobody_learns_from_a_name_that_a_team_is_there_which_shows_nothing(
+    owner: User, stranger: User, teammate: User, team: Team
+) -> None:
+    Method.objects.create(team=team, name="Secret")
+    veiled = Method.objects.create(team=team, name="Veiled")
+    visibility.change(method=veiled, visibility="ANONYMOUS", actor=owner, now=timezone.now())
+    client = Client()
+    client.force_login(stranger)
+    # Founding, renaming and signing up under that name do what they do under any other.
+    assert client.post("/team/", {"name": "Owls"}).status_code == 302
+    own = teams.team_of(user=stranger)
+    assert own.name == "Owls"
+    assert client.post("/team/", {"name": "Barn owls"}).status_code == 302
+    newcomer = User.objects.create_user("newcomer@example.org", "correct horse", name="Owls")
+    assert teams.team_of(user=newcomer).name == "Owls"
+
+
+def test_of_two_teams_of_one_name_the_first_to_be_shown_has_it(
+    owner: User, stranger: User, team: Team
+) -> None:
+    other = teams.create(user=stranger, name="0WLS", now=timezone.now())
+    waiting = Method.objects.create(team=other, name="Waiting")
+    shown(team)
+    client = Client()
+    client.force_login(stranger)
+    answer = client.post(
+        f"/api/v1/methods/{waiting.pk}/visibility",
+        {"visibility": "PUBLIC", "confirm": True},
+        content_type="application/json",
+    )
+    assert (answer.status_code, answer.json()["code"]) == (422, "name-taken")
+    assert "expected your team to be renamed before" in answer.json()["detail"]
+    page = client.post(f"/methods/{waiting.pk}/visibility/", {"visibility": "PUBLIC", "confirm": "on"})
+    assert page.status_code == 422
+    assert "expected your team to be renamed before" in pages.page(page).one("main").text
+    teams.rename(team=other, name="Lapwings", actor=stranger, now=timezone.now())
+    visibility.change(method=waiting, visibility="PUBLIC", actor=stranger, now=timezone.now())
+
+
+def test_a_reveal_on_a_date_numbers_a_name_that_was_shown_meanwhile(
+    owner: User, stranger: User, team: Team
+) -> None:
+    now = timezone.now()
+    other = teams.create(user=stranger, name="0WLS", now=now)
+    veiled = Method.objects.create(team=other, name="Veiled")
+    at = now + timedelta(days=1)
+    visibility.change(method=veiled, visibility="ANONYMOUS", actor=stranger, now=now, reveal_at=at)
+    shown(team)
+    assert visibility.reveal_due(now=at) == 1
+    other.refresh_from_db()
+    assert (other.name, other.is_shown) == ("0WLS 2", True)
+    assert AuditEvent.objects.filter(verb="renamed", noun_id=other.pk).exists()
+
+
+def test_methods_that_come_along_show_the_name_of_the_team_that_they_come_to(
+    owner: User, stranger: User, maintainer: User, team: Team
+) -> None:
+    others = teams.create(user=stranger, name="0WLS", now=timezone.now())
+    shown(team)
+    loner = teams.team_of(user=maintainer)
+    method = shown(loner)
+    _, secret = invitations.make(team=others, actor=stranger, now=timezone.now())
+    with refused("name-taken"):
+        invitations.accept(secret=secret, user=maintainer, now=timezone.now())
+    method.refresh_from_db()
+    assert method.team == loner
+
+
+def test_a_team_and_a_method_are_renamed_once_a_day(owner: User, team: Team) -> None:
+    now = timezone.now()
+    method = Method.objects.create(team=team, name="Net")
+    client = Client()
+    client.force_login(owner)
+    assert client.post("/team/", {"name": "Barn Owls"}).status_code == 302
+    page = client.post("/team/", {"name": "Eagle Owls"})
+    assert page.status_code == 422
+    told = pages.page(page).one("main").text
+    address = f"/api/v1/methods/{method.pk}"
+    assert client.patch(address, {"name": "Net 2"}, content_type="application/json").status_code == 200
+    # What else is said of a method can be changed as often as one likes.
+    again = {"name": "Net 2", "description": "Better."}
+    assert client.patch(address, again, content_type="application/json").status_code == 200
+    answer = client.patch(address, {"name": "Net 3"}, content_type="application/json")
+    assert (answer.status_code, answer.json()["code"]) == (422, "renamed-lately")
+    sentence = r"The name was changed at [-0-9: ]{16} UTC; expected the next change after [-0-9: ]{16} UTC\."
+    assert re.search(sentence, told)
+    assert re.fullmatch(sentence, answer.json()["detail"])
+    team.refresh_from_db()
+    assert team.name == "Barn Owls"
+    later = now + timedelta(hours=24, minutes=1)
+    assert teams.rename(team=team, name="Eagle Owls", actor=owner, now=later).name == "Eagle Owls"
+    assert methods.edit(method=method, changes={"name": "Net 3"}, actor=owner, now=later).name == "Net 3"
 
 
 def test_renaming_changes_every_board_and_is_told_to_the_trail(
@@ -58,9 +164,9 @@ def test_renaming_changes_every_board_and_is_told_to_the_trail(
     builders.score_all()
     number = BoardVersion.objects.get(split="test").number
     with refused("not-the-owner"):
-        teams.rename(team=team, name="Mates", actor=teammate)
-    teams.rename(team=team, name="Barn Owls", actor=owner)
-    teams.rename(team=team, name="Barn Owls", actor=owner)
+        teams.rename(team=team, name="Mates", actor=teammate, now=timezone.now())
+    teams.rename(team=team, name="Barn Owls", actor=owner, now=timezone.now())
+    teams.rename(team=team, name="Barn Owls", actor=owner, now=timezone.now())
     assert BoardVersion.objects.get(split="test").number == number + 1
     (event,) = AuditEvent.objects.filter(verb="renamed")
     assert (event.actor, event.details) == (owner, {"from": "Owls", "to": "Barn Owls"})
@@ -152,6 +258,15 @@ def appoint_owner(team: str, email: str, reason: str = "Her account is closed.")
     return out.getvalue()
 
 
+def test_of_teams_of_one_name_the_owner_is_appointed_by_id(
+    owner: User, teammate: User, stranger: User, team: Team
+) -> None:
+    teams.create(user=stranger, name="Owls", now=timezone.now())
+    with pytest.raises(CommandError, match=f"2 teams are called 'Owls'; expected one .*{team.pk}"):
+        appoint_owner("Owls", teammate.email)
+    assert appoint_owner(str(team.pk), teammate.email).startswith(teammate.email)
+
+
 def test_a_maintainer_appoints_an_owner_where_the_owner_is_gone(
     owner: User, teammate: User, team: Team
 ) -> None:
@@ -187,6 +302,7 @@ def test_page_founds_renames_hands_over_removes_and_leaves(
 ) -> None:
     client.force_login(stranger)
     assert "No team yet" in pages.page(client.get("/team/")).one("main").text
+    shown(team)
     response = client.post("/team/", {"name": "owls"})
     assert response.status_code == 422
     assert "looks like" in pages.page(response).one("main").text

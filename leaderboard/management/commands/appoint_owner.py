@@ -1,13 +1,17 @@
 """`manage.py appoint_owner TEAM EMAIL --reason …`."""
 
+import re
 from argparse import ArgumentParser
-from typing import Any
+from typing import Any, Final
 
 from django.core.management.base import BaseCommand, CommandError
+from django.db.models import Q
 
 from leaderboard import teams
 from leaderboard.models import Team, User
 from leaderboard.texts import Refused
+
+UUID_TEXT: Final = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 
 
 class Command(BaseCommand):
@@ -17,7 +21,7 @@ class Command(BaseCommand):
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """TEAM, EMAIL, reason."""
-        parser.add_argument("team", help="the team's name, as boards show it")
+        parser.add_argument("team", help="the team's name, as boards show it, or its id")
         parser.add_argument("email", help="of the member who will own it")
         parser.add_argument("--reason", required=True, help="a sentence for the audit trail")
 
@@ -26,9 +30,7 @@ class Command(BaseCommand):
         reason = options["reason"].strip()
         if not reason:
             raise CommandError("No reason was given; expected a sentence for the audit trail.")
-        team = Team.objects.filter(name=options["team"]).first()
-        if team is None:
-            raise CommandError(f"No team is called {options['team']!r}.")
+        team = _team(options["team"])
         email = options["email"].strip().lower()
         heir = User.objects.filter(email=email).first()
         if heir is None:
@@ -38,3 +40,15 @@ class Command(BaseCommand):
         except Refused as refusal:
             raise CommandError(str(refusal)) from refusal
         self.stdout.write(f"{email} owns the team {team.name}.")
+
+
+def _team(text: str) -> Team:
+    """The team of this name or id. Teams that nobody sees may have one name, and then the id is asked for."""
+    by_id = Q(pk=text) if UUID_TEXT.fullmatch(text) else Q()
+    found = list(Team.objects.filter(Q(name=text) | by_id).order_by("created_at"))
+    if not found:
+        raise CommandError(f"No team is called {text!r}.")
+    if len(found) > 1:
+        ids = ", ".join(f"{team.pk} ({team.memberships.count()} members)" for team in found)
+        raise CommandError(f"{len(found)} teams are called {text!r}; expected one of their ids: {ids}.")
+    return found[0]
