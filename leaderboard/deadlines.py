@@ -11,12 +11,13 @@ from leaderboard.texts import Refused
 def refusal_of(split: Split, *, now: datetime) -> Refused | None:
     """Why a split takes nothing from anybody now; None if it does."""
     code, sentence = "", ""
+    opens_at, closes_at = split.times
     if not split.has_ground_truth:
         code, sentence = "split-not-open", "are not open yet: it has no ground truth."
-    elif split.opens_at and now < split.opens_at:
-        code, sentence = "split-not-open", f"open at {split.opens_at:%Y-%m-%d %H:%M} UTC."
-    elif split.closes_at and now >= split.closes_at:
-        code, sentence = "split-closed", f"closed at {split.closes_at:%Y-%m-%d %H:%M} UTC."
+    elif opens_at and now < opens_at:
+        code, sentence = "split-not-open", f"open at {opens_at:%Y-%m-%d %H:%M} UTC."
+    elif closes_at and now >= closes_at:
+        code, sentence = "split-closed", f"closed at {closes_at:%Y-%m-%d %H:%M} UTC."
     return Refused(code, f"Submissions to {split.pk} {sentence}", field="split") if code else None
 
 
@@ -28,8 +29,9 @@ def is_open(split: Split, *, now: datetime) -> bool:
 def sentence_of(split: Split, *, now: datetime) -> str:
     """Since when, until when or why not the split takes submissions; empty where nothing limits it."""
     refusal = refusal_of(split, now=now)
-    if refusal is None and split.closes_at:
-        return f"Submissions to {split.pk} close at {split.closes_at:%Y-%m-%d %H:%M} UTC."
+    closes_at = split.times[1]
+    if refusal is None and closes_at:
+        return f"Submissions to {split.pk} close at {closes_at:%Y-%m-%d %H:%M} UTC."
     return str(refusal or "")
 
 
@@ -39,5 +41,6 @@ def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quota
     refusal = refusal_of(split, now=now)
     if refusal is None:
         return quota
-    opens_at = split.opens_at if split.opens_at and split.opens_at > now and split.has_ground_truth else None
-    return replace(quota, is_open=False, next_slot_at=opens_at, sentence=str(refusal))
+    opens_at = split.times[0]
+    is_to_come = opens_at is not None and opens_at > now and split.has_ground_truth
+    return replace(quota, is_open=False, next_slot_at=opens_at if is_to_come else None, sentence=str(refusal))

@@ -22,7 +22,10 @@ from django.db.models import Exists, OuterRef, Q
 
 from leaderboard import audit, lifecycle
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
-from leaderboard.models.quotas import QuotaRules
+from leaderboard.quota_rules import UNLIMITED, Rules, rules_of
+from leaderboard.texts import Refused
+
+__all__ = ["UNLIMITED", "Quota", "QuotaExceeded", "Rules", "override", "require", "rules_of", "span", "state"]
 
 REJECTED_WINDOW = timedelta(hours=24)
 BYTES_WINDOW = timedelta(hours=24)
@@ -41,34 +44,6 @@ class QuotaExceeded(Exception):
 
 class NotMaintainer(Exception):
     """Only maintainers give a team other rules."""
-
-
-@dataclass(frozen=True)
-class Rules:
-    """What holds for a team on a split; None is without limit."""
-
-    limit: int | None
-    window: timedelta
-    min_gap: timedelta
-    rejected_limit: int | None
-
-    @property
-    def window_s(self) -> float:
-        """The window in seconds."""
-        return self.window.total_seconds()
-
-    @property
-    def min_gap_s(self) -> float:
-        """The gap in seconds."""
-        return self.min_gap.total_seconds()
-
-    @property
-    def are_none(self) -> bool:
-        """Whether nothing is limited."""
-        return self.limit is None and self.rejected_limit is None and not self.min_gap
-
-
-UNLIMITED = Rules(limit=None, window=timedelta(days=1), min_gap=timedelta(0), rejected_limit=None)
 
 
 @dataclass(frozen=True)
@@ -131,20 +106,6 @@ def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now
         quota = _with_bytes(quota, team=team, user=user, size_bytes=size_bytes, now=now)
     if not quota.is_open:
         raise QuotaExceeded(quota)
-
-
-def rules_of(*, team: Team | None, split: Split) -> Rules:
-    """The split's rules, or the team's own."""
-    if not settings.QUOTAS:
-        return UNLIMITED
-    own = QuotaOverride.objects.filter(team=team, split=split).first() if team else None
-    row: QuotaRules = own or split
-    return Rules(
-        limit=row.quota_limit,
-        window=row.quota_window,
-        min_gap=row.quota_min_gap,
-        rejected_limit=row.quota_rejected_limit,
-    )
 
 
 def _state(*, team: Team | None, user: User, split: Split, rules: Rules, now: datetime) -> Quota:
@@ -280,13 +241,17 @@ def span(time: timedelta) -> str:
 
     >>> span(timedelta(days=30)), span(timedelta(days=1)), span(timedelta(minutes=90))
     ('30 days', '24 hours', '90 minutes')
+    >>> span(timedelta(0)), span(timedelta(days=-3)), span(timedelta(seconds=0.4))
+    ('0 seconds', '-3 days', '0 seconds')
     """
     seconds = round(time.total_seconds())
-    for unit_s, name, least in ((86_400, "day", 2), (3_600, "hour", 1), (60, "minute", 1), (1, "second", 0)):
-        if seconds % unit_s == 0 and seconds >= least * unit_s:
-            n = seconds // unit_s
-            return f"1 {name}" if n == 1 else f"{n:,} {name}s"
-    raise AssertionError("whole seconds are a multiple of one second")
+    if seconds < 0:
+        return f"-{span(-time)}"
+    units = ((86_400, "day", 2), (3_600, "hour", 1), (60, "minute", 1))
+    fits = (unit for unit in units if seconds % unit[0] == 0 and seconds >= unit[2] * unit[0])
+    unit_s, name, _ = next(fits, (1, "second", 0))
+    n = seconds // unit_s
+    return f"1 {name}" if n == 1 else f"{n:,} {name}s"
 
 
 def _minute_after(at: datetime) -> datetime:
@@ -312,7 +277,8 @@ def override(
 ) -> QuotaOverride:
     """Give a team rules of its own on a split, in place of any it had. `actor` None is the command line.
 
-    Raises `NotMaintainer`, and `Team.DoesNotExist` if the team has just ended.
+    Raises `NotMaintainer`, `Refused` for rules that make no sense, and `Team.DoesNotExist` if the team has
+    just ended.
     """
     _require_maintainer(actor)
     rules = {
@@ -321,6 +287,8 @@ def override(
         "quota_min_gap": min_gap,
         "quota_rejected_limit": rejected_limit,
     }
+    for name, fault in QuotaOverride(**rules).faults().items():
+        raise Refused("bad-value", fault, field=name)
     with transaction.atomic():
         # Before the row that names it: whoever ends the team holds it, and waits for the audit trail.
         if not hold(team=team):

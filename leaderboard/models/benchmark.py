@@ -57,11 +57,33 @@ class Split(QuotaRules):
     class Meta:
         ordering = ["position", "name"]
         constraints = [
-            models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="split_decimals_one_or_two")
+            models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="split_decimals_one_or_two"),
+            *QuotaRules.Meta.constraints,
+            models.CheckConstraint(
+                condition=Q(opens_at=None) | Q(closes_at=None) | Q(opens_at__lt=models.F("closes_at")),
+                name="split_opens_before_it_closes",
+            ),
         ]
 
     def __str__(self) -> str:
         return self.name
+
+    def faults(self) -> dict[str, str]:
+        """The same, and of its times."""
+        found = super().faults()
+        if self.opens_at and self.closes_at and self.opens_at >= self.closes_at:
+            found["closes_at"] = (
+                f"The split would close at {self.closes_at:%Y-%m-%d %H:%M} UTC and open at "
+                f"{self.opens_at:%Y-%m-%d %H:%M} UTC; expected to open before it closes."
+            )
+        return found
+
+    @property
+    def times(self) -> tuple[datetime | None, datetime | None]:
+        """When it opens and closes; neither where the two make no sense together."""
+        if self.opens_at and self.closes_at and self.opens_at >= self.closes_at:
+            return None, None
+        return self.opens_at, self.closes_at
 
     @property
     def has_ground_truth(self) -> bool:

@@ -1,11 +1,17 @@
 """How much may be sent: the rules of a split, and of single teams that have others."""
 
 from datetime import timedelta
+from typing import Final
 
+from django.core.exceptions import ValidationError
 from django.db import models
+from django.db.models import Q
 from django.utils import timezone
 
 from leaderboard.models.people import Team, User
+
+MAX_SPAN: Final = timedelta(days=3650)
+"""The longest window, and the longest gap: ten years."""
 
 
 class QuotaRules(models.Model):
@@ -29,9 +35,50 @@ class QuotaRules(models.Model):
 
     class Meta:
         abstract = True
+        constraints = [
+            models.CheckConstraint(
+                condition=Q(quota_window__gt=timedelta(0), quota_window__lte=MAX_SPAN),
+                name="%(class)s_window_is_above_0_and_at_most_10_years",
+            ),
+            models.CheckConstraint(
+                condition=Q(quota_min_gap__gte=timedelta(0), quota_min_gap__lte=MAX_SPAN),
+                name="%(class)s_gap_is_from_0_to_10_years",
+            ),
+        ]
 
     def __str__(self) -> str:
         return f"{self.quota_limit} in {self.quota_window}, {self.quota_min_gap} apart"
+
+    def clean(self) -> None:
+        """Raise `ValidationError` for rules that make no sense."""
+        super().clean()
+        faults = self.faults()
+        if faults:
+            raise ValidationError(faults)
+
+    def faults(self) -> dict[str, str]:
+        """By field, what is found and what is expected of each rule that makes no sense."""
+        found = {}
+        for name in ("quota_limit", "quota_rejected_limit"):
+            count = getattr(self, name)
+            if count is not None and count < 0:
+                found[name] = f"The number is {count}; expected one from 0, or nothing."
+        if self.quota_window is not None and not _is_span(self.quota_window, is_none_allowed=False):
+            found["quota_window"] = (
+                f"The window is {self.quota_window}; expected whole seconds, more than 0 and at most "
+                f"{MAX_SPAN.days:,} days."
+            )
+        if self.quota_min_gap is not None and not _is_span(self.quota_min_gap, is_none_allowed=True):
+            found["quota_min_gap"] = (
+                f"The least time apart is {self.quota_min_gap}; expected whole seconds, from 0 to "
+                f"{MAX_SPAN.days:,} days."
+            )
+        return found
+
+
+def _is_span(span: timedelta, *, is_none_allowed: bool) -> bool:
+    is_long_enough = span >= timedelta(0) if is_none_allowed else span > timedelta(0)
+    return is_long_enough and span <= MAX_SPAN and not span.microseconds
 
 
 class QuotaOverride(QuotaRules):
@@ -45,6 +92,7 @@ class QuotaOverride(QuotaRules):
 
     class Meta:
         constraints = [
+            *QuotaRules.Meta.constraints,
             models.UniqueConstraint(fields=["team", "split"], name="one_quota_override_per_team_and_split"),
         ]
 

@@ -14,7 +14,7 @@ from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import editions, exports, preview, quotas, rescoring
+from leaderboard import editions, exports, preview, quota_rules, quotas, rescoring
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
 from leaderboard.web import edition_tables, queue_tables
 from leaderboard.web.maintainer_forms import DiscardForm, OpenForm, PublishForm, RollBackForm, VerbForm
@@ -54,6 +54,7 @@ def hub(request: HttpRequest) -> HttpResponse:
         "queue": queue_tables.totals(),
         "n_overrides": QuotaOverride.objects.count(),
         "n_events": AuditEvent.objects.count(),
+        "ignored": quota_rules.ignored(),
     }
     return render(request, "maintainers/hub.html", context)
 

@@ -8,11 +8,10 @@ from urllib.parse import urlencode
 from django import forms
 
 from leaderboard import quotas
-from leaderboard.models.quotas import QuotaRules
+from leaderboard.models.quotas import MAX_SPAN, QuotaRules
 from leaderboard.web.maintainer_forms import VerbForm
 
 MAX_COUNT: Final = 1_000_000
-MAX_SPAN: Final = timedelta(days=3650)
 _UNITS: Final = {
     "day": timedelta(days=1),
     "hour": timedelta(hours=1),

@@ -11,6 +11,7 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
+from leaderboard import quota_rules
 from leaderboard import quotas as verbs
 from leaderboard.models import QuotaOverride, Split, Team, User
 from leaderboard.web import quota_tables as tables
@@ -37,6 +38,7 @@ def quotas(request: HttpRequest) -> HttpResponse:
         "page": page,
         "overrides": [(row, tables.rules_of(row)) for row in page],
         "are_off": not settings.QUOTAS,
+        "ignored": quota_rules.ignored(),
     }
     return render(request, "maintainers/quotas.html", context, status=400 if lookup.errors else 200)
 

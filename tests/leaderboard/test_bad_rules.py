@@ -1,0 +1,196 @@
+"""A window or a date that makes no sense is refused at every door, and stops nothing where it is there."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from typing import Any
+
+import pytest
+from django.core.exceptions import ValidationError
+from django.db import IntegrityError, connection, transaction
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import quota_rules, quotas, teams
+from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
+from leaderboard.texts import Refused
+from tests import builders, pages
+
+NONE, DAY = timedelta(0), timedelta(days=1)
+LONG = timedelta(days=99_999_999)
+WINDOW = "expected whole seconds, more than 0 and at most 3,650 days."
+GAP = "expected whole seconds, from 0 to 3,650 days."
+BAD_SPANS = [
+    ("quota_window", -DAY, f"The window is -1 day, 0:00:00; {WINDOW}"),
+    ("quota_window", NONE, f"The window is 0:00:00; {WINDOW}"),
+    ("quota_window", LONG, f"The window is 99999999 days, 0:00:00; {WINDOW}"),
+    ("quota_min_gap", -DAY, f"The least time apart is -1 day, 0:00:00; {GAP}"),
+    ("quota_min_gap", LONG, f"The least time apart is 99999999 days, 0:00:00; {GAP}"),
+]
+RULES: dict[str, Any] = {"limit": 50, "window": DAY, "min_gap": NONE, "rejected_limit": 3}
+
+
+@contextmanager
+def unchecked() -> Iterator[None]:
+    """SQLite as somebody has it who writes into it by hand."""
+    with connection.cursor() as cursor:
+        cursor.execute("PRAGMA ignore_check_constraints = ON")
+        try:
+            yield
+        finally:
+            cursor.execute("PRAGMA ignore_check_constraints = OFF")
+
+
+def typed(span: timedelta) -> str:
+    return f"{span.days} 00:00:00"
+
+
+def split_form(**fields: str) -> dict[str, str]:
+    """The administration's form of the split `test` as a browser sends it."""
+    split = Split.objects.get(pk="test")
+    sent = {"title": split.title, "description": split.description, "position": "0", "decimals": "1"}
+    sent |= {"quota_limit": "3", "quota_rejected_limit": "20"}
+    sent |= {"quota_window": "30 00:00:00", "quota_min_gap": "1 00:00:00"}
+    return sent | {f"{name}_{part}": "" for name in ("opens_at", "closes_at") for part in "01"} | fields
+
+
+@pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)
+def test_the_administration_refuses_a_rule_that_makes_no_sense(
+    edition: Edition, keeper: Client, field: str, value: timedelta, sentence: str
+) -> None:
+    before = Split.objects.values().get(pk="test")
+    answer = keeper.post("/admin/leaderboard/split/test/change/", split_form(**{field: typed(value)}))
+    assert (answer.status_code, sentence in pages.page(answer).text) == (200, True)
+    team = teams.team_of(user=User.objects.get())
+    fields = {"team": str(team.pk), "split": "test", "reason": "R", "quota_limit": "3"}
+    fields |= {"quota_window": "1 00:00:00", "quota_min_gap": "0", "quota_rejected_limit": ""}
+    answer = keeper.post("/admin/leaderboard/quotaoverride/add/", {**fields, field: typed(value)})
+    assert (answer.status_code, sentence in pages.page(answer).text) == (200, True)
+    assert Split.objects.values().get(pk="test") == before
+    assert not QuotaOverride.objects.exists()
+
+
+def test_the_administration_takes_rules_that_make_sense_and_refuses_times_that_do_not(
+    edition: Edition, keeper: Client
+) -> None:
+    times = {"opens_at_0": "2027-02-01", "opens_at_1": "00:00:00", "closes_at_0": "2027-01-01"}
+    answer = keeper.post("/admin/leaderboard/split/test/change/", split_form(**times, closes_at_1="00:00:00"))
+    said = "The split would close at 2027-01-01 00:00 UTC and open at 2027-02-01 00:00 UTC; expected to open"
+    assert (answer.status_code, said in pages.page(answer).text) == (200, True)
+    times["closes_at_0"] = "2027-03-01"
+    answer = keeper.post("/admin/leaderboard/split/test/change/", split_form(**times, closes_at_1="00:00:00"))
+    assert answer.status_code == 302
+    assert Split.objects.get(pk="test").closes_at is not None
+
+
+@pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)
+@pytest.mark.usefixtures("benchmark")
+def test_model_verb_and_database_refuse_it_as_well(
+    owner: User, field: str, value: timedelta, sentence: str
+) -> None:
+    split = Split.objects.get(pk="test")
+    setattr(split, field, value)
+    with pytest.raises(ValidationError) as found:
+        split.full_clean()
+    assert sentence in found.value.message_dict[field][0]
+    with pytest.raises(IntegrityError), transaction.atomic():
+        Split.objects.filter(pk="test").update(**{field: value})
+    given = RULES | {field.removeprefix("quota_"): value}
+    team = teams.team_of(user=owner)
+    with pytest.raises(Refused) as refused:
+        quotas.override(team=team, split=split, reason="R", actor=None, now=timezone.now(), **given)
+    assert (sentence in str(refused.value), refused.value.field) == (True, field)
+    assert not AuditEvent.objects.filter(verb="quota_overridden").exists()
+
+
+@pytest.mark.usefixtures("benchmark")
+def test_the_database_refuses_a_split_that_closes_before_it_opens() -> None:
+    now = timezone.now()
+    with pytest.raises(IntegrityError), transaction.atomic():
+        Split.objects.filter(pk="test").update(opens_at=now, closes_at=now)
+    Split.objects.filter(pk="test").update(opens_at=now, closes_at=now + DAY)
+
+
+# --- one that is there all the same ------------------------------------------------------------------------
+
+
+def assert_nothing_fails(client: Client, edition: Edition, *, by: User, maintainer: User) -> str:
+    """Submit and ask everywhere. Returns what maintainers read of it."""
+    client.force_login(by)
+    for address in ("/submit/", "/api/v1/quota", "/board/test/", "/api/v1/splits"):
+        assert client.get(address).status_code == 200, address
+    builders.submit(by, builders.predictions(edition))
+    client.force_login(maintainer)
+    team = teams.team_of(user=by)
+    for address in (f"/maintain/quotas/{team.pk}/", f"/maintain/quotas/{team.pk}/test/"):
+        assert client.get(address).status_code == 200, address
+    [ignored] = quota_rules.ignored()
+    for address in ("/maintain/", "/maintain/quotas/"):
+        assert ignored in pages.page(client.get(address)).one("main").text
+    return ignored
+
+
+@pytest.mark.skipif(connection.vendor != "sqlite", reason="PostgreSQL's constraints cannot be bypassed")
+@pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)
+def test_a_bad_rule_of_a_team_stops_nothing_and_the_split_s_own_holds(
+    edition: Edition,
+    owner: User,
+    maintainer: User,
+    client: Client,
+    field: str,
+    value: timedelta,
+    sentence: str,
+) -> None:
+    team, split = teams.team_of(user=owner), Split.objects.get(pk="test")
+    row = quotas.override(team=team, split=split, reason="R", actor=None, now=timezone.now(), **RULES)
+    with unchecked():
+        QuotaOverride.objects.filter(pk=row.pk).update(**{field: value})
+        said = assert_nothing_fails(client, edition, by=owner, maintainer=maintainer)
+        held = quota_rules.rules_of(team=team, split=split)
+    assert said == f"The rules of Owls on test: {sentence} This is ignored until you correct it."
+    assert getattr(held, field.removeprefix("quota_")) == getattr(split, field)
+    assert (held.limit, held.rejected_limit) == (50, 3)
+
+
+@pytest.mark.skipif(connection.vendor != "sqlite", reason="PostgreSQL's constraints cannot be bypassed")
+@pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)
+def test_a_bad_rule_of_a_split_stops_nothing_and_the_one_from_the_start_holds(
+    edition: Edition,
+    owner: User,
+    maintainer: User,
+    client: Client,
+    field: str,
+    value: timedelta,
+    sentence: str,
+) -> None:
+    with unchecked():
+        Split.objects.filter(pk="test").update(**{field: value})
+        said = assert_nothing_fails(client, edition, by=owner, maintainer=maintainer)
+        held = quota_rules.rules_of(team=None, split=Split.objects.get(pk="test"))
+    assert said == f"The rules of test: {sentence} This is ignored until you correct it."
+    shipped = {"quota_window": 30 * DAY, "quota_min_gap": DAY}
+    assert getattr(held, field.removeprefix("quota_")) == shipped[field]
+
+
+@pytest.mark.skipif(connection.vendor != "sqlite", reason="PostgreSQL's constraints cannot be bypassed")
+def test_times_that_make_no_sense_stop_nothing_and_are_reported(
+    edition: Edition, owner: User, maintainer: User, client: Client
+) -> None:
+    now: datetime = timezone.now()
+    with unchecked():
+        Split.objects.filter(pk="test").update(opens_at=now + 2 * DAY, closes_at=now + DAY)
+        said = assert_nothing_fails(client, edition, by=owner, maintainer=maintainer)
+    assert "expected to open before it closes. This is ignored until you correct it." in said
+
+
+@pytest.mark.parametrize(
+    ("span", "words"),
+    [
+        (-DAY, "-24 hours"),
+        (NONE, "0 seconds"),
+        (timedelta.min, "-999,999,999 days"),
+        (timedelta(seconds=1, microseconds=1), "1 second"),
+    ],
+)
+def test_every_span_can_be_said(span: timedelta, words: str) -> None:
+    assert quotas.span(span) == words
