@@ -15,8 +15,8 @@ from evaluator.protocol import INTERVAL_NAMES, METRICS
 
 ABSENT: Final = "–"
 BRACKETS: Final = (
-    "[low, high]: 95 % confidence interval, bootstrap over recordings. (2-4) behind a rank: rank range "
-    "at 95 %."
+    "In square brackets: 95 % confidence interval, bootstrap over recordings. In round brackets behind a "
+    "rank: rank range at 95 %."
 )
 _SYMBOLS: Final = {"mid": "MiD", "rte": "RTE"}
 _LATEX_UNITS: Final = {"mid": r"$\times 10^{-4}$", "rte": r"\%"}
@@ -210,8 +210,8 @@ def as_markdown(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[
         "",
         f"{units}; lower is better. Best of a column **bold**, second *italic*.",
     ]
-    for line in (*_caption(rows), *about):
-        lines += ["", markdown(line)]
+    for line in (*_caption(rows), *map(markdown, about)):
+        lines += ["", line]
     return "\n".join([*lines, ""])
 
 

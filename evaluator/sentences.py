@@ -60,8 +60,21 @@ def p_text(p: float | None, below: float | None = None) -> str:
     ('p < 0.01', 'p ≥ 0.05')
     """
     if p is None:
-        return f"p ≥ {SIGNIFICANT:g}" if below is None or below > SIGNIFICANT else f"p < {below:g}"
+        return f"p {p_cell(p, below) or f'≥ {SIGNIFICANT:g}'}"
     return "p = 1" if p == 1 else f"p = {p:.4f}"
+
+
+def p_cell(p: float | None, below: float | None) -> str:
+    """The same for a table's column: four decimals, else the class; empty where there is neither.
+
+    >>> p_cell(0.0496, 0.05), p_cell(1.0, 1.0), p_cell(None, 0.01), p_cell(None, 1.0), p_cell(None, None)
+    ('0.0496', '1.0000', '< 0.01', '≥ 0.05', '')
+    """
+    if p is not None:
+        return f"{p:.4f}"
+    if below is None:
+        return ""
+    return f"< {below:g}" if below <= SIGNIFICANT else f"≥ {SIGNIFICANT:g}"
 
 
 def sentence(first: str, second: str, *, name: str, found: Found, decimals: int = 2) -> str:

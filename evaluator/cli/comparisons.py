@@ -18,7 +18,7 @@ from evaluator.cli.options import json_option, sendable, slug, url_option
 from evaluator.cli.reading import TABLE, bytes_of, naming
 from evaluator.cli.tokens import has_token
 from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import Found, others, sentence
+from evaluator.sentences import Found, others, p_cell, sentence
 
 if TYPE_CHECKING:
     from evaluator.answers import Compared
@@ -163,14 +163,17 @@ def table(
         ]
         rows.append([Cell(printable(name)), *map(Cell, texts)])
 
-    def column(kind: str, n: int, sign: str = "+") -> list[Cell]:
-        values = [published(getattr(found.get(name), kind, None), decimals=n) for name in SCORE_NAMES]
-        return [Cell(NO_VALUE if value is None else f"{value:{sign}.{n}f}") for value in values]
+    def column(kind: str) -> list[Cell]:
+        values = [published(getattr(found.get(name), kind, None), decimals=decimals) for name in SCORE_NAMES]
+        return [Cell(NO_VALUE if value is None else f"{value:+.{decimals}f}") for value in values]
+
+    gaps = [found.get(name) for name in SCORE_NAMES]
+    chances = [NO_VALUE if gap is None else p_cell(gap.p, gap.p_below) or NO_VALUE for gap in gaps]
 
     rows += [
-        [Cell("difference", is_bold=True), *column("difference", decimals)],
-        [Cell("95 % from"), *column("low", decimals)],
-        [Cell("95 % to"), *column("high", decimals)],
-        [Cell("p"), *column("p", 4, sign="")],
+        [Cell("difference", is_bold=True), *column("difference")],
+        [Cell("95 % from"), *column("low")],
+        [Cell("95 % to"), *column("high")],
+        [Cell("p"), *map(Cell, chances)],
     ]
     return aligned(rows, align="<" + "." * len(SCORE_NAMES))

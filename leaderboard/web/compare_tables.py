@@ -10,6 +10,8 @@ from django.utils.safestring import SafeString
 from evaluator import Difference
 from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
+from evaluator.sentences import p_cell
+from evaluator.significance import too_few_recordings
 from leaderboard.comparisons import Compared, Pair
 from leaderboard.standings import Entry
 from leaderboard.web import charts, drawing
@@ -31,6 +33,7 @@ class DifferenceRow:
     difference: str
     interval: str  # both ends as wide as the widest, so that points stand in line
     p: str
+    reason: str  # why there is neither interval nor p; empty where there are
     is_significant: bool
     drawn: SafeString
 
@@ -173,7 +176,8 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css:
             signed(found.high, decimals=decimals),
             css=css,
         ),
-        p="" if found.p is None else p_text(found.p),
+        p=p_cell(found.p, found.p_below),
+        reason="" if found.p_below is not None else too_few_recordings(found.n_effective),
         is_significant=found.is_significant,
         drawn=drawing.difference(scale, found.difference, found.low, found.high),
     )
@@ -189,12 +193,3 @@ def signed(value: float, *, decimals: int = 2) -> str:
     if not float(text):
         return text
     return f"{'−' if value < 0 else '+'}{text}"
-
-
-def p_text(p: float) -> str:
-    """A p-value with its four decimals, below each other in a column.
-
-    >>> p_text(0.0003), p_text(0.0496), p_text(0.8)
-    ('0.0003', '0.0496', '0.8000')
-    """
-    return f"{p:.4f}"

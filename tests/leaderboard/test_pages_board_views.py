@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 from django.test import Client
 
-from leaderboard.models import Method, Submission, User, Visibility
+from evaluator import SCORE_NAMES
+from leaderboard.models import Method, PublishedResult, Submission, User, Visibility
 from leaderboard.web import board_query
 from tests import builders, pages
 from tests.leaderboard.test_pages_board import MID, get, row_of
@@ -48,6 +49,48 @@ def test_values_have_intervals_ranks_have_ranges_and_what_is_with_the_best_is_ma
     published = row_of(root, "Deep Scale")
     assert "quoted from a paper" in published.one("td", class_="interval").attributes["title"]
     assert published.one("td", class_="interval").text == "no interval"
+
+
+def test_where_a_quoted_row_leads_by_far_no_submission_is_marked(
+    client: Client, inferred: list[Submission]
+) -> None:
+    PublishedResult.objects.create(
+        split_id="test",
+        slug="leader",
+        method_name="Leader",
+        authors="A",
+        source_title="T",
+        source_url="https://example.org",
+        source_table="1",
+        year=2023,
+        scores=dict.fromkeys(SCORE_NAMES, 0.1),
+    )
+    builders.infer_all()
+    builders.board_changed("test")
+    root = get(client)
+    assert row_of(root, "Leader").one("td", class_="rank").text == "1"
+    ranges = [row_of(root, sent.method.name).one("span", class_="range").text for sent in inferred]
+    assert not any("(1" in text for text in ranges), ranges
+    assert root.one("tbody").all("td", class_="with-best") == []
+    entries = client.get("/api/v1/splits/test/board?intervals=1").json()["entries"]
+    found = [each for entry in entries for each in entry["intervals"].values()]
+    assert len(found) == 20
+    assert not any(each["is_with_best"] for each in found)
+
+
+def test_marked_are_exactly_the_values_whose_rank_range_begins_at_1(
+    client: Client, inferred: list[Submission]
+) -> None:
+    root = get(client)
+    answer = client.get("/api/v1/splits/test/board?intervals=1").json()
+    for entry in answer["entries"]:
+        low = [entry["intervals"].get(name, {}).get("rank_low") for name in SCORE_NAMES]
+        cells = row_of(root, entry["method"]).all("td")[MID - 1 :]
+        values = [cell for cell in cells if "interval" not in cell.classes][:10]
+        assert ["with-best" in cell.classes for cell in values] == [rank == 1 for rank in low]
+        assert [each["is_with_best"] for each in entry["intervals"].values()] == [
+            each["rank_low"] == 1 for each in entry["intervals"].values()
+        ]
 
 
 def test_one_error_alone_has_a_whisker_in_every_column(client: Client, inferred: list[Submission]) -> None:
