@@ -31,6 +31,7 @@ class Predictions:
 
     `ttc_s` is float64 (n,), read-only, in the manifest's order: seconds from the target frame, scale ratios
     already converted, nothing truncated. `digest` is "sha256:" and the hex SHA-256 of the file's bytes.
+    `names` are the file's own keys by row, where it was written for another manifest than this one.
     """
 
     manifest: Manifest
@@ -40,6 +41,7 @@ class Predictions:
     meta: Mapping[str, object] | None = None
     keys: KeyKind = "anno_id"
     enveloped: bool = False
+    names: tuple[str, ...] | None = None
 
     @classmethod
     def from_arrays(
@@ -65,7 +67,8 @@ class Predictions:
 
     def where(self, row: int) -> str:
         """The JSON pointer to the value of sequence `row`."""
-        names = self.manifest.anno_id_keys if self.keys == "anno_id" else self.manifest.natural_keys
+        ours = self.manifest.anno_id_keys if self.keys == "anno_id" else self.manifest.natural_keys
+        names = ours if self.names is None else self.names
         return pointer("predictions", names[row]) if self.enveloped else pointer(names[row])
 
 

@@ -1,24 +1,36 @@
-"""What changed between two revisions of a ground truth."""
+"""What changed between two revisions of a ground truth, and how a file for one is read for the other.
+
+Sequences are told apart by their natural keys (bag_stamp/cam_id/ts/track_id). An anno_id is a number of one
+manifest and means nothing in another.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from evaluator.truth import GroundTruth
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.predictions import Predictions
+from evaluator.problems import Problem, Rejected, listed, pointer, quoted
+from evaluator.truth import GroundTruth, Manifest
+
+Rows = NDArray[np.intp]
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """Counts of sequences, told apart by their natural keys: only in the new, only in the old, in both with
-    another time to contact."""
+    """Counts of sequences: only in the new one, only in the old one, in both with another time to contact,
+    in both with another anno_id."""
 
     n_added: int
     n_removed: int
     n_changed: int
+    n_renumbered: int
 
 
 def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
-    """Count what `new` adds, removes and changes. No value is told.
+    """Count what `new` adds, removes, changes and numbers anew. No value is told.
 
     >>> import tempfile, pathlib
     >>> from evaluator import read_truth
@@ -27,10 +39,51 @@ def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
     >>> _ = (folder / "a.csv").write_text(f"{head}\\n0,b,1,5,1,2.0\\n1,b,1,6,1,3.0\\n")
     >>> _ = (folder / "b.csv").write_text(f"{head}\\n0,b,1,6,1,3.5\\n1,b,1,7,1,4.0\\n")
     >>> compare(read_truth(folder / "a.csv"), read_truth(folder / "b.csv"))
-    Comparison(n_added=1, n_removed=1, n_changed=1)
+    Comparison(n_added=1, n_removed=1, n_changed=1, n_renumbered=1)
     """
-    before = dict(zip(old.manifest.natural_keys, old.ttc_s.tolist(), strict=True))
-    after = dict(zip(new.manifest.natural_keys, new.ttc_s.tolist(), strict=True))
-    common = before.keys() & after.keys()
-    n_changed = sum(before[key] != after[key] for key in common)
-    return Comparison(len(after) - len(common), len(before) - len(common), n_changed)
+    rows = rows_in(old.manifest, new.manifest)
+    common = rows >= 0
+    n_common = int(np.count_nonzero(common))
+    before = rows[common]
+    return Comparison(
+        n_added=new.n_sequences - n_common,
+        n_removed=old.n_sequences - n_common,
+        n_changed=int(np.count_nonzero(old.ttc_s[before] != new.ttc_s[common])),
+        n_renumbered=int(np.count_nonzero(old.manifest.anno_id[before] != new.manifest.anno_id[common])),
+    )
+
+
+def rows_in(old: Manifest, new: Manifest) -> Rows:
+    """For every sequence of `new` its row in `old`, (n,); -1 where `old` does not have it."""
+    row_of = old.row_of_natural_key
+    return np.array([row_of.get(key, -1) for key in new.natural_keys], dtype=np.intp)
+
+
+def realigned(predictions: Predictions, *, manifest: Manifest) -> Predictions:
+    """The predictions in the order of another manifest, sequence by sequence.
+
+    Values for sequences that `manifest` does not have are left aside. Raises `Rejected` with `missing-keys`
+    where it has sequences that the file's own manifest did not have.
+    """
+    own = predictions.manifest
+    rows = rows_in(own, manifest)
+    if len(missing := np.flatnonzero(rows < 0)):
+        raise absent(missing, manifest=manifest)
+    ttc_s = predictions.ttc_s[rows]
+    ttc_s.setflags(write=False)
+    names = own.natural_keys if predictions.keys == "natural_key" else own.anno_id_keys
+    sent = tuple([names[row] for row in rows.tolist()])
+    return replace(predictions, manifest=manifest, ttc_s=ttc_s, names=sent)
+
+
+def absent(rows: Rows, *, manifest: Manifest) -> Rejected:
+    """The rejection of a file whose own manifest did not have these rows of `manifest`, to be raised."""
+    names = [manifest.natural_keys[row] for row in rows.tolist()]
+    n = len(names)
+    what = "1 sequence has" if n == 1 else f"{n:,} sequences have"
+    message = (
+        f"{what} no value, added by a correction after the file was sent: "
+        f"{listed([quoted(name) for name in names])}; expected a new file with one for each of the "
+        f"{manifest.n_sequences:,} sequences of the present manifest."
+    )
+    return Rejected([Problem("missing-keys", message, pointer(names[0]))], n_problems=n)

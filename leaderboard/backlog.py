@@ -1,4 +1,4 @@
-"""What workers do when no submission waits: comparisons, then intervals and ranges, then analyses.
+"""What workers do when no submission waits: counts of changed labels, comparisons, intervals, analyses.
 
 Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
 for longer than a fraction of a second.
@@ -49,6 +49,8 @@ def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
 
 def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[], object]]:
     held = ground_truth.held()
+    for old, new in ground_truth.uncompared(held=held):
+        yield partial(ground_truth.count_changes, old, new)
     asked = comparisons.waiting(held=held).select_related(
         "edition__ground_truth", "first__submission", "second__submission"
     )

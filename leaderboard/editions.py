@@ -5,7 +5,16 @@ from dataclasses import dataclass
 from django.db.models import Count
 
 from leaderboard import rescoring
-from leaderboard.models import Edition, Evaluation, Publication, Split, Status, Submission
+from leaderboard.models import (
+    Edition,
+    Evaluation,
+    GroundTruth,
+    Publication,
+    Split,
+    Status,
+    Submission,
+    TruthComparison,
+)
 
 
 @dataclass(frozen=True)
@@ -29,12 +38,8 @@ class TruthChange:
 
     n_added: int
     n_removed: int
-    n_changed: int
-
-    @property
-    def is_none(self) -> bool:
-        """Whether both are the same."""
-        return not (self.n_added or self.n_removed or self.n_changed)
+    n_changed: int  # in both, with another time to contact
+    n_renumbered: int | None  # in both, with another anno_id; None where it was not counted in its time
 
 
 @dataclass(frozen=True)
@@ -89,18 +94,25 @@ def _past(edition: Edition, split: Split, publications: tuple[Publication, ...])
 
 
 def truth_change(old: Edition, new: Edition) -> TruthChange | None:
-    """What differs between the ground truths of two editions; None if these two were never compared.
+    """What differs between the ground truths of two editions; None if these two were never compared."""
+    return change_of_truth(old.ground_truth, new.ground_truth)
 
-    They are counted once, at import, against the ground truth that was published then.
+
+def change_of_truth(before: GroundTruth, after: GroundTruth) -> TruthChange | None:
+    """What differs between two ground truths; None if these two were never compared.
+
+    They are counted by the command that reads one of them in, against the board's of that moment, or else by
+    a worker.
     """
-    before, after = old.ground_truth, new.ground_truth
     if before.pk == after.pk:
-        return TruthChange(0, 0, 0)
-    if after.compared_with_id == before.pk:
-        return TruthChange(after.n_added, after.n_removed, after.n_changed)
-    if before.compared_with_id == after.pk:
-        return TruthChange(before.n_removed, before.n_added, before.n_changed)
-    return None
+        return TruthChange(0, 0, 0, 0)
+    found = TruthComparison.objects.between(before, after).order_by("pk").last()
+    if found is None:
+        return None
+    added, removed = found.n_added, found.n_removed
+    if found.old_id == after.pk:
+        added, removed = removed, added
+    return TruthChange(added, removed, found.n_changed, found.n_renumbered)
 
 
 def rescored(submission: Submission) -> Rescored | None:

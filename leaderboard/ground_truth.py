@@ -6,7 +6,7 @@ The database has its digest and counts; the file store has its public manifest; 
 import dataclasses
 import os
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from datetime import datetime
 from functools import lru_cache
 from pathlib import Path
@@ -17,9 +17,9 @@ from django.db.models import Max
 
 import evaluator
 from evaluator.protocol import get_protocol
-from evaluator.revisions import compare
+from evaluator.revisions import Comparison, compare
 from leaderboard import audit, boards, files
-from leaderboard.models import Edition, GroundTruth, Publication, Split, User
+from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
 
 
 class Refused(Exception):
@@ -71,7 +71,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         raise Refused(f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
     old = split.published_edition.ground_truth if split.published_edition else None
-    comparison = _compared(old, truth)
+    counts = _compared(old, truth)
     _keep_values(truth)
     files.keep_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
     with transaction.atomic():
@@ -93,20 +93,21 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
                 },
                 "imported_at": now,
                 "imported_by": actor,
-                **comparison,
             },
         )
         if row.split_id != split.pk:
             raise Refused(f"This ground truth belongs to the split {row.split_id!r} already.")
+        if old is not None and counts is not None:
+            _keep_comparison(old, row, counts)
         if is_new:
             audit.record(verb="imported", noun="GroundTruth", noun_id=row.pk, actor=actor)
     return row
 
 
-def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> dict[str, object]:
-    """What changed since `old`, as columns of the new row. Raises `evaluator.Rejected` for no overlap."""
-    if old is None:
-        return {}
+def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> Comparison | None:
+    """What changed since `old`; None if there is nothing else. Raises `evaluator.Rejected` for no overlap."""
+    if old is None or old.digest == truth.digest:
+        return None
     comparison = compare(load(old.digest), truth)
     if comparison.n_added == truth.n_sequences:
         message = (
@@ -115,7 +116,40 @@ def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> dict[str
             "expected a correction of it, with the same natural keys (bag_stamp/cam_id/ts/track_id)."
         )
         raise evaluator.Rejected([evaluator.Problem("no-overlap", message)])
-    return {"compared_with": old, **dataclasses.asdict(comparison)}
+    return comparison
+
+
+def _keep_comparison(old: GroundTruth, new: GroundTruth, counts: Comparison) -> None:
+    TruthComparison.objects.update_or_create(old=old, new=new, defaults=dataclasses.asdict(counts))
+
+
+def uncompared(*, held: Collection[str]) -> list[tuple[GroundTruth, GroundTruth]]:
+    """The board's ground truth and that of an edition beside it, where nobody has counted what differs.
+
+    So it is after the board has changed while an edition was being prepared. Only pairs that are both among
+    the digests `held`.
+    """
+    beside = Edition.objects.filter(
+        published_at=None,
+        discarded_at=None,
+        ground_truth__in=held,
+        split__published_edition__ground_truth__in=held,
+    ).select_related("ground_truth", "split__published_edition__ground_truth")
+    pairs = {
+        (edition.split.published_edition.ground_truth, edition.ground_truth)
+        for edition in beside
+        if edition.split.published_edition is not None
+    }
+    return [
+        (old, new)
+        for old, new in sorted(pairs, key=lambda pair: (pair[0].pk, pair[1].pk))
+        if old != new and not TruthComparison.objects.between(old, new).exists()
+    ]
+
+
+def count_changes(old: GroundTruth, new: GroundTruth) -> None:
+    """Count what differs between two ground truths, for whoever asks later. Raises as `load` does."""
+    _keep_comparison(old, new, compare(load(old.digest), load(new.digest)))
 
 
 def new_edition(

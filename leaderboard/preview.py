@@ -8,7 +8,7 @@ from uuid import UUID
 from django.contrib.auth.models import AnonymousUser
 
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import rescoring, standings
+from leaderboard import editions, rescoring, standings
 from leaderboard.models import Edition, Evaluation, Status, Submission
 
 ABSENT = "ABSENT"  # not evaluated in that edition
@@ -16,6 +16,7 @@ COLUMNS: Final = (
     *("submission", "method", "team", "old_status", "new_status", "old_rank", "new_rank"),
     *(f"{side}_{name}" for side in ("old", "new", "delta") for name in SCORE_NAMES),
     "reason",
+    "n_renumbered",
 )
 """Of the flat rows, in their order."""
 
@@ -68,6 +69,7 @@ class Preview:
     published: Edition
     changes: tuple[Change, ...]
     progress: rescoring.Progress
+    truth: editions.TruthChange | None  # between the two; None if these were never compared
 
     @property
     def replaces(self) -> int:
@@ -112,12 +114,19 @@ def preview(edition: Edition) -> Preview:
         key=lambda c: (-c.rank_change, c.new_rank or 10**6, c.method.casefold(), str(c.submission_id))
     )
     return Preview(
-        edition=edition, published=published, changes=tuple(changes), progress=rescoring.progress(edition)
+        edition=edition,
+        published=published,
+        changes=tuple(changes),
+        progress=rescoring.progress(edition),
+        truth=editions.truth_change(published, edition),
     )
 
 
 def rows(found: Preview) -> list[dict[str, Any]]:
-    """The preview as flat rows for CSV and JSON: one for each submission, with `COLUMNS`."""
+    """The preview as flat rows for CSV and JSON: one for each submission, with `COLUMNS`.
+
+    `n_renumbered` is of the edition and the same in all rows: sequences with another anno_id than before.
+    """
     return [
         {
             "submission": str(change.submission_id),
@@ -131,6 +140,7 @@ def rows(found: Preview) -> list[dict[str, Any]]:
             **{f"new_{name}": change.new[name] for name in SCORE_NAMES},
             **{f"delta_{name}": value for name, value in change.delta.items()},
             "reason": change.problems[0]["message"] if change.problems else "",
+            "n_renumbered": found.truth.n_renumbered if found.truth else None,
         }
         for change in found.changes
     ]
@@ -138,13 +148,14 @@ def rows(found: Preview) -> list[dict[str, Any]]:
 
 def document(found: Preview) -> dict[str, Any]:
     """The preview as one document for programs: totals, progress, and the flat rows."""
-    truth, progress = found.edition.ground_truth, found.progress
+    truth, progress = found.truth, found.progress
     return {
         "edition": found.edition.number,
         "replaces": found.replaces,
-        "n_added": truth.n_added,
-        "n_removed": truth.n_removed,
-        "n_changed_sequences": truth.n_changed,
+        "n_added": truth.n_added if truth else None,
+        "n_removed": truth.n_removed if truth else None,
+        "n_changed_sequences": truth.n_changed if truth else None,
+        "n_renumbered": truth.n_renumbered if truth else None,
         "n_changed": found.n_changed,
         "n_moved": found.n_moved,
         "n_newly_rejected": found.n_newly_rejected,

@@ -112,8 +112,11 @@ BY_SHAPE: Final[dict[str, dict[str, Said]]] = {
     },
     "Preview": {
         "replaces": Said("Number of the edition that it would take the place of.", 2),
-        "n_added": Said("Sequences that the ground truth has more than before.", 0),
+        "n_added": Said(
+            "Sequences that the ground truth has more than the board's; null if not compared.", 0
+        ),
         "n_removed": Said("Sequences that it has no more.", 1),
+        "n_renumbered": Said("Sequences that have another anno_id than before.", 0),
         "n_changed_sequences": Said("Sequences whose true value differs.", 12),
         "n_changed": Said("Submissions whose numbers change.", 40),
         "n_moved": Said("Submissions whose rank changes.", 4),

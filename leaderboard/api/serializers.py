@@ -294,9 +294,10 @@ class PreviewSerializer(serializers.Serializer[preview.Preview]):
 
     edition = serializers.IntegerField(source="edition.number")
     replaces = serializers.IntegerField()
-    n_added = serializers.IntegerField(source="edition.ground_truth.n_added")
-    n_removed = serializers.IntegerField(source="edition.ground_truth.n_removed")
-    n_changed_sequences = serializers.IntegerField(source="edition.ground_truth.n_changed")
+    n_added = serializers.IntegerField(source="truth.n_added", default=None, allow_null=True)
+    n_removed = serializers.IntegerField(source="truth.n_removed", default=None, allow_null=True)
+    n_changed_sequences = serializers.IntegerField(source="truth.n_changed", default=None, allow_null=True)
+    n_renumbered = serializers.IntegerField(source="truth.n_renumbered", default=None, allow_null=True)
     n_changed = serializers.IntegerField()
     n_moved = serializers.IntegerField()
     n_newly_rejected = serializers.IntegerField()

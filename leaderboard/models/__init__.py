@@ -1,14 +1,28 @@
 """What the leaderboard remembers. Constraints live here; verbs live beside this package."""
 
 from leaderboard.models.audit import AuditEvent
-from leaderboard.models.benchmark import Edition, GroundTruth, Publication, PublishedResult, Split
+from leaderboard.models.benchmark import (
+    Edition,
+    GroundTruth,
+    Publication,
+    PublishedResult,
+    Split,
+    TruthComparison,
+)
 from leaderboard.models.boards import BoardVersion, Snapshot
 from leaderboard.models.inference import Analysis, Comparison
 from leaderboard.models.limits import Allowance, CachedValue
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
 from leaderboard.models.quotas import QuotaOverride
-from leaderboard.models.submissions import Evaluation, IdempotencyKey, Score, Status, Submission
+from leaderboard.models.submissions import (
+    Evaluation,
+    IdempotencyKey,
+    Score,
+    SentFile,
+    Status,
+    Submission,
+)
 from leaderboard.models.sweep import SweepBeat
 
 __all__ = [
@@ -33,12 +47,14 @@ __all__ = [
     "QuotaOverride",
     "Scope",
     "Score",
+    "SentFile",
     "Snapshot",
     "Split",
     "Status",
     "Submission",
     "SweepBeat",
     "Team",
+    "TruthComparison",
     "User",
     "Visibility",
 ]

@@ -103,14 +103,6 @@ class GroundTruth(models.Model):
     counts = models.JSONField(help_text="Sequences per interval, and out of range.")
     imported_at = models.DateTimeField(default=timezone.now)
     imported_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
-    # What changed since the ground truth that was published when this one came in. Counted at import, where
-    # the values are at hand; the values themselves are told to nobody.
-    compared_with = models.ForeignKey(
-        "self", null=True, blank=True, on_delete=models.PROTECT, related_name="+"
-    )
-    n_added = models.PositiveIntegerField(default=0)
-    n_removed = models.PositiveIntegerField(default=0)
-    n_changed = models.PositiveIntegerField(default=0)
 
     def __str__(self) -> str:
         return f"{self.split_id} {self.short_digest}"
@@ -119,6 +111,38 @@ class GroundTruth(models.Model):
     def short_digest(self) -> str:
         """The first eight digits of the digest, for people."""
         return self.digest.removeprefix("sha256:")[:8]
+
+
+class TruthComparisonQuerySet(models.QuerySet["TruthComparison"]):
+    """Questions about comparisons of ground truths."""
+
+    def between(self, one: GroundTruth, other: GroundTruth) -> Self:
+        """The comparisons of these two, in either direction."""
+        return self.filter(models.Q(old=one, new=other) | models.Q(old=other, new=one))
+
+
+class TruthComparison(models.Model):
+    """By how many sequences one ground truth differs from another.
+
+    Counted where the values are at hand; the values themselves are told to nobody.
+    """
+
+    old = models.ForeignKey(GroundTruth, on_delete=models.PROTECT, related_name="+")
+    new = models.ForeignKey(GroundTruth, on_delete=models.PROTECT, related_name="comparisons")
+    n_added = models.PositiveIntegerField()
+    n_removed = models.PositiveIntegerField()
+    n_changed = models.PositiveIntegerField(help_text="In both, with another time to contact.")
+    n_renumbered = models.PositiveIntegerField(
+        null=True, help_text="In both, with another anno_id; null where it was not counted in its time."
+    )
+
+    objects: ClassVar[TruthComparisonQuerySet] = TruthComparisonQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
+
+    class Meta:
+        constraints = [models.UniqueConstraint(fields=["old", "new"], name="ground_truths_compared_once")]
+
+    def __str__(self) -> str:
+        return f"{self.old_id} to {self.new_id}"
 
 
 class Edition(models.Model):

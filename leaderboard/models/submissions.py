@@ -2,7 +2,7 @@
 
 import uuid
 from collections.abc import Collection
-from typing import ClassVar, Self
+from typing import ClassVar, NamedTuple, Self
 
 from django.contrib.auth.models import AnonymousUser
 from django.db import models
@@ -13,6 +13,17 @@ from django.utils import timezone
 from leaderboard.models.benchmark import Edition, Split
 from leaderboard.models.methods import FINITE, Method
 from leaderboard.models.people import User
+
+
+class SentFile(NamedTuple):
+    """What a submission's values follow from: the bytes, and the manifest that gives their keys a meaning.
+
+    Both are digests. An anno_id is a number of one manifest, so the same bytes may say something else for
+    another one.
+    """
+
+    digest: str
+    manifest_digest: str
 
 
 class SubmissionQuerySet(models.QuerySet["Submission"]):
@@ -47,6 +58,11 @@ class Submission(models.Model):
     submitted_at = models.DateTimeField(default=timezone.now, db_index=True)
     via = models.CharField(max_length=4, choices=Via)
     digest = models.CharField("digest of the file", max_length=80)
+    manifest_digest = models.CharField(
+        "digest of the manifest",
+        max_length=80,
+        help_text="The manifest that was public when the file came; its keys are read with it for ever.",
+    )
     size_bytes = models.PositiveBigIntegerField()
     filename = models.CharField(max_length=200, blank=True)
     note = models.CharField(max_length=500, blank=True)
@@ -60,14 +76,20 @@ class Submission(models.Model):
         constraints = [
             # A method belongs to one team, so this is also once per team.
             models.UniqueConstraint(
-                fields=["split", "method", "digest"],
+                fields=["split", "method", "digest", "manifest_digest"],
                 condition=Q(withdrawn_at=None),
-                name="same_bytes_once_per_split_and_method",
+                name="same_bytes_once_per_split_method_manifest",
             ),
+            models.CheckConstraint(condition=~Q(manifest_digest=""), name="submission_names_its_manifest"),
         ]
 
     def __str__(self) -> str:
         return f"{self.method} on {self.split_id} ({self.id})"
+
+    @property
+    def sent_file(self) -> SentFile:
+        """What its values follow from."""
+        return SentFile(self.digest, self.manifest_digest)
 
 
 class IdempotencyKey(models.Model):

@@ -1,13 +1,13 @@
 """Editions as they are drawn: what changed in words, how far a re-scoring is, and what it would change."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 from evaluator.protocol import SCORE_NAMES
 from evaluator.report import format_published
 from leaderboard import editions
-from leaderboard.models import Edition, Evaluation, Publication, Split, Status
+from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status
 from leaderboard.preview import ABSENT, Change, Preview
 from leaderboard.rescoring import Progress
 from leaderboard.standings import Board, flat_scores
@@ -36,10 +36,10 @@ def counted(n: int, singular: str, plural: str = "") -> str:
 def truth_words(change: editions.TruthChange | None) -> str:
     """What differs between two ground truths, in words; empty if nothing does.
 
-    >>> truth_words(editions.TruthChange(n_added=3, n_removed=0, n_changed=12))
+    >>> truth_words(editions.TruthChange(n_added=3, n_removed=0, n_changed=12, n_renumbered=0))
     '12 labels corrected, 3 sequences added'
-    >>> truth_words(editions.TruthChange(0, 1, 0)), truth_words(None)
-    ('1 sequence removed', 'another ground truth')
+    >>> truth_words(editions.TruthChange(0, 1, 0, 7)), truth_words(None)
+    ('1 sequence removed, 7 sequences renumbered', 'another ground truth')
     """
     if change is None:
         return "another ground truth"
@@ -47,13 +47,26 @@ def truth_words(change: editions.TruthChange | None) -> str:
         (change.n_changed, "label", "corrected"),
         (change.n_added, "sequence", "added"),
         (change.n_removed, "sequence", "removed"),
+        (change.n_renumbered, "sequence", "renumbered"),
     )
     return ", ".join(f"{counted(n, noun)} {done}" for n, noun, done in parts if n)
 
 
+def truth_choices(split: Split, truths: Sequence[GroundTruth]) -> tuple[tuple[GroundTruth, str], ...]:
+    """Ground truths, each with what differs from the board's, in words; "" for the board's own."""
+    board = split.published_edition.ground_truth if split.published_edition else None
+    changes = (editions.change_of_truth(board, truth) if board else None for truth in truths)
+    words = (truth_words(change) if change else "not compared" for change in changes)
+    return tuple(zip(truths, words, strict=True))
+
+
 def change_words(old: Edition, new: Edition) -> str:
     """How one edition differs from another: in its labels, its sequences, its protocol."""
-    truth = truth_words(editions.truth_change(old, new))
+    return _change_words(editions.truth_change(old, new), old, new)
+
+
+def _change_words(change: editions.TruthChange | None, old: Edition, new: Edition) -> str:
+    truth = truth_words(change)
     rules = f"protocol {new.protocol} instead of {old.protocol}" if old.protocol != new.protocol else ""
     return ", ".join(part for part in (truth, rules) if part)
 
@@ -250,19 +263,20 @@ def change_table(found: Preview) -> ChangeTable:
     return ChangeTable(
         headings=tuple(score_heading(name) for name in SCORE_NAMES),
         rows=tuple(_change_row(change) for change in found.changes),
-        truth=change_words(found.published, found.edition),
+        truth=_change_words(found.truth, found.published, found.edition),
         totals=_totals(found),
     )
 
 
 def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
-    truth = editions.truth_change(found.published, found.edition)
+    truth = found.truth
     sequences: tuple[tuple[str, str], ...] = (("sequences", "not compared"),)
     if truth is not None:
         sequences = (
             ("sequences added", grouped(truth.n_added)),
             ("sequences removed", grouped(truth.n_removed)),
             ("labels changed", grouped(truth.n_changed)),
+            ("another anno_id", "not counted" if truth.n_renumbered is None else grouped(truth.n_renumbered)),
         )
     return (
         *sequences,

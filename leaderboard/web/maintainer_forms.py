@@ -52,7 +52,7 @@ class OpenForm(VerbForm):
     def __init__(self, data: Any = None, *, split: Split) -> None:
         """`split` decides what there is to choose from."""
         published = split.published_edition
-        self.truths = list(split.ground_truths.select_related("compared_with").order_by("-imported_at"))
+        self.truths = list(split.ground_truths.order_by("-imported_at"))
         initial = {"digest": published.ground_truth_id, "protocol": published.protocol} if published else {}
         super().__init__(data, initial=initial)
         self.fields["digest"].choices = [(truth.pk, truth.pk) for truth in self.truths]  # type: ignore[attr-defined]  # a ChoiceField

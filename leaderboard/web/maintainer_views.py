@@ -63,7 +63,7 @@ def hub(request: HttpRequest) -> HttpResponse:
 @asks_first
 def open_edition(request: HttpRequest, split: str) -> HttpResponse:
     """Open an edition beside the board and queue every standing submission for it."""
-    found = get_object_or_404(Split.objects.select_related("published_edition"), pk=split)
+    found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
     form = OpenForm.asked(request, split=found)
     if form.is_valid():
         with form.refusals():
@@ -71,7 +71,8 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
                 split_name=split, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
             )
             return redirect("maintain_edition", split, opened.number)
-    return _form(request, "maintainers/open.html", form, split=found)
+    choices = edition_tables.truth_choices(found, form.truths)
+    return _form(request, "maintainers/open.html", form, split=found, choices=choices)
 
 
 @maintainers_only

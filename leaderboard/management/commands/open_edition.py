@@ -11,8 +11,8 @@ from django.utils import timezone
 
 from evaluator import Rejected
 from evaluator.protocol import PROTOCOLS
-from leaderboard import ground_truth, rescoring
-from leaderboard.models import Edition
+from leaderboard import editions, ground_truth, rescoring
+from leaderboard.models import Edition, Split
 
 
 class Command(BaseCommand):
@@ -53,11 +53,16 @@ class Command(BaseCommand):
             ) from rejected
         except (rescoring.Refused, ground_truth.Refused) as refused:
             raise CommandError(str(refused)) from refused
-        truth = edition.ground_truth
+        published = (
+            Split.objects.select_related("published_edition__ground_truth")
+            .get(pk=edition.split_id)
+            .published_edition
+        )
+        assert published is not None  # noqa: S101 - for the type checker: a correction was opened beside it
         self.stdout.write(
-            f"{edition}: ground truth {truth.digest}, protocol {edition.protocol}, "
+            f"{edition}: ground truth {edition.ground_truth_id}, protocol {edition.protocol}, "
             f"decimals {edition.decimals}; "
-            f"{truth.n_added} sequences added, {truth.n_removed} removed, {truth.n_changed} changed."
+            f"against edition {published.number}: {counts(editions.truth_change(published, edition))}."
         )
         if options["wait"]:
             self._follow(edition)
@@ -76,6 +81,17 @@ class Command(BaseCommand):
                 last = text
             # The work is done by other processes; only the database knows how far they are.
             time.sleep(1)
+
+
+def counts(change: editions.TruthChange | None) -> str:
+    """By how much one ground truth differs from another, in words."""
+    if change is None:
+        return "another ground truth, not compared with this one yet"
+    said = f"{change.n_added} sequences added, {change.n_removed} removed, {change.n_changed} changed"
+    if change.n_renumbered is None:
+        return said
+    have = "sequence has" if change.n_renumbered == 1 else "sequences have"
+    return f"{said}; {change.n_renumbered} {have} another anno_id"
 
 
 def line(progress: rescoring.Progress) -> str:

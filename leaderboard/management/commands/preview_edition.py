@@ -7,7 +7,7 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 
 from leaderboard import exports, preview, rescoring
-from leaderboard.management.commands.open_edition import line
+from leaderboard.management.commands.open_edition import counts, line
 from leaderboard.models import Edition
 
 
@@ -40,10 +40,9 @@ class Command(BaseCommand):
         self.stdout.write(exports.csv_text(preview.rows(found), columns=preview.COLUMNS), ending="")
 
     def _table(self, found: preview.Preview) -> None:
-        truth = found.edition.ground_truth
         self.stdout.write(
-            f"{found.edition} against edition {found.replaces}: {truth.n_added} sequences added, "
-            f"{truth.n_removed} removed, {truth.n_changed} changed; {found.n_changed} entries change, "
+            f"{found.edition} against edition {found.replaces}: {counts(found.truth)}; "
+            f"{found.n_changed} entries change, "
             f"{found.n_moved} change rank, {found.n_newly_rejected} become rejected."
         )
         self.stdout.write(line(found.progress))
