@@ -54,7 +54,7 @@ def measure(n: int) -> None:
     from django.utils import timezone  # noqa: PLC0415
 
     from benchmarks._correction import open_split  # noqa: PLC0415
-    from leaderboard import analyses, bags, comparisons, ground_truth, inference  # noqa: PLC0415
+    from leaderboard import aligned, analyses, comparisons, ground_truth, inference  # noqa: PLC0415
     from leaderboard.demo.truth import simulate  # noqa: PLC0415
     from leaderboard.models import Comparison, Submission  # noqa: PLC0415
 
@@ -92,7 +92,7 @@ def measure(n: int) -> None:
         _took_s(lambda: comparisons.compute(rows[0], now=timezone.now())) * 1e3,
         "ms",
     )
-    values = bags.predictions_of(edition, digest=first.submission.digest)
+    values = aligned.of(first.submission.sent_file, edition)
     closer = _took_s(lambda: analyses.content_of(values, truth, protocol=edition.protocol))
     figure("inference", n, "analysis", closer * 1e3, "ms")
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import evaluator
 from evaluator.protocol import get_protocol
-from leaderboard import bags, ground_truth
+from leaderboard import aligned, ground_truth
 from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
 
 Floats = NDArray[np.float64]
@@ -86,7 +86,7 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
     Raises `OSError` if the store or the private directory does not answer.
     """
     truth = ground_truth.load(evaluation.edition.ground_truth_id)
-    predictions = bags.predictions_of(evaluation.edition, digest=evaluation.submission.digest)
+    predictions = aligned.of(evaluation.submission.sent_file, evaluation.edition)
     content = content_of(predictions, truth, protocol=evaluation.edition.protocol)
     with transaction.atomic():
         if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:

@@ -15,30 +15,31 @@ import structlog
 from django.conf import settings
 from numpy.typing import NDArray
 
-from evaluator import GroundTruth, Predictions, floors, published
+from evaluator import GroundTruth, floors, published
 from evaluator.protocol import SCORE_NAMES, get_protocol
 from evaluator.report import BagSums
 from evaluator.scoring import Scorer
-from leaderboard import files, ground_truth, quarantine
-from leaderboard.models import Edition
+from leaderboard import aligned, ground_truth
+from leaderboard.models import Edition, SentFile
 
 log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
 
 
-def path(edition: Edition, *, digest: str) -> Path:
-    """Where the sums of a file of this digest are kept for this ground truth and protocol."""
+def path(edition: Edition, *, file: SentFile) -> Path:
+    """Where the sums of a file are kept for this ground truth and protocol."""
     truth = edition.ground_truth_id.removeprefix("sha256:")
     kept = Path(settings.BAGS_DIR or Path(settings.GROUND_TRUTH_DIR) / "bags")
-    return kept / f"{truth[:32]}-{edition.protocol}" / f"{digest.removeprefix('sha256:')}.f8"
+    digest, manifest = (part.removeprefix("sha256:") for part in file)
+    return kept / f"{truth[:32]}-{edition.protocol}" / f"{digest}-{manifest[:32]}.f8"
 
 
-def keep(edition: Edition, *, digest: str, bags: BagSums | None) -> None:
+def keep(edition: Edition, *, file: SentFile, bags: BagSums | None) -> None:
     """Keep a file's sums, little-endian float64. A disk that does not take them costs only time later."""
     if bags is None:
         return
-    target = path(edition, digest=digest)
+    target = path(edition, file=file)
     try:
         target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         handle, temporary = tempfile.mkstemp(dir=target.parent)
@@ -46,14 +47,14 @@ def keep(edition: Edition, *, digest: str, bags: BagSums | None) -> None:
             out.write(bags.sums.astype("<f8").tobytes())
         Path(temporary).replace(target)
     except OSError as fault:
-        log.warning("bags_not_kept", digest=digest, reason=str(fault)[:200])
+        log.warning("bags_not_kept", digest=file.digest, reason=str(fault)[:200])
 
 
-def load(edition: Edition, *, digest: str) -> Floats | None:
+def load(edition: Edition, *, file: SentFile) -> Floats | None:
     """The sums that were kept, (G, 10); None if they are not all there."""
     n_bags = edition.ground_truth.n_recordings
     try:
-        data = path(edition, digest=digest).read_bytes()
+        data = path(edition, file=file).read_bytes()
     except OSError:
         return None
     if len(data) != n_bags * len(SCORE_NAMES) * 8:
@@ -61,36 +62,19 @@ def load(edition: Edition, *, digest: str) -> Floats | None:
     return np.frombuffer(data, dtype="<f8").reshape(n_bags, len(SCORE_NAMES)).astype(np.float64)
 
 
-def sums_of(edition: Edition, *, digest: str) -> Floats:
+def sums_of(edition: Edition, *, file: SentFile) -> Floats:
     """The sums of a scored file, kept or made anew, (G, 10).
 
-    Raises `OSError` if the store, the disk or the private directory does not answer, and what
-    `quarantine.read_predictions` raises.
+    Raises what `aligned.read` raises.
     """
-    kept = load(edition, digest=digest)
+    kept = load(edition, file=file)
     if kept is not None:
         return kept
-    predictions = predictions_of(edition, digest=digest)
+    predictions = aligned.of(file, edition)
     bags = _scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for
-    keep(edition, digest=digest, bags=bags)
+    keep(edition, file=file, bags=bags)
     return bags.sums
-
-
-def predictions_of(edition: Edition, *, digest: str) -> Predictions:
-    """The values of a scored file, as they were kept or from the file itself. Raises as `sums_of` does."""
-    manifest = ground_truth.load(edition.ground_truth_id).manifest
-    predictions = files.load_aligned(manifest=manifest, digest=digest)
-    if predictions is not None:
-        return predictions
-    with files.opened_predictions(digest) as source:
-        return quarantine.read_predictions(
-            source,
-            manifest=manifest,
-            manifest_path=ground_truth.manifest_path(edition.ground_truth_id),
-            heartbeat=lambda: True,
-            heartbeat_s=settings.HEARTBEAT_S,
-        )
 
 
 def counts_of(edition: Edition) -> Floats:

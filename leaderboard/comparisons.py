@@ -206,8 +206,8 @@ def compute(row: Comparison, *, now: datetime) -> None:
     # First to the end of the line: what cannot be computed, again and again, keeps nothing else waiting.
     Comparison.objects.filter(pk=row.pk, computed_at=None).update(asked_at=now)
     edition = row.edition
-    digests = (row.first.submission.digest, row.second.submission.digest)
-    first, second = (bags.sums_of(edition, digest=digest) for digest in digests)
+    sent = (row.first.submission.sent_file, row.second.submission.sent_file)
+    first, second = (bags.sums_of(edition, file=file) for file in sent)
     found = differences.difference(
         first, second, bags.counts_of(edition), signs=inference.generator_of(edition, purpose="signs")
     )

@@ -17,8 +17,10 @@ from typing import IO
 import numpy as np
 from django.core.files.base import ContentFile, File
 from django.core.files.storage import FileSystemStorage, Storage, storages
+from numpy.typing import NDArray
 
-from evaluator import Manifest, Predictions
+from evaluator import Predictions
+from leaderboard.models import SentFile
 
 CHUNK_BYTES = 1 << 20
 INCOMING = ".incoming"
@@ -173,7 +175,7 @@ def aligned_name(*, manifest_digest: str, digest: str) -> str:
 
 
 def keep_aligned(predictions: Predictions) -> None:
-    """Keep a file's values in seconds as little-endian float64, in ascending anno_id.
+    """Keep a file's values in seconds as little-endian float64, in ascending anno_id of the file's manifest.
 
     They were checked when the file was read, so scoring them again needs neither its bytes nor a child. The
     order is the manifest's own: two tables of the same sequences may have their rows in another order.
@@ -185,18 +187,18 @@ def keep_aligned(predictions: Predictions) -> None:
         store().save(name, ContentFile(ascending.astype("<f8", copy=False).tobytes()))
 
 
-def load_aligned(*, manifest: Manifest, digest: str) -> Predictions | None:
-    """The values that were kept of a file, in the order of `manifest`; None if they are not all there."""
+def load_aligned(file: SentFile, *, n_sequences: int) -> NDArray[np.float64] | None:
+    """The seconds that were kept of a file, (n,), in ascending anno_id of its own manifest.
+
+    None if they are not all there.
+    """
+    name = aligned_name(manifest_digest=file.manifest_digest, digest=file.digest)
     try:
-        with store().open(aligned_name(manifest_digest=manifest.digest, digest=digest), "rb") as kept:
+        with store().open(name, "rb") as kept:
             data = kept.read()
     except OSError:
         return None
-    ttc_s = np.empty(manifest.n_sequences)
-    if len(data) != ttc_s.nbytes:
-        return None
-    ttc_s[manifest.rows_by_id] = np.frombuffer(data, dtype="<f8")
-    return Predictions(manifest=manifest, ttc_s=ttc_s, digest=digest)
+    return np.frombuffer(data, dtype="<f8") if len(data) == 8 * n_sequences else None
 
 
 def keep_manifest(*, digest: str, csv: bytes) -> None:

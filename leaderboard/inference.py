@@ -27,7 +27,7 @@ from evaluator.ranges import Quoted, rank_ranges
 from evaluator.significance import MIN_DEGREES, cut_off, too_few_recordings
 from leaderboard import bags, boards, bulk
 from leaderboard.entries import printed_decimals
-from leaderboard.models import Edition, Evaluation, PublishedResult, Score, Status, Visibility
+from leaderboard.models import Edition, Evaluation, PublishedResult, Score, SentFile, Status, Visibility
 
 log = structlog.get_logger(__name__)
 
@@ -49,7 +49,7 @@ class Standing:
     """A scored submission in an edition that its team has not withdrawn."""
 
     evaluation_id: UUID
-    digest: str
+    file: SentFile
     method_id: UUID
     is_shown: bool
     value: float  # its MiD, as published
@@ -101,14 +101,15 @@ def standing(edition: Edition) -> list[Standing]:
     ).values_list(
         "evaluation_id",
         "evaluation__submission__digest",
+        "evaluation__submission__manifest_digest",
         "evaluation__submission__method_id",
         "evaluation__submission__method__visibility",
         "value",
         "evaluation__submission__submitted_at",
     )
     return [
-        Standing(pk, digest, method, visibility != Visibility.PRIVATE, value, at)
-        for pk, digest, method, visibility, value, at in rows
+        Standing(pk, SentFile(digest, manifest), method, visibility != Visibility.PRIVATE, value, at)
+        for pk, digest, manifest, method, visibility, value, at in rows
     ]
 
 
@@ -224,7 +225,7 @@ def _inferred(
     for start in range(0, len(missing), uncertainty.BATCH):
         between()
         some = missing[start : start + uncertainty.BATCH]
-        sums = np.stack([bags.sums_of(edition, digest=row.digest) for row in some])
+        sums = np.stack([bags.sums_of(edition, file=row.file) for row in some])
         places = [table.row_of[row.evaluation_id] for row in some]
         ends = bootstrap_of(edition).intervals(sums)
         # As they are kept: ranges must not depend on which of them were made before.
@@ -234,7 +235,7 @@ def _inferred(
     rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)
     if rivals:
         ranges = rank_ranges(
-            np.stack([bags.sums_of(edition, digest=row.digest) for row in rivals]),
+            np.stack([bags.sums_of(edition, file=row.file) for row in rivals]),
             published=table.value[places],
             usable=usable,
             rng=generator_of(edition, purpose="signs"),

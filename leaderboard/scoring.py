@@ -17,9 +17,9 @@ import evaluator
 from evaluator import GroundTruth, Rejected, Report, published
 from evaluator.protocol import get_protocol
 from evaluator.scoring import Scorer
-from leaderboard import bags, broker, files, ground_truth, lifecycle, quarantine
+from leaderboard import aligned, bags, broker, ground_truth, lifecycle, quarantine
 from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
-from leaderboard.models import Edition, Evaluation, Status
+from leaderboard.models import Edition, Evaluation, SentFile, Status
 
 log = structlog.get_logger(__name__)
 
@@ -111,15 +111,17 @@ def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
 
 
 def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
-    """Score a batch of an edition from values that are already aligned with its manifest.
+    """Score a batch of an edition from the values that were kept when their files were first read.
 
-    Returns the leases that need their file read again: those without such values (another manifest), and
-    those that the protocol rejects, so that the problem is worded from the file itself. A store that does not
-    answer is theirs to report as well.
+    Returns the leases that need their file read again: those without such values, and those that the protocol
+    rejects, so that the problem is worded from the file itself. A store that does not answer is theirs to
+    report as well.
     """
     ids = [lease.evaluation_id for lease in leases]
-    rows = Evaluation.objects.filter(pk__in=ids).values_list("pk", "submission__digest")
-    digests = _insist(lambda: dict(rows))
+    rows = Evaluation.objects.filter(pk__in=ids).values_list(
+        "pk", "submission__digest", "submission__manifest_digest"
+    )
+    sent = _insist(lambda: {pk: SentFile(*digests) for pk, *digests in rows})
     try:
         truth = _truth(edition)
     except (OSError, TruthDamaged):
@@ -128,11 +130,19 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     outcomes: list[tuple[Lease, Outcome]] = []
     rest: list[Lease] = []
     for lease in leases:
-        predictions = files.load_aligned(manifest=truth.manifest, digest=digests[lease.evaluation_id])
+        file = sent[lease.evaluation_id]
+        try:
+            predictions = aligned.kept(file, edition)
+        except Rejected as rejected:
+            # For want of sequences that the file cannot have, which needs no word of the file.
+            outcomes.append((lease, rejection(rejected)))
+            continue
+        except OSError:
+            predictions = None
         try:
             if predictions is not None:
                 report = scorer.report(predictions, keep_bags=True)
-                bags.keep(edition, digest=predictions.digest, bags=report.bags)
+                bags.keep(edition, file=file, bags=report.bags)
                 outcomes.append((lease, scored(report, decimals=edition.decimals)))
                 continue
         except (Rejected, *FAULTS_OF_THE_FILE) as fault:
@@ -214,27 +224,15 @@ class Pulse:
 
 
 def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcome:
-    """Read, check and score one submission's file. A pure function of file digest and edition."""
-    edition = evaluation.edition
+    """Read, check and score one file. A pure function of its bytes, its manifest and the edition."""
+    edition, file = evaluation.edition, evaluation.submission.sent_file
     truth = _truth(edition)
     try:
-        with files.opened_predictions(evaluation.submission.digest) as source:
-            predictions = quarantine.read_predictions(
-                source,
-                manifest=truth.manifest,
-                manifest_path=ground_truth.manifest_path(edition.ground_truth_id),
-                heartbeat=heartbeat,
-                heartbeat_s=settings.HEARTBEAT_S,
-            )
+        predictions = aligned.read(file, edition, heartbeat=heartbeat)
         report = evaluator.evaluate(predictions, truth, protocol=edition.protocol, keep_bags=True)
     except Rejected as rejected:
         return rejection(rejected)
-    bags.keep(edition, digest=predictions.digest, bags=report.bags)
-    try:
-        files.keep_aligned(predictions)
-    except OSError as fault:
-        # They only make re-scoring quicker; without them it reads the file again.
-        log.warning("values_not_kept", submission_id=str(evaluation.submission_id), reason=_in_words(fault))
+    bags.keep(edition, file=file, bags=report.bags)
     return scored(report, decimals=edition.decimals)
 
 

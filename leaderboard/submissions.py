@@ -12,7 +12,7 @@ from django.db.models import Q
 
 from leaderboard import audit, boards, deadlines, estimates, files, lifecycle, methods, quotas, teams
 from leaderboard.entries import Interval, scored_of
-from leaderboard.models import Evaluation, Method, Split, Status, Submission, Team, User
+from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
 from leaderboard.names import clean_name
 from leaderboard.texts import Refused, clean_text, clean_url
 
@@ -71,10 +71,11 @@ def submit(
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
-    The same bytes again, for the same split and method, are answered with the first submission, cost nothing
-    and change nothing. With a new file, details that differ from the method's own replace them, through
-    `methods.edit`; without `may_edit` they are refused. Raises `Refused` or `quotas.QuotaExceeded` (nothing
-    is kept then).
+    The same bytes again, for the same split, method and manifest, are answered with the first submission,
+    cost nothing and change nothing. Once a correction has another manifest, the same bytes are another
+    submission: their keys may mean other sequences. With a new file, details that differ from the method's
+    own replace them, through `methods.edit`; without `may_edit` they are refused. Raises `Refused` or
+    `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
     name = clean_name("method", method_name)
@@ -99,7 +100,10 @@ def submit(
         quotas.hold(team=team)
         teams.require_member(team, user)
         method = _method(team=team, name=name, details=details, now=now)
-        standing = Submission.objects.standing().filter(split=split, method=method, digest=kept.digest)
+        # Held from here on, so that the manifest is that of the edition in which the file is queued.
+        split = Split.objects.lock_shared(split.pk)
+        file = SentFile(kept.digest, _manifest_digest(split))
+        standing = Submission.objects.standing().filter(split=split, method=method, **file._asdict())
         first = standing.first()
         if first is not None:
             return Submitted(submission=first, is_new=False)
@@ -115,7 +119,7 @@ def submit(
                     submitted_by=user,
                     submitted_at=now,
                     via=via,
-                    digest=kept.digest,
+                    **file._asdict(),
                     size_bytes=kept.size_bytes,
                     filename=_clean_filename(filename),
                     note=note,
@@ -124,7 +128,7 @@ def submit(
         except IntegrityError:
             # The same bytes came twice at once, and the other request was first.
             return Submitted(submission=standing.get(), is_new=False)
-        _queue(submission, split)
+        _queue(submission, split=split)
         if changes:
             submission.method = methods.edit(method=method, changes=changes, actor=user)
         audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
@@ -139,8 +143,11 @@ def submit(
     return Submitted(submission=submission, is_new=True)
 
 
-def _queue(submission: Submission, split: Split) -> None:
-    """Queue the submission for the published edition, and for any that is being prepared beside it."""
+def _queue(submission: Submission, *, split: Split) -> None:
+    """Queue the submission for the published edition, and for any that is being prepared beside it.
+
+    The caller holds the split.
+    """
     in_preparation = Q(published_at=None, discarded_at=None)
     for edition in split.editions.filter(in_preparation | Q(pk=split.published_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
@@ -148,7 +155,7 @@ def _queue(submission: Submission, split: Split) -> None:
 
 def _open_split(name: str, *, now: datetime) -> Split:
     # Looked up here and not there: not every text is one that a database can be asked for.
-    splits = {split.name: split for split in Split.objects.select_related("published_edition")}
+    splits = {split.name: split for split in Split.objects.select_related("published_edition__ground_truth")}
     split = splits.get(name)
     if split is None:
         known = ", ".join(splits)
@@ -173,8 +180,8 @@ def _before_the_quota(
     try:
         quotas.require(team=team, user=user, split=split, size_bytes=upload.size, now=now)
     except quotas.QuotaExceeded:
-        same = {"split": split, "method__in": named, "digest": files.measure(upload).digest}
-        first = Submission.objects.standing().filter(**same).first()
+        file = SentFile(files.measure(upload).digest, _manifest_digest(split))
+        first = Submission.objects.standing().filter(split=split, method__in=named, **file._asdict()).first()
         if first is None:
             raise
         return first
@@ -194,8 +201,8 @@ def _before_an_edit(
     changes = details.changes_of(method) if method is not None else {}
     if method is None or not changes:
         return None
-    same = {"split": split, "method": method, "digest": files.measure(upload).digest}
-    first = Submission.objects.standing().filter(**same).first()
+    file = SentFile(files.measure(upload).digest, _manifest_digest(split))
+    first = Submission.objects.standing().filter(split=split, method=method, **file._asdict()).first()
     if first is None:
         raise _token_split(method, changes)
     return first
@@ -210,6 +217,12 @@ def _token_split(method: Method, changes: Mapping[str, str]) -> TokenSplit:
         "what stands there, nothing, or a token for every split.",
         field=first,
     )
+
+
+def _manifest_digest(split: Split) -> str:
+    """The manifest that is public now. The split takes submissions, so it has a published edition."""
+    assert split.published_edition is not None  # noqa: S101 - for the type checker: the caller has looked
+    return split.published_edition.ground_truth.manifest_digest
 
 
 def _checked(upload: "File[bytes] | None") -> "File[bytes]":

@@ -61,6 +61,7 @@ def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int 
             submitted_at=now - timedelta(minutes=i),
             via=Submission.Via.API,
             digest=f"sha256:{rng.getrandbits(256):064x}",
+            manifest_digest=edition.ground_truth.manifest_digest,
             size_bytes=1000,
         )
         for i, method in enumerate(methods)

@@ -85,6 +85,7 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
                 submitted_at=now,
                 via=Submission.Via.API,
                 digest=digest,
+                manifest_digest=truth.manifest.digest,
                 size_bytes=size_bytes,
             )
         )

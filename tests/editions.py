@@ -1,14 +1,15 @@
 """Editions for tests: corrected ground truth, and the verbs with their usual arguments."""
 
+import json
 from pathlib import Path
 from typing import Any
 
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from evaluator import GroundTruth, evaluate, published, read_predictions
+from evaluator import GroundTruth, evaluate, published, read_manifest, read_predictions
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import benchmark, rescoring, scoring, standings
+from leaderboard import benchmark, files, rescoring, standings
 from leaderboard.models import (
     Edition,
     Publication,
@@ -34,6 +35,13 @@ def corrected(tmp_path: Path, *, drop: str = "", factor: float = 1.0, recording:
         kept.append(",".join(fields))
     path = tmp_path / f"corrected-{drop}-{factor}.csv"
     path.write_text("\n".join(kept) + "\n")
+    return path
+
+
+def extended(tmp_path: Path) -> Path:
+    """The made-up truth with one sequence more, which no file has a value for."""
+    path = tmp_path / "extended.csv"
+    path.write_text((tmp_path / "truth-test.csv").read_text() + "900,0001,9,700000000,1,3.5\n")
     return path
 
 
@@ -92,7 +100,11 @@ def board_now() -> standings.Board:
 
 
 def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) -> dict[str, float | None]:
-    with scoring.files.opened_predictions(submission.digest) as kept:
-        predictions = read_predictions(kept.read(), manifest=truth.manifest)
-    values = evaluate(predictions, truth).flat()
+    """What the evaluator alone makes of the file's values, each for the sequence that it was sent for."""
+    own = read_manifest(Path(files.store().path(files.manifest_name(submission.manifest_digest))))
+    with files.opened_predictions(submission.digest) as kept:
+        sent = read_predictions(kept.read(), manifest=own)
+    said = dict(zip(own.natural_keys, sent.ttc_s.tolist(), strict=True))
+    file = json.dumps({key: said[key] for key in truth.manifest.natural_keys}).encode()
+    values = evaluate(read_predictions(file, manifest=truth.manifest), truth).flat()
     return {name: published(value, decimals=decimals) for name, value in values.items()}

@@ -39,6 +39,7 @@ def queued(edition: Edition, user: User, *, priority: int = Evaluation.PRIORITY_
         submitted_at=timezone.now(),
         via=Submission.Via.API,
         digest=f"sha256:{uuid.uuid4().hex}",
+        manifest_digest=edition.ground_truth.manifest_digest,
         size_bytes=2,
     )
     return lifecycle.enqueue(submission=submission, edition=edition, priority=priority)

@@ -181,7 +181,7 @@ def test_what_cannot_be_computed_keeps_nothing_else_waiting(
 ) -> None:
     monkeypatch.setattr(backlog, "MAX_AT_ONCE", 1)
     lost, manifest = entries[0].digest, ground_truth.load(edition.ground_truth_id).manifest
-    bags.path(edition, digest=lost).unlink()
+    bags.path(edition, file=entries[0].sent_file).unlink()
     files.store().delete(files.aligned_name(manifest_digest=manifest.digest, digest=lost))
     files.store().delete(files.predictions_name(lost))
     ask(*entries[:2])

@@ -14,7 +14,7 @@ from leaderboard import rescoring, submissions
 from leaderboard.models import Edition, Publication, Submission, User
 from leaderboard.web.kept import memory
 from tests import builders, pages
-from tests.editions import corrected, open_edition, publish, roll_back
+from tests.editions import corrected, extended, open_edition, publish, roll_back
 
 OLD, NEW = "/board/test/editions/1/", "/board/test/editions/2/"
 EDITIONS = "/board/test/editions/"
@@ -259,13 +259,13 @@ def test_withdrawn_entry_leaves_a_marked_row_without_values(
 def test_entry_that_the_next_edition_cannot_score_is_marked(
     client: Client, entries: list[Submission], tmp_path: Path
 ) -> None:
-    # Without a recording, every file has keys too many, and none can be scored.
-    second = open_edition(corrected(tmp_path, drop="0002"))
+    # No file has a value for what was added, so none can be scored.
+    second = open_edition(extended(tmp_path))
     builders.score_all()
     publish(second, leave_out=True)
     marked = [row[1] for row in pages.board_rows(get(client, OLD)) if "not in edition 2" in row[1]]
     assert len(marked) == len(entries)
-    assert all(text.endswith("Edition 2 removed sequences that its file predicts.") for text in marked)
+    assert all(text.endswith("Edition 2 added sequences that its file does not predict.") for text in marked)
 
 
 def test_entry_that_lacks_added_sequences_is_marked_with_that_reason(

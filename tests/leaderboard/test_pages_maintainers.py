@@ -28,7 +28,7 @@ from leaderboard.models import (
     Visibility,
 )
 from tests import builders, pages
-from tests.editions import corrected, open_edition, publish
+from tests.editions import corrected, extended, open_edition, publish
 from tests.leaderboard.desk import FIRST, HUB, OPEN, SECOND, board_number, get, said, totals
 
 PAGES = (HUB, OPEN, SECOND, f"{SECOND}publish/", f"{SECOND}discard/", f"{FIRST}roll-back/")
@@ -247,14 +247,16 @@ def test_moved_entries_come_first_with_both_ranks(
 def test_entries_that_become_rejected_say_why(
     keeper: Client, entries: list[Submission], tmp_path: Path
 ) -> None:
-    open_edition(corrected(tmp_path, drop="0003"))
+    open_edition(extended(tmp_path))
     builders.score_all()
     root = get(keeper, SECOND)
     assert totals(root)["become rejected"] == "4"
     for row in root.one("table", class_="changes").one("tbody").all("tr"):
         status = row.one("td", class_="status")
-        assert status.one("summary").text == "5 keys name no sequence of the manifest"
-        assert "expected its anno_ids" in status.one("p").text
+        assert status.one("summary").text == (
+            "1 sequence has no value, added by a correction after the file was sent"
+        )
+        assert "expected a new file" in status.one("p").text
         assert status.text.startswith("rejected, was scored")
         assert "worse" in status.classes
     listed = said(keeper, f"{SECOND}publish/")

@@ -10,7 +10,7 @@ from django.utils import timezone
 from leaderboard import lifecycle, submissions
 from leaderboard.models import AuditEvent, Edition, Evaluation, Publication, Status, Submission, User
 from tests import builders, pages
-from tests.editions import corrected, open_edition, publish, roll_back
+from tests.editions import corrected, extended, open_edition, publish, roll_back
 from tests.leaderboard.test_pages_everywhere import assert_sound
 
 
@@ -93,9 +93,9 @@ def test_value_that_stays_is_said_to_stay(signed_in: Client, sent: Submission) -
 def test_team_is_told_that_the_new_truth_cannot_score_its_file(
     signed_in: Client, sent: Submission, tmp_path: Path
 ) -> None:
-    second = open_edition(corrected(tmp_path, drop="0003"))
+    second = open_edition(extended(tmp_path))
     builders.score_all()
-    publish(second)
+    publish(second, leave_out=True)
     assert notices(signed_in, sent) == [
         f"Edition 2 became the board on {changed_on()}: Labels corrected. It cannot score this file, for "
         f"the reason below. In edition 1 it keeps its result, MiD {mid(sent, 1)}. "

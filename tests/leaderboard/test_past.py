@@ -28,7 +28,7 @@ from leaderboard.models import (
 )
 from leaderboard.snapshots import BOARD, PAST
 from tests import board_rows, builders
-from tests.editions import ANYBODY, corrected, open_edition, publish, quote, roll_back
+from tests.editions import ANYBODY, extended, open_edition, publish, quote, roll_back
 
 A_MOMENT = timedelta(microseconds=1)
 MAX_STATEMENTS = 3
@@ -149,11 +149,11 @@ def test_it_follows_every_change(edition: Edition, eventful: list[Submission], o
 def test_it_is_of_the_edition_that_was_the_board(
     entries: list[Submission], owner: User, stranger: User, tmp_path: Path
 ) -> None:
-    # Without a recording, every file has keys too many, and none can be scored in the second.
-    second = open_edition(corrected(tmp_path, drop="0002"))
+    # No file has a value for what was added, so none can be scored in the second.
+    second = open_edition(extended(tmp_path))
     builders.score_all()
     publish(second, leave_out=True)
-    assert any("unscorable='unknown-keys'" in row for board in assert_the_same(ANYBODY) for row in board)
+    assert any("unscorable='missing-keys'" in row for board in assert_the_same(ANYBODY) for row in board)
     send(stranger, second, "Short", 1.12)
     assert_the_same(ANYBODY)
     quote("after-the-first", mid=1.0)
@@ -218,12 +218,12 @@ def test_rows_that_say_why_they_stay_behind_cost_no_statement(
     entries: list[Submission], client: Client, tmp_path: Path
 ) -> None:
     at = timezone.now()
-    second = open_edition(corrected(tmp_path, drop="0002"))
+    second = open_edition(extended(tmp_path))
     builders.score_all()
     publish(second, leave_out=True)
     addresses = (f"/board/test/?at={at:%Y-%m-%dT%H:%M:%S.%fZ}", "/board/test/editions/1/")
     for address in addresses:
-        assert "Edition 2 removed sequences that its file predicts." in client.get(address).text
+        assert "Edition 2 added sequences that its file does not predict." in client.get(address).text
         snapshots.PAST.memory.clear()
         snapshots.BOARD.memory.clear()
         assert n_statements(client, address) <= MAX_STATEMENTS

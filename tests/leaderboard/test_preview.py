@@ -1,13 +1,18 @@
 """Looking before switching, and what former editions and withdrawn entries leave."""
 
+import csv
+import io
+import random
 from pathlib import Path
 
 import pytest
 from django.core.management import call_command
+from django.test import Client
 from django.utils import timezone
 
-from evaluator import Rejected, read_truth
-from leaderboard import ground_truth, preview, standings, submissions
+from evaluator import read_truth
+from leaderboard import backlog, ground_truth, preview, standings, submissions
+from leaderboard.editions import TruthChange
 from leaderboard.models import (
     Edition,
     Split,
@@ -16,7 +21,7 @@ from leaderboard.models import (
     User,
 )
 from tests import builders
-from tests.editions import ANYBODY, board_now, corrected, offline, open_edition, publish
+from tests.editions import ANYBODY, board_now, corrected, extended, offline, open_edition, publish
 
 
 def test_preview_compares_entry_by_entry(entries: list[Submission], tmp_path: Path) -> None:
@@ -25,8 +30,7 @@ def test_preview_compares_entry_by_entry(entries: list[Submission], tmp_path: Pa
     builders.score_all()
     found = preview.preview(edition)
     truth = read_truth(path)
-    assert (edition.ground_truth.n_added, edition.ground_truth.n_removed) == (0, 0)
-    assert edition.ground_truth.n_changed == 5
+    assert found.truth == TruthChange(n_added=0, n_removed=0, n_changed=5, n_renumbered=0)
     assert found.replaces == 1
     old_truth = ground_truth.load(found.published.ground_truth_id)
     for change in found.changes:
@@ -39,33 +43,90 @@ def test_preview_compares_entry_by_entry(entries: list[Submission], tmp_path: Pa
     assert {c.submission_id: c.old_rank for c in found.changes} == old_ranks
 
 
-def test_preview_says_what_becomes_rejected_and_why(entries: list[Submission], tmp_path: Path) -> None:
+def test_removed_sequences_reject_nothing_and_the_rest_is_scored(
+    entries: list[Submission], tmp_path: Path
+) -> None:
     path = corrected(tmp_path, drop="0003", factor=1.3)
     edition = open_edition(path)
     builders.score_all()
     found = preview.preview(edition)
-    assert found.n_newly_rejected == 4
-    assert edition.ground_truth.n_removed == 5
+    assert found.truth == TruthChange(n_added=0, n_removed=5, n_changed=5, n_renumbered=0)
+    assert found.n_newly_rejected == 0
     truth = read_truth(path)
     for change in found.changes:
-        with pytest.raises(Rejected) as caught:
-            offline(Submission.objects.get(pk=change.submission_id), truth)
+        assert change.new == offline(Submission.objects.get(pk=change.submission_id), truth)
+    publish(edition)
+    assert board_now().n_submissions == 4
+
+
+def test_preview_says_what_becomes_rejected_and_why(entries: list[Submission], tmp_path: Path) -> None:
+    edition = open_edition(extended(tmp_path))
+    builders.score_all()
+    found = preview.preview(edition)
+    assert found.n_newly_rejected == 4
+    assert found.truth == TruthChange(n_added=1, n_removed=0, n_changed=0, n_renumbered=0)
+    for change in found.changes:
         assert change.new_status == Status.REJECTED
-        assert change.problems[0]["message"] == caught.value.problems[0].message
+        assert change.problems[0]["message"].startswith("1 sequence has no value, added by a correction")
         assert change.rank_change > 0
 
 
 def test_entries_a_new_truth_cannot_score_stay_in_the_old_edition_marked(
     entries: list[Submission], edition: Edition, tmp_path: Path
 ) -> None:
-    second = open_edition(corrected(tmp_path, drop="0003"))
+    second = open_edition(extended(tmp_path))
     builders.score_all()
-    publish(second)
+    publish(second, leave_out=True)
     assert board_now().n_submissions == 0
     split = Split.objects.get(pk="test")
     old = standings.board(split=split, edition=edition, viewer=ANYBODY)
     assert old.n_submissions == 4
     assert all(entry.is_unscorable for entry in old.entries if entry.kind == "submission")
+
+
+def test_counts_are_against_the_edition_that_is_named_whatever_was_the_board_at_import(
+    entries: list[Submission], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Users found 1927 changed labels between a truth and itself."""
+    one, two = corrected(tmp_path, factor=1.3), corrected(tmp_path, drop="0003")
+    first, second = open_edition(one), open_edition(two)
+    builders.score_all()
+    publish(first)
+    call_command("open_edition", "test", "--protocol", "toolkit")
+    assert "against edition 2: 0 sequences added, 0 removed, 0 changed" in capsys.readouterr().out
+    # The second was compared with edition 1; asked anew, or by a worker, it is compared with the board.
+    second = Edition.objects.get(pk=second.pk)
+    assert preview.document(preview.preview(second))["n_removed"] is None
+    backlog.work_off(now=timezone.now(), rng=random.Random(0))
+    assert preview.preview(second).truth == TruthChange(0, 5, 5, 0)
+    assert preview.document(preview.preview(second))["n_changed_sequences"] == 5
+    call_command("open_edition", "test", "--truth", str(two))
+    assert "against edition 2: 0 sequences added, 5 removed, 5 changed" in capsys.readouterr().out
+    publish(second, replaces=2, leave_out=True)
+    call_command("open_edition", "test", "--truth", str(one), "--protocol", "toolkit")
+    assert "against edition 3: 5 sequences added, 0 removed, 5 changed" in capsys.readouterr().out
+
+
+def test_every_door_counts_the_sequences_that_have_another_anno_id(
+    entries: list[Submission], tmp_path: Path, keeper: Client, capsys: pytest.CaptureFixture[str]
+) -> None:
+    lines = (tmp_path / "truth-test.csv").read_text().splitlines()
+    ids = [line.partition(",")[0] for line in lines[1:]]
+    turned = [f"{number},{line.partition(',')[2]}" for number, line in zip(ids[::-1], lines[1:], strict=True)]
+    path = tmp_path / "turned.csv"
+    path.write_text("\n".join([lines[0], *turned]) + "\n")
+    call_command("open_edition", "test", "--truth", str(path))
+    builders.score_all()
+    call_command("preview_edition", "test", "2")
+    assert capsys.readouterr().out.count("0 changed; 120 sequences have another anno_id") == 2
+    call_command("preview_edition", "test", "2", "--format", "csv")
+    [row, *_] = csv.DictReader(io.StringIO(capsys.readouterr().out))
+    assert row["n_renumbered"] == "120"
+    page = "/maintain/test/editions/2/"
+    assert "120 sequences renumbered" in keeper.get(page).content.decode()
+    assert keeper.get(f"{page}preview.json").json()["n_renumbered"] == 120
+    found = keeper.get("/api/v1/splits/test/editions/2/preview").json()
+    assert (found["n_renumbered"], found["n_changed_sequences"], found["n_changed"]) == (120, 0, 0)
 
 
 def test_changing_one_value_changes_exactly_the_values_that_it_must(
@@ -79,7 +140,7 @@ def test_changing_one_value_changes_exactly_the_values_that_it_must(
     path.write_text("\n".join(lines) + "\n")
     second = open_edition(path)
     builders.score_all()
-    assert second.ground_truth.n_changed == 1
+    assert preview.preview(second).truth == TruthChange(0, 0, 1, 0)
     for change in preview.preview(second).changes:
         changed = {name for name in standings.SCORE_NAMES if change.old[name] != change.new[name]}
         assert changed == {"mid", "mid_small", "rte", "rte_small"}
@@ -136,6 +197,6 @@ def test_commands_open_preview_publish_and_roll_back(
     call_command("publish_edition", "test", "2", "--roll-back", "--reason", "A mistake.")
     said = capsys.readouterr().out
     assert "100 %  4 of 4: 4 scored, 0 rejected, 0 failed by our fault" in said
-    assert "5 changed; 4 entries change" in said
+    assert "5 changed; 0 sequences have another anno_id; 4 entries change" in said
     assert "The board of test is test edition 2." in said
     assert said.rstrip().endswith("The board of test is test edition 1.")

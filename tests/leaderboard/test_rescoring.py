@@ -10,7 +10,7 @@ from django.db import IntegrityError, transaction
 from django.utils import timezone
 
 from evaluator import Predictions, Rejected, evaluate, published, read_truth
-from leaderboard import ground_truth, lifecycle, rescoring, scoring, standings
+from leaderboard import files, ground_truth, lifecycle, rescoring, scoring, standings
 from leaderboard.models import (
     AuditEvent,
     Edition,
@@ -46,7 +46,7 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
     path = corrected(tmp_path, factor=1.3)
     edition = open_edition(path)
     for submission in entries:
-        scoring.files.store().delete(scoring.files.predictions_name(submission.digest))
+        files.store().delete(files.predictions_name(submission.digest))
     builders.score_all()
     truth = read_truth(path)
     old = ground_truth.load(Split.objects.get(pk="test").published_edition.ground_truth_id)

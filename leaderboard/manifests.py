@@ -1,0 +1,53 @@
+"""Former manifests, for workers: a file's keys are read for ever with the manifest that it was written for.
+
+The file store has every public manifest under its digest. Workers keep them beside their sums, in the form
+that the reading process takes; what is missing there is made anew.
+"""
+
+import os
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+from django.conf import settings
+
+from evaluator import Manifest, Rejected, read_manifest
+from leaderboard import files
+
+
+def path(digest: str) -> Path:
+    """A file with the manifest of this digest, for `Manifest.load`.
+
+    Raises `OSError` if the store does not have it whole, or if there is no room for it here.
+    """
+    kept = Path(settings.BAGS_DIR or Path(settings.GROUND_TRUTH_DIR) / "bags") / "manifests"
+    target = kept / f"{digest.removeprefix('sha256:')}.npz"
+    if not target.exists():
+        manifest = _stored(digest)
+        target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        handle, temporary = tempfile.mkstemp(dir=kept, suffix=".npz")
+        os.close(handle)
+        manifest.save(Path(temporary))
+        Path(temporary).replace(target)
+    return target
+
+
+@lru_cache(maxsize=1)
+def load(digest: str) -> Manifest:
+    """The manifest of this digest. Raises `OSError` as `path` does."""
+    return _stored(digest)
+
+
+def _stored(digest: str) -> Manifest:
+    with tempfile.NamedTemporaryFile(suffix=".csv") as local:
+        with files.store().open(files.manifest_name(digest), "rb") as kept:
+            local.write(kept.read())
+        local.flush()
+        try:
+            manifest = read_manifest(local.name)
+        except Rejected as fault:
+            # Whoever sent a file is never to blame for it.
+            raise OSError(f"the manifest {digest} in the file store cannot be read: {fault}") from fault
+    if manifest.digest != digest:
+        raise OSError(f"the manifest {digest} in the file store has another content: {manifest.digest}")
+    return manifest
