@@ -33,7 +33,7 @@ def name_manifests(apps, schema_editor):
 
 
 class Migration(migrations.Migration):
-    dependencies = [("leaderboard", "0014_floor_of_editions")]
+    dependencies = [("leaderboard", "0015_effective_recordings")]
     operations = [
         migrations.AddField(
             model_name="submission",
