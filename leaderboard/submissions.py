@@ -95,13 +95,12 @@ def submit(
     kept = files.keep_predictions(upload, now=now)
     with transaction.atomic():
         # First of all: whoever founds a team has the audit trail from then on, and waits for nothing more.
+        # From here on the board stays, so the file is queued in an edition with the manifest named below.
         split = Split.objects.lock_shared(split.pk)
         team = teams.team_of(user=user)
         quotas.hold(team=team)
         teams.require_member(team, user)
         method = _method(team=team, name=name, details=details, now=now)
-        # Held from here on, so that the manifest is that of the edition in which the file is queued.
-        split = Split.objects.lock_shared(split.pk)
         file = SentFile(kept.digest, _manifest_digest(split))
         standing = Submission.objects.standing().filter(split=split, method=method, **file._asdict())
         first = standing.first()

@@ -206,6 +206,7 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
         "sequences added": "0",
         "sequences removed": "0",
         "labels changed": "5",
+        "another anno_id": "0",
         "entries": "4",
         "entries change": str(found.n_changed),
         "change rank": str(found.n_moved),

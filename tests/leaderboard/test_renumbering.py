@@ -66,7 +66,7 @@ def report(said: Said, path: Path) -> Report:
 
 
 def offline(said: Said, path: Path) -> dict[str, float | None]:
-    return {name: published(value) for name, value in report(said, path).flat().items()}
+    return {name: published(value, decimals=1) for name, value in report(said, path).flat().items()}
 
 
 def scores(submission: Submission, edition: Edition) -> dict[str, float | None]:

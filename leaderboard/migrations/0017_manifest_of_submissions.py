@@ -33,7 +33,7 @@ def name_manifests(apps, schema_editor):
 
 
 class Migration(migrations.Migration):
-    dependencies = [("leaderboard", "0015_effective_recordings")]
+    dependencies = [("leaderboard", "0016_decimals_of_editions")]
     operations = [
         migrations.AddField(
             model_name="submission",
