@@ -33,7 +33,7 @@ def name_manifests(apps, schema_editor):
 
 
 class Migration(migrations.Migration):
-    dependencies = [("leaderboard", "0016_decimals_of_editions")]
+    dependencies = [("leaderboard", "0018_sound_rules")]
     operations = [
         migrations.AddField(
             model_name="submission",

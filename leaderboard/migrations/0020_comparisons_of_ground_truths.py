@@ -18,7 +18,7 @@ def keep_counts(apps, schema_editor):
 
 
 class Migration(migrations.Migration):
-    dependencies = [("leaderboard", "0017_manifest_of_submissions")]
+    dependencies = [("leaderboard", "0019_manifest_of_submissions")]
     operations = [
         migrations.CreateModel(
             name="TruthComparison",

@@ -4,7 +4,7 @@ from django.db import migrations
 
 
 class Migration(migrations.Migration):
-    dependencies = [("leaderboard", "0018_comparisons_of_ground_truths")]
+    dependencies = [("leaderboard", "0020_comparisons_of_ground_truths")]
     operations = [
         migrations.RemoveField(model_name="groundtruth", name="compared_with"),
         migrations.RemoveField(model_name="groundtruth", name="n_added"),
