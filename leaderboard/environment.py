@@ -5,7 +5,7 @@ Imported by `leaderboard/settings.py` alone, before Django is configured.
 
 import os
 import stat
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from contextlib import suppress
 from pathlib import Path
 from tempfile import mkstemp
@@ -21,14 +21,25 @@ if PROFILE not in {"embedded", "production"}:
     raise ImproperlyConfigured(f"TSTTC_PROFILE is {PROFILE!r}; expected 'embedded' or 'production'.")
 PRODUCTION = PROFILE == "production"
 
+# Which process this is, so that none has to be given a secret that it has no use for.
+PROCESSES = ("web", "worker", "beat", "migrate", "maintainer")
+PROCESS: str = env.str("TSTTC_PROCESS", default="web")
+if PROCESS not in PROCESSES:
+    raise ImproperlyConfigured(f"TSTTC_PROCESS is {PROCESS!r}; expected one of {', '.join(PROCESSES)}.")
 
-def required(name: str, *, embedded: Any) -> Any:
-    """The variable's text; in production its absence is an error, elsewhere `embedded` stands in."""
-    if PRODUCTION and not env.str(name, default=""):
+
+def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsewhere: Any = "") -> Any:
+    """The variable's text; in production its absence is an error, elsewhere `embedded` stands in.
+
+    `by` are the processes of production that need it; in the others `elsewhere` stands in.
+    """
+    if not PRODUCTION:
+        return env.str(name, default=embedded)
+    if PROCESS in by and not env.str(name, default=""):
         raise ImproperlyConfigured(
             f"{name} is not set. In production it has no default; docs/operations.md describes it."
         )
-    return env.str(name, default=embedded)
+    return env.str(name, default="") or elsewhere
 
 
 def make_private(folder: Path) -> None:
@@ -44,7 +55,12 @@ def make_private(folder: Path) -> None:
 
 
 def key_of_checkout(path: Path, make: Callable[[], str]) -> str:
-    """A key of this checkout's own, made once, so that what it signed survives a restart of the demo."""
+    """A key of this checkout's own, made once, so that what it signed survives a restart of the demo.
+
+    In production, where only the web process is given keys, it is one that nobody else ever has.
+    """
+    if PRODUCTION:
+        return make()
     if not path.exists():
         # Whole at once, and the first one's for all: several processes may start together.
         handle, own = mkstemp(dir=path.parent, prefix=f".{path.name}-")

@@ -43,11 +43,11 @@ if not PRODUCTION:
 
 # --- the frame -------------------------------------------------------------------------------------------
 
-SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="") or key_of_checkout(
+SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="", by={"web"}) or key_of_checkout(
     DATA_DIR / "secret-key", get_random_secret_key
 )
 # Signs score receipts (see leaderboard/receipts.py); what former keys signed still verifies.
-RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="") or key_of_checkout(
+RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="", by={"web"}) or key_of_checkout(
     DATA_DIR / "receipt-key", token_urlsafe
 )
 RECEIPT_OLD_KEYS = env.list("TSTTC_RECEIPT_OLD_KEYS", default=[])
@@ -129,7 +129,12 @@ DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 
 DATABASES = {
     "default": env.db_url_config(
-        required("TSTTC_DATABASE_URL", embedded=f"sqlite:///{DATA_DIR / 'leaderboard.sqlite3'}")
+        required(
+            "TSTTC_DATABASE_URL",
+            embedded=f"sqlite:///{DATA_DIR / 'leaderboard.sqlite3'}",
+            by={"web", "worker", "migrate", "maintainer"},
+            elsewhere="sqlite://:memory:",
+        )
     )
 }
 if "sqlite" in DATABASES["default"]["ENGINE"]:
@@ -143,6 +148,10 @@ else:
     DATABASES["default"]["CONN_MAX_AGE"] = env.int("TSTTC_DATABASE_CONN_MAX_AGE", default=60)
     DATABASES["default"]["CONN_HEALTH_CHECKS"] = True
     DATABASES["default"].setdefault("OPTIONS", {})["connect_timeout"] = 5
+
+# The role of web, workers and maintainers on PostgreSQL, which owns nothing (see the command `grant`).
+APPLICATION_ROLE = env.str("TSTTC_APPLICATION_ROLE", default="")
+APPLICATION_PASSWORD = env.str("TSTTC_APPLICATION_PASSWORD", default="")
 
 # Prediction files, aligned arrays and public manifests, all named by their digest: in a local directory, or
 # in an S3-compatible service that web and workers on several machines share (see leaderboard/s3.py).
@@ -216,7 +225,12 @@ CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=60)
 
 # --- Celery: a broker message is only a nudge, the database is the queue ------------------------------------
 
-CELERY_BROKER_URL = required("TSTTC_BROKER_URL", embedded="filesystem://")
+CELERY_BROKER_URL = required(
+    "TSTTC_BROKER_URL",
+    embedded="filesystem://",
+    by={"web", "worker", "beat", "maintainer"},
+    elsewhere="memory://",
+)
 CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any]
 if CELERY_BROKER_URL.startswith("filesystem"):
     BROKER_DIR = DATA_DIR / "broker"

@@ -1,6 +1,9 @@
 """The production set-up as far as it can be checked without a container engine, and its documentation."""
 
+import os
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +71,142 @@ def test_what_runs_for_ever_is_watched_and_restarted(name: str) -> None:
     assert SERVICES[name]["healthcheck"]["test"]
 
 
+@pytest.mark.parametrize("name", sorted(SERVICES))
+def test_every_service_is_without_privileges_and_has_limits(name: str) -> None:
+    service = SERVICES[name]
+    assert service["cap_drop"] == ["ALL"]
+    assert service.get("cap_add", []) == (["NET_BIND_SERVICE"] if name == "proxy" else [])
+    assert "no-new-privileges:true" in service["security_opt"]
+    assert service["mem_limit"]
+    assert service["pids_limit"]
+    if name not in OURS and name != "proxy":
+        assert service["user"] not in {"root", "0"}
+
+
+def test_networks_are_for_one_purpose_each_and_workers_have_no_way_out() -> None:
+    found = {name: set(service["networks"]) for name, service in SERVICES.items()}
+    assert found == {
+        "proxy": {"pages"},
+        "web": {"pages", "database", "broker"},
+        "worker": {"database", "broker"},
+        "beat": {"broker"},
+        "migrate": {"database"},
+        "maintainer": {"database", "broker"},
+        "db": {"database"},
+        "redis": {"broker"},
+    }
+    assert COMPOSE["networks"] == {
+        "pages": None,
+        "database": {"internal": True},
+        "broker": {"internal": True},
+    }
+
+
+KEYS = {
+    "TSTTC_SECRET_KEY",
+    "TSTTC_RECEIPT_KEY",
+    "TSTTC_RECEIPT_OLD_KEYS",
+    "TSTTC_EMAIL_URL",
+    "TSTTC_METRICS_TOKEN",
+}
+S3_KEYS = {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"}
+HAVE: dict[str, set[str]] = {
+    "web": KEYS | S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
+    "worker": S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
+    "maintainer": S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
+    "beat": {"TSTTC_BROKER_URL"},
+    "migrate": {"TSTTC_DATABASE_URL", "TSTTC_APPLICATION_PASSWORD"},
+}
+
+
+@pytest.mark.parametrize("name", sorted(OURS))
+def test_each_service_has_the_secrets_that_it_uses_and_no_others(name: str) -> None:
+    secret = {*KEYS, *S3_KEYS, "TSTTC_DATABASE_URL", "TSTTC_BROKER_URL", "TSTTC_APPLICATION_PASSWORD"}
+    environment = OURS[name]["environment"]
+    assert set(environment) & secret == HAVE[name]
+    assert environment["TSTTC_PROCESS"] == name
+    # Only what brings the tables up to date signs in as their owner.
+    is_owner = "//tsttc:${POSTGRES_PASSWORD" in environment.get("TSTTC_DATABASE_URL", "")
+    assert is_owner == (name == "migrate")
+
+
+@pytest.mark.parametrize("name", sorted(OURS))
+def test_each_process_starts_with_the_variables_that_compose_gives_it(name: str) -> None:
+    given = dict.fromkeys(OURS[name]["environment"], "x" * 43) | {
+        "TSTTC_PROFILE": "production",
+        "TSTTC_PROCESS": name,
+        "TSTTC_DATABASE_URL": "postgres://u:p@db/tsttc",
+        "TSTTC_BROKER_URL": "redis://redis/0",
+        "TSTTC_EMAIL_URL": "smtp://mail",
+        "TSTTC_FILES_URL": "",
+        "TSTTC_TRUSTED_PROXIES": "1",
+        "TSTTC_MAX_PREDICTIONS_BYTES": "1",
+    }
+    environment = {key: text for key, text in given.items() if key in OURS[name]["environment"]}
+    statement = "from leaderboard import settings; print(len(settings.SECRET_KEY) > 40)"
+    assert python(statement, environment) == "True\n"
+    page = python("import leaderboard.wsgi", environment)
+    assert ("expected 'web', which alone has the keys" in page) == (name != "web")
+
+
+def test_the_web_process_does_not_start_without_its_keys() -> None:
+    for missing in ("TSTTC_SECRET_KEY", "TSTTC_DATABASE_URL"):
+        environment = dict.fromkeys(
+            ("TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY", "TSTTC_ALLOWED_HOSTS"), "x" * 43
+        )
+        environment |= {"TSTTC_PROFILE": "production", "TSTTC_SITE_URL": "https://x"}
+        environment.pop(missing, None)
+        assert f"{missing} is not set" in python("import leaderboard.settings", environment)
+
+
+def python(statement: str, environment: dict[str, str]) -> str:
+    """What a program prints that has these variables and none of ours beside them."""
+    usual = {name: text for name, text in os.environ.items() if name in {"PATH", "HOME"}}
+    done = subprocess.run(
+        [sys.executable, "-c", statement],
+        cwd=REPOSITORY,
+        env=usual | environment,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return done.stdout + done.stderr
+
+
+def test_the_password_of_the_broker_is_in_no_command_line_and_it_is_not_root() -> None:
+    redis = SERVICES["redis"]
+    script = redis["command"][-1]
+    assert script.splitlines()[-1] == "exec redis-server /run/redis/redis.conf"
+    assert "/run/redis" in redis["tmpfs"]
+    assert "REDIS_PASSWORD" not in script.splitlines()[-1]
+
+
+def test_the_log_of_the_database_has_no_statement_and_no_value() -> None:
+    options = SERVICES["db"]["command"]
+    assert {"log_min_error_statement=panic", "log_error_verbosity=terse"} <= set(options)
+    assert {"log_parameter_max_length=0", "log_parameter_max_length_on_error=0"} <= set(options)
+
+
+def test_only_uploads_are_buffered_whole_and_nobody_sends_for_ever() -> None:
+    text = (REPOSITORY / "deploy/Caddyfile").read_text()
+    uploads = text[text.index("handle @uploads") : text.index("handle {")]
+    others = text[text.index("handle {") :]
+    assert "@uploads path /submit/ /api/v1/submissions\n" in text
+    assert uploads.count("{$TSTTC_MAX_REQUEST_SIZE}") == 2
+    assert "max_size 1MB" in others
+    assert "request_buffers 64KB" in others
+    assert "TSTTC_MAX_REQUEST_SIZE" not in others
+    assert re.search(r"timeouts \{[^}]*read_body \dm", text)
+    assert text.count("{") == text.count("}")
+
+
+def test_secrets_on_disk_are_committed_nowhere_and_in_no_image() -> None:
+    assert "/.env" in (REPOSITORY / ".gitignore").read_text().splitlines()
+    ignored = (REPOSITORY / ".dockerignore").read_text().splitlines()
+    assert ignored[0] == "*"
+    assert not any(line.startswith("!.env") for line in ignored)
+
+
 def test_nothing_but_the_proxy_is_reachable_from_outside() -> None:
     assert [name for name, service in SERVICES.items() if "ports" in service] == ["proxy"]
 
@@ -90,11 +229,23 @@ def test_every_variable_of_the_deployment_is_read_by_something() -> None:
 
 def test_no_secret_has_a_default() -> None:
     text = (REPOSITORY / "docker-compose.yml").read_text()
-    for name in ("TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY", "POSTGRES_PASSWORD", "REDIS_PASSWORD"):
+    for name in (
+        "TSTTC_SECRET_KEY",
+        "TSTTC_RECEIPT_KEY",
+        "POSTGRES_PASSWORD",
+        "APPLICATION_PASSWORD",
+        "REDIS_PASSWORD",
+    ):
         assert f"${{{name}:?" in text
         assert f"${{{name}:-" not in text
     example = (REPOSITORY / "deploy/env.example").read_text()
-    for name in ("TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY", "POSTGRES_PASSWORD", "REDIS_PASSWORD"):
+    for name in (
+        "TSTTC_SECRET_KEY",
+        "TSTTC_RECEIPT_KEY",
+        "POSTGRES_PASSWORD",
+        "APPLICATION_PASSWORD",
+        "REDIS_PASSWORD",
+    ):
         assert f"\n{name}=\n" in example
 
 

@@ -1,0 +1,69 @@
+"""`manage.py grant`: let the application's own role work on PostgreSQL, after each `migrate`.
+
+The role owns nothing. It reads and writes every table but two: of the audit trail it reads and adds rows, of
+the applied migrations it reads. So a fault in a web process or a worker cannot take the trail's triggers off.
+"""
+
+from typing import Any, Final
+
+from django.conf import settings
+from django.core.management.base import BaseCommand, CommandError
+from django.db import connection, transaction
+from psycopg import sql
+
+ONLY: Final = {"leaderboard_auditevent": "SELECT, INSERT", "django_migrations": "SELECT"}
+_ROLE: Final = "SELECT 1 FROM pg_roles WHERE rolname = %s"
+_MAY: Final = "SELECT, INSERT, UPDATE, DELETE"
+
+
+class Command(BaseCommand):
+    """Makes the role if it is not there, and gives it what it needs and nothing more."""
+
+    help = "Grant TSTTC_APPLICATION_ROLE what the application needs; run as the owner, after migrate."
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Grant, or say that there is nobody to grant anything to."""
+        role = settings.APPLICATION_ROLE
+        if not role:
+            self.stdout.write("TSTTC_APPLICATION_ROLE is not set: the application works as the owner.")
+            return
+        if connection.vendor != "postgresql":
+            raise CommandError("The database has no roles; expected PostgreSQL.")
+        with transaction.atomic():
+            make_role(role, password=settings.APPLICATION_PASSWORD)
+            grant_to(role)
+        self.stdout.write(f"The role {role} may do what the application does.")
+
+
+def make_role(role: str, *, password: str) -> None:
+    """Make the role that signs in with this password, or give it this one."""
+    if not password:
+        raise CommandError("TSTTC_APPLICATION_PASSWORD is not set; expected the password of the role.")
+    with connection.cursor() as cursor:
+        cursor.execute(_ROLE, [role])
+        verb = "ALTER" if cursor.fetchone() else "CREATE"
+        # It is in no group, and takes no rights that somebody gave it before.
+        options = "LOGIN NOSUPERUSER NOCREATEDB NOCREATEROLE NOREPLICATION NOBYPASSRLS"
+        statement = sql.SQL("{} ROLE {} WITH {} PASSWORD {}").format(
+            sql.SQL(verb), sql.Identifier(role), sql.SQL(options), sql.Literal(password)
+        )
+        cursor.execute(statement.as_string(cursor.connection))
+
+
+def grant_to(role: str) -> None:
+    """Give the role what the application needs on every table that there is now."""
+    own = sql.Identifier(role)
+    with connection.cursor() as cursor:
+        tables = connection.introspection.table_names(cursor)
+        statements = [
+            sql.SQL("GRANT USAGE ON SCHEMA public TO {}").format(own),
+            sql.SQL("GRANT USAGE, SELECT ON ALL SEQUENCES IN SCHEMA public TO {}").format(own),
+        ]
+        for table in tables:
+            name = sql.Identifier(table)
+            statements += [
+                sql.SQL("REVOKE ALL ON {} FROM {}").format(name, own),
+                sql.SQL("GRANT {} ON {} TO {}").format(sql.SQL(ONLY.get(table, _MAY)), name, own),
+            ]
+        for statement in statements:
+            cursor.execute(statement.as_string(cursor.connection))
