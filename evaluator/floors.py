@@ -24,14 +24,14 @@ def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL)
 
 
 def floor_sentence(floor: Mapping[str, float | None] | None, *, decimals: int = 2) -> str:
-    """The floor in words, from its published values; empty where it is not known.
+    """The floor in words, from its published values; empty where it is not known, or 0 in every column.
 
     >>> print(floor_sentence({"mid": 0.36, "mid_crucial": 0.0, "rte": 0.73, "rte_crucial": 0.02}))
     Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73 %, RTE on crucial \
 0.02 % and 0 in every other column. No file can score lower, because the protocol truncates predictions and \
 not the ground truth.
     """
-    if not floor:
+    if not floor or not any(floor.values()):
         return ""
     values = {name: floor[name] for name in SCORE_NAMES if floor.get(name) is not None}
     shown = [name for name, value in values.items() if value or name in _LABELS]

@@ -1,4 +1,4 @@
-"""How sure a number is, and whether one model is better than another by more than chance makes."""
+"""The confidence interval of a score, and whether one model is significantly better than another."""
 
 import numpy as np
 

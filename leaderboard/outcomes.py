@@ -53,7 +53,7 @@ class Outcome:
 
     @property
     def intervals(self) -> Mapping[str, Interval]:
-        """How sure its values are."""
+        """The confidence intervals and rank ranges of its values."""
         return shown_intervals(self.progress, self.place)
 
 
@@ -110,7 +110,7 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
 
 
 def shown_intervals(progress: Progress, place: Place | None) -> Mapping[str, Interval]:
-    """How sure the values are. Ranges are of rows of the present board, and of nothing else."""
+    """The confidence intervals of the values, and rank ranges if it is a row of the present board."""
     return place.intervals if place else _without_ranges(progress.intervals)
 
 

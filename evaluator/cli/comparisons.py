@@ -42,9 +42,10 @@ Scores = Mapping[str, float | None]
 def compare(*, first: str, second: str, split: str, truth_path: Path | None, url: str, as_json: bool) -> None:
     """Compare FIRST with SECOND, methods of a board by name or id, or with --truth two prediction files.
 
-    Whole recordings are resampled, since what follows in one recording is alike: each column gets the
-    difference, its 95 % interval, and the p of a two-sided test. Below 0 the first is better. Below the table
-    stands what overall MiD means in words, and which other columns differ significantly.
+    Each column gets the difference, its 95 % confidence interval, and the p-value of a two-sided test, both
+    by whole recordings, since the sequences of one recording resemble each other. Below 0 the first is
+    better. The sentence below the table says what overall MiD means; then follow the other columns that
+    differ significantly.
 
     \b
     Examples:

@@ -30,9 +30,10 @@ def texts_of(entry: BoardEntry, *, missing: str, scores: tuple[str, ...] = SCORE
 
 
 def in_short(submission: Submission) -> Iterator[str]:
-    """Where a scored submission stands, and how sure its two errors are, each where the server knows it.
+    """Where a scored submission stands, and the intervals of its two errors, each where the server knows it.
 
-    "rank 2 (1–3)", and "MiD 14.21 (13.60–14.90), RTE 11.90 (11.20–12.60), in brackets at 95 %".
+    "rank 2 (1–3)", and "MiD 14.21 (13.60–14.90), RTE 11.90 (11.20–12.60), in brackets the 95 % confidence
+    intervals".
     """
     if submission.rank is not None:
         found = submission.intervals.get("mid")
@@ -52,7 +53,7 @@ def in_short(submission: Submission) -> Iterator[str]:
         )
     ]
     if errors:
-        yield f"{', '.join(errors)}, in brackets at 95 %"
+        yield f"{', '.join(errors)}, in brackets the 95 % confidence intervals"
     elif submission.awaits_intervals:
         yield "Intervals are being computed."
 

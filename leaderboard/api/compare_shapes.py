@@ -16,10 +16,10 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
 
     difference = serializers.FloatField(help_text="In the column's unit.")
     low = serializers.FloatField(
-        allow_null=True, help_text="Lower end of its 95 % interval; null: too few recordings."
+        allow_null=True, help_text="Lower end of its 95 % confidence interval; null: too few recordings."
     )
     high = serializers.FloatField(
-        allow_null=True, help_text="Upper end of its 95 % interval; null: too few recordings."
+        allow_null=True, help_text="Upper end of its 95 % confidence interval; null: too few recordings."
     )
     p = serializers.FloatField(
         allow_null=True,

@@ -50,7 +50,7 @@ class CompareView(APIView):
         },
     )
     def get(self, request: Request) -> Response:
-        """Differences with 95 % intervals and p between two to five methods; 202 until all are computed."""
+        """Compare two to five methods: differences, confidence intervals and p; 202 until all are there."""
         query = request.query_params
         split = _split(request, query.get("split", ""))
         number = query.get("edition")
