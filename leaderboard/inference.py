@@ -69,14 +69,6 @@ def why_no_interval(edition: Edition) -> str:
     return f"There are no intervals: they would be made of {too_few_recordings(most)}."
 
 
-def why_no_interval_of(edition: Edition, name: str) -> str:
-    """Why one column of this edition has none: `too few recordings (…)`; "" if it has, or is not known."""
-    n_effective = edition.n_effective.get(name)
-    if n_effective is None or n_effective >= MIN_DEGREES:
-        return ""
-    return too_few_recordings(n_effective)
-
-
 def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
     """The random numbers of an edition: everything that is drawn for it comes from here."""
     return uncertainty.generator_of(seed_of(edition), purpose=purpose)

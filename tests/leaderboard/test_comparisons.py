@@ -83,10 +83,20 @@ def test_the_worker_computes_what_the_evaluator_says_offline(
             read.append(read_predictions(kept.read(), manifest=truth.manifest))
     offline = compare_predictions(read[0], read[1], truth, decimals=1)
     for name, found in known(pair).items():
-        assert found.low == offline[name].low, name
-        assert found.high == offline[name].high
-        assert found.p == (None if offline[name].p is None else pytest.approx(offline[name].p, rel=0.05))
-        assert found.difference == pytest.approx(offline[name].difference, abs=0.11)
+        assert found == offline[name], name
+
+
+def test_what_is_published_of_a_difference_says_the_same_of_0_as_its_p(
+    entries: list[Submission], edition: Edition
+) -> None:
+    ask(*entries)
+    builders.infer_all()
+    pairs = ask(*entries).pairs
+    found = [gap for pair in pairs for gap in known(pair).values() if gap.low is not None]
+    assert len(found) > 20
+    for gap in found:
+        assert (gap.low > 0 or gap.high < 0) == gap.is_significant == (gap.p_below <= 0.05)
+        assert gap.p == round(gap.p, 4)
 
 
 def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[Submission]) -> None:

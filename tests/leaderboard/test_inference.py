@@ -26,18 +26,7 @@ from leaderboard.models import (
 )
 from tests import builders
 from tests.editions import ANYBODY, board_now, corrected, open_edition, publish
-
-INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
-
-
-def scores_of(submission: Submission, edition: Edition) -> dict[str, Score]:
-    rows = Score.objects.filter(evaluation__submission=submission, evaluation__edition=edition)
-    return {row.metric if row.interval == "overall" else f"{row.metric}_{row.interval}": row for row in rows}
-
-
-def everything() -> list[tuple[object, ...]]:
-    """All that was ever inferred, to be compared byte for byte."""
-    return list(Score.objects.order_by("pk").values_list("pk", *INFERRED))
+from tests.leaderboard.inferred_scores import INFERRED, everything, scores_of
 
 
 def hide(submission: Submission) -> None:
@@ -204,6 +193,30 @@ def test_printed_rows_are_counted_where_they_surely_or_possibly_stand(
         if entry.kind == "submission":
             interval = entry.intervals["mid"]
             assert interval.rank_low <= entry.rank <= interval.rank_high
+
+
+def test_what_may_be_the_best_of_a_column_counts_quoted_rows(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    quoted = PublishedResult.objects.filter(split="test")
+    quoted.delete()
+    builders.infer_all()
+    best = scores_of(inferred[0], edition)["mid"]
+    assert (best.rank_low, best.rank_high, best.is_with_best) == (1, 1, True)
+    PublishedResult.objects.create(
+        split_id="test",
+        slug="leads",
+        method_name="Leads",
+        authors="A",
+        source_title="T",
+        source_url="https://example.org",
+        source_table="1",
+        year=2023,
+        scores={"mid": 0.1},
+    )
+    builders.infer_all()
+    best.refresh_from_db()
+    assert (best.rank_low, best.rank_high, best.is_with_best) == (2, 2, False)
 
 
 def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(

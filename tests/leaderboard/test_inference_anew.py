@@ -1,0 +1,58 @@
+"""When all that was inferred is made anew, and what it is made of."""
+
+import pytest
+
+from evaluator import SCORE_NAMES
+from leaderboard import bags, inference
+from leaderboard.models import Comparison, Edition, Evaluation, Score, Submission
+from tests import builders
+from tests.leaderboard.inferred_scores import everything
+
+
+@pytest.fixture
+def inferred(entries: list[Submission]) -> list[Submission]:
+    """Four scored submissions, and what workers make of them afterwards."""
+    assert builders.infer_all() == 1
+    return entries
+
+
+def test_what_was_made_in_another_way_is_made_anew(inferred: list[Submission], edition: Edition) -> None:
+    expected = everything()
+    Score.objects.exclude(low=None).update(low=0.0, high=99.0, rank_low=1, rank_high=1)
+    edition.refresh_from_db()
+    assert edition.inference_digest.startswith(f"{inference.METHOD} sha256:")
+    former = edition.inference_digest.partition(" ")[2]
+    Edition.objects.filter(pk=edition.pk).update(inference_digest=former)
+    assert builders.infer_all() == 1
+    assert everything() == expected
+
+
+def test_an_edition_knows_its_effective_numbers_of_recordings(
+    inferred: list[Submission], edition: Edition
+) -> None:
+    edition.refresh_from_db()
+    counts = bags.counts_of(edition)
+    for column, name in enumerate(SCORE_NAMES):
+        exact = (counts[:, column] ** 2).sum() ** 2 / (counts[:, column] ** 4).sum()
+        assert 0 <= exact - edition.n_effective[name] < 0.1
+
+
+def test_every_random_number_of_an_edition_comes_from_its_seed(
+    inferred: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def everything_drawn() -> list[object]:
+        Score.objects.update(low=None, high=None)
+        Edition.objects.filter(pk=edition.pk).update(inference_digest="")
+        Comparison.objects.all().delete()
+        ids = sorted(Evaluation.objects.filter(edition=edition).values_list("pk", flat=True))
+        row = Comparison.objects.create(edition=edition, first_id=ids[0], second_id=ids[1])
+        builders.infer_all()
+        row.refresh_from_db()
+        return [*everything(), row.differences]
+
+    before = everything_drawn()
+    assert everything_drawn() == before
+    monkeypatch.setattr(inference, "seed_of", lambda edition: f"secret {edition.ground_truth_id}")
+    after = everything_drawn()
+    assert before[-1] != after[-1]
+    assert before[:-1] != after[:-1]
