@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -29,13 +30,15 @@ def convert(
     frame_gap: int | None = None,
     to_fps_hz: float | None = None,
     to_frame_gap: int | None = None,
+    natural_keys: Mapping[str, str] | None = None,
 ) -> bytes:
     """A prediction file with the same predictions in the unit `to`.
 
     A file in the toolkit's flat form has times to contact, or scale ratios at the rate that `fps_hz` or
     `frame_gap` says; an envelope says itself what it has. Scale ratios are written at `to_fps_hz` or
     `to_frame_gap`, by themselves at 2 Hz (gap 5), the dataset's own. Keys stay as they are; whether they are
-    those of a split, `read_predictions` knows.
+    those of a split, `read_predictions` knows. With `natural_keys`, from anno_id to natural key, the file
+    must have exactly these anno_ids, and is written with the natural keys (see `numbering`).
 
     Raises `Rejected` for what no prediction file may hold, `ValueError` for rates that do not fit together.
     """
@@ -43,6 +46,8 @@ def convert(
     _require_one_rate(document, fps_hz, frame_gap)
     findings = Findings()
     names = _names(document, findings)
+    if natural_keys is not None:
+        _require_anno_ids(names, natural_keys, findings, document.pointer)
     values = _numbers(document.predictions, findings, document.pointer)
     is_ratio = document.unit == "scale_ratio" or fps_hz is not None or frame_gap is not None
     rates: Floats | None = None
@@ -57,6 +62,8 @@ def convert(
     findings.raise_if_any()
     ttc_s = values if rates is None else scale_ratio_to_ttc(values, fps_hz=rates)
     meta = document.meta
+    if natural_keys is not None:
+        names = [natural_keys[name] for name in names]
     if to == "ttc":
         return write_predictions(keys=names, ttc_s=ttc_s, meta=meta)
     if to_fps_hz is None and to_frame_gap is None:
@@ -116,6 +123,34 @@ def _names(document: Document, findings: Findings) -> list[str]:
         message = f"{len(repeated):,} keys appear more than once: {shown}; expected every key once."
         findings.group("duplicate-keys", message, document.pointer(repeated[0]), n_faults=len(repeated))
     return names
+
+
+def _require_anno_ids(
+    names: list[str], natural_keys: Mapping[str, str], findings: Findings, place: Callable[[str], str]
+) -> None:
+    """Note every way in which the keys of the file are not the anno_ids of the folder."""
+    if names and set(natural_keys.values()).issuperset(names):
+        message = (
+            f"The {len(names):,} keys are natural keys already; expected anno_ids of the toolkit. "
+            "The file needs no annotations: it can be sent as it is."
+        )
+        findings.group("unknown-keys", message, place(names[0]), n_faults=len(names))
+        return
+    given = set(names)
+    counts = f"The file has {len(given):,} anno_ids and the folder {len(natural_keys):,} sequences"
+    unknown = [name for name in given if name not in natural_keys]
+    missing = [key for key in natural_keys if key not in given]
+    if unknown:
+        expected = f"expected the anno_ids 0 to {len(natural_keys) - 1}"
+        shown = listed([quoted(name) for name in sorted(unknown)])
+        message = f"{counts}; no sequence for {len(unknown):,} of the anno_ids: {shown}; {expected}."
+        findings.group("unknown-keys", message, place(min(unknown)), n_faults=len(unknown))
+    if missing:
+        message = (
+            f"{counts}; no value for {len(missing):,} of the sequences: {listed(missing)}; "
+            "expected one for each, from the folder that the toolkit has read."
+        )
+        findings.group("missing-keys", message, place(missing[0]), n_faults=len(missing))
 
 
 def _numbers(members: Members, findings: Findings, place: object) -> Floats:

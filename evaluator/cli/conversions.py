@@ -1,4 +1,4 @@
-"""The subcommand convert: the same predictions in another unit, or at another rate."""
+"""The subcommand convert: the same predictions in another unit, at another rate, or under natural keys."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Literal
 import click
 
 from evaluator.cli.options import predictions_argument
-from evaluator.cli.reading import bytes_of, naming, write_bytes
+from evaluator.cli.reading import FOLDER, bytes_of, naming, write_bytes
 
 GAP = click.IntRange(1, 5)
 RATE = click.FloatRange(min=0, min_open=True)
 
 
-@click.command(short_help="Turn scale ratios at any frame gap into seconds, and back.")
+@click.command(short_help="Turn scale ratios into seconds and back, and anno_ids into natural keys.")
 @predictions_argument
 @click.option(
     "--frame-gap", type=GAP, metavar="G", help="PREDICTIONS has scale ratios of frames this far apart."
@@ -32,6 +32,12 @@ RATE = click.FloatRange(min=0, min_open=True)
 )
 @click.option("--to-fps", "to_fps_hz", type=RATE, metavar="HZ", help="The same as a rate.")
 @click.option(
+    "--annotations",
+    type=FOLDER,
+    metavar="FOLDER",
+    help="Write natural keys: the anno_ids are those that the toolkit gave when it read this folder here.",
+)
+@click.option(
     "-o",
     "--output",
     type=click.Path(dir_okay=False, path_type=Path),
@@ -46,15 +52,22 @@ def convert(
     to: Literal["ttc", "scale_ratio"],
     to_frame_gap: int | None,
     to_fps_hz: float | None,
+    annotations: Path | None,
     output: Path | None,
 ) -> None:
-    """Write PREDICTIONS, a JSON file or - for standard input, in another unit or at another rate.
+    """Write PREDICTIONS, a JSON file or - for standard input, in another unit, at another rate, or with other
+    keys.
 
     An envelope says itself what its numbers are. A flat file, from key to number, has scale ratios if
     --frame-gap or --fps is given, and seconds otherwise.
 
+    The toolkit numbers the sequences in the order in which the file system lists the annotation files, which
+    differs between machines. With --annotations the result file of the toolkit gets natural keys, which mean
+    the same everywhere. Run this where the toolkit ran, on the folder that it read.
+
     \b
     Examples:
+      tsttc convert results.json --annotations annotations/val/ -o predictions.json
       tsttc convert ratios.json --frame-gap 1 -o predictions.json
       tsttc convert predictions.json --to scale_ratio --to-frame-gap 3 -o ratios.json
     """
@@ -68,6 +81,12 @@ def convert(
         raise click.UsageError(
             "Seconds have no rate: --to-frame-gap and --to-fps belong to --to scale_ratio."
         )
+    natural_keys = None
+    if annotations is not None:
+        from evaluator.numbering import read_numbering  # noqa: PLC0415 -- loads numpy
+
+        with naming(annotations):
+            natural_keys = read_numbering(annotations).natural_keys
     data = bytes_of(predictions)
     with naming(predictions):
         try:
@@ -78,6 +97,7 @@ def convert(
                 frame_gap=frame_gap,
                 to_fps_hz=to_fps_hz,
                 to_frame_gap=to_frame_gap,
+                natural_keys=natural_keys,
             )
         except ValueError as fault:
             raise click.UsageError(str(fault)) from None
@@ -85,4 +105,5 @@ def convert(
         click.echo(found)
         return
     write_bytes(output, found)
-    click.echo(f"{output}: {'seconds' if to == 'ttc' else 'scale ratios'}.")
+    unit = "seconds" if to == "ttc" else "scale ratios"
+    click.echo(f"{output}: {unit}{' by natural key' if natural_keys is not None else ''}.")

@@ -12,11 +12,18 @@ from evaluator.cli import gates
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import result_in_words
 from evaluator.cli.options import json_option, predictions_argument
-from evaluator.cli.reading import TABLE, bytes_of, name_of, naming, write_bytes
+from evaluator.cli.reading import FOLDER, TABLE, bytes_of, name_of, naming, write_bytes
+from evaluator.cli.warnings_in_words import (
+    as_documents,
+    echo_warnings,
+    numbering_in_words,
+    numbering_warnings,
+)
 from evaluator.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 
 if TYPE_CHECKING:
-    from evaluator import Report
+    from evaluator import Manifest, Report
+    from evaluator.numbering import Numbering
 
 
 @click.command(short_help="Say whether a prediction file is complete and well-formed.")
@@ -25,39 +32,71 @@ if TYPE_CHECKING:
     "--manifest",
     "manifest_path",
     type=TABLE,
-    required=True,
     metavar="FILE",
     help="The split's manifest, which says what sequences there are; its ground truth will do.",
 )
+@click.option(
+    "--annotations",
+    type=FOLDER,
+    metavar="FOLDER",
+    help="The toolkit's annotations: also say whether the toolkit numbers them here as the manifest does.",
+)
 @json_option
-def check(*, predictions: Path, manifest_path: Path, as_json: bool) -> None:
+def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | None, as_json: bool) -> None:
     """Say whether PREDICTIONS, a JSON file or - for standard input, is complete and well-formed.
 
-    The rules are the server's; nothing is sent anywhere.
+    The rules are the server's; nothing is sent anywhere. A warning is no fault: it says that the values
+    probably belong to other sequences. Without --manifest the sequences are those of --annotations.
 
     \b
-    Example:
+    Examples:
       tsttc check predictions.json --manifest manifest.csv
+      tsttc check results.json --annotations annotations/val/
     """
-    from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- numpy, which --help can do without
+    from evaluator import read_predictions  # noqa: PLC0415 -- numpy, which --help can do without
+    from evaluator.plausibility import warnings_of  # noqa: PLC0415 -- as above
 
-    with naming(manifest_path):
-        sequences = read_manifest(manifest_path)
+    sequences, numbering = _sequences(manifest_path, annotations)
     with naming(predictions):
         found = read_predictions(bytes_of(predictions), manifest=sequences)
+    warnings = warnings_of(found)
+    if numbering is not None and annotations is not None:
+        warnings += numbering_warnings(numbering, found, predictions=predictions, annotations=annotations)
     if as_json:
         echo_json(
             {
                 "predictions_digest": found.digest,
                 "manifest_digest": sequences.digest,
                 "n_sequences": sequences.n_sequences,
+                "n_renumbered": None if numbering is None else numbering.n_renumbered,
                 "problems": [],
+                "warnings": as_documents(warnings),
             }
         )
-    else:
-        click.echo(
-            f"{name_of(predictions)} is good: {sequences.n_sequences:,} sequences, each predicted once."
-        )
+        return
+    good = "well-formed" if warnings else "good"
+    click.echo(f"{name_of(predictions)} is {good}: {sequences.n_sequences:,} sequences, each predicted once.")
+    if numbering is not None:
+        click.echo(numbering_in_words(numbering))
+    echo_warnings(warnings)
+
+
+def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Manifest, Numbering | None]:
+    """The sequences to check against, and how the toolkit numbers them where a folder says so."""
+    from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
+    from evaluator.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
+
+    sequences = None
+    if manifest_path is not None:
+        with naming(manifest_path):
+            sequences = read_manifest(manifest_path)
+    if annotations is not None:
+        with naming(annotations):
+            numbering = read_numbering(annotations, manifest=sequences)
+        return numbering.manifest, numbering
+    if sequences is None:
+        raise click.UsageError("Missing option '--manifest', or '--annotations' in its place.")
+    return sequences, None
 
 
 @click.command(short_help="Score a prediction file against ground truth that you have.")
@@ -84,23 +123,29 @@ def score(
 ) -> None:
     """Score PREDICTIONS, a JSON file or - for standard input, against ground truth that you have.
 
-    The numbers are the server's: two decimals as the board publishes them, all of float64 with --json.
+    The numbers are the server's: two decimals as the board publishes them, all of float64 with --json. If you
+    have the dataset, name the folder of its annotations. A warning says that the predictions hardly
+    go with the true times; the usual cause is a file whose sequences are numbered in another order.
 
     \b
     Examples:
-      tsttc score predictions.json --truth val.csv
+      tsttc score predictions.json --truth annotations/val/
       tsttc score predictions.json --truth val.csv --json | jq .scores.overall.mid
       tsttc score predictions.json --truth val.csv --fail-if "mid > 15.0 or rte > 13"
     """
     from evaluator import evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy, as above
+    from evaluator.plausibility import warnings_with_truth  # noqa: PLC0415 -- numpy, as above
 
     with naming(truth_path):
         truth = read_truth(truth_path)
     with naming(predictions):
         found = read_predictions(bytes_of(predictions), manifest=truth.manifest)
         report = evaluate(found, truth, protocol=protocol)
+    warnings = warnings_with_truth(found, truth)
+    if not as_json:
+        echo_warnings(warnings)
     gates.told(
-        report.as_dict(),
+        {**report.as_dict(), "warnings": as_documents(warnings)},
         show=lambda: click.echo("\n".join(_in_words(report))),
         judge=lambda: gates.judge(fail_if, report.flat()),
         as_json=as_json,
@@ -121,7 +166,8 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
     """Write the manifest of TRUTH_OR_FOLDER: every column of the ground truth but the values.
 
     TRUTH_OR_FOLDER is a CSV file or a folder of the toolkit's annotations. The manifest is what
-    participants get; it gives the anno_id and the natural key of every sequence.
+    participants get; it gives the anno_id and the natural key of every sequence. Of a folder, standard error
+    is told whether the toolkit gives the same anno_ids on this machine.
 
     \b
     Examples:
@@ -129,9 +175,13 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
       tsttc manifest annotations/val/ -o manifest.csv
     """
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
+    from evaluator.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
 
+    numbering = None
     with naming(truth):
-        table = read_manifest(truth)
+        if truth.is_dir():
+            numbering = read_numbering(truth)
+        table = read_manifest(truth) if numbering is None else numbering.manifest
     if output is not None:
         if output.exists() and output.samefile(truth):
             raise click.BadParameter("this is the ground truth itself; name another file.", param_hint="-o")
@@ -142,6 +192,7 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
                 "manifest_digest": table.digest,
                 "n_sequences": table.n_sequences,
                 "n_recordings": table.n_recordings,
+                "n_renumbered": None if numbering is None else numbering.n_renumbered,
                 "output": None if output is None else str(output),
                 **({"csv": table.to_csv().decode()} if output is None else {}),
             }
@@ -150,6 +201,8 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
         click.echo(table.to_csv(), nl=False)
     else:
         click.echo(f"{output}: {table.n_sequences:,} sequences of {table.n_recordings:,} recordings.")
+    if numbering is not None and not as_json:
+        click.echo(numbering_in_words(numbering), err=True)
 
 
 def _in_words(report: Report) -> Iterator[str]:

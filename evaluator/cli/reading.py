@@ -14,6 +14,7 @@ from evaluator.cli.failures import rejected
 from evaluator.problems import Rejected
 
 TABLE: Final = click.Path(exists=True, path_type=Path)
+FOLDER: Final = click.Path(exists=True, file_okay=False, path_type=Path)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ import click
 
 from evaluator.cli.failures import rejected
 from evaluator.cli.places import cache_folder
+from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.problems import Rejected
 
 if TYPE_CHECKING:
@@ -40,11 +41,12 @@ def opened(path: Path) -> Iterator[BinaryIO]:
 
 
 def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> None:
-    """Raise Failure, with every problem, for a file that the server would reject.
+    """Raise Failure, with every problem, for a file that the server would reject; warn of a doubtful one.
 
     A split without a manifest is left to the server, which says what is the matter with it.
     """
     from evaluator.answers import Refused  # noqa: PLC0415 -- loads msgspec
+    from evaluator.plausibility import warnings_of  # noqa: PLC0415 -- loads numpy
     from evaluator.predictions import read_predictions  # noqa: PLC0415 -- loads numpy
 
     file.seek(0)
@@ -60,10 +62,11 @@ def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> No
     if manifest is None:
         return
     try:
-        read_predictions(data, manifest=manifest)
+        found = read_predictions(data, manifest=manifest)
     except Rejected as fault:
         name = "standard input" if name == "-" else name
         raise rejected(name, fault, hint="Nothing was sent, so it costs nothing.") from None
+    echo_warnings(warnings_of(found))
 
 
 def manifest_of(client: Client, split: str) -> Manifest | None:

@@ -1,5 +1,7 @@
 """Folders of annotation files as the dataset has them: pickles with attribute-dicts of foreign classes."""
 
+import math
+import os
 import pickle
 import sys
 from collections.abc import Callable, Iterator, Mapping
@@ -9,6 +11,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import pytest
 
 START_NS = 1_600_000_000_000_000_000
 STEP_NS = 100_000_000
@@ -107,3 +110,61 @@ def write_folder(folder: Path, files: Mapping[str, object], *, protocol: int = 4
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content if isinstance(content, bytes) else pickle.dumps(content, protocol=protocol))
     return folder
+
+
+# --- another machine's order ----------------------------------------------------------------------------
+
+N_BAGS = 8
+
+
+def ttc_of(bag: int, track: int, frame: int) -> float:
+    """A time to contact that changes slowly along a track, and differs between tracks and recordings."""
+    return (-1) ** track * (2.0 + 1.1 * track + 0.9 * (bag * 5 % N_BAGS) + 0.9 * math.cos(frame / 40 + bag))
+
+
+def driving_folder(folder: Path) -> Path:
+    """Recordings of three to seven objects each, which come and go."""
+    rng = np.random.default_rng(5)
+    for bag in range(N_BAGS):
+        tracks = {
+            track: [*range(start := int(rng.integers(20)), start + int(rng.integers(40, 70)))]
+            for track in range(3 + bag * 3 % 5)
+        }
+        frames = camera(tracks, bag_stamp=f"bag{bag}")
+        for objects in frames.values():
+            for one in objects:
+                one["ttc_imu"] = ttc_of(bag, one["id"], (one["ts"] - START_NS) // STEP_NS)
+        write_folder(folder, {f"bag{bag}.pkl": [frames]})
+    return folder
+
+
+def list_backwards(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let the file system list every folder in reverse order of names, as another one may."""
+    real = os.walk
+
+    def walk(top: Any, **options: Any) -> Iterator[tuple[str, list[str], list[str]]]:
+        for directory, folders, names in real(top, **options):
+            folders.sort(reverse=True)
+            yield directory, folders, sorted(names, reverse=True)
+
+    monkeypatch.setattr(os, "walk", walk)
+
+
+def toolkit_results(folder: Path, *, error: float = 1.02) -> dict[str, tuple[str, float]]:
+    """By the toolkit's anno_id the natural key and a prediction, from a plain loop like the toolkit's."""
+    found: dict[str, tuple[str, float]] = {}
+    for directory, _, names in os.walk(folder):
+        for name in names:
+            for frames in pickle.loads(Path(directory, name).read_bytes()):
+                held: dict[Any, list[Any]] = {}
+                for _stamp, objects in sorted(frames.items()):
+                    for one in objects:
+                        before = held.get(one["id"], [])
+                        is_next = bool(before) and one["ts"] - before[-1]["ts"] == STEP_NS
+                        held[one["id"]] = [*before, one] if is_next else [one]
+                    for track in [key for key, sequence in held.items() if len(sequence) == 6]:
+                        last = held.pop(track)[-1]
+                        bag = last["bag_stamp"].rsplit("/", 1)[-1]
+                        key = f"{bag}/{last['cam_id']}/{last['ts']}/{last['id']}"
+                        found[str(len(found))] = (key, error * float(last["ttc_imu"]))
+    return found

@@ -1,0 +1,85 @@
+"""The anno_ids that the toolkit gives the sequences of a folder on this machine, beside those of a manifest.
+
+The toolkit numbers from 0 over the files in the order in which the file system lists them; a manifest made
+from the same folder numbers over the sorted files. Which sequences there are, and their order within a file,
+is the same for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.annotation_folders import read_annotations
+from evaluator.problems import Findings, listed
+from evaluator.scale import Floats
+from evaluator.truth import Manifest
+
+
+@dataclass(frozen=True, eq=False)
+class Numbering:
+    """A manifest, and for each anno_id of the toolkit, 0 to n - 1, the row of the manifest: (n,)."""
+
+    manifest: Manifest
+    rows: NDArray[np.intp]
+
+    @property
+    def n_renumbered(self) -> int:
+        """How many anno_ids name another sequence in the toolkit's numbering than in the manifest's."""
+        return int(np.count_nonzero(self.manifest.anno_id[self.rows] != np.arange(len(self.rows))))
+
+    @cached_property
+    def natural_keys(self) -> dict[str, str]:
+        """The natural key of each anno_id of the toolkit."""
+        keys = self.manifest.natural_keys
+        return {str(anno_id): keys[row] for anno_id, row in enumerate(self.rows.tolist())}
+
+    def realigned(self, ttc_s: Floats) -> Floats:
+        """Values of a file with anno_ids, aligned by the manifest's, (n,): the same by the toolkit's.
+
+        The manifest's anno_ids are 0 to n - 1, as those of every folder are.
+        """
+        values = np.empty_like(ttc_s)
+        values[self.rows] = ttc_s[np.argsort(self.manifest.anno_id, kind="stable")]
+        return values
+
+
+def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> Numbering:
+    """How the toolkit numbers the sequences of an annotation folder on this machine.
+
+    The numbering is told beside that of `manifest`, or of the manifest that is made from the folder. Raises
+    `Rejected` for a folder that cannot be read, and where folder and manifest have different sequences.
+    """
+    folder = Path(folder)
+    found = read_annotations(folder, with_ttc=False)
+    own = Manifest.from_table(found.table)
+    ends = np.cumsum(found.n_sequences)
+    rows = np.concatenate(
+        [np.arange(ends[file] - found.n_sequences[file], ends[file]) for file in found.listed]
+    ).astype(np.intp)
+    if manifest is None or manifest.digest == own.digest:
+        return Numbering(own, rows)
+    _require_the_same(own.natural_keys, manifest.natural_keys, folder.name)
+    keys, row_of = own.natural_keys, manifest.row_of_natural_key
+    return Numbering(manifest, np.array([row_of[keys[row]] for row in rows.tolist()], dtype=np.intp))
+
+
+def _require_the_same(own: Sequence[str], wanted: Sequence[str], where: str) -> None:
+    findings = Findings()
+    for code, missing, words in (
+        ("missing-keys", sorted(set(wanted) - set(own)), "The folder lacks sequences of the manifest ({})"),
+        (
+            "unknown-keys",
+            sorted(set(own) - set(wanted)),
+            "The folder has sequences that the manifest lacks ({})",
+        ),
+    ):
+        if missing:
+            message = f"{words.format(f'{len(missing):,}')}: {listed(missing)}; expected the same sequences."
+            findings.group(code, message, where, n_faults=len(missing))
+    findings.raise_if_any()

@@ -1,0 +1,144 @@
+"""Warnings about files that are well-formed and probably not meant: values that belong to other sequences.
+
+A file whose anno_ids were numbered in another order holds good values under wrong keys, and no rule of the
+format can see that. Two questions can. With the manifest alone: do the values of one object, from one window
+to the next, differ less than those of two objects that the same camera sees one after the other? With ground
+truth: do the values go with the true ones at all? A warning rejects nothing.
+
+Values are compared by the rank of -1/τ, which orders them by scale ratio, so that no outlier decides.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.predictions import Predictions
+from evaluator.scale import Floats
+from evaluator.truth import GroundTruth, Manifest
+
+MAX_STEP_NS: Final = 1_000_000_000
+"""Windows of one track that end this close together are neighbours; in the dataset they are 0.6 s apart."""
+
+MIN_PAIRS: Final = 100
+"""With fewer pairs of either kind nothing is said."""
+
+MAX_ROUGHNESS: Final = 0.8
+MIN_CORRELATION: Final = 0.3
+MAX_FLIPPED: Final = 0.3
+
+Pairs = NDArray[np.intp]
+
+
+@dataclass(frozen=True, slots=True)
+class FileWarning:
+    """Something that is probably wrong with a file, which is scored all the same."""
+
+    code: str
+    message: str
+
+
+WARNING_CODES: Final[dict[str, str]] = {
+    "shuffled-values": "Values of one object differ as much as those of several: probably wrong keys.",
+    "unlike-truth": "The predictions do not go with the true times, or have the opposite sign.",
+    "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
+}
+"""Every code with what it means."""
+
+
+def warnings_of(predictions: Predictions) -> list[FileWarning]:
+    """What the file and its manifest tell, without any true value."""
+    found = roughness(predictions.manifest, predictions.ttc_s)
+    if found is None or found <= MAX_ROUGHNESS:
+        return []
+    message = (
+        "The values look shuffled: from one window to the next those of one object differ "
+        f"{found:.2f} times as much as those of two objects; expected at most {MAX_ROUGHNESS}, since "
+        f"an object changes slowly. {_CAUSE}"
+    )
+    return [FileWarning("shuffled-values", message)]
+
+
+def warnings_with_truth(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
+    """What the comparison with ground truth tells. Not for hidden values: it says something about them."""
+    found, true = order_of(predictions.ttc_s), order_of(truth.ttc_s)
+    if truth.n_sequences < MIN_PAIRS or found.std() == 0 or true.std() == 0:
+        return []
+    correlation = float(np.corrcoef(found, true)[0, 1])
+    flipped = float(np.mean((predictions.ttc_s < 0) != (truth.ttc_s < 0)))
+    has_both_signs = bool((predictions.ttc_s < 0).any() and (predictions.ttc_s > 0).any())
+    if correlation >= MIN_CORRELATION and not (has_both_signs and flipped > MAX_FLIPPED):
+        return []
+    is_mirrored = correlation < -MIN_CORRELATION
+    cause = (
+        "Probably every sign is wrong: τ is negative when the object moves away." if is_mirrored else _CAUSE
+    )
+    message = (
+        f"The predictions hardly go with the true times: their rank correlation is {correlation:.2f}, and "
+        f"{100 * flipped:.0f} % have the opposite sign; expected at least {MIN_CORRELATION} and at most "
+        f"{100 * MAX_FLIPPED:.0f} %. {cause}"
+    )
+    return [FileWarning("unlike-truth", message)]
+
+
+_CAUSE: Final = (
+    "Probably the anno_ids are those of the toolkit on a machine that lists the annotation files in another "
+    "order: tsttc convert FILE --annotations FOLDER writes natural keys."
+)
+
+
+def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
+    """How far neighbouring windows of one object differ, over how far successive windows of two objects do.
+
+    Both are means of absolute differences of ranks: 1 where the values have nothing to do with their keys,
+    and well below where they are smooth in time. None where there are too few pairs, or the values do not
+    differ.
+    """
+    same, other = _pairs(manifest)
+    if min(len(same), len(other)) < MIN_PAIRS:
+        return None
+    ranks = order_of(ttc_s)
+    apart = _mean_difference(ranks, other)
+    return _mean_difference(ranks, same) / apart if apart > 0 else None
+
+
+def order_of(ttc_s: Floats) -> Floats:
+    """The rank of each value by scale ratio, float64 (n,); equal values share the mean of theirs."""
+    with np.errstate(divide="ignore"):
+        _, index, counts = np.unique(-1 / ttc_s, return_inverse=True, return_counts=True)
+    ends = np.cumsum(counts)
+    means: Floats = (ends - (counts - 1) / 2)[index]
+    return means
+
+
+def _mean_difference(ranks: Floats, pairs: Pairs) -> float:
+    found = float(np.abs(ranks[pairs[:, 0]] - ranks[pairs[:, 1]]).mean())
+    return found if math.isfinite(found) else 0.0
+
+
+@lru_cache(maxsize=4)  # by the manifest itself, which every file of a split shares
+def _pairs(manifest: Manifest) -> tuple[Pairs, Pairs]:
+    """Rows (n, 2) of neighbouring windows of one object, and of successive windows of two, per camera."""
+    cameras = _numbered([f"{b}/{c}" for b, c in zip(manifest.bag_stamp, manifest.cam_id, strict=True)])
+    tracks = _numbered(list(manifest.track_id))
+    by_track = np.lexsort((manifest.ts_ns, tracks, cameras))
+    by_time = np.lexsort((tracks, manifest.ts_ns, cameras))
+
+    def successive(order: NDArray[np.intp], *, of_one_track: bool) -> Pairs:
+        first, second = order[:-1], order[1:]
+        is_near = manifest.ts_ns[second] - manifest.ts_ns[first] <= MAX_STEP_NS
+        is_pair = is_near & (cameras[first] == cameras[second])
+        is_pair &= (tracks[first] == tracks[second]) == of_one_track
+        return np.stack([first[is_pair], second[is_pair]], axis=1)
+
+    return successive(by_track, of_one_track=True), successive(by_time, of_one_track=False)
+
+
+def _numbered(names: list[str]) -> NDArray[np.intp]:
+    _, index = np.unique(np.array(names), return_inverse=True)
+    return index

@@ -1,0 +1,209 @@
+"""The toolkit numbers a folder as the file system lists it: said, warned of, and mended by natural keys."""
+
+import json
+import re
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+
+from evaluator import Rejected, evaluate, read_manifest, read_predictions, read_truth
+from evaluator.conversion import convert
+from evaluator.numbering import read_numbering
+from tests.evaluator.toolkit_folders import driving_folder, list_backwards, toolkit_results
+from tests.evaluator.worlds import flat
+
+Tsttc = Callable[..., Result]
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Annotations on a machine that lists them backwards."""
+    list_backwards(monkeypatch)
+    return driving_folder(tmp_path / "my annotations")
+
+
+@pytest.fixture
+def results(folder: Path, tmp_path: Path) -> Path:
+    """What the toolkit writes there."""
+    path = tmp_path / "results.json"
+    path.write_bytes(flat({anno_id: ttc_s for anno_id, (_, ttc_s) in toolkit_results(folder).items()}))
+    return path
+
+
+def test_numbers_are_those_of_the_toolkit_in_whatever_order_files_are_listed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = driving_folder(tmp_path / "here")
+    for _ in range(2):
+        keys = {anno_id: key for anno_id, (key, _) in toolkit_results(folder).items()}
+        assert read_numbering(folder).natural_keys == keys
+        list_backwards(monkeypatch)
+
+
+def test_sequences_that_change_their_number_are_counted(folder: Path) -> None:
+    numbering = read_numbering(folder)
+    keys = read_manifest(folder).natural_keys
+    differing = [i for i, key in enumerate(keys) if numbering.natural_keys[str(i)] != key]
+    assert numbering.n_renumbered == len(differing) > 300
+
+
+def test_results_of_the_toolkit_score_what_they_are_worth_once_they_have_natural_keys(
+    tsttc: Tsttc, folder: Path, results: Path, tmp_path: Path
+) -> None:
+    truth = read_truth(folder)
+    worth = evaluate(read_predictions(results.read_bytes(), manifest=truth.manifest), truth)
+    converted = tmp_path / "natural.json"
+    made = tsttc("convert", results, "--annotations", folder, "-o", converted)
+    assert (made.exit_code, made.stdout) == (0, f"{converted}: seconds by natural key.\n")
+    found = json.loads(tsttc("score", converted, "--truth", folder, "--json").stdout)
+    assert found["scores"]["overall"]["rte"] == pytest.approx(2.0)
+    assert found["warnings"] == []
+    assert worth.scores["overall"].rte is not None
+    assert worth.scores["overall"].rte > 20
+
+
+def test_values_are_kept_to_the_last_bit(folder: Path, results: Path) -> None:
+    numbering = read_numbering(folder)
+    by_key = dict(toolkit_results(folder).values())
+    assert json.loads(convert(results.read_bytes(), natural_keys=numbering.natural_keys)) == by_key
+
+
+def test_keys_and_unit_change_together(folder: Path, tsttc: Tsttc, tmp_path: Path) -> None:
+    ratios = tmp_path / "ratios.json"
+    ratios.write_bytes(flat(dict.fromkeys(toolkit_results(folder), 0.9)))
+    made = json.loads(tsttc("convert", ratios, "--frame-gap", 1, "--annotations", folder).stdout)
+    assert set(made) == set(read_manifest(folder).natural_keys)
+    assert set(made.values()) == {0.8999999999999996}
+
+
+def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
+    tsttc: Tsttc, folder: Path, results: Path
+) -> None:
+    checked = tsttc("check", results, "--annotations", folder)
+    n_renumbered = read_numbering(folder).n_renumbered
+    assert checked.exit_code == 0
+    assert checked.stdout == (
+        f"{results} is well-formed: 327 sequences, each predicted once.\n"
+        f"The toolkit gives {n_renumbered} of the 327 sequences of the folder another "
+        "anno_id than the manifest: this machine lists the files in another order.\n"
+    )
+    shuffled, numbering = checked.stderr.splitlines()
+    assert shuffled.startswith("Warning: The values look shuffled: ")
+    assert "The values are smooth in the toolkit's numbering alone, so the toolkit has written" in numbering
+    command = shlex.split(numbering[numbering.index("tsttc convert") :])
+    assert command == ["tsttc", "convert", str(results), "--annotations", str(folder), "-o", "natural.json"]
+    document = json.loads(tsttc("check", results, "--annotations", folder, "--json").stdout)
+    assert [warning["code"] for warning in document["warnings"]] == ["shuffled-values", "other-numbering"]
+    assert document["n_renumbered"] == n_renumbered
+
+
+def test_check_does_not_warn_of_a_file_in_the_manifest_s_numbers(
+    tsttc: Tsttc, folder: Path, tmp_path: Path
+) -> None:
+    path = tmp_path / "mine.json"
+    path.write_bytes(flat(read_truth(folder).ttc_s.tolist()))
+    checked = tsttc("check", path, "--annotations", folder)
+    assert (checked.exit_code, checked.stderr) == (0, "")
+    assert "this machine lists the files in another order" in checked.stdout
+
+
+def test_check_of_natural_keys_needs_no_warning(tsttc: Tsttc, folder: Path, results: Path) -> None:
+    data = tsttc("convert", results, "--annotations", folder).stdout_bytes
+    checked = tsttc("check", "-", "--annotations", folder, stdin=data)
+    assert (checked.exit_code, checked.stderr) == (0, "")
+
+
+def test_few_sequences_are_warned_of_by_the_order_alone(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    for file in sorted(folder.glob("*.pkl"))[2:]:
+        file.unlink()
+    path = tmp_path / "results.json"
+    path.write_bytes(flat({anno_id: ttc_s for anno_id, (_, ttc_s) in toolkit_results(folder).items()}))
+    checked = tsttc("check", path, "--annotations", folder)
+    assert re.search("^Warning: .*If the toolkit has written the file: give it natural keys", checked.stderr)
+    assert checked.stderr.count("\n") == 1
+
+
+def test_same_order_is_said_as_well(tsttc: Tsttc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for _ in range(2):  # backwards twice is forwards
+        list_backwards(monkeypatch)
+    folder = driving_folder(tmp_path / "annotations")
+    for file in sorted(folder.glob("*.pkl"))[1:]:
+        file.unlink()
+    made = tsttc("manifest", folder, "-o", tmp_path / "manifest.csv")
+    assert made.stderr == (
+        "The toolkit gives every sequence of the folder the manifest's anno_id: this machine lists the files "
+        "in the same order.\n"
+    )
+
+
+def test_manifest_of_a_folder_says_how_the_toolkit_numbers_it(tsttc: Tsttc, folder: Path) -> None:
+    n_renumbered = read_numbering(folder).n_renumbered
+    made = tsttc("manifest", folder)
+    assert made.stderr.startswith(f"The toolkit gives {n_renumbered} of the 327 sequences")
+    assert json.loads(tsttc("manifest", folder, "--json").stdout)["n_renumbered"] == n_renumbered
+
+
+def test_order_is_checked_against_the_split_s_manifest(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    manifest = tmp_path / "manifest.csv"
+    manifest.write_bytes(read_manifest(folder).to_csv())
+    lines = manifest.read_text().splitlines(keepends=True)
+    both = ("--manifest", manifest, "--annotations", folder)
+    manifest.write_text("".join(lines))
+    results = tmp_path / "mine.json"
+    results.write_bytes(flat(read_truth(folder).ttc_s.tolist()))
+    assert tsttc("check", results, *both).exit_code == 0
+    manifest.write_text("".join([*lines[:-2], lines[-1].replace("bag7", "bag9")]))
+    refused = tsttc("check", results, *both)
+    assert refused.exit_code == 1
+    assert "The folder lacks sequences of the manifest (1): bag9/" in refused.stderr
+    assert "The folder has sequences that the manifest lacks (2): bag7/" in refused.stderr
+
+
+# --- what cannot be converted ---------------------------------------------------------------------------
+
+
+def messages(data: bytes, folder: Path) -> list[str]:
+    with pytest.raises(Rejected) as rejected:
+        convert(data, natural_keys=read_numbering(folder).natural_keys)
+    return [f"{problem.code}: {problem.message}" for problem in rejected.value.problems]
+
+
+def test_results_of_another_folder_are_refused_with_both_numbers(folder: Path) -> None:
+    assert messages(flat({str(i): 1.0 for i in range(326)}), folder) == [
+        "missing-keys: The file has 326 anno_ids and the folder 327 sequences; no value for 1 of the "
+        "sequences: 326; expected one for each, from the folder that the toolkit has read."
+    ]
+    assert messages(flat({str(i): 1.0 for i in range(328)}), folder) == [
+        "unknown-keys: The file has 328 anno_ids and the folder 327 sequences; no sequence for 1 of the "
+        'anno_ids: "327"; expected the anno_ids 0 to 326.'
+    ]
+
+
+def test_natural_keys_are_not_converted_again(folder: Path, results: Path) -> None:
+    once = convert(results.read_bytes(), natural_keys=read_numbering(folder).natural_keys)
+    assert messages(once, folder) == [
+        "unknown-keys: The 327 keys are natural keys already; expected anno_ids of the toolkit. The file "
+        "needs no annotations: it can be sent as it is."
+    ]
+
+
+def test_folder_without_annotations_is_named(tsttc: Tsttc, results: Path, tmp_path: Path) -> None:
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    refused = tsttc("convert", results, "--annotations", empty)
+    assert refused.exit_code == 1
+    assert "The folder has no annotation files; expected at least one *.pkl." in refused.stderr
+    assert tsttc("convert", results, "--annotations", results).exit_code == 2
+    assert tsttc("check", results).exit_code == 2
+
+
+def test_realigned_values_are_those_of_the_natural_keys(folder: Path, results: Path) -> None:
+    numbering = read_numbering(folder)
+    as_sent = read_predictions(results.read_bytes(), manifest=numbering.manifest)
+    data = convert(results.read_bytes(), natural_keys=numbering.natural_keys)
+    meant = read_predictions(data, manifest=numbering.manifest)
+    assert np.array_equal(numbering.realigned(as_sent.ttc_s), meant.ttc_s)

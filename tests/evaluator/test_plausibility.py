@@ -1,0 +1,172 @@
+"""Warnings: of files whose values belong to other sequences, and of no others."""
+
+import itertools
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import Result
+
+from evaluator import GroundTruth, Predictions, read_manifest, read_predictions, read_truth
+from evaluator.plausibility import MAX_ROUGHNESS, WARNING_CODES, roughness, warnings_of, warnings_with_truth
+from evaluator.scale import Floats
+from evaluator.tables import Table
+from tests.evaluator.recorded_site import RecordedSite, Reply
+from tests.evaluator.toolkit_folders import driving_folder
+from tests.evaluator.worlds import SHARED_DATA, flat, make_truth
+
+KITTI = SHARED_DATA / "kitti-dev"
+RNG = np.random.default_rng(7)
+Tsttc = Callable[..., Result]
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory: pytest.TempPathFactory) -> GroundTruth:
+    """Recordings of several objects whose time to contact changes slowly."""
+    return read_truth(driving_folder(tmp_path_factory.mktemp("driven") / "annotations"))
+
+
+def predicted(truth: GroundTruth, ttc_s: Floats) -> Predictions:
+    data = flat(dict(zip(truth.manifest.anno_id_keys, ttc_s.tolist(), strict=True)))
+    return read_predictions(data, manifest=truth.manifest)
+
+
+def codes(truth: GroundTruth, ttc_s: Floats) -> tuple[list[str], list[str]]:
+    """Without the truth, and with it."""
+    found = predicted(truth, ttc_s)
+    told = [warning.code for warning in warnings_of(found)]
+    return told, [warning.code for warning in warnings_with_truth(found, truth)]
+
+
+def with_noise(ttc_s: Floats, sigma: float) -> Floats:
+    return -1 / (-1 / ttc_s + RNG.normal(0, sigma, len(ttc_s)))
+
+
+def test_good_and_mediocre_files_are_not_warned_of(driven: GroundTruth) -> None:
+    for ttc_s in (driven.ttc_s, 1.3 * driven.ttc_s, with_noise(driven.ttc_s, 0.05)):
+        assert codes(driven, ttc_s) == ([], [])
+
+
+def test_shuffled_values_are_warned_of(driven: GroundTruth) -> None:
+    assert codes(driven, RNG.permutation(driven.ttc_s)) == (["shuffled-values"], ["unlike-truth"])
+
+
+def test_recordings_in_another_order_are_warned_of(driven: GroundTruth) -> None:
+    recording = driven.manifest.recording_index
+    rows = np.concatenate([np.flatnonzero(recording == index) for index in reversed(range(8))])
+    assert codes(driven, driven.ttc_s[rows]) == (["shuffled-values"], ["unlike-truth"])
+
+
+def test_signs_of_the_other_convention_are_said_to_be_that(driven: GroundTruth) -> None:
+    assert codes(driven, -driven.ttc_s) == ([], ["unlike-truth"])
+    [warning] = warnings_with_truth(predicted(driven, -driven.ttc_s), driven)
+    assert "rank correlation is -1.00, and 100 % have the opposite sign" in warning.message
+    assert warning.message.endswith("Probably every sign is wrong: τ is negative when the object moves away.")
+
+
+@pytest.mark.parametrize("value", [5.0, -5.0, 1e300, 1e-300])
+def test_constant_files_are_not_warned_of(driven: GroundTruth, value: float) -> None:
+    assert codes(driven, np.full(driven.n_sequences, value)) == ([], [])
+
+
+def test_infinite_values_are_compared_as_well(driven: GroundTruth) -> None:
+    ttc_s = np.where(np.abs(driven.ttc_s) > 8, np.copysign(np.inf, driven.ttc_s), driven.ttc_s)
+    assert codes(driven, ttc_s) == ([], [])
+
+
+def test_small_files_are_never_warned_of() -> None:
+    truth = make_truth([1.0 + n / 10 for n in range(90)])
+    assert roughness(truth.manifest, truth.ttc_s) is None
+    assert codes(truth, truth.ttc_s[::-1]) == ([], [])
+
+
+def test_roughness_is_that_of_a_plain_loop(driven: GroundTruth) -> None:
+    ttc_s = with_noise(driven.ttc_s, 0.1)
+    table = driven.to_table()
+    order = sorted(range(len(ttc_s)), key=lambda row: -1 / ttc_s[row])
+    rank = {row: place for place, row in enumerate(order)}
+
+    def mean_difference(by: str, *, of_one: bool) -> float:
+        rows = sorted(
+            range(len(ttc_s)),
+            key=lambda row: (
+                (table.bag_stamp[row], table.track_id[row], table.ts_ns[row])
+                if by == "track"
+                else (table.bag_stamp[row], table.ts_ns[row], table.track_id[row])
+            ),
+        )
+        found = [
+            abs(rank[a] - rank[b])
+            for a, b in itertools.pairwise(rows)
+            if table.bag_stamp[a] == table.bag_stamp[b]
+            and (table.track_id[a] == table.track_id[b]) is of_one
+            and table.ts_ns[b] - table.ts_ns[a] <= 1_000_000_000
+        ]
+        return sum(found) / len(found)
+
+    expected = mean_difference("track", of_one=True) / mean_difference("time", of_one=False)
+    assert roughness(driven.manifest, ttc_s) == pytest.approx(expected)
+
+
+def test_submit_warns_before_it_sends_and_sends_all_the_same(
+    tsttc: Tsttc, site: RecordedSite, at_site: None, driven: GroundTruth, tmp_path: Path
+) -> None:
+    rows = [{"edition": 1, "is_board": True, "manifest": driven.manifest.digest}]
+    site.put("GET /api/v1/splits/val/editions", Reply(rows))
+    site.put(
+        "GET /api/v1/splits/val/manifest",
+        Reply(driven.manifest.to_csv(), headers={"Content-Type": "text/csv"}),
+    )
+    path = tmp_path / "mine.json"
+    path.write_bytes(flat(RNG.permutation(driven.ttc_s).tolist()))
+    result = tsttc("submit", path, "--split", "val", "--method", "Foo++")
+    assert result.stderr.startswith("Warning: The values look shuffled: ")
+    assert len(site.posts) == 1
+
+
+def test_every_code_is_described_in_the_docs() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs/file-format.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("| `")]
+    for code, meaning in WARNING_CODES.items():
+        assert any(line.startswith(f"| `{code}`") and meaning in line for line in rows)
+
+
+# --- real driving ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def kitti() -> tuple[GroundTruth, np.ndarray]:
+    """KITTI's windows as the dataset cuts them, by time; and their rows in the whole table."""
+    if not KITTI.is_dir():
+        pytest.skip("shared/data/kitti-dev is not there")
+    table = read_truth(KITTI / "truth.csv").to_table()
+    ends: dict[tuple[str, str, str], int] = {}
+    rows = []
+    for row in sorted(range(len(table.ts_ns)), key=lambda row: (table.bag_stamp[row], table.ts_ns[row])):
+        track = (table.bag_stamp[row], table.cam_id[row], table.track_id[row])
+        if table.ts_ns[row] - ends.get(track, -(10**18)) >= 600_000_000:
+            rows.append(row)
+            ends[track] = table.ts_ns[row]
+    columns = {
+        name: [getattr(table, name)[row] for row in rows]
+        for name in ("bag_stamp", "cam_id", "ts_ns", "track_id", "ttc_s")
+    }
+    return GroundTruth.from_table(Table(anno_id=list(range(len(rows))), **columns)), np.array(rows)
+
+
+@pytest.mark.parametrize("name", ["box-area", "box-sqrt-area", "box-height", "pointrcnn-height"])
+def test_estimators_of_real_driving_are_not_warned_of_and_their_shuffled_values_are(
+    kitti: tuple[GroundTruth, np.ndarray], name: str
+) -> None:
+    truth, rows = kitti
+    data = (KITTI / "predictions" / f"{name}.ttc.json").read_bytes()
+    ttc_s = read_predictions(data, manifest=read_manifest(KITTI / "truth.csv")).ttc_s[rows]
+    assert codes(truth, ttc_s) == ([], [])
+    found = roughness(truth.manifest, ttc_s)
+    assert found is not None
+    assert found < 0.6 < MAX_ROUGHNESS
+    recording = truth.manifest.recording_index
+    backwards = np.concatenate([np.flatnonzero(recording == index) for index in reversed(range(11))])
+    for order in (RNG.permutation(len(rows)), backwards):
+        assert codes(truth, ttc_s[order]) == (["shuffled-values"], ["unlike-truth"])
