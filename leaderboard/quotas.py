@@ -119,12 +119,15 @@ def _spent(
     """When the team and its people sent what costs a slot, and what was rejected or cancelled, in order."""
     since = now - max(rules.window, rules.min_gap, REJECTED_WINDOW)
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
-    # Scoring anew after a correction costs nothing and gives nothing back.
+    # Scoring anew after a correction costs nothing. It gives a slot back where the board cannot score what
+    # another edition has scored: the team has to send another file, and for no fault of its own.
+    board = evaluations.filter(edition=split.published_edition_id)
     live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
     rows = (
         Submission.objects.filter(_theirs(team, user), split=split, submitted_at__gt=since)
         .annotate(
             is_scored=Exists(evaluations.filter(status=Status.SCORED)),
+            is_given_back=Exists(board.filter(status=Status.REJECTED)),
             is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),
             is_rejected=Exists(live.filter(status=Status.REJECTED)),
             is_poison=Exists(
@@ -134,10 +137,15 @@ def _spent(
             is_cancelled=Exists(live.filter(status=Status.CANCELLED, submission__withdrawn_at__isnull=False)),
         )
         .order_by("submitted_at")
-        .values_list("submitted_at", "is_scored", "is_pending", "is_rejected", "is_cancelled", "is_poison")
+        .values_list(
+            *("submitted_at", "is_scored", "is_given_back", "is_pending"),
+            *("is_rejected", "is_cancelled", "is_poison"),
+        )
     )
     spent, rejected = [], []
-    for submitted_at, is_scored, is_pending, *is_one_too_many in rows:
+    for submitted_at, is_scored, is_given_back, is_pending, *is_one_too_many in rows:
+        if is_scored and is_given_back:
+            continue
         if is_scored or is_pending:
             spent.append(submitted_at)
         elif any(is_one_too_many):

@@ -171,6 +171,19 @@ def unfinished(edition: Edition) -> list[Submission]:
     )
 
 
+def newly_rejected(edition: Edition) -> list[Submission]:
+    """Standing submissions that the board scores and this edition rejects: publishing it takes them off."""
+    here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
+    board = Evaluation.objects.filter(edition=edition.split.published_edition_id, status=Status.SCORED)
+    return list(
+        Submission.objects.standing()
+        .filter(pk__in=here.values("submission"))
+        .filter(pk__in=board.values("submission"))
+        .select_related("method__team")
+        .order_by("submitted_at")
+    )
+
+
 def publish(
     *,
     edition: Edition,
@@ -183,8 +196,9 @@ def publish(
     """Make an edition the board of its split, in one transaction.
 
     `replaces` is the number of the edition that the maintainer compared with; if another one has become the
-    board meanwhile, nothing happens. While standing submissions are unfinished it refuses, unless they are
-    knowingly left out (`leave_out`), which the changelog then tells.
+    board meanwhile, nothing happens. While standing submissions are unfinished, or scored on the board and
+    rejected in this edition, it refuses, unless they are knowingly left out (`leave_out`), which the
+    changelog then tells.
     Raises `NotMaintainer` or `Refused`.
     """
     _require_maintainer(actor)
@@ -195,16 +209,16 @@ def publish(
             state = "was discarded" if edition.discarded_at else "is the board already"
             raise Refused(f"{edition} {state}; there is nothing to publish.")
         _require_same_board(split, replaces)
-        waiting = unfinished(edition)
-        if waiting and not leave_out:
-            raise Refused(_unfinished_sentence(edition, waiting))
+        waiting, losing = unfinished(edition), newly_rejected(edition)
+        if (waiting or losing) and not leave_out:
+            raise Refused(_left_out_sentence(edition, waiting, losing))
         return ground_truth.make_board(
             edition=edition,
             kind=Publication.Kind.PUBLISHED,
             reason=reason,
             now=now,
             actor=actor,
-            left_out=[str(submission.pk) for submission in waiting],
+            left_out=[str(submission.pk) for submission in (*waiting, *losing)],
         )
 
 
@@ -296,10 +310,22 @@ def _reason(text: str) -> str:
     return text[:1000]
 
 
-def _unfinished_sentence(edition: Edition, waiting: Sequence[Submission]) -> str:
-    shown = ", ".join(f"{submission.method.name} ({submission.pk})" for submission in waiting[:20])
-    more = f", and {len(waiting) - 20} more" if len(waiting) > 20 else ""
-    return (
-        f"{edition} is not finished: {len(waiting)} standing submissions are neither scored nor rejected: "
-        f"{shown}{more}. Wait, retry them, or leave them out knowingly."
-    )
+def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: Sequence[Submission]) -> str:
+    said = []
+    if waiting:
+        said.append(
+            f"{edition} is not finished: {len(waiting)} standing submissions are neither scored nor "
+            f"rejected: {_named(waiting)}. Wait, retry them, or leave them out knowingly."
+        )
+    if losing:
+        entries = "1 entry" if len(losing) == 1 else f"{len(losing)} entries"
+        said.append(
+            f"{edition} rejects {entries} that the board scores: {_named(losing)}. "
+            "Leave them out knowingly, or correct the ground truth."
+        )
+    return " ".join(said)
+
+
+def _named(rows: Sequence[Submission]) -> str:
+    shown = ", ".join(f"{submission.method.name} ({submission.pk})" for submission in rows[:20])
+    return f"{shown}, and {len(rows) - 20} more" if len(rows) > 20 else shown

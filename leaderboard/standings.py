@@ -83,6 +83,7 @@ class Board:
     filters: Filters = field(default_factory=Filters)
     n_in_all: int = 0  # rows before the filters
     n_submissions: int = 0  # those of them that are submissions
+    n_left_behind: int = 0  # where there is none: those that former editions scored and this one does not
 
 
 def parse_moment(text: str) -> datetime:
@@ -147,6 +148,7 @@ def arranged(
 ) -> Board:
     """A board of ranked rows: those that fit the filters, in the order of one column."""
     filters, now = filters or Filters(), timezone.now()
+    n_submissions = sum(entry.kind == "submission" for entry in entries)
     dates = [entry.listed_at for entry in entries if entry.listed_at]
     if edition and edition.published_at:
         dates.append(edition.published_at)
@@ -161,7 +163,19 @@ def arranged(
         deadline=deadlines.sentence_of(split, now=now),
         filters=filters,
         n_in_all=len(entries),
-        n_submissions=sum(entry.kind == "submission" for entry in entries),
+        n_submissions=n_submissions,
+        n_left_behind=0 if n_submissions or edition is None or at else _n_left_behind(edition),
+    )
+
+
+def _n_left_behind(edition: Edition) -> int:
+    """Standing submissions of shown methods that another published edition of the split has scored."""
+    scored = Evaluation.objects.filter(status=Status.SCORED, edition__published_at__isnull=False)
+    return (
+        Submission.objects.standing()
+        .filter(split=edition.split_id, method__in=Method.objects.shown())
+        .filter(pk__in=scored.exclude(edition=edition).values("submission"))
+        .count()
     )
 
 

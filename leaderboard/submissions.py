@@ -312,6 +312,7 @@ class Progress:
     edition_number: int | None = None
     protocol: str = ""
     decimals: int = 2  # of its values
+    kept_in: int | None = None  # rejected here: the number of the last published edition that scored it
 
 
 def evaluation_of(submission: Submission) -> Evaluation:
@@ -357,6 +358,7 @@ def progress(submission: Submission) -> Progress:
         edition_number=evaluation.edition.number,
         decimals=evaluation.edition.decimals,
         protocol=evaluation.edition.protocol,
+        kept_in=evaluation.kept_in,
     )
 
 
@@ -364,6 +366,11 @@ def _sentence(evaluation: Evaluation) -> str:
     """Whose fault it was, or what goes on, where that needs saying."""
     n_failed = evaluation.n_poison_strikes + evaluation.n_infrastructure_strikes
     match evaluation.status:
+        case Status.REJECTED if evaluation.kept_in is not None:
+            return (
+                f"Edition {evaluation.edition.number} cannot score this file. It keeps its result in edition "
+                f"{evaluation.kept_in}, and its slot of the quota is given back."
+            )
         case Status.REJECTED:
             n = evaluation.n_problems
             found = f"it has {n:,} problems" if n != 1 else "it has a problem"

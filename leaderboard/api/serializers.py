@@ -270,7 +270,7 @@ class PublicationSerializer(serializers.Serializer[Publication]):
     n_left_out = serializers.SerializerMethodField()
 
     def get_n_left_out(self, publication: Publication) -> int:
-        """How many submissions were knowingly left unfinished."""
+        """How many submissions were knowingly left out: unfinished, or rejected and scored before."""
         return len(publication.left_out)
 
 

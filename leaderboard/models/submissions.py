@@ -210,6 +210,14 @@ class Evaluation(models.Model):
         return f"{self.submission_id} in {self.edition}"
 
     @property
+    def kept_in(self) -> int | None:
+        """The number of the last published edition that scored what this one rejects; None if none did."""
+        if self.status != Status.REJECTED:
+            return None
+        rivals = [row for row in self.submission.evaluations.all() if row.status == Status.SCORED]
+        return max((row.edition.number for row in rivals if row.edition.published_at), default=None)
+
+    @property
     def is_final(self) -> bool:
         """Whether nothing will change any more."""
         return self.status in FINAL_STATUSES

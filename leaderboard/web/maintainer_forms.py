@@ -78,7 +78,7 @@ class RollBackForm(ReasonForm):
 
 
 class PublishForm(RollBackForm):
-    """The same, and whether what is unfinished is knowingly left out."""
+    """The same, and whether what is unfinished or newly rejected is knowingly left out."""
 
     leave_out = forms.BooleanField(required=False)
 

@@ -23,7 +23,11 @@ class Command(BaseCommand):
         )
         parser.add_argument("--reason", required=True, help="a sentence for the public changelog")
         parser.add_argument("--roll-back", action="store_true")
-        parser.add_argument("--leave-out", action="store_true", help="publish although some are unfinished")
+        parser.add_argument(
+            "--leave-out",
+            action="store_true",
+            help="publish although some are unfinished, or scored on the board and rejected in this edition",
+        )
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Publish or roll back, and say what is the board now."""

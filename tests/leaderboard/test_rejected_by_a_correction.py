@@ -1,0 +1,109 @@
+"""Entries that a correction cannot score: published only knowingly, no slot of the quota, and true words."""
+
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import quotas, rescoring, submissions, teams
+from leaderboard.models import Edition, Publication, Split, Status, Submission, User
+from leaderboard.quotas import Quota
+from tests import builders
+from tests.editions import extended, open_edition, publish, roll_back
+from tests.leaderboard.test_pages_everywhere import assert_sound
+
+PUBLISH = "/maintain/test/editions/2/publish/"
+
+
+@pytest.fixture
+def sent(edition: Edition, owner: User) -> Submission:
+    """A public, scored submission."""
+    submission = builders.submit(owner, builders.predictions(edition), method="Foo")
+    builders.score_all()
+    return submission
+
+
+@pytest.fixture
+def adding(sent: Submission, tmp_path: Path) -> Edition:
+    """An edition beside the board with one sequence more, in which the submission is rejected."""
+    second = open_edition(extended(tmp_path))
+    builders.score_all()
+    return second
+
+
+def left(user: User) -> Quota:
+    Split.objects.update(quota_limit=3, quota_window=timedelta(days=30), quota_min_gap=timedelta(days=1))
+    split = Split.objects.get(pk="test")
+    return quotas.state(team=teams.team_of(user=user), user=user, split=split, now=timezone.now())
+
+
+def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_knowingly(
+    sent: Submission, adding: Edition, keeper: Client
+) -> None:
+    sentence = f"test edition 2 rejects 1 entry that the board scores: Foo ({sent.pk})."
+    with pytest.raises(rescoring.Refused) as refused:
+        publish(adding)
+    assert sentence in str(refused.value)
+    with pytest.raises(CommandError) as failed:
+        call_command("publish_edition", "test", "2", "--reason", "More labels.")
+    assert sentence in str(failed.value)
+    data = {"replaces": "1", "reason": "More labels."}
+    answer = keeper.post(PUBLISH, data)
+    assert answer.status_code == 422
+    form = assert_sound(answer)
+    assert sentence in form.one("div", class_="form-errors").text
+    assert form.one("legend").text == "1 scored entry rejected"
+    assert "checked" not in form.one("input", name="leave_out").attributes
+    assert Publication.objects.count() == 1
+    assert keeper.post(PUBLISH, {**data, "leave_out": "on"}).status_code == 302
+    assert Publication.objects.get(edition=adding).left_out == [str(sent.pk)]
+    assert keeper.get("/api/v1/splits/test/changelog").json()[0]["n_left_out"] == 1
+
+
+def test_the_command_publishes_with_leave_out(adding: Edition) -> None:
+    call_command("publish_edition", "test", "2", "--reason", "More labels.", "--leave-out")
+    assert Split.objects.get(pk="test").published_edition == adding
+
+
+def test_the_slot_is_given_back_for_as_long_as_the_board_rejects_the_entry(
+    sent: Submission, adding: Edition, owner: User
+) -> None:
+    assert (left(owner).used, left(owner).is_open) == (1, False)
+    publish(adding, leave_out=True)
+    found = left(owner)
+    assert (found.used, found.n_rejected, found.is_open) == (0, 0, True)
+    new = builders.submit(owner, builders.predictions(adding), method="Foo")
+    builders.score_all()
+    assert submissions.progress(new).state == Status.SCORED
+    assert left(owner).used == 1
+    roll_back()
+    assert left(owner).used == 2
+
+
+def test_the_words_are_true_wherever_they_stand(
+    sent: Submission, adding: Edition, client: Client, owner: User
+) -> None:
+    publish(adding, leave_out=True)
+    board = assert_sound(client.get("/board/test/")).one("main").text
+    assert "Nobody has submitted" not in board
+    assert (
+        "Edition 2 scores no submission yet. 1 submission that former editions scored is not in it" in board
+    )
+    client.force_login(owner)
+    said = (
+        "Edition 2 cannot score this file. It keeps its result in edition 1, and its slot of the quota is "
+        "given back."
+    )
+    page = assert_sound(client.get(f"/submissions/{sent.pk}/"))
+    outcome = page.one("div", id="outcome").text
+    assert said in outcome
+    assert "problem in the file" not in outcome
+    progress = submissions.progress(Submission.objects.get(pk=sent.pk))
+    assert (progress.sentence, progress.kept_in) == (said, 1)
+
+
+def test_a_board_to_which_nobody_has_sent_says_so(edition: Edition, client: Client) -> None:
+    assert "Nobody has submitted to test yet." in assert_sound(client.get("/board/test/")).one("main").text
