@@ -67,7 +67,8 @@ def of(*, submission: Submission, viewer: User | AnonymousUser) -> Closer | None
 
 def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
     """What stands on the board of an open split and has no analysis, the newest first."""
-    boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=held)
+    opened = [digest for digest in held if not ground_truth.is_marked_hidden(digest)]
+    boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=opened)
     return (
         Evaluation.objects.filter(
             status=Status.SCORED,
@@ -83,8 +84,11 @@ def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
 def make(evaluation: Evaluation, *, now: datetime) -> None:
     """Look closely at one evaluation, and keep what is seen; not if its split was hidden meanwhile.
 
+    Nor if its ground truth was imported as a hidden one: then it is a mistake, or worse, to call it open.
     Raises `OSError` if the store or the private directory does not answer.
     """
+    if ground_truth.is_marked_hidden(evaluation.edition.ground_truth_id):
+        return
     truth = ground_truth.load(evaluation.edition.ground_truth_id)
     predictions = aligned.of(evaluation.submission.sent_file, evaluation.edition)
     content = content_of(predictions, truth, protocol=evaluation.edition.protocol)

@@ -23,6 +23,7 @@ from evaluator import Predictions
 from leaderboard.models import SentFile
 
 CHUNK_BYTES = 1 << 20
+_DIGEST_BYTES = 32
 INCOMING = ".incoming"
 LEFTOVER_S = 3600.0
 FRESH = timedelta(hours=12)
@@ -177,28 +178,44 @@ def aligned_name(*, manifest_digest: str, digest: str) -> str:
 def keep_aligned(predictions: Predictions) -> None:
     """Keep a file's values in seconds as little-endian float64, in ascending anno_id of the file's manifest.
 
+    Before them stands their SHA-256, so that values that were changed or cut off are never scored.
+
     They were checked when the file was read, so scoring them again needs neither its bytes nor a child. The
     order is the manifest's own: two tables of the same sequences may have their rows in another order.
     """
     manifest = predictions.manifest
     name = aligned_name(manifest_digest=manifest.digest, digest=predictions.digest)
-    if not store().exists(name):
-        ascending = predictions.ttc_s[manifest.rows_by_id]
-        store().save(name, ContentFile(ascending.astype("<f8", copy=False).tobytes()))
+    values = predictions.ttc_s[manifest.rows_by_id].astype("<f8", copy=False).tobytes()
+    if store().exists(name):
+        if _checked(_read(name)) == values:
+            return
+        store().delete(name)
+    store().save(name, ContentFile(hashlib.sha256(values).digest() + values))
 
 
 def load_aligned(file: SentFile, *, n_sequences: int) -> NDArray[np.float64] | None:
     """The seconds that were kept of a file, (n,), in ascending anno_id of its own manifest.
 
-    None if they are not all there.
+    None if they are not all there, or not as they were kept.
     """
-    name = aligned_name(manifest_digest=file.manifest_digest, digest=file.digest)
+    values = _checked(_read(aligned_name(manifest_digest=file.manifest_digest, digest=file.digest)))
+    return np.frombuffer(values, dtype="<f8") if len(values) == 8 * n_sequences else None
+
+
+def _read(name: str) -> bytes:
+    """What the store has under this name; nothing if it has nothing, or does not answer."""
     try:
         with store().open(name, "rb") as kept:
-            data = kept.read()
+            data: bytes = kept.read()
     except OSError:
-        return None
-    return np.frombuffer(data, dtype="<f8") if len(data) == 8 * n_sequences else None
+        return b""
+    return data
+
+
+def _checked(data: bytes) -> bytes:
+    """The values behind their digest; nothing if it is not theirs."""
+    digest, values = data[:_DIGEST_BYTES], data[_DIGEST_BYTES:]
+    return values if hashlib.sha256(values).digest() == digest else b""
 
 
 def keep_manifest(*, digest: str, csv: bytes) -> None:

@@ -72,7 +72,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     truth = evaluator.read_truth(path)
     old = split.published_edition.ground_truth if split.published_edition else None
     counts = _compared(old, truth)
-    _keep_values(truth)
+    _keep_values(truth, is_hidden=split.is_hidden)
     files.keep_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
     with transaction.atomic():
         # The split before the audit trail, as every verb takes them: two that did it the other way round
@@ -228,10 +228,27 @@ def manifest_path(digest: str) -> Path:
     return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.manifest.npz"
 
 
-def _keep_values(truth: evaluator.GroundTruth) -> None:
-    """Write values and manifest to the private directory: whole or not at all, readable by its owner only."""
+def is_marked_hidden(digest: str) -> bool:
+    """Whether the values of this digest were imported as hidden ones, whatever the database says today.
+
+    Who can write into the database could call a split open; the private directory tells workers otherwise.
+    """
+    return _mark_path(digest).exists()
+
+
+def _mark_path(digest: str) -> Path:
+    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.hidden"
+
+
+def _keep_values(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
+    """Write values and manifest to the private directory: whole or not at all, readable by its owner only.
+
+    Hidden ones are marked as such, before they can be read.
+    """
     directory = Path(settings.GROUND_TRUTH_DIR)
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if is_hidden:
+        _mark_path(truth.digest).touch(mode=0o600)
     for part, target in ((truth, values_path(truth.digest)), (truth.manifest, manifest_path(truth.digest))):
         if target.exists():
             continue

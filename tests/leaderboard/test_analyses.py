@@ -93,6 +93,18 @@ def test_a_split_that_is_hidden_later_shows_and_keeps_nothing(
     assert not Analysis.objects.exists()
 
 
+def test_hidden_values_are_looked_at_by_no_worker_whatever_the_database_calls_their_split(
+    edition: Edition, owner: User
+) -> None:
+    submission = builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    # As somebody who has the web process could.
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    builders.infer_all()
+    analyses.make(submission.evaluations.get(), now=timezone.now())
+    assert not Analysis.objects.exists()
+
+
 def test_what_was_withdrawn_before_is_not_looked_at(val: Edition, owner: User) -> None:
     made = builders.submit(owner, builders.predictions(val), split="val")
     builders.score_all()

@@ -118,6 +118,24 @@ def test_a_file_without_its_kept_values_is_read_again_beside_the_batch(
     assert_all_scored_once(edition)
 
 
+def test_kept_values_that_were_changed_are_not_scored(edition: Edition) -> None:
+    truth = ground_truth.load(edition.ground_truth_id)
+    digest = evaluator.read_predictions(crowd.contents(truth, 3), manifest=truth.manifest).digest
+    name = files.aligned_name(manifest_digest=truth.manifest.digest, digest=digest)
+    store = files.store()
+    with store.open(name, "rb") as kept:
+        data = bytearray(kept.read())
+    right = bytes(data)
+    data[-1] ^= 0x80  # the sign of the last value: as long as before, and a prediction like any other
+    store.delete(name)
+    store.save(name, ContentFile(bytes(data)))
+    builders.score_all()
+    assert not Evaluation.objects.exclude(status=Status.SCORED).exists()
+    # The file itself was read again, and what is kept is right.
+    with store.open(name, "rb") as kept:
+        assert kept.read() == right
+
+
 def test_workers_hear_of_every_batch(
     benchmark: None, tmp_path: Path, django_capture_on_commit_callbacks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
