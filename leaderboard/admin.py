@@ -11,8 +11,9 @@ from django.db.models import Model, QuerySet, URLField
 from django.http import Http404, HttpRequest, HttpResponse
 from django.utils import timezone
 
-from leaderboard import audit, boards, lifecycle, quotas, tokens
+from leaderboard import admissions, audit, boards, lifecycle, quotas, tokens
 from leaderboard.models import (
+    Admission,
     ApiToken,
     AuditEvent,
     Edition,
@@ -157,6 +158,8 @@ class SplitAdmin(AuditedAdmin):
 
     list_display = ["name", "title", "is_hidden", "published_edition", "opens_at", "closes_at", "quota_limit"]
     audited_fields = (
+        "needs_admission",
+        "how_to_be_admitted",
         "opens_at",
         "closes_at",
         "quota_limit",
@@ -214,6 +217,37 @@ class QuotaOverrideAdmin(admin.ModelAdmin):
         quotas.end_override(row=obj, actor=cast("User", request.user))
 
     def delete_queryset(self, request: HttpRequest, queryset: QuerySet[QuotaOverride]) -> None:
+        """The same for many."""
+        for row in queryset:
+            self.delete_model(request, row)
+
+
+@admin.register(Admission)
+class AdmissionAdmin(admin.ModelAdmin):
+    """Teams that submit to a split by admission. The verbs write them, and tell the audit trail."""
+
+    list_display = ["team", "split", "reason", "admitted_by", "admitted_at"]
+    list_filter = ["split"]
+    search_fields = ["team__name", "reason"]
+    autocomplete_fields = ["team"]
+    readonly_fields = ["admitted_by", "admitted_at"]
+
+    def get_readonly_fields(self, request: HttpRequest, obj: Admission | None = None) -> list[str]:
+        """Who is admitted stays."""
+        fixed = super().get_readonly_fields(request, obj)
+        return [*fixed, "team", "split"] if obj else list(fixed)
+
+    def save_model(self, request: HttpRequest, obj: Admission, form: Any, change: bool) -> None:
+        """Admit the team."""
+        actor, now = cast("User", request.user), timezone.now()
+        row = admissions.admit(team=obj.team, split=obj.split, reason=obj.reason, actor=actor, now=now)
+        obj.pk = row.pk
+
+    def delete_model(self, request: HttpRequest, obj: Admission) -> None:
+        """Take the admission back."""
+        admissions.end(row=obj, actor=cast("User", request.user))
+
+    def delete_queryset(self, request: HttpRequest, queryset: QuerySet[Admission]) -> None:
         """The same for many."""
         for row in queryset:
             self.delete_model(request, row)

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from datetime import datetime
 
-from leaderboard import quotas
+from leaderboard import admissions, quotas
 from leaderboard.models import Split, Team, User
 from leaderboard.texts import Refused
 
@@ -36,9 +36,12 @@ def sentence_of(split: Split, *, now: datetime) -> str:
 
 
 def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quotas.Quota:
-    """What the team has left on the split; none of it can be had while the split takes nothing."""
+    """What the team has left on the split; none of it can be had while the split takes nothing from it."""
     quota = quotas.state(team=team, user=user, split=split, now=now)
     refusal = refusal_of(split, now=now)
+    not_admitted = admissions.refusal_of(team=team, split=split)
+    if refusal is None and not_admitted is not None:
+        return replace(quota, is_open=False, next_slot_at=None, sentence=str(not_admitted))
     if refusal is None:
         return quota
     opens_at = split.times[0]

@@ -56,6 +56,7 @@ API_CODES: Final[dict[str, str]] = {
     "unknown-split": "There is no such split.",
     "unknown-method": "There is no such method, or it is not yours to use.",
     "split-not-open": "The split takes no submissions yet.",
+    "not-admitted": "The split takes files of admitted teams alone, and the team is not one of them.",
     "split-closed": "The split takes no submissions any more.",
     # comparing
     "bad-comparison": "The request names too few or too many methods to compare, or one twice.",

@@ -8,7 +8,8 @@ process that read them, until a maintainer has had them read again: that is our 
 All files that a team sends within a day, whatever came of them, have a number of bytes in common.
 
 Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
-have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people.
+have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people. One person
+has one account: what is sent from several accounts of one mailbox is sent by one person.
 """
 
 import math
@@ -18,7 +19,7 @@ from datetime import datetime, timedelta
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import Exists, OuterRef, Q
+from django.db.models import Exists, OuterRef, Q, QuerySet
 
 from leaderboard import audit, lifecycle
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
@@ -90,8 +91,11 @@ def hold(*, team: Team) -> bool:
     To be called before anything is looked up that `require` or an answer depends on. Returns whether the team
     is still there.
     """
-    # SQLite has one writer at a time, and takes no notice.
-    return Team.objects.select_for_update(no_key=True).filter(pk=team.pk).first() is not None
+    # The teams of other accounts of its people spend the same quota. SQLite has one writer at a time, and
+    # takes no notice.
+    others = Membership.objects.filter(user__mailbox__in=team.members.values("mailbox")).values("team")
+    rows = Team.objects.select_for_update(no_key=True).filter(Q(pk=team.pk) | Q(pk__in=others))
+    return team.pk in {row.pk for row in rows.order_by("pk")}
 
 
 def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now: datetime) -> None:
@@ -154,11 +158,21 @@ def _spent(
 
 
 def _theirs(team: Team | None, user: User) -> Q:
-    """What the team got from anybody, and what its people sent to anybody."""
-    if team is None:
-        return Q(submitted_by=user)
-    people = Membership.objects.filter(team=team).values("user")
-    return Q(method__team=team) | Q(submitted_by__in=people)
+    """What the team got from anybody, and what its people sent to anybody, from whatever account."""
+    theirs = Q(submitted_by__in=_accounts(team, user).values("pk"))
+    return theirs if team is None else theirs | Q(method__team=team)
+
+
+def _accounts(team: Team | None, user: User) -> QuerySet[User]:
+    """The accounts of the team's people, or of this person without a team.
+
+    Where addresses are proved, accounts of one mailbox are one person's. Where they are not, anybody could
+    spend the quota of somebody else under an address that looks like theirs.
+    """
+    people = User.objects.filter(membership__team=team) if team else User.objects.filter(pk=user.pk)
+    if settings.ACCOUNT_EMAIL_VERIFICATION != "mandatory":
+        return people
+    return User.objects.filter(mailbox__in=people.values("mailbox"))
 
 
 def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int, now: datetime) -> Quota:
@@ -288,7 +302,7 @@ def override(
     Raises `NotMaintainer`, `Refused` for rules that make no sense, and `Team.DoesNotExist` if the team has
     just ended.
     """
-    _require_maintainer(actor)
+    require_maintainer(actor)
     rules = {
         "quota_limit": limit,
         "quota_window": window,
@@ -317,7 +331,7 @@ def override(
 
 def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") -> None:
     """Let the split's rules hold for the team again. Raises `NotMaintainer`."""
-    _require_maintainer(actor)
+    require_maintainer(actor)
     with transaction.atomic():
         row.delete()
         audit.record(
@@ -329,6 +343,7 @@ def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") ->
         )
 
 
-def _require_maintainer(actor: User | None) -> None:
+def require_maintainer(actor: User | None) -> None:
+    """Raise `NotMaintainer` for anybody else; None is the command line."""
     if actor is not None and not actor.is_maintainer:
-        raise NotMaintainer("Only maintainers give a team other quotas.")
+        raise NotMaintainer("Only maintainers give a team other quotas, or admit it.")

@@ -10,7 +10,18 @@ from django.core.files.base import File
 from django.db import IntegrityError, transaction
 from django.db.models import Q
 
-from leaderboard import audit, boards, deadlines, estimates, files, lifecycle, methods, quotas, teams
+from leaderboard import (
+    admissions,
+    audit,
+    boards,
+    deadlines,
+    estimates,
+    files,
+    lifecycle,
+    methods,
+    quotas,
+    teams,
+)
 from leaderboard.entries import Interval, scored_of
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
 from leaderboard.names import clean_name
@@ -100,6 +111,7 @@ def submit(
         team = teams.team_of(user=user)
         quotas.hold(team=team)
         teams.require_member(team, user)
+        admissions.require(team=team, split=split)
         method = _method(team=team, name=name, details=details, now=now)
         file = SentFile(kept.digest, _manifest_digest(split))
         standing = Submission.objects.standing().filter(split=split, method=method, **file._asdict())
@@ -175,6 +187,7 @@ def _before_the_quota(
     So that a file that cannot be taken is not written first. Raises `Refused` or `quotas.QuotaExceeded`.
     """
     team = teams.present_team_of(user=user)
+    admissions.require(team=team, split=split)
     named = Method.objects.filter(team=team, name=method_name)
     try:
         quotas.require(team=team, user=user, split=split, size_bytes=upload.size, now=now)

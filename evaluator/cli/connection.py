@@ -26,7 +26,7 @@ OPTIONS = frozenset(
         *("sort", "at", "m", "visibility"),
     }
 )
-WORDS_OF_403 = frozenset({"token-scope", "token-split"})
+WORDS_OF_403 = frozenset({"token-scope", "token-split", "not-admitted"})
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
 from leaderboard import (
+    admissions,
     comparisons,
     filters,
     idempotency,
@@ -87,7 +88,7 @@ def _of_a_verb(exc: Exception) -> Response | None:
             status = 413 if isinstance(exc, submissions.TooLarge) else 422
             if exc.code in {"split-not-open", "split-closed"}:
                 status = 409
-            if isinstance(exc, submissions.TokenSplit):
+            if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):
                 status = 403
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
         case quotas.QuotaExceeded():

@@ -104,6 +104,7 @@ class SplitSerializer(serializers.Serializer[Split]):
     is_open = serializers.SerializerMethodField(help_text="Whether it takes submissions.")
     opens_at = serializers.DateTimeField(allow_null=True)
     closes_at = serializers.DateTimeField(allow_null=True)
+    needs_admission = serializers.BooleanField(help_text="Whether it takes files of admitted teams alone.")
     is_hidden = serializers.BooleanField()
     is_simulated = serializers.BooleanField()
     edition = serializers.IntegerField(source="published_edition.number", default=None, allow_null=True)

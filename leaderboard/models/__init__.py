@@ -14,7 +14,7 @@ from leaderboard.models.inference import Analysis, Comparison
 from leaderboard.models.limits import Allowance, CachedValue
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
-from leaderboard.models.quotas import QuotaOverride
+from leaderboard.models.quotas import Admission, QuotaOverride
 from leaderboard.models.submissions import (
     Evaluation,
     IdempotencyKey,
@@ -26,6 +26,7 @@ from leaderboard.models.submissions import (
 from leaderboard.models.sweep import SweepBeat
 
 __all__ = [
+    "Admission",
     "Allowance",
     "Analysis",
     "ApiToken",

@@ -41,6 +41,14 @@ class Split(QuotaRules):
         default=True, help_text="Hidden ground truth: nothing finer than interval aggregates is shown."
     )
     is_simulated = models.BooleanField(default=False, help_text="Ground truth made by a simulation.")
+    needs_admission = models.BooleanField(
+        default=False, help_text="Only teams that a maintainer has admitted submit to it."
+    )
+    how_to_be_admitted = models.CharField(
+        max_length=300,
+        blank=True,
+        help_text="How a team asks for it, as the end of a sentence, like “write to …”.",
+    )
     opens_at = models.DateTimeField(null=True, blank=True)
     closes_at = models.DateTimeField(null=True, blank=True)
     decimals = models.PositiveSmallIntegerField(

@@ -6,8 +6,28 @@ from typing import Any, ClassVar
 from django.contrib.auth.base_user import AbstractBaseUser, BaseUserManager
 from django.contrib.auth.models import PermissionsMixin
 from django.db import models
+from django.db.models import Case, F, Value, When
+from django.db.models.functions import Concat, Lower, StrIndex, Substr
+from django.db.models.lookups import GreaterThan, LessThan
 from django.utils import timezone
 from knox.models import AbstractAuthToken
+
+# Where an address has a plus sign and where its @, from 1; 0: nowhere.
+_PLUS, _AT = StrIndex("email", Value("+")), StrIndex("email", Value("@"))
+MAILBOX = Lower(
+    Case(
+        When(
+            GreaterThan(_PLUS, 1) & LessThan(_PLUS, _AT),
+            then=Concat(Substr("email", 1, _PLUS - 1), Substr("email", _AT)),
+        ),
+        default=F("email"),
+        output_field=models.CharField(),
+    )
+)
+"""An address in small letters, without what follows a plus sign before the @: the mailbox that it leads to.
+
+So it is with nearly every provider. Dots stay: with most providers another dot is another person's mailbox.
+"""
 
 
 class UserManager(BaseUserManager["User"]):
@@ -29,6 +49,9 @@ class User(AbstractBaseUser, PermissionsMixin):  # type: ignore[django-manager-m
     """An account. Maintainers are those with `is_staff`."""
 
     email = models.EmailField("e-mail address", unique=True)
+    mailbox = models.GeneratedField(
+        expression=MAILBOX, output_field=models.CharField(max_length=254), db_persist=True, db_index=True
+    )
     name = models.CharField("name", max_length=80, blank=True, help_text="Shown as the team's name.")
     is_staff = models.BooleanField("maintainer", default=False)
     is_active = models.BooleanField("active", default=True)

@@ -98,3 +98,21 @@ class QuotaOverride(QuotaRules):
 
     def __str__(self) -> str:
         return f"{self.team} on {self.split_id}: {super().__str__()}"
+
+
+class Admission(models.Model):
+    """That a team may submit to a split by admission. Written by `leaderboard.admissions`."""
+
+    team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="admissions")
+    split = models.ForeignKey("Split", on_delete=models.CASCADE, related_name="admissions")
+    reason = models.CharField(max_length=500, help_text="Why. The team does not see it.")
+    admitted_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
+    admitted_at = models.DateTimeField(default=timezone.now)
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["team", "split"], name="one_admission_per_team_and_split"),
+        ]
+
+    def __str__(self) -> str:
+        return f"{self.team} on {self.split_id}"

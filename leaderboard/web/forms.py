@@ -10,7 +10,7 @@ from django.conf import settings
 from django.http import HttpRequest
 from django.utils import timezone
 
-from leaderboard import deadlines, names, teams, visibility
+from leaderboard import admissions, deadlines, names, teams, visibility
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.quotas import QuotaExceeded
 from leaderboard.submissions import Refused
@@ -62,7 +62,8 @@ def offers_for(user: User, *, now: datetime) -> list[Offer]:
     found = []
     for split in Split.objects.select_related("published_edition"):
         quota = deadlines.left(team=team, user=user, split=split, now=now)
-        is_open = deadlines.is_open(split, now=now)
+        is_admitted = admissions.refusal_of(team=team, split=split) is None
+        is_open = is_admitted and deadlines.is_open(split, now=now)
         until = deadlines.sentence_of(split, now=now) if is_open else ""
         sentence = f"{quota.sentence} {until}".strip()
         found.append(Offer(split=split, is_open=is_open, sentence=sentence))

@@ -6,7 +6,7 @@ from datetime import datetime
 from django.db.models import Q, QuerySet
 
 from leaderboard import names, quotas
-from leaderboard.models import QuotaOverride, Split, Team, User
+from leaderboard.models import Admission, QuotaOverride, Split, Team, User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.templatetags.board import grouped
 
@@ -32,6 +32,7 @@ class TeamRow:
     own: QuotaOverride | None
     rules: Rules
     quota: quotas.Quota
+    admission: Admission | None = None
 
     @property
     def is_never(self) -> bool:
@@ -80,12 +81,14 @@ def overrides() -> QuerySet[QuotaOverride]:
 def team_rows(team: Team, *, viewer: User, now: datetime) -> tuple[TeamRow, ...]:
     """The team on every split. Whose the question is (`viewer`) makes no difference to a team."""
     own = {row.split_id: row for row in team.quota_overrides.select_related("set_by")}
+    admitted = {row.split_id: row for row in team.admissions.all()}
     return tuple(
         TeamRow(
             split=split,
             own=own.get(split.pk),
             rules=rules_of(own.get(split.pk, split)),
             quota=quotas.state(team=team, user=viewer, split=split, now=now),
+            admission=admitted.get(split.pk),
         )
         for split in Split.objects.all()
     )
