@@ -2,31 +2,40 @@
 
 import secrets
 from collections.abc import Iterator
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from django.core.management import CommandError, call_command
 from django.db import ProgrammingError, connection, transaction
 from django.test import Client
 from django.utils import timezone
+from pytest_django import Settings
 
 from leaderboard import audit, visibility
-from leaderboard.management.commands.grant import grant_to, make_role
 from leaderboard.models import Edition, Status, Submission, User
 from tests import builders
 from tests.editions import corrected, open_edition, publish
 
-pytestmark = pytest.mark.skipif(
+POSTGRESQL_ONLY = pytest.mark.skipif(
     "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
 )
 
 
+def grant() -> str:
+    """What the command prints."""
+    out = StringIO()
+    call_command("grant", stdout=out)
+    return out.getvalue()
+
+
 @pytest.fixture
-def as_application(db: None) -> Iterator[None]:
+def as_application(db: None, settings: Settings) -> Iterator[None]:
     """From here on every statement is the application role's."""
     role = f"tsttc_application_{secrets.token_hex(4)}"
-    make_role(role, password=secrets.token_hex(8))
-    grant_to(role)
-    grant_to(role)  # after each migration
+    settings.APPLICATION_ROLE, settings.APPLICATION_PASSWORD = role, 'it\'s a "secret"'
+    for _ in range(2):  # after each migration
+        assert grant() == f"The role {role} may do what the application does.\n"
     with connection.cursor() as cursor:
         cursor.execute(f"SET ROLE {role}")
     yield
@@ -36,6 +45,7 @@ def as_application(db: None) -> Iterator[None]:
         cursor.execute(f"DROP ROLE {role}")
 
 
+@POSTGRESQL_ONLY
 def test_it_submits_scores_shows_publishes_and_reads_like_the_owner(
     edition: Edition, owner: User, tmp_path: Path, as_application: None
 ) -> None:
@@ -56,6 +66,7 @@ def test_it_submits_scores_shows_publishes_and_reads_like_the_owner(
     assert audit.verify().n_events > 3
 
 
+@POSTGRESQL_ONLY
 @pytest.mark.parametrize(
     "statement",
     [
@@ -82,3 +93,12 @@ def test_it_can_neither_change_the_trail_nor_take_its_guard_off(
     ):
         cursor.execute(statement)
     assert audit.verify().n_events == 1
+
+
+def test_without_a_role_nothing_is_granted_and_without_a_password_nothing_is_made(
+    db: None, settings: Settings
+) -> None:
+    assert grant() == "TSTTC_APPLICATION_ROLE is not set: the application works as the owner.\n"
+    settings.APPLICATION_ROLE = "tsttc_application"
+    with pytest.raises(CommandError, match=r"has no roles|TSTTC_APPLICATION_PASSWORD is not set"):
+        grant()
