@@ -10,7 +10,7 @@ from typing import Any
 
 import msgspec
 
-from evaluator.problems import Problem
+from evaluator.problems import FileWarning, Problem
 from evaluator.significance import p_below
 
 FINAL_STATES = frozenset({"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"})
@@ -50,6 +50,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     counts: dict[str, int] | None = None
     n_out_of_range: int | None = None
     truncated: dict[str, int] | None = None
+    warnings: list[FileWarning] = []
     problems: list[Problem] = []
     n_problems: int | None = None
     queue: Queue | None = None

@@ -11,7 +11,6 @@ Values are compared by the rank of -1/τ, which orders them by scale ratio, so t
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 from typing import Final
 
@@ -19,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.predictions import Predictions
+from evaluator.problems import FileWarning
 from evaluator.scale import Floats
 from evaluator.truth import GroundTruth, Manifest
 
@@ -33,22 +33,6 @@ MIN_CORRELATION: Final = 0.3
 MAX_FLIPPED: Final = 0.3
 
 Pairs = NDArray[np.intp]
-
-
-@dataclass(frozen=True, slots=True)
-class FileWarning:
-    """Something that is probably wrong with a file, which is scored all the same."""
-
-    code: str
-    message: str
-
-
-WARNING_CODES: Final[dict[str, str]] = {
-    "shuffled-values": "Values of one object differ as much as those of several: probably wrong keys.",
-    "unlike-truth": "The predictions do not go with the true times, or have the opposite sign.",
-    "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
-}
-"""Every code with what it means."""
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
@@ -109,7 +93,7 @@ def roughness(manifest: Manifest, ttc_s: Floats) -> float | None:
 
 def order_of(ttc_s: Floats) -> Floats:
     """The rank of each value by scale ratio, float64 (n,); equal values share the mean of theirs."""
-    with np.errstate(divide="ignore"):
+    with np.errstate(divide="ignore", over="ignore"):
         _, index, counts = np.unique(-1 / ttc_s, return_inverse=True, return_counts=True)
     ends = np.cumsum(counts)
     means: Floats = (ends - (counts - 1) / 2)[index]

@@ -72,6 +72,22 @@ class Problem:
         return f"{self.where}: {self.message}" if self.where else self.message
 
 
+@dataclass(frozen=True, slots=True)
+class FileWarning:
+    """Something that is probably wrong with a file, which is scored all the same."""
+
+    code: str
+    message: str
+
+
+WARNING_CODES: Final[dict[str, str]] = {
+    "shuffled-values": "Values of one object differ as much as those of several: probably wrong keys.",
+    "unlike-truth": "The predictions do not go with the true times, or have the opposite sign.",
+    "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
+}
+"""Every code of a warning with what it means."""
+
+
 class Rejected(Exception):
     """The file is at fault. `problems` lists why; `n_problems` also counts the faults that are not listed."""
 

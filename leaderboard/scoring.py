@@ -6,6 +6,7 @@ import time
 import uuid
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from functools import partial
 from typing import TypeVar
 
@@ -15,6 +16,8 @@ from django.db import DataError, IntegrityError, InterfaceError, OperationalErro
 
 import evaluator
 from evaluator import GroundTruth, Rejected, Report, published
+from evaluator.plausibility import warnings_of
+from evaluator.problems import FileWarning
 from evaluator.protocol import get_protocol
 from evaluator.scoring import Scorer
 from leaderboard import aligned, bags, broker, ground_truth, lifecycle, quarantine
@@ -143,7 +146,8 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
             if predictions is not None:
                 report = scorer.report(predictions, keep_bags=True)
                 bags.keep(edition, file=file, bags=report.bags)
-                outcomes.append((lease, scored(report, decimals=edition.decimals)))
+                warnings = warnings_of(predictions)
+                outcomes.append((lease, scored(report, decimals=edition.decimals, warnings=warnings)))
                 continue
         except (Rejected, *FAULTS_OF_THE_FILE) as fault:
             # Worded, or struck, when it is read again from the file, alone.
@@ -233,7 +237,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
     except Rejected as rejected:
         return rejection(rejected)
     bags.keep(edition, file=file, bags=report.bags)
-    return scored(report, decimals=edition.decimals)
+    return scored(report, decimals=edition.decimals, warnings=warnings_of(predictions))
 
 
 def _announce(edition: Edition) -> None:
@@ -255,8 +259,11 @@ def _in_words(fault: Exception) -> str:
     return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
-def scored(report: Report, *, decimals: int) -> Outcome:
-    """A report as its edition publishes it: values with so many decimals, counts, and nothing finer."""
+def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = ()) -> Outcome:
+    """A report as its edition publishes it: values with so many decimals, counts, and nothing finer.
+
+    `warnings` are those that file and manifest give: others would tell of hidden values.
+    """
     values = {}
     for interval, scores in report.scores.items():
         for metric, value in (("mid", scores.mid), ("rte", scores.rte)):
@@ -272,6 +279,7 @@ def scored(report: Report, *, decimals: int) -> Outcome:
             "n_out_of_range": report.n_out_of_range,
             "truncated": dict(report.truncated),
             "counts": {interval: scores.count for interval, scores in report.scores.items()},
+            "warnings": [asdict(warning) for warning in warnings],
         },
         report_digest=f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}",
     )

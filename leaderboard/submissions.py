@@ -317,6 +317,7 @@ class Progress:
     counts: Mapping[str, int] = field(default_factory=dict)
     truncated: Mapping[str, int] = field(default_factory=dict)
     n_out_of_range: int | None = None
+    warnings: list[dict[str, str]] = field(default_factory=list)  # of a scored file: code and message
     problems: list[dict[str, str]] = field(default_factory=list)
     n_problems: int = 0
     fault_is_ours: bool = False
@@ -363,6 +364,7 @@ def progress(submission: Submission) -> Progress:
         counts=report.get("counts", {}),
         truncated=report.get("truncated", {}),
         n_out_of_range=report.get("n_out_of_range"),
+        warnings=report.get("warnings", []),
         problems=evaluation.problems,
         n_problems=evaluation.n_problems,
         fault_is_ours=evaluation.status == Status.SYSTEM_ERROR,

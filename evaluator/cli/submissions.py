@@ -27,6 +27,7 @@ from evaluator.cli.options import (
 )
 from evaluator.cli.sending import opened, require_good, sent
 from evaluator.cli.values import in_short
+from evaluator.cli.warnings_in_words import echo_warnings
 
 if TYPE_CHECKING:
     from evaluator.answers import Submission
@@ -269,6 +270,7 @@ def _show(submission: Submission, named: str) -> None:
             decimals=submission.decimals,
         ):
             click.echo(line)
+        echo_warnings(submission.warnings)
 
 
 def _say_if_private(client: Client, submission: Submission) -> None:

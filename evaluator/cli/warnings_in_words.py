@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 import click
 
 from evaluator.cli.layout import printable
+from evaluator.problems import FileWarning
 
 if TYPE_CHECKING:
     from evaluator.numbering import Numbering
-    from evaluator.plausibility import FileWarning
     from evaluator.predictions import Predictions
 
 
@@ -47,7 +47,7 @@ def numbering_warnings(
     numbering: Numbering, found: Predictions, *, predictions: Path, annotations: Path
 ) -> list[FileWarning]:
     """A warning for a file of anno_ids that the toolkit has probably numbered otherwise than the manifest."""
-    from evaluator.plausibility import MAX_ROUGHNESS, FileWarning, roughness  # noqa: PLC0415 -- loads numpy
+    from evaluator.plausibility import MAX_ROUGHNESS, roughness  # noqa: PLC0415 -- loads numpy
 
     if found.keys != "anno_id" or not numbering.n_renumbered:
         return []

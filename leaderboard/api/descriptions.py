@@ -105,6 +105,10 @@ BY_SHAPE: Final[dict[str, dict[str, Said]]] = {
         "status": Said("The HTTP status.", 429),
         "problems": Said("Each thing that is wrong."),
     },
+    "Warning": {
+        "code": Said("A stable word for programs: docs/file-format.md lists all.", "shuffled-values"),
+        "message": Said("What was found and expected, and the probable cause, in a sentence or two."),
+    },
     "NewSubmissionRequest": {
         "description": Said("What is said of the method; replaces what was said before.", "Six frames."),
         "paper_url": Said("Address of the method's paper (http or https).", "https://example.org/paper"),
@@ -182,6 +186,7 @@ BY_SHAPE: Final[dict[str, dict[str, Said]]] = {
         "queue": Said("Its place in the queue; null: it does not wait."),
         "n_out_of_range": Said("Sequences with |τ| > 20 s, in the overall means only.", 7),
         "truncated": Said("Predictions that the protocol moved to a boundary, by boundary.", {"20": 3}),
+        "warnings": Said("What is probably wrong with a scored file; the file and its manifest say so."),
         "problems": Said("What is wrong with a rejected file, the first of each kind."),
         "n_problems": Said("How many faults it has, listed or not.", 0),
         "quota": Said("What the team has left after this submission."),

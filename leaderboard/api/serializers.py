@@ -42,6 +42,13 @@ class ProblemSerializer(serializers.Serializer[Any]):
     where = serializers.CharField(allow_blank=True)
 
 
+class WarningSerializer(serializers.Serializer[Any]):
+    """What is probably wrong with a file that was scored all the same."""
+
+    code = serializers.CharField()
+    message = serializers.CharField()
+
+
 class ErrorSerializer(serializers.Serializer[Any]):
     """RFC 9457 problem details."""
 

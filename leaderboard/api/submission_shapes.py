@@ -12,6 +12,7 @@ from leaderboard.api.serializers import (
     ScoresSerializer,
     SlotsSerializer,
     UncertaintySerializer,
+    WarningSerializer,
     absolute,
 )
 from leaderboard.models import Status, Visibility
@@ -88,6 +89,7 @@ class SubmissionSerializer(serializers.Serializer[Outcome]):
     counts = CountsSerializer(allow_null=True)
     n_out_of_range = serializers.IntegerField(allow_null=True)
     truncated = serializers.DictField(child=serializers.IntegerField())
+    warnings = WarningSerializer(many=True)
     problems = ProblemSerializer(many=True)
     n_problems = serializers.IntegerField()
 
@@ -128,6 +130,7 @@ class SubmissionSerializer(serializers.Serializer[Outcome]):
             "counts": progress.counts or None,
             "n_out_of_range": progress.n_out_of_range,
             "truncated": progress.truncated,
+            "warnings": progress.warnings,
             "problems": progress.problems,
             "n_problems": progress.n_problems,
         }

@@ -9,7 +9,8 @@ import pytest
 from click.testing import Result
 
 from evaluator import GroundTruth, Predictions, read_manifest, read_predictions, read_truth
-from evaluator.plausibility import MAX_ROUGHNESS, WARNING_CODES, roughness, warnings_of, warnings_with_truth
+from evaluator.plausibility import MAX_ROUGHNESS, roughness, warnings_of, warnings_with_truth
+from evaluator.problems import WARNING_CODES
 from evaluator.scale import Floats
 from evaluator.tables import Table
 from tests.evaluator.recorded_site import RecordedSite, Reply
