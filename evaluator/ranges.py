@@ -9,7 +9,7 @@ was before it was rounded. Two quoted rows are never compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Final
 
@@ -112,7 +112,7 @@ class _Family:
     """One column: entries in ascending order, quoted rows, and which hypotheses about them are rejected.
 
     Of the entries these are θ_b ≤ θ_a of all ordered pairs. Those with b above a can never be rejected and
-    stay at every step (`_down`); the others leave as they are rejected: `rejected[b, a]`, b is worse. With a
+    stay at every step; the others leave as they are rejected: `rejected[b, a]`, b is worse. With a
     quoted row from v − h to v + h they are θ ≤ v + h and θ ≥ v − h; with a value on the other side they, too,
     can never be rejected and stay.
     """
@@ -147,15 +147,18 @@ class _Family:
 
     def step_down(self, between: Callable[[], None]) -> None:
         """Reject until nothing more is found."""
-        up, down = self._extremes(between)
+        up, down = self._among_entries(between)
         while True:
-            critical = float(np.quantile(np.maximum(up, down), CONFIDENCE, method="higher"))
-            tested = [(self.rejected, self._t), *((side.rejected, side.t) for side in self._sides)]
-            if not any(((t > critical) & ~rejected).any() for rejected, t in tested):
+            largest = np.maximum(np.maximum(up, down), self._against_quoted(between))
+            critical = float(np.quantile(largest, CONFIDENCE, method="higher"))
+            is_found = [
+                _reject(rejected, t > critical)
+                for rejected, t in [(self.rejected, self._t), *((s.rejected, s.t) for s in self._sides)]
+            ]
+            if not any(is_found):
                 return
-            for rejected, t in tested:
-                np.logical_or(rejected, t > critical, out=rejected)
-            up, _ = self._extremes(between)
+            if is_found[0]:
+                up, _ = self._among_entries(between)
 
     def n_better(self) -> Integers:
         """How many rows are significantly better than each entry."""
@@ -167,39 +170,52 @@ class _Family:
         quoted = [side.rejected.sum(axis=1) for side in self._sides if side.sign < 0]
         return np.asarray(sum(quoted, start=self.rejected.sum(axis=0)))
 
-    def _extremes(self, between: Callable[[], None]) -> tuple[Weights, Weights]:
-        """In every draw the largest studentised rise and fall over what is not rejected.
+    def _blocks(self, between: Callable[[], None]) -> Iterator[tuple[slice, Weights, Weights]]:
+        """Draws that stay in the processor's cache: which they are, the entries' sums, and room for as many.
 
-        Falls are those of entries alone, which can never be rejected and are the same at every step. One row
-        and a block of draws at a time, which stay in the processor's cache: all pairs at once, 19,900 ×
-        2,000, would be 160 MB.
+        All pairs at once, 19,900 × 2,000, would be 160 MB.
         """
         n_entries, n_draws = self._turned.shape
-        up, down = np.zeros((2, n_draws), dtype=np.float32)
-        partners = [a + 1 + np.flatnonzero(~self.rejected[a + 1 :, a]) for a in range(n_entries - 1)]
         size = max(_CACHED // n_entries, 1)
         buffer = np.empty((n_entries, size), dtype=np.float32)
         for start in range(0, n_draws, size):
             between()
             block = slice(start, min(start + size, n_draws))
-            part = np.ascontiguousarray(self._turned[:, block])
+            yield block, np.ascontiguousarray(self._turned[:, block]), buffer
+
+    def _among_entries(self, between: Callable[[], None]) -> tuple[Weights, Weights]:
+        """In every draw the largest studentised rise and fall over pairs a < b that are not rejected."""
+        n_entries, n_draws = self._turned.shape
+        up, down = np.zeros((2, n_draws), dtype=np.float32)
+        partners = [a + 1 + np.flatnonzero(~self.rejected[a + 1 :, a]) for a in range(n_entries - 1)]
+        for block, part, buffer in self._blocks(between):
             for a, rows in enumerate(partners):
                 if rows.size:
                     rises = _rises(part, part[a], rows, self._inverse[a, rows], buffer)
                     np.maximum(up[block], rises.max(axis=0), out=up[block])
                     np.maximum(down[block], -rises.min(axis=0), out=down[block])
-            for side in self._sides:
-                _rise_above(part, side, block, buffer, up[block])
         return up, down
 
+    def _against_quoted(self, between: Callable[[], None]) -> Weights:
+        """In every draw the largest studentised rise against quoted rows that is not rejected."""
+        up = np.zeros(self._turned.shape[1], dtype=np.float32)
+        if not self._sides:
+            return up
+        for block, part, buffer in self._blocks(between):
+            for side in self._sides:
+                for i, turned in enumerate(side.turned):
+                    rows = np.flatnonzero(~side.rejected[:, i])
+                    if rows.size:
+                        rises = _rises(part, turned[block], rows, side.inverse[rows, i], buffer)
+                        np.maximum(up[block], rises.max(axis=0), out=up[block])
+        return up
 
-def _rise_above(part: Weights, side: _Side, block: slice, buffer: Weights, up: Weights) -> None:
-    """Raise `up` to the largest studentised rise against quoted rows in a block of draws."""
-    for i, turned in enumerate(side.turned):
-        rows = np.flatnonzero(~side.rejected[:, i])
-        if rows.size:
-            rises = _rises(part, turned[block], rows, side.inverse[rows, i], buffer)
-            np.maximum(up, rises.max(axis=0), out=up)
+
+def _reject(rejected: Booleans, found: Booleans) -> bool:
+    """Add what was found to what is rejected; whether any of it is new."""
+    is_new = bool((found & ~rejected).any())
+    np.logical_or(rejected, found, out=rejected)
+    return is_new
 
 
 def _rises(part: Weights, low: Weights, rows: Integers, inverse: Weights, buffer: Weights) -> Weights:
