@@ -91,6 +91,21 @@ def test_digits_are_no_more_than_are_published() -> None:
     assert re.findall(r"\d+\.\d+", text)[:3] == ["0.4", "0.1", "0.7"]
 
 
+@pytest.mark.parametrize(
+    ("p_below", "words", "is_significant"),
+    [
+        (0.001, "p < 0.001", True),
+        (0.01, "p < 0.01", True),
+        (0.05, "p < 0.05", True),
+        (1.0, "p ≥ 0.05", False),
+    ],
+)
+def test_where_p_itself_is_not_told_its_class_is(p_below: float, words: str, is_significant: bool) -> None:
+    text = said(Difference(-2.0, -3.0, -1.0, None, p_below))
+    assert f"(95 % confidence interval: 1.0 to 3.0 lower; {words})." in text
+    assert ("That is not significant." in text) is not is_significant
+
+
 def test_with_too_few_recordings_a_difference_means_nothing() -> None:
     text = said(Difference(-0.4, None, None, None))
     assert text == (
