@@ -198,10 +198,14 @@ class Difference(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Pair(msgspec.Struct, frozen=True, kw_only=True):
-    """Two methods and their differences by score name; None until a worker has computed them."""
+    """Two methods and their differences by score name; None until a worker has computed them.
+
+    `withheld` says why they have neither interval nor p where nobody is told those.
+    """
 
     differences: dict[str, Difference | None] | None = None
     sentence: str = ""
+    withheld: str = ""
 
 
 class Compared(msgspec.Struct, frozen=True, kw_only=True):
@@ -218,6 +222,11 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
     decimals: int = 2
     is_complete: bool = True
     reason: str = ""
+
+    @property
+    def withheld(self) -> str:
+        """Why nothing but the difference is told of the first pair; else empty."""
+        return self.pairs[0].withheld if self.pairs else ""
 
     def differences(self) -> dict[str, Difference]:
         """Those of the first pair that there are, by score name."""

@@ -77,8 +77,12 @@ def p_cell(p: float | None, below: float | None) -> str:
     return f"< {below:g}" if below <= SIGNIFICANT else f"≥ {SIGNIFICANT:g}"
 
 
-def sentence(first: str, second: str, *, name: str, found: Found, decimals: int = 2) -> str:
+def sentence(
+    first: str, second: str, *, name: str, found: Found, decimals: int = 2, withheld: str = ""
+) -> str:
     """What a difference in one column means, in words; `decimals` are those in which values are published.
+
+    `withheld` says why there is no interval, in a sentence, where it is not for too few recordings.
 
     >>> from evaluator.differences import Difference
     >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
@@ -93,12 +97,15 @@ That is not significant. A difference above 2.0 would have been found in four of
     label, unit = _METRIC_WORDS[metric]
     column = f"{label}{_INTERVAL_WORDS[interval or 'overall']}"
     if round(found.difference, decimals) == 0:
-        return f"{first} and {second} have the same {column} to {_DECIMALS_IN_WORDS[decimals]}."
+        alike = f"{first} and {second} have the same {column} to {_DECIMALS_IN_WORDS[decimals]}."
+        return f"{alike} {withheld}".rstrip()
     digits = _digits(found, decimals)
     gap = (
         f"{_of(first)} {column} is {_amount(found.difference, digits)}{unit} "
         f"{_direction(found.difference)} than {_of(second)}"
     )
+    if withheld:
+        return f"{gap}. {withheld}"
     if found.low is None or found.high is None or found.p_below is None:
         return f"{gap}; there are {too_few_recordings(found.n_effective)} to say whether that is significant."
     ends = _ends(found.difference, found.low, found.high, digits)

@@ -18,7 +18,7 @@ from django.db.models import QuerySet
 
 from evaluator import Difference, differences, sentences
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import bags, broker, entries, inference, snapshots, standings
+from leaderboard import bags, broker, disclosure, entries, inference, snapshots, standings
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.standings import Entry
 
@@ -52,12 +52,14 @@ class NotOnTheBoard(BadComparison):
 class Pair:
     """Two entries and their differences by score name: None until a worker has computed them.
 
-    A column without sequences is not in `differences`.
+    A column without sequences is not in `differences`. `withheld` says why they have neither interval nor p
+    where nobody is told those; it is empty otherwise.
     """
 
     first: Entry
     second: Entry
     differences: Mapping[str, Difference] | None
+    withheld: str = ""
 
     def sentence(self, name: str = "mid") -> str:
         """What the difference in one column means, in words; empty while it is not known."""
@@ -65,7 +67,12 @@ class Pair:
             return ""
         first, second = self.first.method, self.second.method
         return sentences.sentence(
-            first, second, name=name, found=self.differences[name], decimals=self.first.decimals
+            first,
+            second,
+            name=name,
+            found=self.differences[name],
+            decimals=self.first.decimals,
+            withheld=self.withheld,
         )
 
     def others(self) -> tuple[str, tuple[str, ...]]:
@@ -102,6 +109,7 @@ def of(
     """Compare two to five methods of one board: the published edition's unless another is named.
 
     Pairs that no worker has compared yet have `differences` None; they are asked for, and the workers told.
+    Of pairs that `disclosure.why_withheld` names, there is the difference of the published values alone.
     Raises `BadComparison` for another number of methods or the same one twice, `UnknownMethod` for one that
     the viewer may not see, `NotOnTheBoard` for one without a value there.
     """
@@ -110,9 +118,14 @@ def of(
         raise NotOnTheBoard(f"The split {split.pk} has no board yet; expected one with ground truth.")
     chosen = _chosen(board, methods, viewer)
     asked = list(itertools.combinations(chosen, 2))
+    withheld = _withheld(board.edition, asked)
     known = _known(board.edition, chosen)
-    _ask(board.edition, [pair for pair in asked if _key(pair) not in known], now=now)
-    pairs = tuple(_pair(first, second, known.get(_key((first, second)))) for first, second in asked)
+    told = [pair for pair in asked if _key(pair) not in withheld]
+    _ask(board.edition, [pair for pair in told if _key(pair) not in known], now=now)
+    pairs = tuple(
+        _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
+        for pair in asked
+    )
     return Compared(
         split=split,
         edition=board.edition,
@@ -138,6 +151,32 @@ def _chosen(board: standings.Board, methods: Sequence[UUID], viewer: User | Anon
                 raise NotOnTheBoard(f"The method {pk} has no scored submission on {board.split.pk}.")
             raise UnknownMethod(f"There is no method {pk} that you may see; expected one of the board.")
     return [rows[pk] for pk in methods]
+
+
+def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[tuple[UUID, UUID], str]:
+    """By their keys the pairs of which no interval and no p is told, and why."""
+    team_of: dict[UUID, UUID] = {}
+    if edition.split.is_hidden:
+        ids = {entry.method_id for pair in pairs for entry in pair if entry.method_id}
+        team_of = dict(Method.objects.filter(pk__in=ids).values_list("pk", "team"))
+    found = {}
+    for first, second in pairs:
+        teams = {team_of[entry.method_id] for entry in (first, second) if entry.method_id in team_of}
+        why = disclosure.why_withheld(first, second, edition=edition, are_of_one_team=len(teams) == 1)
+        if why:
+            found[_key((first, second))] = why
+    return found
+
+
+def _plain(first: Entry, second: Entry, why: str) -> Pair:
+    """The differences of the published values, which everybody can take from the board."""
+    values = ((name, first.scores[name], second.scores[name]) for name in SCORE_NAMES)
+    shown = {
+        name: Difference(round(one - other, first.decimals) + 0.0, None, None, None)
+        for name, one, other in values
+        if one is not None and other is not None
+    }
+    return Pair(first, second, shown, withheld=why)
 
 
 def _key(pair: tuple[Entry, Entry]) -> tuple[UUID, UUID]:
@@ -213,8 +252,12 @@ def compute(row: Comparison, *, now: datetime) -> None:
     )
     values = [entries.flat_scores(each.scores.all()) for each in (row.first, row.second)]
     shown = {
-        name: differences.rounded_difference(
-            gap, first=values[0][name], second=values[1][name], decimals=edition.decimals
+        name: disclosure.published_difference(
+            gap,
+            differences.rounded_difference(
+                gap, first=values[0][name], second=values[1][name], decimals=edition.decimals
+            ),
+            edition=edition,
         )
         for name, gap in found.items()
     }

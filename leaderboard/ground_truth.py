@@ -18,7 +18,7 @@ from django.db.models import Max
 import evaluator
 from evaluator.protocol import get_protocol
 from evaluator.revisions import Comparison, compare
-from leaderboard import audit, boards, files
+from leaderboard import audit, boards, files, seeds
 from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
 
 
@@ -258,6 +258,7 @@ def _keep_values(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
         with Path(temporary).open("rb") as written:
             os.fsync(written.fileno())
         Path(temporary).replace(target)
+    seeds.ensure()
 
 
 def held() -> frozenset[str]:

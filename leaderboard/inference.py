@@ -25,7 +25,7 @@ from evaluator import published, uncertainty
 from evaluator.protocol import SCORE_NAMES
 from evaluator.ranges import Quoted, rank_ranges
 from evaluator.significance import MIN_DEGREES, cut_off, too_few_recordings
-from leaderboard import bags, boards, bulk
+from leaderboard import bags, boards, bulk, disclosure, seeds
 from leaderboard.entries import printed_decimals
 from leaderboard.models import Edition, Evaluation, PublishedResult, Score, SentFile, Status, Visibility
 
@@ -33,7 +33,7 @@ log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
 # Every digest begins with it. Raised when intervals or ranges are made in another way: all are made anew.
-METHOD = "2"
+METHOD = "3"
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
 PATIENCE = timedelta(minutes=1)
 # All pairs are compared, so the work grows with their number: two seconds of rest for 200 entries.
@@ -75,8 +75,11 @@ def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
 
 
 def seed_of(edition: Edition) -> str:
-    """What the random numbers of an edition are made of; each purpose then has its own."""
-    return edition.ground_truth_id
+    """What the random numbers of an edition are made of; each purpose then has its own.
+
+    Raises `OSError` of a hidden split without its secret.
+    """
+    return seeds.seed_of(edition)
 
 
 # --- which entries ---------------------------------------------------------------------------------------
@@ -221,7 +224,7 @@ def _inferred(
         places = [table.row_of[row.evaluation_id] for row in some]
         ends = bootstrap_of(edition).intervals(sums)
         # As they are kept: ranges must not depend on which of them were made before.
-        low[places], high[places] = (np.round(each, edition.decimals) for each in ends)
+        low[places], high[places] = disclosure.published_ends(*ends, edition=edition)
     rivals = ranked(rows)
     places = [table.row_of[row.evaluation_id] for row in rivals]
     rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)

@@ -221,7 +221,10 @@ def judge_against(
             f"{words}, but the board compares methods, and has a better one of {printable(row.method)}",
             hint="Send it under another method's name, or compare files: tsttc compare A B --truth TRUTH",
         )
-    difference = client.compare(split, [method_id, found.entry.method_id]).differences().get("mid")
+    compared = client.compare(split, [method_id, found.entry.method_id])
+    difference = compared.differences().get("mid")
+    if compared.withheld:
+        raise undecided(f"{words}. {compared.withheld.rstrip('.')}", hint="Compare without --significant.")
     if difference is None or difference.p_below is None:
         few = too_few_recordings(None if difference is None else difference.n_effective)
         raise undecided(f"there are {few} to tell a difference from chance")

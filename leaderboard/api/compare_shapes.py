@@ -23,7 +23,8 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
     p = serializers.FloatField(
         allow_null=True,
-        help_text="Of the two-sided cluster sign-flip test, four decimals; null: too few recordings.",
+        help_text="Of the two-sided cluster sign-flip test, four decimals; null: too few recordings, not "
+        "told of this pair, or the ground truth is hidden, and `p_below` says what is told.",
     )
     p_below = serializers.FloatField(
         allow_null=True,
@@ -56,6 +57,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
             name=self.field_name or "",
             found=found,
             decimals=self.context["decimals"],
+            withheld=self.context["withheld"],
         )
 
 
@@ -79,6 +81,10 @@ class PairSerializer(serializers.Serializer[Pair]):
     sentence = serializers.SerializerMethodField(
         help_text="What the difference in MiD means, in words; empty while it is computed."
     )
+    withheld = serializers.CharField(
+        allow_blank=True,
+        help_text="Why nothing but the difference of the published values is told of these two; else empty.",
+    )
 
     @extend_schema_field(DifferencesSerializer(allow_null=True))
     def get_differences(self, pair: Pair) -> dict[str, Any] | None:
@@ -87,7 +93,7 @@ class PairSerializer(serializers.Serializer[Pair]):
             return None
         found = {name: pair.differences.get(name) for name in SCORE_NAMES}
         names = {"first": pair.first.method, "second": pair.second.method}
-        context = {"names": names, "decimals": pair.first.decimals}
+        context = {"names": names, "decimals": pair.first.decimals, "withheld": pair.withheld}
         return dict(DifferencesSerializer(found, context=context).data)
 
     def get_sentence(self, pair: Pair) -> str:

@@ -101,7 +101,8 @@ def verdict(compared: Compared) -> str:
         return f"{head} There are too few recordings to say what the differences mean."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
     parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
-    return f"{head} On these recordings it is {', and '.join(parts)}."
+    said = [head, f"On these recordings it is {', and '.join(parts)}."] if parts else [head]
+    return " ".join([*said, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
 
 def _told_apart(best: Entry, pairs: Sequence[Pair]) -> tuple[list[str], list[str]]:
@@ -109,7 +110,7 @@ def _told_apart(best: Entry, pairs: Sequence[Pair]) -> tuple[list[str], list[str
     worse: list[str] = []
     alike: list[str] = []
     for pair in pairs:
-        if best in (pair.first, pair.second) and pair.differences:
+        if best in (pair.first, pair.second) and pair.differences and not pair.withheld:
             other = pair.second if pair.first == best else pair.first
             found = pair.differences.get("mid")
             (worse if found and found.is_significant else alike).append(other.method)

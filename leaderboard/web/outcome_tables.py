@@ -134,8 +134,11 @@ def _gap(entry: Entry, other: Entry, name: str) -> str:
 
 
 def _compare_href(submission: Submission, place: Place, other: Entry) -> str:
-    """To the comparison of both methods; empty unless each is represented on the board by this submission."""
-    if place.rank is None or other.method_id == submission.method_id:
+    """To the comparison of both methods; empty unless each is represented on the board by this submission.
+
+    Empty as well where nothing is told of two methods of one team.
+    """
+    if place.rank is None or other.method_id == submission.method_id or submission.split.is_hidden:
         return ""
     query = urlencode([("split", submission.split_id), ("m", submission.method_id), ("m", other.method_id)])
     return f"{reverse('compare')}?{query}"

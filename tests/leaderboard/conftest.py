@@ -6,7 +6,7 @@ import pytest
 from django.test import Client
 
 from leaderboard import teams
-from leaderboard.models import Edition, Membership, Submission, User
+from leaderboard.models import Edition, Membership, Split, Submission, User
 from tests import builders
 from tests.editions import FACTORS, corrected, open_edition
 
@@ -41,6 +41,12 @@ def maintainer(db: None) -> User:
 def edition(benchmark: None, tmp_path: Path) -> Edition:
     """The test split, open, with made-up ground truth."""
     return builders.import_truth(tmp_path)
+
+
+@pytest.fixture
+def open_values(benchmark: None) -> None:
+    """The values of the test split are open: intervals and p are told of all pairs, and exactly."""
+    Split.objects.filter(pk="test").update(is_hidden=False)
 
 
 @pytest.fixture

@@ -8,6 +8,8 @@ from leaderboard.models import Edition, Method, Submission, User, Visibility
 from tests import builders
 from tests.leaderboard.test_api_submissions import client_of
 
+pytestmark = pytest.mark.usefixtures("open_values")
+
 
 def address(*methods: object, split: str = "test", more: str = "") -> str:
     named = "".join(f"&m={method}" for method in methods)

@@ -16,6 +16,8 @@ from leaderboard.models import Comparison, Edition, Method, Split, Submission, U
 from tests import builders
 from tests.editions import ANYBODY
 
+pytestmark = pytest.mark.usefixtures("open_values")
+
 
 def ask(
     *sent: Submission, viewer: User | AnonymousUser = ANYBODY, split: str = "test"

@@ -37,6 +37,7 @@ def kitti() -> Path:
 
 def opened(kitti: Path, path: Path, settings: Any) -> Edition:
     settings.QUOTAS = False
+    Split.objects.filter(pk="test").update(is_hidden=False, decimals=2)
     return ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
 
 

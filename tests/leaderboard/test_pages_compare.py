@@ -8,6 +8,8 @@ from django.test import Client
 from leaderboard.models import Edition, Method, Submission, User
 from tests import builders, pages
 
+pytestmark = pytest.mark.usefixtures("open_values")
+
 
 def get(client: Client, *methods: object, split: str = "test", status: int = 200) -> pages.Element:
     response = client.get("/compare/", {"split": split, "m": [str(pk) for pk in methods]})

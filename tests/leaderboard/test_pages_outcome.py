@@ -167,6 +167,14 @@ def test_the_best_is_beside_the_second_best_of_its_team(
     assert beside(look(signed_in, inferred[0]))[0][0].startswith("M1.1 ")
 
 
+def test_another_method_of_the_team_is_not_compared_with_where_values_are_hidden(
+    signed_in: Client, inferred: list[Submission]
+) -> None:
+    hrefs = [a.attributes["href"] for a in look(signed_in, inferred[1]).all("a")]
+    assert not [href for href in hrefs if href.startswith("/compare/")]
+
+
+@pytest.mark.usefixtures("open_values")
 def test_another_method_of_the_team_can_be_compared_with(
     signed_in: Client, inferred: list[Submission]
 ) -> None:

@@ -1,0 +1,125 @@
+"""What is told of hidden values beyond the means: how fine an interval and a p are, and of which pairs.
+
+Each number that follows from hidden labels tells of them, and a file can be made to be read through such
+numbers. Of a hidden split the ends of intervals are therefore rounded to about a tenth of their width, p is
+told as a class, and only methods that everybody sees by name, of different teams, are compared. Everybody
+gets the same, the teams of the methods as well. `docs/security.md` says what each of these is against, and
+`tests/security/probing.py` measures it.
+"""
+
+import math
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator import Difference
+from leaderboard.entries import Entry
+from leaderboard.models import Edition, Visibility
+
+Floats = NDArray[np.float64]
+
+STEPS_IN_A_WIDTH: Final = 10
+_ROUND: Final = (5, 2, 1)
+
+
+# --- how fine --------------------------------------------------------------------------------------------
+
+
+def step_of(width: float, *, decimals: int) -> float:
+    """The grid of an interval's ends: 1, 2 or 5 times a power of ten, at most a tenth of `width`.
+
+    Never finer than values are published.
+
+    >>> step_of(7.1, decimals=1), step_of(0.3, decimals=1), step_of(24.0, decimals=1)
+    (0.5, 0.1, 2.0)
+    """
+    finest = round(10.0**-decimals, decimals)
+    tenth = width / STEPS_IN_A_WIDTH
+    if not tenth > finest:
+        return finest
+    power = 10.0 ** math.floor(math.log10(tenth))
+    step = next(n * power for n in _ROUND if n * power <= tenth or n == 1)
+    return max(round(step, decimals), finest)
+
+
+def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float]:
+    """Both ends of an interval rounded outwards to their grid.
+
+    >>> coarse_ends(13.61, 20.68, decimals=1), coarse_ends(-0.31, 0.02, decimals=1)
+    ((13.5, 21.0), (-0.4, 0.1))
+    """
+    step = step_of(high - low, decimals=decimals)
+    # What is left of rounding must not move an end that stands on the grid.
+    slack = 1e-9
+    ends = math.floor(low / step + slack) * step, math.ceil(high / step - slack) * step
+    return round(ends[0], decimals) + 0.0, round(ends[1], decimals) + 0.0
+
+
+def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floats, Floats]:
+    """The ends of the intervals of means as an edition publishes them; NaN where there is none."""
+    if not edition.split.is_hidden:
+        return np.round(low, edition.decimals), np.round(high, edition.decimals)
+    shown = np.array(
+        [
+            (np.nan, np.nan) if np.isnan(a) or np.isnan(b) else coarse_ends(a, b, decimals=edition.decimals)
+            for a, b in zip(low.ravel().tolist(), high.ravel().tolist(), strict=True)
+        ]
+    ).reshape(-1, 2)
+    return shown[:, 0].reshape(low.shape), shown[:, 1].reshape(high.shape)
+
+
+def published_difference(found: Difference, shown: Difference, *, edition: Edition) -> Difference:
+    """A difference as an edition publishes it: `found` as it was computed, `shown` rounded to its decimals.
+
+    Of a hidden split the ends are coarse and p is only a class. An end never crosses 0 by being rounded: it
+    is then one unit of the last digit on its own side, so that 0 is outside exactly where p is below 0.05.
+    """
+    if not edition.split.is_hidden or found.low is None or found.high is None:
+        return shown
+    decimals = edition.decimals
+    low, high = coarse_ends(found.low, found.high, decimals=decimals)
+    unit = round(10.0**-decimals, decimals)
+    if shown.difference == 0:
+        low, high = min(low, 0.0), max(high, 0.0)
+    elif shown.is_significant:
+        low, high = (max(low, unit), high) if found.difference > 0 else (low, min(high, -unit))
+    low, high = min(low, shown.difference), max(high, shown.difference)
+    return replace(shown, low=low, high=high, p=None)
+
+
+# --- of which pairs --------------------------------------------------------------------------------------
+
+
+def why_withheld(first: Entry, second: Entry, *, edition: Edition, are_of_one_team: bool) -> str:
+    """Why nothing but the difference of the published values is told of a pair, in a sentence; "" if more is.
+
+    Entries are as their reader sees them.
+    """
+    for entry in (first, second):
+        if entry.visibility == Visibility.ANONYMOUS and not entry.is_mine:
+            return (
+                f"No confidence interval and no p: {entry.method} is anonymous, and they would tell whose it "
+                "may be. They follow once it is public."
+            )
+    if not edition.split.is_hidden:
+        return ""
+    for entry in (first, second):
+        if entry.visibility != Visibility.PUBLIC:
+            return (
+                f"No confidence interval and no p: {entry.method} is not public, and the ground truth of "
+                f"{edition.split_id} is hidden. {_POSSIBLE}"
+            )
+    if are_of_one_team:
+        return (
+            "No confidence interval and no p: both methods are of one team, and the ground truth of "
+            f"{edition.split_id} is hidden. {_POSSIBLE}"
+        )
+    return ""
+
+
+_POSSIBLE: Final = (
+    "There, only public methods of different teams are compared; compare these two on a split with open "
+    "ground truth, or their files offline with tsttc compare."
+)

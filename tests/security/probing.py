@@ -1,0 +1,279 @@
+"""What one more submission tells of hidden labels: the attack, and what it gets before and after the defence.
+
+    python -m tests.security.probing          the table of docs/scoring.md, some minutes
+    python -m tests.security.probing --quick  a small one
+
+File 0 predicts ln α10 = 0.6 for every sequence. That is above every true value, so MiD is linear in what is
+predicted: moving one prediction moves the mean of one range by a known amount, and of no other. File 1 moves
+one sequence in each of K recordings, each by an amount of its own. What is published of file 1 beside file 0
+then tells which ranges the chosen sequences are in.
+
+The decoder here is the best that there is: it computes what would be published under every hypothesis about
+the labels, keeps the hypotheses that fit, weighs them by how common each range is, and names the likeliest
+range of each sequence. `bits` is what it has learnt: −log2 of the share of hypotheses that fit.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator import Difference, published
+from evaluator.differences import rounded_difference, sign_flips
+from evaluator.uncertainty import Bootstrap
+
+Floats = NDArray[np.float64]
+Masks = NDArray[np.int64]
+
+RANGES: Final = ("crucial", "small", "large", "negative")
+SHARES: Final = np.array([0.09, 0.20, 0.43, 0.264])  # of all sequences; the rest is out of range
+LOG_RATIO: Final = 0.6
+# Predictions may lie within ln α10 = ± ln 3: so far up a prediction can be moved, times 10⁴.
+LARGEST: Final = (np.log(3) - LOG_RATIO) * 1e4
+# Amounts run down to a 128th: powers of two where 8 sequences are chosen.
+SPREAD: Final = 128.0
+
+
+@dataclass(frozen=True)
+class World:
+    """A hidden truth of G recordings, and K sequences of which somebody wants to know the ranges.
+
+    `counts` are the sequences per recording and range, (G, 4); `base` and `rival` the sums of MiD of file 0
+    and of a method of another team. Sequence i is in recording i, is moved by `amounts[i]`, and is in the
+    range `labels[i]`; 4 is out of range.
+    """
+
+    counts: Floats
+    base: Floats
+    rival: Floats
+    amounts: Floats
+    labels: NDArray[np.int64]
+
+    @property
+    def n_chosen(self) -> int:
+        """K."""
+        return len(self.amounts)
+
+    def mask(self, column: int) -> int:
+        """The chosen sequences that are in a range, as bits."""
+        return sum(1 << i for i in range(self.n_chosen) if self.labels[i] == column)
+
+    def moved(self, masks: Masks) -> Floats:
+        """What file 1 adds to the sums of a range, if these are the chosen sequences in it: (G, masks)."""
+        found = np.zeros((len(self.counts), len(masks)))
+        found[: self.n_chosen] = ((masks >> np.arange(self.n_chosen)[:, None]) & 1) * self.amounts[:, None]
+        return found
+
+
+def world(*, n_chosen: int, n_sequences: int, n_recordings: int, rng: np.random.Generator) -> World:
+    """A world of recordings of very different sizes, in which each has its own mean of ln α10."""
+    sizes = rng.lognormal(0, 0.8, n_recordings)
+    sizes = np.maximum(sizes / sizes.sum() * n_sequences, 4)
+    shares = rng.dirichlet(12 * np.append(SHARES, 1 - SHARES.sum()), n_recordings)[:, :4]
+    counts = np.maximum(np.round(sizes[:, None] * shares), 1.0)
+    of_ranges = np.array([0.06, 0.024, 0.009, -0.01])  # ln(1 / α10)
+    log_ratios = of_ranges * rng.lognormal(0, 0.2, (n_recordings, 4))
+    noise = rng.gamma(2.0, 20.0, (n_recordings, 4))
+    amounts = LARGEST / SPREAD ** (np.arange(n_chosen) / max(n_chosen - 1, 1))
+    return World(
+        counts=counts,
+        base=counts * (LOG_RATIO + log_ratios) * 1e4,
+        rival=counts * noise,
+        amounts=rng.permutation(amounts) * rng.choice([-0.6, 1.0], n_chosen),
+        labels=rng.choice(5, n_chosen, p=np.append(SHARES, 1 - SHARES.sum())),
+    )
+
+
+# --- what is published of one range, under many hypotheses -----------------------------------------------
+
+Answers = Sequence[tuple[float | str | None, ...]]
+Channel = Callable[[World, int, Masks], Answers]
+
+
+def own_pair(world: World, column: int, masks: Masks) -> Answers:
+    """As it was: interval and p of one's own two files, from random signs that everybody can draw."""
+    gaps, counts = world.moved(masks), np.repeat(world.counts[:, [column]], len(masks), axis=1)
+    found = sign_flips(gaps, counts, rng=np.random.default_rng(1))
+    shown = [
+        rounded_difference(
+            Difference(float(gaps[:, i].sum() / counts[:, i].sum()), *ends),
+            first=None,
+            second=None,
+            decimals=2,
+        )
+        for i in range(len(masks))
+        for ends in [(float(found.low[i]), float(found.high[i]), float(found.p[i]))]
+    ]
+    return [(each.low, each.high, each.p) for each in shown]
+
+
+def own_p(world: World, column: int, masks: Masks) -> Answers:
+    """Of that the p alone."""
+    return [each[2:] for each in own_pair(world, column, masks)]
+
+
+def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
+    """All that is told now, to somebody who knows the secret and every other label: more than there can be.
+
+    The mean and its interval, and difference, interval and class of p beside another team's public method.
+    """
+    from leaderboard import disclosure  # noqa: PLC0415 - needs Django's settings
+    from leaderboard.models import Edition, Split  # noqa: PLC0415 - as above
+
+    edition = Edition(split=Split(is_hidden=True), decimals=1)
+    counts = world.counts[:, [column]]
+    sums = world.base[:, [column]] + world.moved(masks)
+    low, high = Bootstrap(counts, rng=np.random.default_rng(2)).intervals(sums.T[:, :, None])
+    ends = np.concatenate(disclosure.published_ends(low, high, edition=edition), axis=1)
+    gaps = sums - world.rival[:, [column]]
+    found = sign_flips(gaps, np.repeat(counts, len(masks), axis=1), rng=np.random.default_rng(3))
+    answers = []
+    for i, total in enumerate(sums.sum(axis=0).tolist()):
+        gap = Difference(
+            float(gaps[:, i].sum() / counts.sum()),
+            float(found.low[i]),
+            float(found.high[i]),
+            float(found.p[i]),
+        )
+        mean, other = total / counts.sum(), world.rival[:, column].sum() / counts.sum()
+        shown = rounded_difference(gap, first=mean, second=other, decimals=1)
+        told = disclosure.published_difference(gap, shown, edition=edition)
+        answers.append(
+            (*map(repr, ends[i].tolist()), published(mean, decimals=1), told.low, told.high, told.p_below)
+        )
+    return answers
+
+
+# --- the decoder -----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Readout:
+    """What came of one readout: how many of the chosen sequences were named rightly, and the bits learnt."""
+
+    n_right: int
+    bits: float
+
+
+def read(world: World, *, decimals: int, channel: Channel | None = None) -> Readout:
+    """Decode one readout: the means of both files with so many decimals, and what a channel tells beside."""
+    masks = np.arange(1 << world.n_chosen, dtype=np.int64)
+    n_set = np.bitwise_count(masks).astype(np.int64)
+    weights = [
+        np.where(_fit(world, column, masks, decimals, channel), SHARES[column] ** n_set, 0.0)
+        for column in range(len(RANGES))
+    ]
+    weights.append((1 - SHARES.sum()) ** n_set)
+    whole = masks[-1]
+    likely = np.zeros((len(weights), world.n_chosen))
+    for i, weight in enumerate(weights):
+        rest = weights[:i] + weights[i + 1 :]
+        others = _either(_either(rest[0], rest[1]), _either(rest[2], rest[3]))
+        both = weight * others[whole ^ masks]
+        likely[i] = [both[(masks >> k) & 1 == 1].sum() for k in range(world.n_chosen)]
+    total = float(likely[:, 0].sum())
+    named = likely.argmax(axis=0)
+    return Readout(n_right=int((named == world.labels).sum()), bits=-float(np.log2(total)))
+
+
+def _fit(
+    world: World, column: int, masks: Masks, decimals: int, channel: Channel | None
+) -> NDArray[np.bool_]:
+    """Which of the sets of chosen sequences may be those of a range, by all that is published of it."""
+    n, base = world.counts[:, column].sum(), world.base[:, column].sum()
+    sums = world.moved(masks).sum(axis=0)
+    truth = world.mask(column)
+    before, after = (published(total / n, decimals=decimals) for total in (base, base + sums[truth]))
+    assert before is not None
+    assert after is not None
+    # Either mean is rounded: their difference is known to one unit of the last digit.
+    fits = np.abs(sums / n - (after - before)) <= 10.0**-decimals * (1 + 1e-9)
+    if channel is None:
+        return fits
+    candidates = masks[fits]
+    for start in range(0, len(candidates), 256):
+        some = candidates[start : start + 256]
+        # In one product, so that the same hypothesis gives the same answer to the last bit.
+        wanted, *answers = channel(world, column, np.append(truth, some))
+        fits[some] = [answer == wanted for answer in answers]
+    fits[truth] = True
+    return fits
+
+
+def _either(one: Floats, other: Floats) -> Floats:
+    """The weight of each set of sequences as a set of the one kind and a disjoint set of the other."""
+    ones, others = np.flatnonzero(one), np.flatnonzero(other)
+    if len(ones) > len(others):
+        return _either(other, one)
+    found = np.zeros_like(one)
+    for mask in ones.tolist():
+        disjoint = others[(others & mask) == 0]
+        found[disjoint | mask] += one[mask] * other[disjoint]
+    return found
+
+
+# --- the table -------------------------------------------------------------------------------------------
+
+WAYS: Final[dict[str, tuple[int, Channel | None]]] = {
+    "before: means": (2, None),
+    "before: means, p of one's own pair": (2, own_p),
+    "before: means, p and interval": (2, own_pair),
+    "now: means": (1, None),
+    "now: bound, if all but the chosen labels were known": (1, all_that_is_left),
+}
+
+
+def measured(
+    *, n_chosen: int, n_sequences: int, n_recordings: int, n_readouts: int, seed: int = 0
+) -> dict[str, tuple[float, float]]:
+    """For each way the mean number of sequences named rightly per readout, and the mean bits."""
+    found: dict[str, list[Readout]] = {name: [] for name in WAYS}
+    for k in range(n_readouts):
+        rng = np.random.default_rng((seed, k))
+        of = world(n_chosen=n_chosen, n_sequences=n_sequences, n_recordings=n_recordings, rng=rng)
+        for name, (decimals, channel) in WAYS.items():
+            found[name].append(read(of, decimals=decimals, channel=channel))
+    return {
+        name: (
+            float(np.mean([each.n_right for each in readouts])),
+            float(np.mean([each.bits for each in readouts])),
+        )
+        for name, readouts in found.items()
+    }
+
+
+def main() -> None:
+    """Print the table."""
+    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
+    import django  # noqa: PLC0415 - the settings have to be named first
+
+    django.setup()
+    parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--readouts", type=int, default=0)
+    options = parser.parse_args()
+    chosen = (8,) if options.quick else (8, 12)
+    n_readouts = options.readouts or (3 if options.quick else 12)
+    for n_sequences, n_recordings in ((4_000, 100), (28_600, 400)):
+        for n_chosen in chosen:
+            sys.stdout.write(
+                f"{n_sequences:,} sequences, {n_recordings} recordings, {n_chosen} chosen, {n_readouts} "
+                f"readouts; always naming “large”: {SHARES[2] * n_chosen:.1f}\n"
+            )
+            table = measured(
+                n_chosen=n_chosen,
+                n_sequences=n_sequences,
+                n_recordings=n_recordings,
+                n_readouts=n_readouts,
+            )
+            for name, (n_right, bits) in table.items():
+                sys.stdout.write(f"  {name:<52} {n_right:5.1f} right, {bits:5.1f} bits\n")
+
+
+if __name__ == "__main__":
+    main()
