@@ -27,6 +27,7 @@ from leaderboard.names import look
 DAY = timedelta(days=1)
 # What a scene adds to the world.
 _SWEPT = (
+    "truthcomparison",
     *("score", "analysis", "comparison", "evaluation", "idempotencykey", "submission", "publication"),
     *("apitoken", "invitation", "quotaoverride", "method", "membership", "team", "boardversion", "snapshot"),
 )
@@ -89,6 +90,7 @@ def scene(world: World) -> Scene:
     due = Method(team=team, name="Due", visibility=Visibility.ANONYMOUS, shown_at=now, reveal_at=now - DAY)
     Method.objects.bulk_create([public, private, hers, due])
     row = {"split_id": split, "submitted_by": owner, "via": "API", "size_bytes": 2, "submitted_at": now}
+    row["manifest_digest"] = world.edition.ground_truth.manifest_digest
     sent, lost, scored, his, revealed = (
         Submission(method=method, digest=f"sha256:{uuid.uuid4().hex}", **row)
         for method in (public, public, public, hers, due)
