@@ -21,6 +21,7 @@ from leaderboard import (
     methods,
     quotas,
     teams,
+    verdicts,
 )
 from leaderboard.entries import Interval, scored_of
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
@@ -368,41 +369,10 @@ def progress(submission: Submission) -> Progress:
         problems=evaluation.problems,
         n_problems=evaluation.n_problems,
         fault_is_ours=evaluation.status == Status.SYSTEM_ERROR,
-        sentence=_sentence(evaluation),
+        sentence=verdicts.sentence_of(evaluation),
         is_final=evaluation.is_final,
         edition_number=evaluation.edition.number,
         decimals=evaluation.edition.decimals,
         protocol=evaluation.edition.protocol,
         kept_in=evaluation.kept_in,
     )
-
-
-def _sentence(evaluation: Evaluation) -> str:
-    """Whose fault it was, or what goes on, where that needs saying."""
-    n_failed = evaluation.n_poison_strikes + evaluation.n_infrastructure_strikes
-    match evaluation.status:
-        case Status.REJECTED if evaluation.kept_in is not None:
-            return (
-                f"Edition {evaluation.edition.number} cannot score this file. It keeps its result in edition "
-                f"{evaluation.kept_in}, and its slot of the quota is given back."
-            )
-        case Status.REJECTED:
-            n = evaluation.n_problems
-            found = f"it has {n:,} problems" if n != 1 else "it has a problem"
-            return f"The file is at fault: {found}, so nothing of it was scored."
-        case Status.SYSTEM_ERROR:
-            tries = f"{n_failed} times" if n_failed != 1 else "once"
-            is_poison = evaluation.n_poison_strikes >= lifecycle.MAX_POISON_STRIKES
-            counts = " Until then it counts among the files rejected within 24 hours." if is_poison else ""
-            return (
-                f"The fault is ours, not the file's: scoring it failed {tries}. The file is kept; the "
-                f"maintainers see it and can have it scored again.{counts}"
-            )
-        case Status.CANCELLED:
-            return "Its team cancelled it before it was scored."
-        case Status.QUEUED | Status.RUNNING if n_failed:
-            tries = f"{n_failed} tries" if n_failed != 1 else "One try"
-            return (
-                f"{tries} ended without a result. That says nothing of the file; it is tried again by itself."
-            )
-    return ""
