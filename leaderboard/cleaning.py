@@ -1,25 +1,36 @@
 """Files that no submission names: left of uploads that were refused, or whose rows were never written.
 
 A submission's bytes are stored before its rows, so that nothing is acknowledged and then lost; the price is a
-file too many now and then. Only what has not been written for a day is looked at.
+file too many now and then. A request that is refused once its file is stored removes it. What was left all
+the same (a process was killed, a database went away) is removed once it has not been written for a day.
+
+Equal bytes are one file, whoever sends them. So whoever is about to write a row holds the file, and looks
+whether it is still there; and whoever removes one has it alone, and looks whether no row names it.
 """
 
+import hashlib
 import re
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Final
 
-from django.db import transaction
+import structlog
+from django.db import connection, transaction
 
 from leaderboard import audit, files
 from leaderboard.models import Submission
+
+log = structlog.get_logger(__name__)
 
 MIN_AGE: Final = timedelta(days=1)
 FOLDERS: Final = ("predictions", "aligned")
 _NAMED: Final = re.compile(r"([0-9a-f]{64})\.(?:json|f8)")
 _BATCH: Final = 500
+# Names the files among PostgreSQL's advisory locks: "file" in ASCII.
+_LOCKS: Final = 0x66696C65
 
 
 @dataclass(frozen=True)
@@ -39,15 +50,19 @@ def orphans(*, now: datetime) -> Iterator[Orphan]:
     """
     for folder in FOLDERS:
         for name, digest in _without_rows(folder):
-            modified_at = files.store().get_modified_time(name)
+            try:
+                modified_at = files.store().get_modified_time(name)
+                size_bytes = files.store().size(name)
+            except FileNotFoundError:
+                continue  # it was removed meanwhile
             if modified_at < now - MIN_AGE:
-                yield Orphan(name, digest, files.store().size(name), modified_at)
+                yield Orphan(name, digest, size_bytes, modified_at)
 
 
 def remove(orphan: Orphan, *, now: datetime) -> bool:
     """Remove an orphan, unless it has become a submission's meanwhile. Returns whether it was removed."""
     with transaction.atomic():
-        if Submission.objects.filter(digest=orphan.digest).exists():
+        if not _held_alone(orphan.digest) or Submission.objects.filter(digest=orphan.digest).exists():
             return False
         # Written first, so that nothing is ever removed without a trace; undone if nothing was.
         audit.record(
@@ -56,9 +71,61 @@ def remove(orphan: Orphan, *, now: datetime) -> bool:
             noun_id=orphan.digest,
             details={"name": orphan.name, "size_bytes": orphan.size_bytes},
         )
-        is_removed: bool = files.store().delete_if_older(orphan.name, now - MIN_AGE)  # type: ignore[attr-defined]  # both stores have it
+        try:
+            is_removed: bool = files.store().delete_if_older(orphan.name, now - MIN_AGE)  # type: ignore[attr-defined]  # both stores have it
+        except FileNotFoundError:
+            is_removed = False  # somebody else was first
         transaction.set_rollback(not is_removed)
     return is_removed
+
+
+@contextmanager
+def unless_refused(*refusals: type[Exception], digest: str) -> Iterator[None]:
+    """Remove the stored file if one of these is raised, unless a submission names it or is about to.
+
+    To be entered before the transaction that writes the row, which is undone by then.
+    """
+    try:
+        yield
+    except refusals:
+        try:
+            is_removed = _remove_unnamed(digest)
+            log.info("refused_file", digest=digest, is_removed=is_removed)
+        except OSError as fault:
+            # The answer is the refusal all the same; the file is removed in a day.
+            log.warning("refused_file_stays", digest=digest, reason=str(fault)[:200])
+        raise
+
+
+def _remove_unnamed(digest: str) -> bool:
+    with transaction.atomic():
+        if not _held_alone(digest) or Submission.objects.filter(digest=digest).exists():
+            return False
+        files.store().delete(files.predictions_name(digest))
+    return True
+
+
+def hold(digest: str) -> None:
+    """Let nobody remove a file of this digest until the transaction ends; others may hold it as well.
+
+    It is the first lock of its transaction, so whoever removes one keeps nobody waiting who has another.
+    """
+    _lock("pg_advisory_xact_lock_shared", digest)
+
+
+def _held_alone(digest: str) -> bool:
+    """Whether nobody else holds the file, which stays so until the transaction ends."""
+    return _lock("pg_try_advisory_xact_lock", digest)
+
+
+def _lock(function: str, digest: str) -> bool:
+    # SQLite has one writer at a time, who holds everything alone.
+    if connection.vendor != "postgresql":
+        return True
+    number = int.from_bytes(hashlib.sha256(digest.encode()).digest()[:4], signed=True)
+    with connection.cursor() as cursor:
+        cursor.execute(f"SELECT {function}(%s, %s)", [_LOCKS, number])
+        return cursor.fetchone() != (False,)
 
 
 def leftovers() -> list[Path]:

@@ -161,6 +161,14 @@ def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
     return kept
 
 
+def keep_still(upload: "File[bytes]", *, digest: str) -> None:
+    """Keep an uploaded file again if it was removed meanwhile; for whoever has `cleaning.hold`."""
+    name = predictions_name(digest)
+    if not store().exists(name):
+        upload.seek(0)
+        store().save(name, upload)
+
+
 def _is_fresh(name: str, *, now: datetime) -> bool:
     try:
         return store().exists(name) and store().get_modified_time(name) >= now - FRESH

@@ -1,6 +1,6 @@
 """Figures for Prometheus, read from the database when they are asked for.
 
-So they are the same from every process on every machine, and a restart loses nothing. Three statements a
+So they are the same from every process on every machine, and a restart loses nothing. Four statements a
 scrape; the counters are counts of rows that never change again.
 """
 
@@ -27,7 +27,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 
 from leaderboard import health
-from leaderboard.models import Evaluation, Status
+from leaderboard.models import Evaluation, Status, SweepBeat
 
 PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
 BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
@@ -48,7 +48,7 @@ class DatabaseCollector(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Every figure, from three statements."""
+        """Every figure, from four statements."""
         yield from _queue(list(_by_status()))
         yield from _durations(list(_by_bucket()))
         yield _gauge(
@@ -56,6 +56,7 @@ class DatabaseCollector(Collector):
             "Time since the queue was last looked after; NaN if it never was.",
             {(): _or_nan(health.sweep_age_s())},
         )
+        yield from _cleaning()
 
 
 # --- the queue and the states ---------------------------------------------------------------------------
@@ -115,6 +116,23 @@ def _queue(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
         },
         labels=["kind"],
     )
+
+
+def _cleaning() -> Iterator[Metric]:
+    beat = SweepBeat.objects.annotate(
+        age=ExpressionWrapper(Now() - F("cleaned_at"), output_field=DurationField())
+    ).first()
+    age = beat.age if beat else None
+    yield _gauge(
+        "tsttc_last_clean_age_seconds",
+        "Time since stored files that no submission names were last looked for; NaN if they never were.",
+        {(): _or_nan(None if age is None else age.total_seconds())},
+    )
+    n_files, n_bytes = (beat.n_files_removed, beat.n_bytes_removed) if beat else (0, 0)
+    for what, n in (("files", n_files), ("bytes", n_bytes)):
+        yield _counter(
+            f"tsttc_unnamed_{what}_removed", f"Of such files, the {what} that were removed.", {(): n}
+        )
 
 
 # --- how long it takes ----------------------------------------------------------------------------------

@@ -156,8 +156,8 @@ class S3FileStore(S3Storage):
     def delete_if_older(self, name: str, than: datetime) -> bool:
         """Remove a file unless it was written after `than`; whether it was removed.
 
-        S3 has no rename, so a file that is written again between the question and the removal is lost: a
-        matter of milliseconds, for a file that nobody has named for a day.
+        S3 has no rename, so a file that is written again between the question and the removal is removed too.
+        Whoever wrote it looks again before a row names it (`leaderboard/cleaning.py`).
         """
         if self.get_modified_time(name) >= than:
             return False

@@ -276,6 +276,8 @@ CELERY_WORKER_SOFT_SHUTDOWN_TIMEOUT = 20
 CELERY_WORKER_HIJACK_ROOT_LOGGER = False
 CELERY_BEAT_SCHEDULE_FILENAME = str(DATA_DIR / "celerybeat-schedule")
 CELERY_BEAT_MAX_LOOP_INTERVAL = min(5.0, SWEEP_S)
+# How often stored files that no submission names are removed (see leaderboard/upkeep.py).
+CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 CELERY_BEAT_SCHEDULE = {
     "sweep": {
         "task": "leaderboard.tasks.sweep",
@@ -283,6 +285,7 @@ CELERY_BEAT_SCHEDULE = {
         # A sweep that waited longer than its own period has been overtaken by the next one.
         "options": {"expires": max(2 * SWEEP_S, 5.0)},
     },
+    "clean": {"task": "leaderboard.tasks.clean", "schedule": schedule(timedelta(seconds=CLEAN_S))},
 }
 
 # --- accounts --------------------------------------------------------------------------------------------

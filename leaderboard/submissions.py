@@ -14,6 +14,7 @@ from leaderboard import (
     admissions,
     audit,
     boards,
+    cleaning,
     deadlines,
     estimates,
     files,
@@ -105,8 +106,11 @@ def submit(
     if first is not None:
         return Submitted(submission=first, is_new=False)
     kept = files.keep_predictions(upload, now=now)
-    with transaction.atomic():
-        # First of all: whoever founds a team has the audit trail from then on, and waits for nothing more.
+    refused = cleaning.unless_refused(Refused, quotas.QuotaExceeded, digest=kept.digest)
+    with refused, transaction.atomic():
+        cleaning.hold(kept.digest)
+        files.keep_still(upload, digest=kept.digest)
+        # Before the team: whoever founds a team has the audit trail from then on, and waits for nothing more.
         # From here on the board stays, so the file is queued in an edition with the manifest named below.
         split = Split.objects.lock_shared(split.pk)
         team = teams.team_of(user=user)

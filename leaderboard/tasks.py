@@ -5,7 +5,7 @@ import random
 from celery import shared_task
 from django.utils import timezone
 
-from leaderboard import backlog, queue, scoring, snapshots
+from leaderboard import backlog, clock, queue, scoring, snapshots, upkeep
 
 
 @shared_task(name="leaderboard.tasks.nudge")
@@ -18,6 +18,12 @@ def nudge(evaluation_id: str) -> None:
 def sweep() -> None:
     """Take back what dead workers hold and nudge again what waits."""
     queue.sweep(rng=random.Random())  # noqa: S311 - jitter, not a secret
+
+
+@shared_task(name="leaderboard.tasks.clean")
+def clean() -> None:
+    """Remove stored files that no submission names, and what has had its time."""
+    upkeep.clean(now=clock.database_now())
 
 
 @shared_task(name="leaderboard.tasks.infer")

@@ -19,7 +19,7 @@ Deed = Callable[[], object]
 # Whether a statement is where to hold: by its number within the deed's transactions, and by its text.
 Place = Callable[[int, str], bool]
 # The last lock that a verb takes, after which it writes its deed and ends.
-AUDIT_LOCK = "pg_advisory_xact_lock"
+AUDIT_LOCK = "SET CONSTRAINTS ALL IMMEDIATE"
 PATIENCE_S = 60.0
 LOOK_EVERY_S = 0.001
 

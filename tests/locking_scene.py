@@ -1,6 +1,7 @@
 """A small scene that all verbs which take locks can be done in: people, methods, submissions, editions."""
 
 import uuid
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
@@ -22,6 +23,7 @@ from leaderboard.models import (
     User,
     Visibility,
 )
+from leaderboard.models.submissions import SentFile
 from leaderboard.names import look
 
 DAY = timedelta(days=1)
@@ -38,6 +40,7 @@ class World:
     """What stays from scene to scene: a board with two entries, and the maintainer."""
 
     edition: Edition
+    files: Sequence[SentFile]  # whose sums per recording are kept
     correction: GroundTruth  # with its values, and no edition
     maintainer: User
     folder: Path
@@ -92,8 +95,8 @@ def scene(world: World) -> Scene:
     row = {"split_id": split, "submitted_by": owner, "via": "API", "size_bytes": 2, "submitted_at": now}
     row["manifest_digest"] = world.edition.ground_truth.manifest_digest
     sent, lost, scored, his, revealed = (
-        Submission(method=method, digest=f"sha256:{uuid.uuid4().hex}", **row)
-        for method in (public, public, public, hers, due)
+        Submission(method=method, **file._asdict(), **row)
+        for method, file in zip((public, public, public, hers, due), world.files, strict=True)
     )
     Submission.objects.bulk_create([sent, lost, scored, his, revealed])
     truth = _truth_like(world)
@@ -115,7 +118,7 @@ def scene(world: World) -> Scene:
         submission=scored, edition=world.edition, status="SCORED", finished_at=now, finished_attempt=0
     )
     decided.save()
-    # Of so few recordings there is no interval: whoever makes intervals takes this one away.
+    # No interval of this entry: whoever makes intervals changes it.
     Score.objects.create(
         evaluation=decided, metric="mid", interval="overall", value=12.5, low=12.0, high=13.0
     )

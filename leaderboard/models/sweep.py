@@ -15,6 +15,11 @@ class SweepBeat(models.Model):
         default=0, help_text="What waited for a ground truth that the sweeping worker cannot read."
     )
 
+    # What was removed because no submission named it (see leaderboard/upkeep.py), since the beginning.
+    cleaned_at = models.DateTimeField(null=True, blank=True)
+    n_files_removed = models.PositiveBigIntegerField(default=0)
+    n_bytes_removed = models.PositiveBigIntegerField(default=0)
+
     class Meta:
         constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]
 

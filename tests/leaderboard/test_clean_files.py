@@ -11,9 +11,10 @@ from django.core.files.base import ContentFile
 from django.core.management import CommandError, call_command
 from django.utils import timezone
 from pytest_django import Settings
+from structlog.testing import capture_logs
 
-from leaderboard import cleaning, files
-from leaderboard.models import AuditEvent, Edition, Submission, User
+from leaderboard import cleaning, files, health, metrics, tasks, upkeep
+from leaderboard.models import AuditEvent, Edition, IdempotencyKey, Submission, User
 from tests import builders
 
 
@@ -163,3 +164,49 @@ def test_store_that_does_not_answer_is_said_in_a_sentence(db: None, settings: Se
     }
     with pytest.raises(CommandError, match="The file store does not answer: the file store does not answer"):
         clean()
+
+
+# --- by itself ---------------------------------------------------------------------------------------------
+
+
+def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path, settings: Settings) -> None:
+    assert settings.CELERY_BEAT_SCHEDULE["clean"]["task"] == tasks.clean.name
+    health.record_sweep()
+    incoming = Path(settings.FILES_DIR) / files.INCOMING
+    incoming.mkdir(exist_ok=True)
+    half = incoming / "tmpold"
+    half.write_bytes(b'{"0": 1')
+    age(half, hours=2)
+    with capture_logs() as lines:
+        tasks.clean()
+    [line] = [line for line in lines if line["event"] == "cleaned"]
+    assert (line["n_files"], line["n_bytes"], line["n_leftovers"], line["n_keys"]) == (1, 10, 1, 0)
+    assert not orphan.exists()
+    assert not half.exists()
+    assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1
+    printed = metrics.exposition().decode()
+    assert "tsttc_unnamed_files_removed_total 1.0" in printed
+    assert "tsttc_unnamed_bytes_removed_total 10.0" in printed
+    assert "tsttc_last_clean_age_seconds NaN" not in printed
+
+
+def test_two_that_clean_at_once_remove_a_file_once(orphan: Path) -> None:
+    now = timezone.now()
+    found = [list(cleaning.orphans(now=now)) for _ in range(2)]
+    assert [[cleaning.remove(row, now=now) for row in rows] for rows in found] == [[True], [False]]
+    assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1
+
+
+def test_old_idempotency_keys_go_with_them(edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition))
+    now = timezone.now()
+    for days in (1, 8):
+        IdempotencyKey.objects.create(
+            user=owner,
+            key=f"{days} days",
+            request_digest="sha256:0",
+            submission=sent,
+            created_at=now - timedelta(days=days),
+        )
+    assert upkeep.clean(now=now).n_keys == 1
+    assert IdempotencyKey.objects.get().key == "1 days"

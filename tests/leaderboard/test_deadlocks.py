@@ -14,8 +14,12 @@ import pytest
 from django.db import connection
 from django.utils import timezone
 
-from leaderboard import ground_truth, lifecycle, quotas, rescoring
+from evaluator import read_predictions
+from evaluator.protocol import get_protocol
+from evaluator.scoring import Scorer
+from leaderboard import bags, ground_truth, lifecycle, quotas, rescoring
 from leaderboard.models import User
+from leaderboard.models.submissions import SentFile
 from leaderboard.outages import outage_of
 from leaderboard.texts import Refused
 from tests import builders
@@ -48,7 +52,13 @@ def world(benchmark: None, maintainer: User, tmp_path: Path) -> World:
     edition = builders.import_truth(tmp_path, n=40, n_recordings=10)
     path = builders.truth_csv(tmp_path / "corrected.csv", n=40, n_recordings=10, seed=2)
     row = ground_truth.add(split_name="test", path=path, now=timezone.now(), actor=None)
-    return World(edition=edition, correction=row, maintainer=maintainer, folder=tmp_path)
+    truth = ground_truth.load(edition.ground_truth_id)
+    predictions = read_predictions(builders.predictions(edition), manifest=truth.manifest)
+    report = Scorer(truth, get_protocol(edition.protocol)).report(predictions, keep_bags=True)
+    files = [SentFile(f"sha256:{number:064}", truth.manifest.digest) for number in range(5)]
+    for file in files:
+        bags.keep(edition, file=file, bags=report.bags)
+    return World(edition=edition, files=files, correction=row, maintainer=maintainer, folder=tmp_path)
 
 
 @pytest.fixture

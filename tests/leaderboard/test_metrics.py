@@ -123,13 +123,13 @@ def test_age_of_the_last_sweep_is_there(db: None) -> None:
     assert 0 <= figures()["tsttc_last_sweep_age_seconds"] < 30
 
 
-def test_a_scrape_is_three_statements(
+def test_a_scrape_is_four_statements(
     edition: Edition, owner: User, django_assert_num_queries: DjangoAssertNumQueries
 ) -> None:
     for _ in range(3):
         queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
-    with django_assert_num_queries(3):
+    with django_assert_num_queries(4):
         metrics.exposition()
 
 

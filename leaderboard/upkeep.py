@@ -1,0 +1,45 @@
+"""What is removed by itself, every few hours: files that no submission names, and what has had its time."""
+
+from dataclasses import dataclass
+from datetime import datetime
+
+import structlog
+from django.db.models import F
+
+from leaderboard import cleaning, idempotency
+from leaderboard.models import SweepBeat
+
+log = structlog.get_logger(__name__)
+
+
+@dataclass(frozen=True)
+class Cleaned:
+    """What was removed."""
+
+    n_files: int
+    n_bytes: int
+    n_leftovers: int  # half-written files of processes that were killed
+    n_keys: int  # idempotency keys
+
+
+def clean(*, now: datetime) -> Cleaned:
+    """Remove what nobody needs. Several may do it at once; each file is removed by one of them.
+
+    Raises `OSError` if the store does not answer; what was removed until then stays removed.
+    """
+    n_keys = idempotency.forget(now=now)
+    n_files = n_bytes = n_leftovers = 0
+    for orphan in cleaning.orphans(now=now):
+        if cleaning.remove(orphan, now=now):
+            n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
+    for path in cleaning.leftovers():
+        path.unlink(missing_ok=True)
+        n_leftovers += 1
+    SweepBeat.objects.update(
+        cleaned_at=now,
+        n_files_removed=F("n_files_removed") + n_files,
+        n_bytes_removed=F("n_bytes_removed") + n_bytes,
+    )
+    cleaned = Cleaned(n_files, n_bytes, n_leftovers, n_keys)
+    log.info("cleaned", **vars(cleaned))
+    return cleaned

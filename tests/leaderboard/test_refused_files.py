@@ -1,0 +1,199 @@
+"""A refused upload leaves no file, and takes nobody else's away: equal bytes are one file."""
+
+import random
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.core.files.base import ContentFile
+from django.db import connection
+from django.utils import timezone
+
+from leaderboard import cleaning, files, quotas, submissions, teams
+from leaderboard.models import Edition, Split, Submission, User
+from leaderboard.texts import Refused
+from tests import builders
+from tests.interlocking import Meeting
+from tests.leaderboard.test_races import at_once
+from tests.services import crowd_on_postgres
+
+DATA = b'{"0": 1.5}'
+on_postgresql = [
+    pytest.mark.services,
+    pytest.mark.skipif(
+        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
+    ),
+]
+
+
+class Meanwhile(ContentFile):  # type: ignore[type-arg]  # of bytes
+    """An upload during which something else happens: once it is read, and before anything is locked."""
+
+    def __init__(self, data: bytes, deed: Callable[[], object]) -> None:
+        super().__init__(data, name="p.json")
+        self._deeds = [deed]
+
+    def chunks(self, chunk_size: int | None = None) -> Iterator[Any]:
+        """The bytes, after the deed."""
+        while self._deeds:
+            self._deeds.pop()()
+        return super().chunks(chunk_size)
+
+
+def send(user: User, upload: "ContentFile[Any]", *, method: str = "Foo") -> submissions.Submitted:
+    return submissions.submit(
+        user=user,
+        split_name="test",
+        method_name=method,
+        upload=upload,
+        via=Submission.Via.API,
+        now=timezone.now(),
+    )
+
+
+def file_of(data: bytes) -> ContentFile:  # type: ignore[type-arg]  # of bytes
+    return ContentFile(data, name="p.json")
+
+
+def stored(tmp_path: Path) -> list[str]:
+    """The digests of the prediction files there are."""
+    return sorted(f"sha256:{path.stem}" for path in (tmp_path / "files" / "predictions").rglob("*.json"))
+
+
+def one_slot() -> None:
+    Split.objects.filter(pk="test").update(quota_limit=1, quota_window=timedelta(days=1))
+
+
+def test_a_file_whose_slot_was_taken_meanwhile_is_not_kept(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    one_slot()
+    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first")))
+    with pytest.raises(quotas.QuotaExceeded):
+        send(owner, upload)
+    [first] = Submission.objects.all()
+    assert stored(tmp_path) == [first.digest]
+
+
+def test_a_file_whose_name_was_taken_meanwhile_is_not_kept(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first"), method="Foo"))
+    with pytest.raises(Refused, match="looks like"):
+        send(owner, upload, method="F0o")
+    [first] = Submission.objects.all()
+    assert stored(tmp_path) == [first.digest]
+
+
+def test_a_refused_file_that_a_submission_names_stays(
+    edition: Edition, owner: User, stranger: User, tmp_path: Path
+) -> None:
+    one_slot()
+    theirs = send(stranger, file_of(DATA)).submission
+    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first")))
+    with pytest.raises(quotas.QuotaExceeded):
+        send(owner, upload)
+    assert theirs.digest in stored(tmp_path)
+
+
+def test_a_file_that_is_removed_before_its_row_is_written_is_kept_again(
+    edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    """By somebody else who was refused with the same bytes."""
+    teams.team_of(user=owner)
+
+    def remove(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
+        if not removed and "SAVEPOINT" in sql:
+            removed.append(DATA)
+            files.store().delete(files.predictions_name(files.measure(file_of(DATA)).digest))
+        return execute(sql, *rest)
+
+    removed: list[bytes] = []
+    with connection.execute_wrapper(remove):
+        sent = send(owner, file_of(DATA)).submission
+    assert removed
+    assert stored(tmp_path) == [sent.digest]
+
+
+def test_a_store_that_does_not_answer_does_not_hide_the_refusal(
+    edition: Edition, owner: User, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    one_slot()
+    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first")))
+
+    def fail(self: object, name: str) -> None:
+        raise files.StoreAway("away")
+
+    monkeypatch.setattr(files.DurableFileSystemStorage, "delete", fail)
+    with pytest.raises(quotas.QuotaExceeded):
+        send(owner, upload)
+    assert len(stored(tmp_path)) == 2, "the cleaning finds it in a day"
+
+
+# --- at the same moment ----------------------------------------------------------------------------------
+
+
+@pytest.mark.django_db(transaction=True)
+class TestAtOnce:
+    """On PostgreSQL, where several write at once."""
+
+    pytestmark = on_postgresql
+
+    def test_of_a_burst_the_one_that_was_taken_leaves_a_file(
+        self, edition: Edition, owner: User, tmp_path: Path
+    ) -> None:
+        one_slot()
+        teams.team_of(user=owner)
+
+        def sent(number: int) -> bool:
+            try:
+                return send(owner, file_of(random.Random(number).randbytes(1000))).is_new
+            except quotas.QuotaExceeded:
+                return False
+
+        assert sum(at_once(12, sent)) == 1
+        assert stored(tmp_path) == [Submission.objects.get().digest]
+
+    @pytest.mark.parametrize("held", ["refused", "accepted"])
+    def test_no_moment_loses_the_bytes_that_another_team_has_acknowledged(
+        self, edition: Edition, owner: User, stranger: User, tmp_path: Path, held: str
+    ) -> None:
+        """One of the two is held after each of its statements in turn, while the other does all it can."""
+        for user in (owner, stranger):
+            teams.team_of(user=user)
+        # Of the same name as the other's method, so only the owner's is refused, and under the lock.
+        builders.submit(owner, b"first", method="Foo")
+        with crowd_on_postgres(), Meeting(1) as meeting:
+            number, was_held = 0, True
+            while was_held:
+                number += 1
+                data = b"%d" % number
+                deeds = {
+                    "refused": lambda data=data: refused(owner, data),
+                    "accepted": lambda data=data: send(stranger, file_of(data)),
+                }
+                first, second = deeds.pop(held), *deeds.values()
+                outcome = meeting.of(first, second, at=lambda found, sql, n=number: found == n)
+                was_held = outcome.was_held
+                assert outcome.faults == (None, None)
+                [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)
+                assert kept.digest in stored(tmp_path), f"held at statement {number}"
+        assert number > 5
+
+
+def refused(user: User, data: bytes) -> None:
+    """Send a file that is refused once it is stored, since its method's name looks like another one."""
+    name = f"Bar {data.decode()}"
+    meanwhile = Meanwhile(data, lambda: send(user, file_of(b"other" + data), method=name))
+    with pytest.raises(Refused, match="looks like"):
+        send(user, meanwhile, method=name.replace("a", "а"))
+
+
+def test_old_files_are_cleaned_by_the_same_rule(edition: Edition, owner: User, tmp_path: Path) -> None:
+    """What `cleaning.remove` does is proved in test_clean_files.py; that it takes the same lock, here."""
+    kept = files.keep_predictions(file_of(DATA), now=timezone.now())
+    orphan = cleaning.Orphan(files.predictions_name(kept.digest), kept.digest, 10, timezone.now())
+    assert cleaning.remove(orphan, now=timezone.now() + timedelta(days=2))
+    assert stored(tmp_path) == []
