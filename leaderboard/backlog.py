@@ -12,7 +12,16 @@ from functools import partial
 import structlog
 
 from evaluator import Rejected
-from leaderboard import analyses, comparisons, ground_truth, inference, lifecycle, quarantine, scoring
+from leaderboard import (
+    analyses,
+    comparisons,
+    ground_truth,
+    inference,
+    lifecycle,
+    quarantine,
+    questions,
+    scoring,
+)
 
 log = structlog.get_logger(__name__)
 
@@ -51,10 +60,13 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
     held = ground_truth.held()
     for old, new in ground_truth.uncompared(held=held):
         yield partial(ground_truth.count_changes, old, new)
-    asked = comparisons.waiting(held=held).select_related(
+    asked = questions.waiting(held=held).select_related(
         "edition__ground_truth", "first__submission", "second__submission"
     )
-    for row in asked[:MAX_AT_ONCE]:
+    begun: list[int] = []
+    # Asked anew each time: somebody else may have come, whose turn it is.
+    while len(begun) < MAX_AT_ONCE and (row := asked.exclude(pk__in=begun).first()) is not None:
+        begun.append(row.pk)
         yield partial(comparisons.compute, row, now=now)
     for edition in inference.stale(now=now, held=held):
         yield partial(inference.infer, edition=edition, now=now, between=between)
@@ -73,5 +85,5 @@ def _let_live_work_by(*, rng: random.Random, is_stopping: Callable[[], bool]) ->
 def editions_waiting(*, now: datetime) -> list[int]:
     """Editions of which something waits, for whoever tells the workers. Also forgets what must not stay."""
     analyses.forget_hidden()
-    asked = comparisons.waiting().values_list("edition", flat=True)[:MAX_AT_ONCE]
+    asked = questions.waiting().values_list("edition", flat=True)[:MAX_AT_ONCE]
     return sorted({edition.pk for edition in inference.stale(now=now, held=None)} | set(asked))

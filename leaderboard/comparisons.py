@@ -6,25 +6,21 @@ the answer is complete.
 """
 
 import itertools
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
-from functools import partial
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
-from django.db.models import QuerySet
 
 from evaluator import Difference, differences, sentences
 from evaluator.protocol import SCORE_NAMES
-from leaderboard import bags, broker, disclosure, entries, inference, snapshots, standings
+from leaderboard import bags, disclosure, entries, inference, questions, snapshots, standings
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.standings import Entry
 
 MIN_METHODS, MAX_METHODS = 2, 5
-# A worker takes a fraction of a second for each; nobody's questions may keep all the others' waiting.
-MAX_WAITING = 500
 
 
 class BadComparison(Exception):
@@ -105,13 +101,15 @@ def of(
     viewer: User | AnonymousUser,
     now: datetime,
     edition: Edition | None = None,
+    address: str = "",
 ) -> Compared:
     """Compare two to five methods of one board: the published edition's unless another is named.
 
     Pairs that no worker has compared yet have `differences` None; they are asked for, and the workers told.
     Of pairs that `disclosure.why_withheld` names, there is the difference of the published values alone.
-    Raises `BadComparison` for another number of methods or the same one twice, `UnknownMethod` for one that
-    the viewer may not see, `NotOnTheBoard` for one without a value there.
+    A visitor's places are counted by the `address` that they ask from. Raises `BadComparison` for another
+    number of methods or the same one twice, `UnknownMethod` for one that the viewer may not see,
+    `NotOnTheBoard` for one without a value there, `questions.TooManyWaiting` if there is no place.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
@@ -120,8 +118,13 @@ def of(
     asked = list(itertools.combinations(chosen, 2))
     withheld = _withheld(board.edition, asked)
     known = _known(board.edition, chosen)
-    told = [pair for pair in asked if _key(pair) not in withheld]
-    _ask(board.edition, [pair for pair in told if _key(pair) not in known], now=now)
+    told = [key for key in map(_key, asked) if key not in withheld]
+    questions.ask(
+        edition=board.edition,
+        pairs=[key for key in told if key not in known or known[key].differences is None],
+        asker=questions.asker_of(user=viewer, address=address),
+        now=now,
+    )
     pairs = tuple(
         _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
         for pair in asked
@@ -197,20 +200,6 @@ def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[tuple[UUID, UUID],
     return {(row.first_id, row.second_id): row for row in rows}
 
 
-def _ask(edition: Edition, pairs: Sequence[tuple[Entry, Entry]], *, now: datetime) -> None:
-    """Note what nobody has asked for yet, and tell the workers; beyond a limit, whoever asks asks again."""
-    # Of this edition: where no worker has the values of another one, only what is asked of that waits on.
-    if not pairs or Comparison.objects.filter(edition=edition, computed_at=None).count() >= MAX_WAITING:
-        return
-    rows = [
-        Comparison(edition=edition, first_id=first, second_id=second, asked_at=now)
-        for first, second in map(_key, pairs)
-    ]
-    with transaction.atomic():
-        Comparison.objects.bulk_create(rows, ignore_conflicts=True)
-        transaction.on_commit(partial(broker.infer, edition.pk), robust=True)
-
-
 def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
     if row is None or row.differences is None:
         return Pair(first, second, None)
@@ -231,19 +220,12 @@ def _n_methods(n: int) -> str:
 # --- a worker's work -------------------------------------------------------------------------------------
 
 
-def waiting(*, held: Collection[str] | None = None) -> QuerySet[Comparison]:
-    """What was asked for and is not computed, the oldest first; with `held` what this worker can compute."""
-    rows = Comparison.objects.filter(computed_at=None).order_by("asked_at", "pk")
-    return rows if held is None else rows.filter(edition__ground_truth__in=held)
-
-
 def compute(row: Comparison, *, now: datetime) -> None:
     """Compare the two entries of a row, recording by recording, and write what came of it, once.
 
     Raises what `bags.sums_of` raises; the row waits on then.
     """
-    # First to the end of the line: what cannot be computed, again and again, keeps nothing else waiting.
-    Comparison.objects.filter(pk=row.pk, computed_at=None).update(asked_at=now)
+    questions.begin(row, now=now)
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
     first, second = (bags.sums_of(edition, file=file) for file in sent)
@@ -261,6 +243,8 @@ def compute(row: Comparison, *, now: datetime) -> None:
         )
         for name, gap in found.items()
     }
-    Comparison.objects.filter(pk=row.pk, computed_at=None).update(
-        differences={name: asdict(gap) for name, gap in shown.items()}, computed_at=now
-    )
+    with transaction.atomic():
+        Comparison.objects.filter(pk=row.pk, computed_at=None).update(
+            differences={name: asdict(gap) for name, gap in shown.items()}, computed_at=now
+        )
+        questions.end(row)

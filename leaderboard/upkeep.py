@@ -6,7 +6,7 @@ from datetime import datetime
 import structlog
 from django.db.models import F
 
-from leaderboard import cleaning, idempotency
+from leaderboard import cleaning, idempotency, questions
 from leaderboard.models import SweepBeat
 
 log = structlog.get_logger(__name__)
@@ -20,6 +20,7 @@ class Cleaned:
     n_bytes: int
     n_leftovers: int  # half-written files of processes that were killed
     n_keys: int  # idempotency keys
+    n_questions: int  # about comparisons that no worker could compute
 
 
 def clean(*, now: datetime) -> Cleaned:
@@ -28,6 +29,7 @@ def clean(*, now: datetime) -> Cleaned:
     Raises `OSError` if the store does not answer; what was removed until then stays removed.
     """
     n_keys = idempotency.forget(now=now)
+    n_questions = questions.forget(now=now)
     n_files = n_bytes = n_leftovers = 0
     for orphan in cleaning.orphans(now=now):
         if cleaning.remove(orphan, now=now):
@@ -40,6 +42,6 @@ def clean(*, now: datetime) -> Cleaned:
         n_files_removed=F("n_files_removed") + n_files,
         n_bytes_removed=F("n_bytes_removed") + n_bytes,
     )
-    cleaned = Cleaned(n_files, n_bytes, n_leftovers, n_keys)
+    cleaned = Cleaned(n_files, n_bytes, n_leftovers, n_keys, n_questions)
     log.info("cleaned", **vars(cleaned))
     return cleaned

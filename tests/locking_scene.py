@@ -29,9 +29,9 @@ from leaderboard.names import look
 DAY = timedelta(days=1)
 # What a scene adds to the world.
 _SWEPT = (
-    "truthcomparison",
-    *("score", "analysis", "comparison", "evaluation", "idempotencykey", "submission", "publication"),
-    *("apitoken", "invitation", "quotaoverride", "method", "membership", "team", "boardversion", "snapshot"),
+    *("score", "analysis", "question", "comparison", "truthcomparison", "evaluation", "idempotencykey"),
+    *("submission", "publication", "apitoken", "invitation", "quotaoverride", "method", "membership"),
+    *("team", "boardversion", "snapshot"),
 )
 
 

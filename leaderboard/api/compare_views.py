@@ -11,7 +11,7 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import comparisons, snapshots
+from leaderboard import comparisons, rates, snapshots
 from leaderboard.api.authentication import require_split
 from leaderboard.api.compare_shapes import ComparedSerializer
 from leaderboard.api.problems import edition_number
@@ -47,6 +47,7 @@ class CompareView(APIView):
             ),
             (400, "application/problem+json"): ErrorSerializer,
             (404, "application/problem+json"): ErrorSerializer,
+            (429, "application/problem+json"): ErrorSerializer,
         },
     )
     def get(self, request: Request) -> Response:
@@ -60,6 +61,7 @@ class CompareView(APIView):
             split=split,
             viewer=request.user,
             now=timezone.now(),
+            address=rates.address_of(request),
             edition=get_object_or_404(editions, split=split, number=edition_number(number))
             if number
             else None,

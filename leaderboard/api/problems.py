@@ -19,6 +19,7 @@ from leaderboard import (
     idempotency,
     outages,
     problem_codes,
+    questions,
     quotas,
     rates,
     receipts,
@@ -91,10 +92,8 @@ def _of_a_verb(exc: Exception) -> Response | None:
             if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):
                 status = 403
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case quotas.QuotaExceeded():
-            retry_after_s = exc.quota.retry_after_s(now=timezone.now())
-            headers = {"Retry-After": str(retry_after_s)} if retry_after_s else None
-            return problem(status=429, code=exc.code, detail=str(exc), where=exc.field, headers=headers)
+        case quotas.QuotaExceeded() | questions.TooManyWaiting():
+            return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
         case receipts.NoReceipt():
@@ -104,6 +103,16 @@ def _of_a_verb(exc: Exception) -> Response | None:
         return None
     status, code, where = OF_VERBS[type(exc)]
     return problem(status=status, code=code, detail=str(exc), where=where)
+
+
+def _not_yet(exc: quotas.QuotaExceeded | questions.TooManyWaiting) -> Response:
+    """What is taken later."""
+    if isinstance(exc, quotas.QuotaExceeded):
+        retry_after_s = exc.quota.retry_after_s(now=timezone.now())
+    else:
+        retry_after_s = exc.retry_after_s
+    headers = {"Retry-After": str(retry_after_s)} if retry_after_s else None
+    return problem(status=429, code=exc.code, detail=str(exc), where=exc.field, headers=headers)
 
 
 def _of_the_request(exc: Exception) -> Response | None:

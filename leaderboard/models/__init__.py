@@ -10,7 +10,7 @@ from leaderboard.models.benchmark import (
     TruthComparison,
 )
 from leaderboard.models.boards import BoardVersion, Snapshot
-from leaderboard.models.inference import Analysis, Comparison
+from leaderboard.models.inference import Analysis, Comparison, Question
 from leaderboard.models.limits import Allowance, CachedValue
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
@@ -45,6 +45,7 @@ __all__ = [
     "Method",
     "Publication",
     "PublishedResult",
+    "Question",
     "QuotaOverride",
     "Scope",
     "Score",

@@ -8,7 +8,7 @@ from django.shortcuts import render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from leaderboard import comparisons, snapshots
+from leaderboard import comparisons, questions, rates, snapshots
 from leaderboard.keeping import kept, matching
 from leaderboard.models import Split
 from leaderboard.web import compare_tables
@@ -19,7 +19,7 @@ PARAMETERS: Final = {
     "split": matching(r"[a-zA-Z0-9_-]{0,32}"),
     "m": matching(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", is_list=True),
 }
-NOT_FOUND, UNPROCESSABLE = 404, 400
+NOT_FOUND, UNPROCESSABLE, TOO_MANY = 404, 400, 429
 # What the page offers to choose from; the board itself offers all.
 MAX_OFFERED = 50
 
@@ -38,8 +38,14 @@ def compare(request: HttpRequest) -> HttpResponse:
         split = _split(request, request.GET.get("split") or HOME_SPLIT)
         if not wanted:
             return _choose(request, split)
-        compared = comparisons.of(methods=_ids(wanted), split=split, viewer=request.user, now=timezone.now())
-    except comparisons.BadComparison as refusal:
+        compared = comparisons.of(
+            methods=_ids(wanted),
+            split=split,
+            viewer=request.user,
+            now=timezone.now(),
+            address=rates.address_of(request),
+        )
+    except (comparisons.BadComparison, questions.TooManyWaiting) as refusal:
         return _refused(request, refusal)
     draw = kept(_drawn) if compared.is_complete else _drawn  # what is being computed changes by itself
     return draw(request, compared)
@@ -94,10 +100,16 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
     }
 
 
-def _refused(request: HttpRequest, refusal: comparisons.BadComparison) -> HttpResponse:
+def _refused(
+    request: HttpRequest, refusal: comparisons.BadComparison | questions.TooManyWaiting
+) -> HttpResponse:
     """What is wrong with the choice, and the choice again."""
     name = request.GET.get("split") or HOME_SPLIT
     split = next((split for split in splits_of(request) if split.pk == name), None)
     status = NOT_FOUND if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else UNPROCESSABLE
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
+    if isinstance(refusal, questions.TooManyWaiting):
+        response = render(request, "compare/choose.html", context, status=TOO_MANY)
+        response["Retry-After"] = str(refusal.retry_after_s)
+        return response
     return render(request, "compare/choose.html", context, status=status)

@@ -10,7 +10,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
 from evaluator import SCORE_NAMES, Difference, compare_predictions, published, read_predictions
-from leaderboard import backlog, bags, comparisons, files, ground_truth, submissions
+from leaderboard import backlog, bags, comparisons, files, ground_truth, questions, submissions
 from leaderboard.comparisons import BadComparison, NotOnTheBoard, UnknownMethod
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
 from tests import builders
@@ -176,18 +176,6 @@ def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission],
     assert codes == {"bad-comparison", "unknown-method", "not-on-the-board"}
 
 
-def test_questions_beyond_a_limit_wait_to_be_asked_again(
-    entries: list[Submission], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(comparisons, "MAX_WAITING", 1)
-    ask(*entries[:2])
-    assert not ask(*entries[1:3]).is_complete
-    assert Comparison.objects.count() == 1
-    builders.infer_all()
-    ask(*entries[1:3])
-    assert Comparison.objects.count() == 2
-
-
 def test_what_cannot_be_computed_keeps_nothing_else_waiting(
     entries: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -256,5 +244,5 @@ def test_waiting_questions_are_told_to_the_workers_again(entries: list[Submissio
     assert backlog.editions_waiting(now=timezone.now() + timedelta(hours=1)) == []
     ask(*entries[:2])
     assert backlog.editions_waiting(now=timezone.now()) == [edition.pk]
-    assert comparisons.waiting(held=set()).count() == 0
-    assert comparisons.waiting(held=ground_truth.held()).count() == 1
+    assert questions.waiting(held=set()).count() == 0
+    assert questions.waiting(held=ground_truth.held()).count() == 1
