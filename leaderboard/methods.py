@@ -102,6 +102,24 @@ def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
 # --- what its team says ----------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True)
+class MethodDetails:
+    """Details of a method that come with a file; an empty one says nothing, and changes nothing."""
+
+    description: str = ""
+    paper_url: str = ""
+    code_url: str = ""
+
+    @property
+    def given(self) -> dict[str, str]:
+        """Those that are not empty."""
+        return {name: value for name, value in vars(self).items() if value}
+
+    def changes_of(self, method: Method) -> dict[str, str]:
+        """Those that are not empty and differ from the method's own."""
+        return {name: value for name, value in self.given.items() if getattr(method, name) != value}
+
+
 def edit(
     *, method: Method, changes: Mapping[str, object], actor: User, now: datetime | None = None
 ) -> Method:

@@ -1,8 +1,8 @@
 """Who waits for which comparison, and whose turn it is: nobody's questions keep all the others' waiting.
 
 Each asker has a number of places. Askers take turns: whoever was served lets everybody go first who asks
-within the next minute, however many questions they have left; within an asker's own the oldest is first. Those
-who are signed in begin a minute ahead of visitors, who cannot take their places either.
+within the next minute, however many questions they have left; within an asker's own the oldest is first.
+Those who are signed in begin a minute ahead of visitors, who cannot take their places either.
 """
 
 from collections.abc import Collection, Sequence

@@ -48,24 +48,6 @@ class Submitted:
     is_new: bool
 
 
-@dataclass(frozen=True)
-class MethodDetails:
-    """Details of a method that come with a file; an empty one says nothing, and changes nothing."""
-
-    description: str = ""
-    paper_url: str = ""
-    code_url: str = ""
-
-    @property
-    def given(self) -> dict[str, str]:
-        """Those that are not empty."""
-        return {name: value for name, value in vars(self).items() if value}
-
-    def changes_of(self, method: Method) -> dict[str, str]:
-        """Those that are not empty and differ from the method's own."""
-        return {name: value for name, value in self.given.items() if getattr(method, name) != value}
-
-
 def submit(
     *,
     user: User,
@@ -92,7 +74,7 @@ def submit(
     """
     split = _open_split(split_name, now=now)
     name = clean_name("method", method_name)
-    details = MethodDetails(
+    details = methods.MethodDetails(
         description=clean_text("description", description, limit=2000, required=False),
         paper_url=clean_url("paper_url", paper_url),
         code_url=clean_url("code_url", code_url),
@@ -208,7 +190,7 @@ def _before_the_quota(
 
 
 def _before_an_edit(
-    *, user: User, split: Split, method_name: str, upload: "File[bytes]", details: MethodDetails
+    *, user: User, split: Split, method_name: str, upload: "File[bytes]", details: methods.MethodDetails
 ) -> Submission | None:
     """Of who may not change the method, the submission that had these bytes before. None: there is no change.
 
@@ -260,7 +242,7 @@ def too_large(*, found_bytes: int) -> str:
     )
 
 
-def _method(*, team: Team, name: str, details: MethodDetails, now: datetime) -> Method:
+def _method(*, team: Team, name: str, details: methods.MethodDetails, now: datetime) -> Method:
     """The team's method of that name, as it is; a new one is made with these details, and is private.
 
     Raises `Refused` for a name that looks like another one of the team's.

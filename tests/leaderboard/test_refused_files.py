@@ -3,6 +3,7 @@
 import random
 from collections.abc import Callable, Iterator
 from datetime import timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -170,17 +171,22 @@ class TestAtOnce:
             while was_held:
                 number += 1
                 data = b"%d" % number
-                deeds = {
-                    "refused": lambda data=data: refused(owner, data),
-                    "accepted": lambda data=data: send(stranger, file_of(data)),
+                deeds: dict[str, Callable[[], object]] = {
+                    "refused": partial(refused, owner, data),
+                    "accepted": partial(send, stranger, file_of(data)),
                 }
                 first, second = deeds.pop(held), *deeds.values()
-                outcome = meeting.of(first, second, at=lambda found, sql, n=number: found == n)
+                outcome = meeting.of(first, second, at=partial(is_number, number))
                 was_held = outcome.was_held
                 assert outcome.faults == (None, None)
                 [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)
                 assert kept.digest in stored(tmp_path), f"held at statement {number}"
         assert number > 5
+
+
+def is_number(wanted: int, found: int, sql: str) -> bool:
+    """Whether this is the statement of that number."""
+    return found == wanted
 
 
 def refused(user: User, data: bytes) -> None:

@@ -6,7 +6,7 @@ from django.db import migrations, models
 class Migration(migrations.Migration):
 
     dependencies = [
-        ('leaderboard', '0021_no_counts_in_ground_truths'),
+        ('leaderboard', '0022_mailboxes_and_admissions'),
     ]
 
     operations = [
