@@ -93,7 +93,6 @@ def scene(world: World) -> Scene:
     due = Method(team=team, name="Due", visibility=Visibility.ANONYMOUS, shown_at=now, reveal_at=now - DAY)
     Method.objects.bulk_create([public, private, hers, due])
     row = {"split_id": split, "submitted_by": owner, "via": "API", "size_bytes": 2, "submitted_at": now}
-    row["manifest_digest"] = world.edition.ground_truth.manifest_digest
     sent, lost, scored, his, revealed = (
         Submission(method=method, **file._asdict(), **row)
         for method, file in zip((public, public, public, hers, due), world.files, strict=True)

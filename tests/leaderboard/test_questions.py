@@ -15,6 +15,7 @@ from leaderboard.questions import Asker, TooManyWaiting
 from tests import builders
 from tests.leaderboard import queue_rows
 
+pytestmark = pytest.mark.usefixtures("open_values")
 Pairs = list[tuple[Any, Any]]
 ANYBODY = AnonymousUser()
 

@@ -6,7 +6,7 @@ from django.db import migrations, models
 class Migration(migrations.Migration):
 
     dependencies = [
-        ('leaderboard', '0022_mailboxes_and_admissions'),
+        ('leaderboard', '0023_forget_comparisons_of_hidden_splits'),
     ]
 
     operations = [

@@ -8,7 +8,7 @@ from django.db import migrations, models
 class Migration(migrations.Migration):
 
     dependencies = [
-        ('leaderboard', '0023_cleaning_beat'),
+        ('leaderboard', '0024_cleaning_beat'),
     ]
 
     operations = [
