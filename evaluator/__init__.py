@@ -1,6 +1,6 @@
 """TSTTC's evaluator: prediction files in, motion-in-depth error and relative time-to-contact error out.
 
-    truth = read_truth("val.csv")
+    truth = read_truth("annotations/val")  # the folder that comes with the dataset, or a table
     predictions = read_predictions(Path("mine.json").read_bytes(), manifest=truth.manifest)
     print(evaluate(predictions, truth).to_json())
 

@@ -30,7 +30,9 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "missing-predictions": "The envelope has no `predictions`.",
     "bad-rate": "`fps` or `frame_gap` is absent, doubled, not wanted, or no valid rate.",
     "bad-meta": "`meta` is not a plain JSON object of moderate size.",
-    "missing-keys": "Sequences of the manifest have no prediction.",
+    "missing-keys": (
+        "Sequences of the manifest have no prediction; or a correction added them after the file was sent."
+    ),
     "unknown-keys": "Predictions are given for sequences that the manifest does not have.",
     "duplicate-keys": "A key appears more than once.",
     "mixed-keys": "The file mixes anno_ids with natural keys.",

@@ -50,7 +50,7 @@ def compare(*, first: str, second: str, split: str, truth_path: Path | None, url
     \b
     Examples:
       tsttc compare "Foo++" "Bar" --split val
-      tsttc compare new.json old.json --truth val.csv
+      tsttc compare new.json old.json --truth annotations/val/
     """
     if truth_path is not None:
         _compare_files(Path(first), Path(second), truth_path, as_json=as_json)
