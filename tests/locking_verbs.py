@@ -13,6 +13,7 @@ from django.utils import timezone
 
 from evaluator.protocol import SCORE_NAMES
 from leaderboard import (
+    admissions,
     bags,
     boards,
     clock,
@@ -30,6 +31,7 @@ from leaderboard import (
     visibility,
 )
 from leaderboard.models import (
+    Admission,
     Edition,
     Evaluation,
     Invitation,
@@ -170,6 +172,18 @@ def _end_override(scene: Scene) -> Deed:
     return partial(quotas.end_override, row=row, actor=scene.world.maintainer)
 
 
+def _admit(scene: Scene, team: Team) -> Deed:
+    split = scene.world.edition.split
+    return partial(admissions.admit, team=team, split=split, reason="A study.", **_by_maintainer(scene))
+
+
+def _end_admission(scene: Scene) -> Deed:
+    if not scene.team.admissions.exists():
+        _admit(scene, scene.team)()
+    row = Admission.objects.get(team=scene.team)
+    return partial(admissions.end, row=row, actor=scene.world.maintainer)
+
+
 def _token(scene: Scene) -> Deed:
     split = scene.world.edition.split_id
     return partial(tokens.create, user=scene.owner, name="CI", now=timezone.now(), split_name=split)
@@ -259,6 +273,8 @@ VERBS: Mapping[str, Callable[[Scene], Deed]] = {
     "override a quota": lambda scene: _override(scene, scene.team),
     "override a loner's quota": lambda scene: _override(scene, _alone(scene)),
     "end an override": _end_override,
+    "admit a loner": lambda scene: _admit(scene, _alone(scene)),
+    "end an admission": _end_admission,
     "make a token": _token,
     "revoke a token": lambda scene: partial(
         tokens.revoke, token=scene.token, now=timezone.now(), actor=scene.owner

@@ -14,7 +14,7 @@ from django.test import Client
 from django.utils import timezone
 from knox.settings import CONSTANTS
 
-from leaderboard import invitations, quotas, teams
+from leaderboard import admissions, invitations, quotas, teams
 from leaderboard.models import ApiToken, Edition, Invitation, Membership, Method, Submission, User, Visibility
 from tests import builders
 from tests.security.matrix import ROLES
@@ -117,16 +117,18 @@ def _fill_the_administration(maintainer: User, submission: Submission) -> None:
     """A row of every model that the administration shows and that nothing above has made."""
     Group.objects.create(name="a group")
     EmailAddress.objects.create(user=maintainer, email=maintainer.email, primary=True, verified=True)
+    team, split, now = submission.method.team, submission.split, timezone.now()
+    admissions.admit(team=team, split=split, reason="a test", actor=maintainer, now=now)
     quotas.override(
-        team=submission.method.team,
-        split=submission.split,
+        team=team,
+        split=split,
         limit=50,
         window=timedelta(days=1),
         min_gap=timedelta(0),
         rejected_limit=None,
         reason="a test",
         actor=maintainer,
-        now=timezone.now(),
+        now=now,
     )
 
 
