@@ -1,4 +1,4 @@
-"""How sure the numbers of an edition are: an interval for every value, a range for every rank.
+"""Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
 
 Workers make them from sums per recording, which never leave the workers' private directory, and write them
 beside the scores. An interval belongs to one evaluation and stays; ranges belong to all entries of a board

@@ -232,7 +232,7 @@ class Score(models.Model):
     value = models.FloatField()
     low = models.FloatField(null=True, blank=True)
     high = models.FloatField(null=True, blank=True)
-    # Where the entry may stand in its column at 95 %; whether it is not significantly worse than the best.
+    # Where the entry may stand in its column at 95 %; whether that begins at 1.
     rank_low = models.PositiveIntegerField(null=True, blank=True)
     rank_high = models.PositiveIntegerField(null=True, blank=True)
     is_with_best = models.BooleanField(null=True, blank=True)
