@@ -33,12 +33,19 @@ def contents(truth: evaluator.GroundTruth, number: int) -> bytes:
 
 
 def published_scores(
-    truth: evaluator.GroundTruth, number: int, *, against: evaluator.GroundTruth | None = None
+    truth: evaluator.GroundTruth,
+    number: int,
+    *,
+    against: evaluator.GroundTruth | None = None,
+    decimals: int = 1,
 ) -> dict[str, float | None]:
-    """The ten numbers that a board must show, for predictions made from `truth`, scored `against` another."""
+    """The ten numbers that a board must show, for predictions made from `truth`, scored `against` another.
+
+    A hidden split's, unless other `decimals` are given.
+    """
     values = predictions(truth, number)
     report = evaluator.evaluate(values, against or truth)
-    return {name: evaluator.published(value) for name, value in report.flat().items()}
+    return {name: evaluator.published(value, decimals=decimals) for name, value in report.flat().items()}
 
 
 def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int) -> None:

@@ -69,7 +69,7 @@ def test_equal_values_have_equal_badges(methods: list[Method], client: Client) -
     with transaction.atomic():
         Score.objects.filter(metric="mid", interval="overall").update(value=1.0)
         boards.changed("test")
-    assert {badge(client, method) for method in methods} == {"TSTTC test: rank 1, MiD 1.00"}
+    assert {badge(client, method) for method in methods} == {"TSTTC test: rank 1, MiD 1.0"}
 
 
 def test_badge_says_what_there_is_instead_of_a_rank(
@@ -97,7 +97,7 @@ def test_badge_follows_the_board_and_is_kept_as_long_as_it_stands(
         Score.objects.filter(evaluation__submission__method=methods[0]).update(value=0.5)
         boards.changed("test")
     assert client.get(address, headers={"If-None-Match": first["ETag"]}).status_code == 200
-    assert badge(client, methods[0]) == "TSTTC test: rank 1, MiD 0.50"
+    assert badge(client, methods[0]) == "TSTTC test: rank 1, MiD 0.5"
 
 
 def test_no_badge_tells_that_a_private_method_is_there(

@@ -75,11 +75,13 @@ def test_revealing_an_anonymous_method_moves_nobody(client: Client, method: Meth
     assert (sight["before"]["rank"], sight["after"]["rank"], sight["moved"]) == (1, 1, [])
 
 
-def test_numbers_of_the_preview_have_two_decimals(client: Client, method: Method, owner: User) -> None:
+def test_numbers_of_the_preview_have_the_editions_decimals(
+    client: Client, method: Method, owner: User
+) -> None:
     (sight,) = foresee(client, method, builders.token(owner), "?as=PUBLIC")[1]["splits"]
     values = [value for value in sight["after"]["scores"].values() if value is not None]
     assert len(values) == 10
-    assert values == [round(value, 2) for value in values]
+    assert values == [round(value, 1) for value in values]
 
 
 def test_the_preview_is_the_teams_alone(

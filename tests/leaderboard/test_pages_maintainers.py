@@ -219,9 +219,9 @@ def test_comparison_is_the_previews_line_by_line(keeper: Client, rescored: Editi
         assert cells[-1].text == "scored"
         for cell, name in zip(cells[1:-1], SCORE_NAMES, strict=True):
             old, new, delta = change.old[name], change.new[name], change.delta[name]
-            assert f"{old:.2f}" in cell.text
-            assert f"{new:.2f}" in cell.text
-            assert cell.one("span", class_="delta").text == (f"{delta:+.2f}" if delta else "0.00").replace(
+            assert f"{old:.1f}" in cell.text
+            assert f"{new:.1f}" in cell.text
+            assert cell.one("span", class_="delta").text == (f"{delta:+.1f}" if delta else "0.0").replace(
                 "-", "−"
             )
 

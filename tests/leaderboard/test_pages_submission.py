@@ -189,7 +189,7 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     for half, symbol in ((mid, "MiD"), (rte, "RTE")):
         heads = [head.all("span")[0].text for head in half.one("thead").all("th")]
         assert heads == [symbol, *(f"{symbol}{letter}" for letter in "csln")]
-    scores = {f"{s.metric}-{s.interval}": f"{s.value:.2f}" for s in submission.evaluations.get().scores.all()}
+    scores = {f"{s.metric}-{s.interval}": f"{s.value:.1f}" for s in submission.evaluations.get().scores.all()}
     values, counts = ([cell.text for cell in row.all("td")] for row in mid.one("tbody").all("tr"))
     names = ("overall", "crucial", "small", "large", "negative")
     # A value may be followed by its mark.
@@ -311,7 +311,7 @@ def test_list_has_my_teams_submissions_with_state_and_errors(
     assert [row[1] for row in rows] == ["Waiting one", "Bad one", "Scored one"]
     assert [row[3] for row in rows] == ["queued", "rejected", "scored"]
     mid = scored.evaluations.get().scores.get(metric="mid", interval="overall").value
-    assert [row[4] for row in rows] == ["–", "–", f"{mid:.2f}"]
+    assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
 
 
 def test_maintainers_list_is_their_own_teams(

@@ -42,7 +42,7 @@ class Offline:
     def scores(self) -> dict[str, float | None]:
         """The ten numbers as they are published."""
         return {
-            name: evaluator.published(self.answer["scores"][interval or "overall"][metric])
+            name: evaluator.published(self.answer["scores"][interval or "overall"][metric], decimals=1)
             for name in evaluator.SCORE_NAMES
             for metric, _, interval in [name.partition("_")]
         }
