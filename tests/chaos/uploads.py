@@ -64,7 +64,7 @@ def _with_expectation(name: str, data: bytes, truth: evaluator.GroundTruth) -> U
     except Rejected as rejected:
         codes = tuple(problem.code for problem in rejected.problems)
         return Upload(name=name, data=data, state="REJECTED", problems=codes)
-    scores = {metric: published(value) for metric, value in report.flat().items()}
+    scores = {metric: published(value, decimals=1) for metric, value in report.flat().items()}
     return Upload(name=name, data=data, state="SCORED", scores=scores)
 
 

@@ -32,7 +32,7 @@ def offline(data: bytes, truth: evaluator.GroundTruth) -> dict[str, float | None
     scores = {}
     for name in evaluator.SCORE_NAMES:
         metric, _, interval = name.partition("_")
-        scores[name] = evaluator.published(getattr(report.scores[interval or "overall"], metric))
+        scores[name] = evaluator.published(getattr(report.scores[interval or "overall"], metric), decimals=1)
     return scores
 
 
@@ -62,7 +62,7 @@ def test_a_person_signs_up_uploads_is_scored_and_sees_the_rank(
     assert published[0]["rank"] == 2
     page = people(site).text_of("/board/test/")
     assert "Counting frames" in page
-    assert f"{outcome['scores']['mid']:.2f}" in page
+    assert f"{outcome['scores']['mid']:.1f}" in page
 
 
 def test_a_file_with_faults_is_rejected_with_their_list_and_the_next_good_one_is_scored(
