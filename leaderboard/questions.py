@@ -63,7 +63,8 @@ def ask(*, edition: Edition, pairs: Sequence[Key], asker: Asker, now: datetime) 
     has_asked = set(
         theirs.filter(comparison__edition=edition).values_list("comparison__first", "comparison__second")
     )
-    new = [pair for pair in pairs if pair not in has_asked]
+    # In one order, so that two who ask for the same pairs cannot wait for each other's rows.
+    new = sorted(pair for pair in pairs if pair not in has_asked)
     if not new:
         return
     _require_places(theirs.count(), len(new), is_signed_in=asker.is_signed_in)
@@ -73,7 +74,7 @@ def ask(*, edition: Edition, pairs: Sequence[Key], asker: Asker, now: datetime) 
     with transaction.atomic():
         Comparison.objects.bulk_create(rows, ignore_conflicts=True)
         ids = {one for one, _ in new}
-        there = Comparison.objects.filter(edition=edition, computed_at=None, first__in=ids)
+        there = Comparison.objects.filter(edition=edition, computed_at=None, first__in=ids).order_by("pk")
         Question.objects.bulk_create(
             [
                 Question(

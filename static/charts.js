@@ -9,6 +9,7 @@ function rowsOf(figure) {
   const rows = [...figure.querySelectorAll("tr[data-x]")].map((row) => ({
     x: Number(row.dataset.x),
     y: Number(row.dataset.y),
+    decimals: Number(row.dataset.decimals),
     label: row.dataset.label,
     isMarked: "marked" in row.dataset,
   }));
@@ -87,7 +88,7 @@ function options(figure, rows, reading, box) {
       setCursor: [
         (chart) => {
           const row = rows[chart.cursor.idx ?? -1];
-          reading.textContent = row ? `${row.label}: MiD ${row.y.toFixed(2)}` : HINTS;
+          reading.textContent = row ? `${row.label}: MiD ${row.y.toFixed(row.decimals)}` : HINTS;
         },
       ],
     },

@@ -7,7 +7,7 @@ import pytest
 from django.utils import timezone
 
 import evaluator
-from leaderboard import analyses, files, ground_truth, submissions
+from leaderboard import analyses, files, ground_truth, rescoring, submissions
 from leaderboard.models import Analysis, Edition, Split, Submission, User
 from tests import builders
 from tests.editions import ANYBODY
@@ -103,6 +103,23 @@ def test_hidden_values_are_looked_at_by_no_worker_whatever_the_database_calls_th
     builders.infer_all()
     analyses.make(submission.evaluations.get(), now=timezone.now())
     assert not Analysis.objects.exists()
+
+
+def test_a_correction_that_renumbers_looks_at_the_same_sequences(
+    sent: Submission, val: Edition, tmp_path: Path
+) -> None:
+    table = ground_truth.load(val.ground_truth_id).to_table()
+    table.anno_id = table.anno_id[::-1]
+    path = tmp_path / "renumbered.csv"
+    path.write_bytes(evaluator.GroundTruth.from_table(table).to_csv())
+    second = rescoring.open_edition(split_name="val", path=path, now=timezone.now(), actor=None)
+    assert second.ground_truth_id != val.ground_truth_id
+    builders.score_all()
+    rescoring.publish(edition=second, reason="Numbers.", now=timezone.now(), actor=None, replaces=1)
+    builders.infer_all()
+    before, after = (Analysis.objects.get(evaluation__edition=each).content for each in (val, second))
+    assert after["worst"] == before["worst"]
+    assert after["curve"] == before["curve"]
 
 
 def test_what_was_withdrawn_before_is_not_looked_at(val: Edition, owner: User) -> None:

@@ -98,8 +98,16 @@ def test_every_form_has_the_editions_decimals(
         found = re.search(r"MiD ([\d.]+)", client.get(address).text)
         assert found is not None
         texts[form] = found[1]
+    found = re.search(r">Foo <span[^>]*>[^<]*MiD&nbsp;([\d.]+)<", client.get("/compare/?split=test").text)
+    assert found is not None
+    texts["choice"] = found[1]
+    # The script that draws the chart again writes as many.
+    charts = re.findall(r'data-decimals="(\d)" data-label="Foo', client.get("/board/test/charts/").text)
+    assert set(charts) == {str(decimals)}
     page = pages.page(client.get(f"/submissions/{submission.pk}/"))
-    texts["page"] = page.all("table", class_="numbers")[0].one("tbody").all("td")[0].text.split()[0]
+    texts["page"] = (
+        page.all("table", class_="numbers")[0].one("tbody").all("td")[0].text.split()[0].rstrip(",")
+    )
     assert {name: len(text.partition(".")[2]) for name, text in texts.items()} == dict.fromkeys(
         texts, decimals
     )

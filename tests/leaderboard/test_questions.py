@@ -102,6 +102,15 @@ def test_asking_again_for_the_same_takes_no_place(edition: Edition, pairs: Pairs
     assert ask(edition, asker, pairs[30])
 
 
+def test_two_who_ask_for_the_same_pairs_write_them_in_one_order(edition: Edition, pairs: Pairs) -> None:
+    """Else each could wait for a row of the other's: they come in the order of the methods in an address."""
+    assert ask(edition, visitor("192.0.2.1"), *reversed(pairs[:5]))
+    written = Comparison.objects.order_by("pk").values_list("first", "second")
+    assert list(written) == pairs[:5]
+    noted = Question.objects.order_by("pk").values_list("comparison__first", "comparison__second")
+    assert list(noted) == pairs[:5]
+
+
 def test_visitors_cannot_take_the_places_of_those_who_are_signed_in(
     edition: Edition, pairs: Pairs, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
