@@ -4,9 +4,11 @@ import uuid
 from collections.abc import Callable, Mapping
 from datetime import timedelta
 from functools import partial
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from django.contrib.auth.models import AnonymousUser
 from django.core.files.base import ContentFile
 from django.test import Client
 from django.utils import timezone
@@ -16,13 +18,17 @@ from leaderboard import (
     admissions,
     bags,
     boards,
+    cleaning,
     clock,
+    comparisons,
+    files,
     ground_truth,
     idempotency,
     inference,
     invitations,
     lifecycle,
     methods,
+    questions,
     quotas,
     rescoring,
     submissions,
@@ -110,13 +116,40 @@ def _release(scene: Scene) -> Deed:
 
 
 def _infer(scene: Scene) -> Deed:
+    return partial(inference.infer, edition=_with_sums(scene), now=timezone.now())
+
+
+def _with_sums(scene: Scene) -> Edition:
     edition = Edition.objects.select_related("ground_truth").get(pk=scene.world.edition.pk)
     for submission in Submission.objects.all():
         # The files of the scene are names alone; what inference reads of them is here.
         sums = bags.path(edition, file=submission.sent_file)
         sums.parent.mkdir(parents=True, exist_ok=True)
         sums.write_bytes(np.ones((edition.ground_truth.n_recordings, len(SCORE_NAMES))).tobytes())
-    return partial(inference.infer, edition=edition, now=timezone.now())
+    return edition
+
+
+def _ask(scene: Scene, *, who: str) -> Deed:
+    # Of the team: what the loner has is deleted for another verb.
+    theirs = Evaluation.objects.filter(edition=scene.world.edition, submission__method__team=scene.team)
+    ids = theirs.order_by("pk").values_list("pk", flat=True)
+    asker = questions.asker_of(user=AnonymousUser(), address=who)
+    pairs = list(combinations(ids, 2))
+    return partial(questions.ask, edition=scene.world.edition, pairs=pairs, asker=asker, now=timezone.now())
+
+
+def _compare(scene: Scene) -> Deed:
+    _with_sums(scene)
+    if not questions.waiting().exists():
+        _ask(scene, who="192.0.2.1")()
+    return partial(comparisons.compute, questions.waiting()[0], now=timezone.now())
+
+
+def _clean(scene: Scene) -> Deed:
+    """A file that is gone already: it takes the same locks, and leaves no trace."""
+    digest, now = f"sha256:{uuid.uuid4().hex}{uuid.uuid4().hex}", timezone.now()
+    orphan = cleaning.Orphan(files.predictions_name(digest), digest, 1, now - 2 * DAY)
+    return partial(cleaning.remove, orphan, now=now)
 
 
 def _by_maintainer(scene: Scene) -> dict[str, Any]:
@@ -264,6 +297,9 @@ VERBS: Mapping[str, Callable[[Scene], Deed]] = {
         lifecycle.retry, evaluation=scene.failed, actor=scene.world.maintainer, reason="Mended."
     ),
     "infer": _infer,
+    "ask for comparisons": lambda scene: _ask(scene, who="192.0.2.2"),
+    "compare": _compare,
+    "clean": _clean,
     "import a ground truth": _import,
     "open an edition": _open,
     "publish": _publish,
