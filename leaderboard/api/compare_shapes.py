@@ -16,10 +16,14 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
 
     difference = serializers.FloatField(help_text="In the column's unit.")
     low = serializers.FloatField(
-        allow_null=True, help_text="Lower end of its 95 % confidence interval; null: too few recordings."
+        allow_null=True,
+        help_text="Lower end of its 95 % confidence interval; null: too few recordings, or not told of "
+        "this pair.",
     )
     high = serializers.FloatField(
-        allow_null=True, help_text="Upper end of its 95 % confidence interval; null: too few recordings."
+        allow_null=True,
+        help_text="Upper end of its 95 % confidence interval; null: too few recordings, or not told of "
+        "this pair.",
     )
     p = serializers.FloatField(
         allow_null=True,
@@ -28,7 +32,8 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
     p_below = serializers.FloatField(
         allow_null=True,
-        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few recordings.",
+        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few recordings, "
+        "or not told of this pair.",
     )
     n_effective = serializers.FloatField(
         allow_null=True,
