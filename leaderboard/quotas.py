@@ -98,6 +98,24 @@ def hold(*, team: Team) -> bool:
     return team.pk in {row.pk for row in rows.order_by("pk")}
 
 
+def hold_before_founding(*, user: User) -> None:
+    """The same with the teams of the person's other accounts, for somebody who is about to found a team.
+
+    Who founds a team has the audit trail from then on, for which others wait who have their teams' rows. The
+    accounts are held as well, so that none of them enters another team meanwhile. Nothing is done for
+    somebody who has a team.
+    """
+    mine = Membership.objects.filter(user=user)
+    if mine.exists():
+        return
+    mailbox = User.objects.filter(pk=user.pk).values("mailbox")
+    accounts = User.objects.select_for_update(no_key=True).filter(mailbox__in=mailbox).order_by("pk")
+    ids = [account.pk for account in accounts]
+    if not mine.exists():
+        others = Membership.objects.filter(user__in=ids).values("team")
+        list(Team.objects.select_for_update(no_key=True).filter(pk__in=others).order_by("pk"))
+
+
 def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now: datetime) -> None:
     """Raise `QuotaExceeded` unless a slot is open for a file of this size.
 

@@ -95,6 +95,7 @@ def submit(
         # Before the team: whoever founds a team has the audit trail from then on, and waits for nothing more.
         # From here on the board stays, so the file is queued in an edition with the manifest named below.
         split = Split.objects.lock_shared(split.pk)
+        quotas.hold_before_founding(user=user)
         team = teams.team_of(user=user)
         quotas.hold(team=team)
         teams.require_member(team, user)

@@ -55,7 +55,7 @@ class Scene:
     owner: User
     member: User
     loner: User  # alone in a team
-    newcomer: User  # in no team
+    newcomer: User  # in no team; another account of the loner's mailbox
     public: Method
     private: Method
     sent: Submission  # queued in both editions
@@ -71,7 +71,7 @@ def scene(world: World) -> Scene:
     _sweep(world)
     now, split = timezone.now(), world.edition.split_id
     owner, member, loner, newcomer, reader = User.objects.bulk_create(
-        User(email=f"{uuid.uuid4()}@example.org") for _ in range(5)
+        User(email=f"{address}@example.org") for address in _addresses()
     )
     team, alone = (
         Team(name=f"Team {mark}", look=look(f"Team {mark}")) for mark in (uuid.uuid4().hex, uuid.uuid4().hex)
@@ -139,6 +139,13 @@ def scene(world: World) -> Scene:
         secret=secret,
         token=ApiToken.objects.get(user=owner),
     )
+
+
+def _addresses() -> list[str]:
+    """Of five accounts, of which the third and the fourth have one mailbox."""
+    found = [str(uuid.uuid4()) for _ in range(5)]
+    found[3] = f"{found[2]}+second"
+    return found
 
 
 def _sweep(world: World) -> None:

@@ -86,6 +86,7 @@ MET = [
     ("open an edition", "submit for the first time"),
     ("submit for the first time", "publish"),
     ("submit", "change an address"),
+    ("submit for the first time", "override a loner's quota"),
 ]
 """Pairs of which one had the audit trail and wanted a row, and the other had the row and wanted the trail."""
 
