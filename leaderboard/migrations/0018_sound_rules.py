@@ -33,6 +33,10 @@ def mend(apps, schema_editor):
             row.quota_min_gap = row.split.quota_min_gap
         row.save(update_fields=["quota_window", "quota_min_gap"])
     Split.objects.filter(opens_at__gte=F("closes_at")).update(opens_at=None, closes_at=None)
+    if schema_editor.connection.vendor == "postgresql":
+        # The foreign keys of a row that was changed twice are checked now: a table that waits for a check
+        # cannot be altered.
+        schema_editor.execute("SET CONSTRAINTS ALL IMMEDIATE")
 
 
 class Migration(migrations.Migration):

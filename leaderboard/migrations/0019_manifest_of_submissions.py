@@ -7,7 +7,7 @@ def name_manifests(apps, schema_editor):
     """The manifest of the edition that was the board when the file came.
 
     Where that is not known, as for rows that were written by hand, that of the first edition in which the file
-    was evaluated.
+    was evaluated; of one that was never evaluated, that of the board.
     """
     submissions = apps.get_model("leaderboard", "Submission").objects
     publications = apps.get_model("leaderboard", "Publication").objects
@@ -19,17 +19,22 @@ def name_manifests(apps, schema_editor):
             evaluations__edition=publication.edition_id,
         ).update(manifest_digest=publication.edition.ground_truth.manifest_digest)
     evaluations = apps.get_model("leaderboard", "Evaluation").objects
-    for submission in submissions.filter(manifest_digest=""):
+    unnamed = submissions.filter(manifest_digest="").select_related("split__published_edition__ground_truth")
+    for submission in unnamed:
         first = (
             evaluations.filter(submission=submission.pk)
             .select_related("edition__ground_truth")
             .order_by("edition__number")
             .first()
         )
-        if first is not None:
-            submissions.filter(pk=submission.pk).update(
-                manifest_digest=first.edition.ground_truth.manifest_digest
-            )
+        edition = first.edition if first is not None else submission.split.published_edition
+        if edition is not None:
+            digest = edition.ground_truth.manifest_digest
+            submissions.filter(pk=submission.pk).update(manifest_digest=digest)
+    if schema_editor is not None and schema_editor.connection.vendor == "postgresql":
+        # The foreign keys of a row that was changed twice, as after an edition was rolled back, are checked now:
+        # a table that waits for a check cannot be altered.
+        schema_editor.execute("SET CONSTRAINTS ALL IMMEDIATE")
 
 
 class Migration(migrations.Migration):

@@ -1,0 +1,28 @@
+"""An installation of an older release, with rows in its tables, is brought up to date."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.services]
+
+
+def test_rows_of_an_older_release_survive_every_migration(postgres_url: str, tmp_path: Path) -> None:
+    """On PostgreSQL, which alters no table that has rows to be checked at COMMIT."""
+    environment = {**os.environ, "TSTTC_DATABASE_URL": postgres_url, "TSTTC_DATA_DIR": str(tmp_path)}
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.upgrade"], env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr[-3000:]
+    assert json.loads(done.stdout.splitlines()[-1]) == {
+        "manifests": ["manifest 1", "manifest 2", "manifest 1", "manifest 1"],
+        "n_added": [1],
+        "decimals": [1, 2, 2],
+        "rules": [30, 3650, None],
+        "is_shown": [True],
+        "mailboxes": ["ada@example.org"],
+    }
