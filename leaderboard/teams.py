@@ -92,11 +92,13 @@ def show_name_in_any_case(team: Team) -> None:
         number += 1
         name = f"{team.name[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
     if name != team.name:
-        details = {"from": team.name, "to": name, "reason": "another team was shown under this name first"}
         Team.objects.filter(pk=team.pk).update(name=name, look=look(name))
-        audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details)
-        team.name = name
+    before, team.name = team.name, name
+    # Before the audit trail: this waits for whoever shows another team under a name like it.
     show_name(team)
+    if name != before:
+        details = {"from": before, "to": name, "reason": "another team was shown under this name first"}
+        audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details)
 
 
 def require_showable(team: Team) -> None:
