@@ -1,5 +1,6 @@
 """The page that sets two to five methods side by side."""
 
+import re
 from uuid import uuid4
 
 import pytest
@@ -104,6 +105,9 @@ def test_without_methods_it_offers_those_of_the_board(client: Client, entries: l
     root = get(client)
     offered = [box.attributes["value"] for box in root.all("input", type="checkbox")]
     assert offered == [str(entry.method_id) for entry in entries]
+    # As many decimals as the edition publishes: the test split's have one.
+    said = [choice.text for choice in root.all("label", class_="choice")]
+    assert all(re.search(r"MiD\s\d+\.\d$", text.strip()) for text in said), said
     assert "no method was scored so far" in words(get(client, split="demo"))
 
 
