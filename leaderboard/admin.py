@@ -240,7 +240,10 @@ class AdmissionAdmin(admin.ModelAdmin):
     def save_model(self, request: HttpRequest, obj: Admission, form: Any, change: bool) -> None:
         """Admit the team."""
         actor, now = cast("User", request.user), timezone.now()
-        row = admissions.admit(team=obj.team, split=obj.split, reason=obj.reason, actor=actor, now=now)
+        try:
+            row = admissions.admit(team=obj.team, split=obj.split, reason=obj.reason, actor=actor, now=now)
+        except Team.DoesNotExist:
+            raise Http404 from None  # it has just ended
         obj.pk = row.pk
 
     def delete_model(self, request: HttpRequest, obj: Admission) -> None:

@@ -28,6 +28,9 @@ def path(digest: str) -> Path:
         handle, temporary = tempfile.mkstemp(dir=kept, suffix=".npz")
         os.close(handle)
         manifest.save(Path(temporary))
+        # Else a power cut could leave a file that is never made anew, because it is there.
+        with Path(temporary).open("rb") as written:
+            os.fsync(written.fileno())
         Path(temporary).replace(target)
     return target
 
