@@ -114,6 +114,8 @@ def of(
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
         raise NotOnTheBoard(f"The split {split.pk} has no board yet; expected one with ground truth.")
+    # It is at hand, and would be asked for again.
+    board.edition.split = board.split
     chosen = _chosen(board, methods, viewer)
     asked = list(itertools.combinations(chosen, 2))
     withheld = _withheld(board.edition, asked)
@@ -158,17 +160,8 @@ def _chosen(board: standings.Board, methods: Sequence[UUID], viewer: User | Anon
 
 def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[tuple[UUID, UUID], str]:
     """By their keys the pairs of which no interval and no p is told, and why."""
-    team_of: dict[UUID, UUID] = {}
-    if edition.split.is_hidden:
-        ids = {entry.method_id for pair in pairs for entry in pair if entry.method_id}
-        team_of = dict(Method.objects.filter(pk__in=ids).values_list("pk", "team"))
-    found = {}
-    for first, second in pairs:
-        teams = {team_of[entry.method_id] for entry in (first, second) if entry.method_id in team_of}
-        why = disclosure.why_withheld(first, second, edition=edition, are_of_one_team=len(teams) == 1)
-        if why:
-            found[_key((first, second))] = why
-    return found
+    whys = {_key(pair): disclosure.why_withheld(*pair, edition=edition) for pair in pairs}
+    return {key: why for key, why in whys.items() if why}
 
 
 def _plain(first: Entry, second: Entry, why: str) -> Pair:

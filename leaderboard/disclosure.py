@@ -92,7 +92,7 @@ def published_difference(found: Difference, shown: Difference, *, edition: Editi
 # --- of which pairs --------------------------------------------------------------------------------------
 
 
-def why_withheld(first: Entry, second: Entry, *, edition: Edition, are_of_one_team: bool) -> str:
+def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
     """Why nothing but the difference of the published values is told of a pair, in a sentence; "" if more is.
 
     Entries are as their reader sees them.
@@ -111,7 +111,8 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition, are_of_one_te
                 f"No confidence interval and no p: {entry.method} is not public, and the ground truth of "
                 f"{edition.split_id} is hidden. {_POSSIBLE}"
             )
-    if are_of_one_team:
+    # Teams that show a method have different names, by a constraint of the database.
+    if first.team == second.team:
         return (
             "No confidence interval and no p: both methods are of one team, and the ground truth of "
             f"{edition.split_id} is hidden. {_POSSIBLE}"

@@ -9,7 +9,6 @@ from django.test import Client
 
 from evaluator import SCORE_NAMES, Difference
 from leaderboard import boards, comparisons, disclosure
-from leaderboard.entries import Entry
 from leaderboard.models import Comparison, Edition, Score, Split, Submission, User, Visibility
 from tests import builders
 from tests.leaderboard.test_comparisons import ask, known, set_visibility
@@ -183,9 +182,3 @@ def test_page_and_api_say_the_same_words(entries: list[Submission], client: Clie
         assert pair["withheld"] in page.text
         assert pair["differences"]["mid"]["low"] is None
         assert pair["sentence"].endswith(pair["withheld"])
-
-
-def test_a_row_of_no_team_is_of_no_team_s() -> None:
-    edition = Edition(split=Split(name="test", is_hidden=True))
-    row = Entry(kind="submission", method="A", team="T", scores={})
-    assert disclosure.why_withheld(row, row, edition=edition, are_of_one_team=False) == ""

@@ -10,7 +10,7 @@ import pytest
 from django.core.files.base import ContentFile
 from django.db import connection
 
-from leaderboard import audit, invitations, quotas, submissions, teams, tokens
+from leaderboard import audit, invitations, quotas, submissions, teams, tokens, visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -21,6 +21,7 @@ from leaderboard.models import (
     Submission,
     Team,
     User,
+    Visibility,
 )
 from leaderboard.texts import Refused
 from tests import builders
@@ -175,20 +176,28 @@ def test_one_person_who_follows_ten_links_at_once_is_in_one_team(owner: User) ->
     assert {row.accepted_by_id for row in used} == {owner.pk}
 
 
-def test_teams_that_look_alike_at_once_are_one(db: None) -> None:
+def test_of_teams_that_look_alike_one_alone_is_shown_at_once(db: None) -> None:
     people = [User.objects.create_user(f"{i}@example.org") for i in range(12)]
+    methods = [
+        Method.objects.create(
+            team=teams.create(user=user, name=["Owls", "0wls", "ΟWLS", "owls"][number % 4], now=FIRST_DAY),
+            name="Foo",
+            created_at=FIRST_DAY,
+        )
+        for number, user in enumerate(people)
+    ]
 
-    def create(number: int) -> bool:
+    def show(number: int) -> bool:
         try:
-            teams.create(
-                user=people[number], name=["Owls", "0wls", "ΟWLS", "owls"][number % 4], now=FIRST_DAY
+            visibility.change(
+                method=methods[number], visibility=Visibility.PUBLIC, actor=people[number], now=FIRST_DAY
             )
         except Refused:
             return False
         return True
 
-    assert sum(at_once(12, create)) == 1
-    assert Team.objects.count() == 1
+    assert sum(at_once(12, show)) == 1
+    assert Team.objects.filter(is_shown=True).count() == 1
 
 
 def test_methods_that_look_alike_at_once_are_one(edition: Edition, owner: User) -> None:
