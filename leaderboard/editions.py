@@ -1,5 +1,6 @@
 """What became of editions: when each was the board, what replaced it, what a correction did to an entry."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from django.db.models import Count
@@ -23,6 +24,7 @@ class Past:
 
     edition: Edition
     followed: Edition | None  # the board that it first replaced
+    change: "TruthChange | None"  # of the ground truth since then; None where the two were never compared
     replaced_by: Publication | None  # None while it is the board
     publications: tuple[Publication, ...] = ()  # each time that it became the board, the newest first
 
@@ -73,7 +75,9 @@ def latest_change(split: Split) -> Publication | None:
 def history(split: Split, publications: tuple[Publication, ...]) -> tuple[Past, ...]:
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
-    return tuple(_past(edition, split, publications) for edition in published.order_by("-number"))
+    # All at once, since each edition asks for one.
+    compared = list(TruthComparison.objects.filter(new__split=split).order_by("pk"))
+    return tuple(_past(edition, split, publications, compared) for edition in published.order_by("-number"))
 
 
 def past(edition: Edition) -> Past:
@@ -81,13 +85,20 @@ def past(edition: Edition) -> Past:
     return _past(edition, edition.split, changelog(edition.split))
 
 
-def _past(edition: Edition, split: Split, publications: tuple[Publication, ...]) -> Past:
+def _past(
+    edition: Edition,
+    split: Split,
+    publications: tuple[Publication, ...],
+    compared: Sequence[TruthComparison] | None = None,
+) -> Past:
     own = tuple(p for p in publications if p.edition_id == edition.pk)
     replaced_by = next((p for p in publications if p.replaced_id == edition.pk), None)
     is_board = split.published_edition_id == edition.pk
+    followed = own[-1].replaced if own else None
     return Past(
         edition=edition,
-        followed=own[-1].replaced if own else None,
+        followed=followed,
+        change=change_of_truth(followed.ground_truth, edition.ground_truth, compared) if followed else None,
         replaced_by=None if is_board else replaced_by,
         publications=own,
     )
@@ -98,15 +109,20 @@ def truth_change(old: Edition, new: Edition) -> TruthChange | None:
     return change_of_truth(old.ground_truth, new.ground_truth)
 
 
-def change_of_truth(before: GroundTruth, after: GroundTruth) -> TruthChange | None:
+def change_of_truth(
+    before: GroundTruth, after: GroundTruth, compared: Sequence[TruthComparison] | None = None
+) -> TruthChange | None:
     """What differs between two ground truths; None if these two were never compared.
 
     They are counted by the command that reads one of them in, against the board's of that moment, or else by
-    a worker.
+    a worker. `compared` are the comparisons to look among, where they are at hand.
     """
     if before.pk == after.pk:
         return TruthChange(0, 0, 0, 0)
-    found = TruthComparison.objects.between(before, after).order_by("pk").last()
+    if compared is None:
+        compared = list(TruthComparison.objects.between(before, after).order_by("pk"))
+    pair = {before.pk, after.pk}
+    found = next((row for row in reversed(compared) if {row.old_id, row.new_id} == pair), None)
     if found is None:
         return None
     added, removed = found.n_added, found.n_removed

@@ -120,7 +120,7 @@ def past_rows(history: Iterable[editions.Past]) -> tuple[PastRow, ...]:
 
 def past_row(past: editions.Past) -> PastRow:
     """One edition, ready to be placed."""
-    change = change_words(past.followed, past.edition) if past.followed else "the first"
+    change = _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
     return PastRow(past=past, change=change)
 
 

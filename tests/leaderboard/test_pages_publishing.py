@@ -54,7 +54,11 @@ def test_opening_what_exists_goes_on_with_it(keeper: Client, second: Edition) ->
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({}, "test edition 1 has this ground truth and protocol, and is the board already."),
+        (
+            {},
+            "test edition 1 has this ground truth, protocol and number of decimals (1), and is the board "
+            "already.",
+        ),
         ({"digest": "sha256:0"}, "That ground truth is not this split's"),
         ({"digest": ""}, "No ground truth was chosen"),
         ({"protocol": "mine"}, "There is no such protocol; expected one of tsttc-1, toolkit."),

@@ -19,7 +19,7 @@ from django.conf import settings
 from django.core.files.base import ContentFile
 from django.utils import timezone
 
-from leaderboard import benchmark, ground_truth, submissions, teams, tokens, visibility
+from leaderboard import benchmark, ground_truth, seeds, submissions, teams, tokens, visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -96,6 +96,9 @@ def build(directory: Path, *, has_secrets: bool) -> Scene:
     """One of the two worlds."""
     directory.mkdir()
     settings.GROUND_TRUTH_DIR = directory / "ground-truth"
+    # The random numbers of hidden splits come from it: what differs by chance alone is not to differ.
+    settings.GROUND_TRUTH_DIR.mkdir()
+    seeds.path().write_text("0" * 2 * seeds.N_BYTES)
     settings.FILES_DIR = directory / "files"
     ground_truth.load.cache_clear()
     benchmark.ensure_splits()
