@@ -18,7 +18,7 @@ from evaluator import read_predictions
 from evaluator.protocol import get_protocol
 from evaluator.scoring import Scorer
 from leaderboard import bags, ground_truth, lifecycle, quotas, rescoring
-from leaderboard.models import User
+from leaderboard.models import Team, User
 from leaderboard.models.submissions import SentFile
 from leaderboard.outages import outage_of
 from leaderboard.texts import Refused
@@ -36,6 +36,7 @@ ANSWERS = (
     quotas.QuotaExceeded,
     rescoring.Refused,
     lifecycle.LostRace,
+    Team.DoesNotExist,  # it has just ended, which is a 404
 )
 pytestmark = [
     pytest.mark.slow,
