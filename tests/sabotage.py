@@ -108,9 +108,9 @@ SABOTAGES = (
     ),
     Sabotage(
         "claim what somebody else has",
-        LIFECYCLE,
-        ".filter(status=Status.QUEUED, due_at__lte=Now())\n            .order_by",
-        ".filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())\n            .order_by",
+        "leaderboard/models/submissions.py",
+        "waiting = self.filter(status=Status.QUEUED, due_at__lte=Now())",
+        "waiting = self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
         f"{STEPS}::test_what_is_claimed_is_not_claimed_again",
     ),
     Sabotage(
@@ -166,8 +166,8 @@ SABOTAGES = (
     Sabotage(
         "no sweep of expired leases",
         "leaderboard/queue.py",
-        "    lifecycle.release_expired(rng=rng)\n    n_sent = 0\n",
-        "    n_sent = 0\n",
+        "    lifecycle.release_expired(rng=rng)\n    visibility",
+        "    visibility",
         f"{QUEUE}::test_sweep_takes_back_what_dead_workers_hold",
     ),
     Sabotage(

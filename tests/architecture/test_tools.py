@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.sabotage import SABOTAGES, Sabotage
 from tests.services import environment_of_its_own
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -86,3 +87,10 @@ def test_every_target_that_the_readme_names_exists() -> None:
     named = {line.split()[1] for line in readme.splitlines() if line.startswith("make ")}
     assert {"demo", "test"} <= named
     assert not {target for target in named if f"\n{target}:" not in makefile}
+
+
+@pytest.mark.parametrize("sabotage", SABOTAGES, ids=lambda sabotage: sabotage.what)
+def test_every_sabotage_still_fits_the_code(sabotage: Sabotage) -> None:
+    assert (REPOSITORY / sabotage.path).read_text(encoding="utf-8").count(sabotage.line) == 1
+    file, _, name = sabotage.test.partition("::")
+    assert f"def {name.partition('[')[0]}(" in (REPOSITORY / file).read_text(encoding="utf-8")
