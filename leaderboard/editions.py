@@ -75,8 +75,9 @@ def latest_change(split: Split) -> Publication | None:
 def history(split: Split, publications: tuple[Publication, ...]) -> tuple[Past, ...]:
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
-    # All at once, since each edition asks for one.
-    compared = list(TruthComparison.objects.filter(new__split=split).order_by("pk"))
+    # All at once, since each edition that followed another asks for one.
+    has_followed = any(publication.replaced_id for publication in publications)
+    compared = list(TruthComparison.objects.filter(new__split=split).order_by("pk")) if has_followed else []
     return tuple(_past(edition, split, publications, compared) for edition in published.order_by("-number"))
 
 
