@@ -22,7 +22,7 @@ ENV PATH=/opt/tsttc/bin:$PATH \
 RUN groupadd --gid 10001 tsttc \
     && useradd --uid 10001 --gid tsttc --no-create-home --home-dir /nonexistent --shell /usr/sbin/nologin tsttc \
     && install -d -o tsttc -g tsttc -m 0750 /var/lib/tsttc /var/lib/tsttc/files \
-    && install -d -o tsttc -g tsttc -m 0700 /var/lib/tsttc/ground-truth /var/lib/tsttc/bags
+    && install -d -o tsttc -g tsttc -m 0700 /var/lib/tsttc/ground-truth /var/lib/tsttc/bags /var/lib/tsttc/certificates
 
 COPY --from=environment /opt/tsttc /opt/tsttc
 WORKDIR /srv/tsttc
