@@ -1,4 +1,4 @@
-# One image for web, worker, beat and the maintainers' commands; docker-compose.yml says which does what.
+# One image for web, worker and the maintainers' commands; docker-compose.yml says which does what.
 
 FROM python:3.11.14-slim-bookworm AS environment
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
@@ -30,7 +30,7 @@ COPY . .
 # Static files are part of the image. Collecting needs no service, only settings that load.
 RUN TSTTC_PROFILE=embedded TSTTC_DATA_DIR=/tmp/collect python manage.py collectstatic --no-input --verbosity 0 \
     && rm -rf /tmp/collect \
-    && python -m compileall -q evaluator leaderboard
+    && python -m compileall -q baselines evaluator leaderboard
 
 USER tsttc
 EXPOSE 8000

@@ -20,14 +20,19 @@ READY := $(or $(wildcard $(DEV_STAMP)),$(SERVER_STAMP))
 
 # A process of the test run for each processor; the tests of one file stay together, with what they share.
 SPREAD := -n auto --dist loadfile
+# So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
+export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo test test-fast chaos sabotage bench docs lint format screenshots lock clean
+.PHONY: help demo demo-runs test test-fast chaos sabotage bench docs lint format screenshots lock echarts clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
 
 demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (PORT=… for another port)
 	@exec $(PY) manage.py demo --host $(HOST) --port $(PORT)
+
+demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew: render its frames and run the baselines on them
+	nice -n 10 $(PY) -m leaderboard.demo.make_runs --jobs 2
 
 test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
 	@status=0; \
@@ -71,7 +76,23 @@ LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra server --extra fr
 lock: ## pin the dependencies of pyproject.toml anew
 	@$(call find_python) && "$$python" -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip install --quiet uv
 	$(LOCK) --output-file requirements.lock
-	$(LOCK) --group dev --constraint requirements.lock --output-file requirements-dev.lock
+	$(LOCK) --extra baselines --group dev --constraint requirements.lock --output-file requirements-dev.lock
+
+# The parts of Apache ECharts that the charts use. Needs node and the npm registry; the digest of what comes out
+# stands in static/vendored/README.md.
+ECHARTS := 6.1.0
+ESBUILD := 0.28.2
+
+echarts: ## build static/vendored/echarts.min.js anew (ECHARTS=… for another version)
+	@folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && \
+	npm install --prefix "$$folder" --ignore-scripts --no-audit --no-fund --silent echarts@$(ECHARTS) esbuild@$(ESBUILD) && \
+	cp static/vendored/echarts.entry.txt "$$folder/entry.mjs" && \
+	"$$folder/node_modules/.bin/esbuild" "$$folder/entry.mjs" --bundle --minify --format=iife --global-name=echarts \
+		--target=es2020 --legal-comments=none '--define:process.env.NODE_ENV="production"' --log-level=error \
+		--outfile=static/vendored/echarts.min.js && \
+	cd "$$folder/node_modules" && cat echarts/LICENSE echarts/NOTICE echarts/licenses/LICENSE-d3 zrender/LICENSE \
+		tslib/LICENSE.txt > "$(CURDIR)/static/vendored/echarts.LICENSE" && \
+	cd "$(CURDIR)" && sha256sum static/vendored/echarts.*
 
 clean: ## remove the environment and everything generated, but not var/ (the demo's data)
 	rm -rf $(VENV) $(VENV)-lock staticfiles build .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis

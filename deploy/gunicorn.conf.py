@@ -7,7 +7,7 @@ import os
 import signal
 from typing import Any
 
-from leaderboard.logs import logging_settings
+from leaderboard.ops.logs import logging_settings
 
 bind = os.environ.get("TSTTC_WEB_BIND", "0.0.0.0:8000")
 # The number of processes is gunicorn's own variable, WEB_CONCURRENCY.
@@ -27,12 +27,12 @@ logconfig_dict = logging_settings(as_json=True, level="INFO")
 
 def post_worker_init(worker: Any) -> None:
     """Asked to end, a process first lets its waiters go, with the state as it is; they ask the next one."""
-    from leaderboard import waiting  # noqa: PLC0415 - needs the application, which is loaded only now
+    from leaderboard.submissions import long_poll  # noqa: PLC0415 - needs the application, which is loaded only now
 
     end = signal.getsignal(signal.SIGTERM)
 
     def let_go(number: int, frame: Any) -> None:
-        waiting.THE_WATCHER.close()
+        long_poll.THE_WATCHER.close()
         if callable(end):
             end(number, frame)
 

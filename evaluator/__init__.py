@@ -11,27 +11,39 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from evaluator.differences import Difference, compare_predictions
-    from evaluator.predictions import Predictions, read_predictions
+    from evaluator.client.client import Client
+    from evaluator.metrics.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
+    from evaluator.metrics.scale import convert_rate, fps_of_gap, scale_ratio_to_ttc, ttc_to_scale_ratio
+    from evaluator.predictions.conversion import convert
+    from evaluator.predictions.predictions import Predictions, read_predictions
+    from evaluator.predictions.writing import write_predictions
     from evaluator.problems import PROBLEM_CODES, Problem, Rejected
-    from evaluator.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
-    from evaluator.report import IntervalScore, Report, format_published, published
-    from evaluator.scoring import evaluate, evaluate_many
-    from evaluator.truth import GroundTruth, Manifest, read_manifest, read_truth
-    from evaluator.uncertainty import confidence_intervals
-    from evaluator.writing import write_predictions
+    from evaluator.scoring.differences import compare_predictions
+    from evaluator.scoring.report import IntervalScore, Report, format_published, published
+    from evaluator.scoring.scoring import evaluate, evaluate_many
+    from evaluator.scoring.significance import Difference
+    from evaluator.scoring.uncertainty import confidence_intervals
+    from evaluator.truth.csv_tables import Table
+    from evaluator.truth.numbering import read_numbering
+    from evaluator.truth.truth import GroundTruth, Manifest, read_manifest, read_truth
 else:
     # Each name is imported when it is first asked for: `tsttc --help` then answers without loading numpy.
     _HOMES = {
-        "differences": ("Difference", "compare_predictions"),
-        "predictions": ("Predictions", "read_predictions"),
+        "client.client": ("Client",),
+        "metrics.scale": ("convert_rate", "fps_of_gap", "scale_ratio_to_ttc", "ttc_to_scale_ratio"),
+        "predictions.conversion": ("convert",),
+        "truth.csv_tables": ("Table",),
+        "truth.numbering": ("read_numbering",),
+        "scoring.differences": ("compare_predictions",),
+        "predictions.predictions": ("Predictions", "read_predictions"),
         "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
-        "protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
-        "report": ("IntervalScore", "Report", "format_published", "published"),
-        "scoring": ("evaluate", "evaluate_many"),
-        "truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
-        "uncertainty": ("confidence_intervals",),
-        "writing": ("write_predictions",),
+        "metrics.protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
+        "scoring.report": ("IntervalScore", "Report", "format_published", "published"),
+        "scoring.scoring": ("evaluate", "evaluate_many"),
+        "scoring.significance": ("Difference",),
+        "truth.truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
+        "scoring.uncertainty": ("confidence_intervals",),
+        "predictions.writing": ("write_predictions",),
     }
     _HOME_OF = {name: f"evaluator.{module}" for module, names in _HOMES.items() for name in names}
 
@@ -48,6 +60,7 @@ __all__ = [
     "PROBLEM_CODES",
     "PROTOCOLS",
     "SCORE_NAMES",
+    "Client",
     "Difference",
     "GroundTruth",
     "IntervalScore",
@@ -57,15 +70,22 @@ __all__ = [
     "Protocol",
     "Rejected",
     "Report",
+    "Table",
     "compare_predictions",
     "confidence_intervals",
+    "convert",
+    "convert_rate",
     "evaluate",
     "evaluate_many",
     "format_published",
+    "fps_of_gap",
     "get_protocol",
     "published",
     "read_manifest",
+    "read_numbering",
     "read_predictions",
     "read_truth",
+    "scale_ratio_to_ttc",
+    "ttc_to_scale_ratio",
     "write_predictions",
 ]

@@ -6,8 +6,8 @@ import json
 
 import pandas as pd
 
-from evaluator.predictions import Predictions, read_predictions
-from evaluator.truth import Manifest
+from evaluator.predictions.predictions import Predictions, read_predictions
+from evaluator.truth.truth import Manifest
 
 
 def manifest_frame(manifest: Manifest) -> pd.DataFrame:

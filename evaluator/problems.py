@@ -1,4 +1,4 @@
-"""What is wrong with a file: `Problem`, and `Rejected` which carries the list.
+"""Problems of a file: `Problem`, and `Rejected`, which carries the list.
 
 A problem says what, where, found and expected in one sentence, in the same words on the page, in the API and
 on the command line. Its code is stable and made for programs; `PROBLEM_CODES` is the whole vocabulary.

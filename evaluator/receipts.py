@@ -17,11 +17,11 @@ import base64
 import hashlib
 import json
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
+from evaluator.metrics.protocol import PROTOCOLS
 
 VERSION: Final = 1
 KIND: Final = "tsttc-score-receipt"
@@ -48,7 +48,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What a receipt says, its signature checked. `scores` has the ten names; None where there is no value.
+    """What a receipt says, its signature checked. `scores` has the protocol's names; None for no value.
 
     `edition` is the edition in which the score stands, whether or not a later one has taken its place.
     `method_id` stays for ever; `method` is the name that it had when the receipt was signed.
@@ -90,11 +90,19 @@ def _members(wanted: Mapping[str, Callable[[object], bool]]) -> Callable[[object
     )
 
 
+def _named(fits: Callable[[object], bool]) -> Callable[[object], bool]:
+    """Of members under names of scores or TTC ranges: `_names_of` says which."""
+    return lambda value: isinstance(value, dict) and all(map(_NAME, value)) and all(map(fits, value.values()))
+
+
 _UUID: Final = r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}"
 _DIGEST: Final = _text(r"sha256:[0-9a-f]{64}")
 _DECIMAL: Final = _text(r"(0|[1-9][0-9]{0,14})(\.[0-9]{1,6})?")
 
-# Every field of a receipt, and what it may be. There are no others.
+_NAME: Final = _text(r"[a-z][a-z0-9]{0,31}(_[a-z][a-z0-9]{0,31})?")
+
+# Every field of a receipt, and what it may be. There are no others. Which names stand in `scores` and
+# `counts` is the protocol's to say, for ever: a protocol never changes, so what was signed stays a receipt.
 FIELDS: Final[dict[str, Callable[[object], bool]]] = {
     "kind": _text(re.escape(KIND)),
     "version": _count,
@@ -107,10 +115,8 @@ FIELDS: Final[dict[str, Callable[[object], bool]]] = {
     "ground_truth": _DIGEST,
     "file": _DIGEST,
     "method": _members({"id": _text(_UUID), "name": _text(r"(?s).{1,80}")}),
-    "scores": _members(
-        dict.fromkeys(SCORE_NAMES, lambda value: value is None or _DECIMAL(value)),
-    ),
-    "counts": _members(dict.fromkeys(INTERVAL_NAMES, _count)),
+    "scores": _named(lambda value: value is None or _DECIMAL(value)),
+    "counts": _named(_count),
     "scored_at": _text(r"[0-9]{4}(-[0-9]{2}){2}T[0-9]{2}(:[0-9]{2}){2}Z"),
     "signature": _text(r"[A-Za-z0-9_-]{86}"),
 }
@@ -253,9 +259,9 @@ def verify(receipt: bytes, keys: Mapping[str, bytes]) -> Verified:
         method=document["method"]["name"],
         scores={
             name: None if document["scores"][name] is None else float(document["scores"][name])
-            for name in SCORE_NAMES
+            for name in _names_of(document)["scores"]
         },
-        counts={name: document["counts"][name] for name in INTERVAL_NAMES},
+        counts={name: document["counts"][name] for name in _names_of(document)["counts"]},
         scored_at=document["scored_at"],
         decimals=max(
             (len(text.partition(".")[2]) for text in document["scores"].values() if text), default=0
@@ -295,6 +301,14 @@ def _document(receipt: bytes) -> Document:
     return document
 
 
+def _names_of(document: Document) -> dict[str, Sequence[str]]:
+    """The names in the receipt's scores and counts: its protocol's; of one that is newer, those it has."""
+    rules = PROTOCOLS.get(document["protocol"])
+    if rules is None:
+        return {name: sorted(document[name]) for name in ("scores", "counts")}
+    return {"scores": rules.score_names, "counts": rules.interval_names}
+
+
 def _misfit(document: Document) -> str:
     """What is missing, added or malformed; empty if nothing is."""
     missing = [name for name in FIELDS if name not in document]
@@ -305,6 +319,9 @@ def _misfit(document: Document) -> str:
         names = ", ".join(json.dumps(name[:40]) for name in added[:5])
         return f"The receipt has {names} beside its fields; expected those of version {VERSION} alone."
     wrong = [name for name, fits in FIELDS.items() if not fits(document[name])]
+    if not wrong:
+        expected = _names_of(document)
+        wrong = [name for name, names in expected.items() if document[name].keys() != set(names)]
     if wrong:
         return f"The receipt's {', '.join(wrong)} is malformed; expected what the leaderboard wrote."
     return ""

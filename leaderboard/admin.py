@@ -1,4 +1,4 @@
-"""Django's admin, read-mostly; its actions call the same verbs as every other door."""
+"""Django's admin, read-mostly; its actions call the domain functions that pages and commands call."""
 
 from collections.abc import Sequence
 from typing import Any, ClassVar, cast
@@ -8,10 +8,10 @@ from django.contrib.admin.models import LogEntry
 from django.contrib.auth.admin import UserAdmin as DjangoUserAdmin
 from django.db import transaction
 from django.db.models import Model, QuerySet, URLField
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import Http404, HttpRequest
 from django.utils import timezone
 
-from leaderboard import admissions, audit, boards, lifecycle, quotas, tokens
+from leaderboard import audit, versions
 from leaderboard.models import (
     Admission,
     ApiToken,
@@ -25,11 +25,12 @@ from leaderboard.models import (
     PublishedResult,
     QuotaOverride,
     Split,
-    Status,
     Submission,
     Team,
     User,
 )
+from leaderboard.people import tokens
+from leaderboard.quotas import admissions
 
 
 class ReadOnlyAdmin(admin.ModelAdmin):
@@ -85,12 +86,12 @@ class AuditedAdmin(admin.ModelAdmin):
         # What is changed here is rare, and may stand on any board. Most views are transactions; where one is
         # not, the sweep finds what a reader has drawn between the two.
         with transaction.atomic():
-            boards.changed_everywhere()
+            versions.changed_everywhere()
 
 
 @admin.register(Evaluation)
 class EvaluationAdmin(ReadOnlyAdmin):
-    """The queue: what waits, what runs, what failed by our fault."""
+    """Every evaluation, decided ones as well; the queue's page retries system errors."""
 
     list_display = [
         "id",
@@ -106,31 +107,6 @@ class EvaluationAdmin(ReadOnlyAdmin):
     search_fields = ["id", "submission__id", "submission__method__name", "submission__method__team__name"]
     list_select_related = ["submission__method", "edition"]
     date_hierarchy = "queued_at"
-    actions = ["retry"]
-
-    def changelist_view(
-        self, request: HttpRequest, extra_context: dict[str, Any] | None = None
-    ) -> HttpResponse:
-        """The list, headed by how many wait for a maintainer."""
-        n_failed = Evaluation.objects.filter(status=Status.SYSTEM_ERROR).count()
-        heading = f"{n_failed} failed by our fault and wait to be retried" if n_failed else None
-        return super().changelist_view(request, {"subtitle": heading, **(extra_context or {})})
-
-    @admin.action(description="Retry system errors", permissions=["retry"])
-    def retry(self, request: HttpRequest, queryset: QuerySet[Evaluation]) -> None:
-        """Queue the chosen system errors again."""
-        n_retried = 0
-        for evaluation in queryset:
-            try:
-                lifecycle.retry(evaluation=evaluation, actor=request.user, reason="from the administration")  # type: ignore[arg-type]  # the admin lets no anonymous user in
-                n_retried += 1
-            except lifecycle.LostRace as race:
-                self.message_user(request, str(race), messages.WARNING)
-        self.message_user(request, f"Queued again: {n_retried}.", messages.SUCCESS)
-
-    def has_retry_permission(self, request: HttpRequest) -> bool:
-        """Maintainers who may look at evaluations may retry them."""
-        return self.has_view_permission(request)
 
 
 @admin.register(Submission)
@@ -179,52 +155,9 @@ class SplitAdmin(AuditedAdmin):
         return False
 
 
-@admin.register(QuotaOverride)
-class QuotaOverrideAdmin(admin.ModelAdmin):
-    """Rules of single teams. The verbs write them, and tell the audit trail."""
-
-    list_display = ["team", "split", "quota_limit", "quota_window", "reason", "set_by", "set_at"]
-    list_filter = ["split"]
-    search_fields = ["team__name", "reason"]
-    autocomplete_fields = ["team"]
-    readonly_fields = ["set_by", "set_at"]
-
-    def get_readonly_fields(self, request: HttpRequest, obj: QuotaOverride | None = None) -> list[str]:
-        """Whose rules they are stays."""
-        fixed = super().get_readonly_fields(request, obj)
-        return [*fixed, "team", "split"] if obj else list(fixed)
-
-    def save_model(self, request: HttpRequest, obj: QuotaOverride, form: Any, change: bool) -> None:
-        """Give the team these rules."""
-        try:
-            row = quotas.override(
-                team=obj.team,
-                split=obj.split,
-                limit=obj.quota_limit,
-                window=obj.quota_window,
-                min_gap=obj.quota_min_gap,
-                rejected_limit=obj.quota_rejected_limit,
-                reason=obj.reason,
-                actor=cast("User", request.user),
-                now=timezone.now(),
-            )
-        except Team.DoesNotExist:
-            raise Http404 from None  # it has just ended
-        obj.pk = row.pk
-
-    def delete_model(self, request: HttpRequest, obj: QuotaOverride) -> None:
-        """Let the split's rules hold for the team again."""
-        quotas.end_override(row=obj, actor=cast("User", request.user))
-
-    def delete_queryset(self, request: HttpRequest, queryset: QuerySet[QuotaOverride]) -> None:
-        """The same for many."""
-        for row in queryset:
-            self.delete_model(request, row)
-
-
 @admin.register(Admission)
 class AdmissionAdmin(admin.ModelAdmin):
-    """Teams that submit to a split by admission. The verbs write them, and tell the audit trail."""
+    """Teams that submit to a split by admission. Domain functions write them, with an audit event."""
 
     list_display = ["team", "split", "reason", "admitted_by", "admitted_at"]
     list_filter = ["split"]
@@ -232,8 +165,8 @@ class AdmissionAdmin(admin.ModelAdmin):
     autocomplete_fields = ["team"]
     readonly_fields = ["admitted_by", "admitted_at"]
 
-    def get_readonly_fields(self, request: HttpRequest, obj: Admission | None = None) -> list[str]:
-        """Who is admitted stays."""
+    def get_readonly_fields(self, request: HttpRequest, obj: Model | None = None) -> list[str]:
+        """Whose it is stays."""
         fixed = super().get_readonly_fields(request, obj)
         return [*fixed, "team", "split"] if obj else list(fixed)
 
@@ -254,17 +187,6 @@ class AdmissionAdmin(admin.ModelAdmin):
         """The same for many."""
         for row in queryset:
             self.delete_model(request, row)
-
-
-@admin.register(AuditEvent)
-class AuditEventAdmin(ReadOnlyAdmin):
-    """The audit trail; a page of its own lets it be exported."""
-
-    list_display = ["id", "at", "actor", "verb", "noun", "noun_id"]
-    list_filter = ["verb", "noun"]
-    search_fields = ["noun_id", "actor__email"]
-    list_select_related = ["actor"]
-    date_hierarchy = "at"
 
 
 @admin.register(Method)
@@ -351,5 +273,6 @@ class UserAdmin(AuditedAdmin, DjangoUserAdmin):
         return super().has_delete_permission(request, obj)
 
 
-for model in (Edition, GroundTruth, Membership, PublishedResult):
+# What else maintainers do with overrides, and ask the audit trail, they do at `/maintain/`.
+for model in (AuditEvent, Edition, GroundTruth, Membership, PublishedResult, QuotaOverride):
     admin.site.register(model, ReadOnlyAdmin)

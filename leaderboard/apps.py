@@ -12,6 +12,6 @@ class LeaderboardConfig(AppConfig):
 
     def ready(self) -> None:
         """Register the system checks; only now can what they look at be imported."""
-        from leaderboard import receipts  # noqa: PLC0415 - needs the models
+        from leaderboard.submissions import receipts  # noqa: PLC0415 - needs the models
 
         checks.register(receipts.check_keys)

@@ -1,11 +1,11 @@
-"""The audit trail: who did what to what, when. Each event is bound to the one before it by its hash.
+"""The audit trail: who did what to what, when. Rows are only added, and soon sealed into a chain of hashes.
 
-Of two transactions that write events the second waits for the end of the first, whose hash it has to know.
-A verb therefore records last of all that it writes: the wait is then as long as a COMMIT. And nobody who has
-the chain waits for a row that somebody has who waits for the chain: see `hold`.
+A verb writes its event in its own transaction and waits for nobody. The sweep seals what is not sealed yet:
+it binds each event to the one before it by its hash. What holds until then says
+`docs/adr/0032-the-sweep-seals-the-audit-trail.md`.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -14,13 +14,12 @@ from django.db import connection, transaction
 from django.db.models import QuerySet
 from django.utils import timezone
 
-from leaderboard import bulk
+from leaderboard.db import bulk
 from leaderboard.models import AuditEvent, User
-from leaderboard.models.audit import GENESIS
+from leaderboard.models.audit import GENESIS, Unsealed
 
-# Names the chain among PostgreSQL's advisory locks: "audit" in ASCII.
+# Names whoever seals among PostgreSQL's advisory locks: "audit" in ASCII.
 _LOCK = 0x6175646974
-_CHECK_AND_LOCK = f"SET CONSTRAINTS ALL IMMEDIATE; SELECT pg_advisory_xact_lock({_LOCK})"
 _CHUNK = 2000
 MAX_BREAKS = 20
 
@@ -39,64 +38,22 @@ def record(
     never a value of a hidden ground truth. Raises `TypeError` for anything else, also for floats, which no
     two databases give back alike.
     """
-    with transaction.atomic():
-        [event] = _chained([(verb, noun, noun_id, details or {})], actor=actor)
-        event.save(force_insert=True)
-    return event
+    return AuditEvent.objects.create(
+        verb=verb, noun=noun, noun_id=_storable(str(noun_id)), actor=actor, details=_plain(details or {})
+    )
 
 
 def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
     """Write many deeds of the machine itself at once: verb, noun, noun_id, details."""
-    columns = ["at", "verb", "noun", "noun_id", "details", "previous_hash", "hash"]
-    with transaction.atomic():
-        events = _chained(list(deeds), actor=None)
-        bulk.insert(AuditEvent, columns, [[getattr(event, name) for name in columns] for event in events])
-
-
-def _chained(
-    deeds: Sequence[tuple[str, str, object, Mapping[str, Any]]], *, actor: User | None
-) -> list[AuditEvent]:
-    """The deeds as events that follow the last one, to be written before the transaction ends."""
-    if not deeds:
-        return []
-    previous_hash = _locked_tip(actor)
     at = timezone.now()
-    events = []
-    for verb, noun, noun_id, details in deeds:
-        event = AuditEvent(
-            at=at,
-            actor=actor,
-            verb=verb,
-            noun=noun,
-            noun_id=_storable(str(noun_id)),
-            details=_plain(details),
-            previous_hash=previous_hash,
-        )
-        event.hash = previous_hash = event.expected_hash()
-        events.append(event)
-    return events
-
-
-def hold(actor: User | None = None) -> None:
-    """Let nobody else record until the transaction ends; to be called where it ends soon.
-
-    Foreign keys that are checked at COMMIT would wait there, with the chain in hand, for whoever holds a row
-    that they name. So those of all rows written until now are checked here, before the chain is taken; and
-    that of the events to come is held: their `actor`.
-    """
-    if connection.vendor != "postgresql":
-        # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
-        return
-    with connection.cursor() as cursor:
-        if actor is not None:
-            cursor.execute("SELECT 1 FROM leaderboard_user WHERE id = %s FOR KEY SHARE", [actor.pk])
-        cursor.execute(_CHECK_AND_LOCK)
-
-
-def _locked_tip(actor: User | None) -> str:
-    """The hash of the last event, which stays the last until the transaction ends."""
-    hold(actor)
-    return AuditEvent.objects.order_by("-pk").values_list("hash", flat=True).first() or GENESIS
+    bulk.insert(
+        AuditEvent,
+        ["at", "verb", "noun", "noun_id", "details"],
+        [
+            [at, verb, noun, _storable(str(noun_id)), _plain(details)]
+            for verb, noun, noun_id, details in deeds
+        ],
+    )
 
 
 def _plain(value: Any) -> Any:
@@ -115,6 +72,44 @@ def _plain(value: Any) -> Any:
 def _storable(text: str) -> str:
     """The text without what PostgreSQL cannot keep: NUL and lone surrogates."""
     return text.replace("\x00", "�").encode("utf-8", "replace").decode()
+
+
+# --- sealing it ------------------------------------------------------------------------------------------
+
+
+def seal() -> int:
+    """Seal every event that is committed and not sealed yet. Returns how many; 0 if another worker is at it.
+
+    Whatever its id and its moment, an event that was committed late is sealed when it is found.
+    """
+    n_sealed = 0
+    while n_now := _seal_some():
+        n_sealed += n_now
+    return n_sealed
+
+
+def _seal_some() -> int:
+    with transaction.atomic():
+        if not _is_the_sealer():
+            return 0
+        last = AuditEvent.objects.exclude(hash=None).order_by("-seal_number").first()
+        number, tip = (last.seal_number or 0, last.hash or "") if last else (0, GENESIS)
+        rows = []
+        for event in AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK]:
+            number, before, tip = number + 1, tip, event.hash_after(tip)
+            rows.append((number, before, tip, event.pk))
+        bulk.update(AuditEvent, ["seal_number", "previous_hash", "hash"], rows)
+    return len(rows)
+
+
+def _is_the_sealer() -> bool:
+    """Whether nobody else seals, which stays so until the transaction ends."""
+    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+    if connection.vendor != "postgresql":
+        return True
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT pg_try_advisory_xact_lock(%s)", [_LOCK])
+        return cursor.fetchone() == (True,)
 
 
 # --- reading it ------------------------------------------------------------------------------------------
@@ -152,31 +147,37 @@ class Break:
 
 @dataclass(frozen=True)
 class Verification:
-    """What going through the chain found: its length, its last hash, the first places that do not hold."""
+    """What going through the chain found: its length, its last hash, the first places that do not hold.
+
+    What is `unsealed` is in no chain yet, and was not looked at.
+    """
 
     n_events: int
     tip: str
     breaks: tuple[Break, ...]
+    unsealed: Unsealed
 
 
 def verify(*, expected_hash: str = "") -> Verification:
-    """Compute every hash anew, from the first event to the last.
+    """Compute every hash anew, from the first sealed event to the last.
 
     A chain whose end was cut off, or which was written anew from some event on, is sound in itself: only a
     hash that was noted elsewhere shows it. With `expected_hash`, some event has to have it.
     """
     n_events, tip, breaks = 0, GENESIS, []
     is_found = not expected_hash
-    for event in AuditEvent.objects.order_by("pk").iterator(chunk_size=_CHUNK):
+    not_yet = AuditEvent.objects.unsealed()
+    sealed = AuditEvent.objects.exclude(hash=None).order_by("seal_number")
+    for event in sealed.iterator(chunk_size=_CHUNK):
         if event.previous_hash != tip:
             before = f"after {n_events:,} events" if n_events else "as the first event"
             breaks.append(Break(event.pk, f"stands {before}, and follows another one: something is missing"))
-        if event.hash != event.expected_hash():
+        if event.hash != event.hash_after(event.previous_hash or ""):
             breaks.append(Break(event.pk, "says something else than when it was written"))
         is_found = is_found or event.hash == expected_hash
-        n_events, tip = n_events + 1, event.hash
+        n_events, tip = n_events + 1, event.hash or ""
     if not is_found:
         breaks.append(
             Break(0, f"no event has the hash {expected_hash[:64]}: the end was cut off or rewritten")
         )
-    return Verification(n_events=n_events, tip=tip, breaks=tuple(breaks[:MAX_BREAKS]))
+    return Verification(n_events, tip, tuple(breaks[:MAX_BREAKS]), unsealed=not_yet)

@@ -4,13 +4,10 @@ import os
 import random
 
 from celery import Celery
-from celery.signals import setup_logging, worker_process_init, worker_process_shutdown
+from celery.signals import setup_logging, worker_process_init, worker_process_shutdown, worker_shutdown
 from django_structlog.celery.steps import DjangoStructLogInitStep
-from kombu.transport import TRANSPORT_ALIASES
 
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
-
-TRANSPORT_ALIASES["filesystem"] = "leaderboard.folder_broker:Transport"
 
 app = Celery("leaderboard")
 app.config_from_object("django.conf:settings", namespace="CELERY")
@@ -20,19 +17,23 @@ app.steps["worker"].add(DjangoStructLogInitStep)
 
 
 @setup_logging.connect  # that somebody listens is what keeps Celery from installing its own handlers
-def keep_our_logging(**_: object) -> None:
-    """Leave logging as `leaderboard/logs.py` set it up."""
+def use_own_logging(**_: object) -> None:
+    """Leave logging as `leaderboard/ops/logs.py` set it up."""
 
 
 @worker_process_init.connect  # Celery has no other door into the processes that run tasks
-def look_for_work_unasked(**_: object) -> None:
-    """Start this process's poller, so that queued work is found with no broker at all."""
-    from leaderboard.queue import Poller  # noqa: PLC0415 - the app registry is ready only now
+def start_poller(**_: object) -> None:
+    """Start this process's pollers, so that queued work is found with no broker at all."""
+    from leaderboard.workers.queue import (  # noqa: PLC0415 - the app registry is ready only now
+        start_pollers,
+        stop_pollers,
+    )
 
-    poller = Poller(rng=random.Random())  # noqa: S311 - jitter, not a secret
-    poller.start()
+    pollers = start_pollers(rng=random.Random())  # noqa: S311 - jitter, not a secret
 
+    # The second is said where the worker has no processes but itself, as in the demo.
     @worker_process_shutdown.connect(weak=False)
+    @worker_shutdown.connect(weak=False)
     def finish_what_is_in_hand(**_: object) -> None:
-        """Let the poller finish, as Celery lets a task; else its evaluation waits for its lease to end."""
-        poller.stop(patience_s=app.conf.worker_soft_shutdown_timeout)
+        """Let the pollers finish, as Celery lets a task; else an evaluation waits for its lease to end."""
+        stop_pollers(pollers, patience_s=app.conf.worker_soft_shutdown_timeout)

@@ -1,5 +1,6 @@
-"""How a view says that anybody may be answered from memory (see `leaderboard/web/kept.py`), and how a reader
-says what is known already.
+"""Mark a view's response as cacheable for anonymous readers, and answer conditional requests.
+
+`leaderboard/web/middleware/page_cache.py` reads the mark.
 """
 
 import re
@@ -9,6 +10,7 @@ from functools import wraps
 from typing import Any, Final, ParamSpec, TypeVar
 
 from django.http import HttpRequest
+from django.utils import timezone
 from django.utils.http import parse_etags
 
 P = ParamSpec("P")
@@ -49,6 +51,12 @@ ANYTHING: Final = matching("")
 NEVER: Final = one_of()
 """The same, where an empty text is not the same as none."""
 
+_DAY: Final = re.compile("[0-9]{4}-[0-9]{2}-[0-9]{2}")
+A_PAST_DAY: Final = Parameter(
+    lambda text: _DAY.fullmatch(text) is not None and text < f"{timezone.now():%Y-%m-%d}"
+)
+"""Worth remembering: days in UTC that are over. Of one that is not, the answer changes when it ends."""
+
 
 def takes(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
     """A view that reads these query parameters and no others: what else an address names is dropped."""
@@ -61,7 +69,7 @@ def parameters_of(view: object) -> Parameters | None:
     return getattr(view, _PARAMETERS, None)
 
 
-def kept(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
+def cacheable(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
     """What this view answers anybody depends on its path, on these parameters and on the boards' numbers."""
 
     @wraps(view)
@@ -73,7 +81,7 @@ def kept(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, 
     return takes(marked, parameters)
 
 
-def is_kept(response: Any) -> bool:
+def is_cacheable(response: Any) -> bool:
     """Whether the view that made it says so."""
     return getattr(response, _MARK, False) is True
 

@@ -1,7 +1,7 @@
 """All settings, read from the environment.
 
-Two profiles: `embedded` (the default: SQLite, a broker in files, everything below `var/`; what `make demo`
-and the tests use) and `production`, which guesses nothing: what it needs and does not find is an error.
+Two profiles: `embedded` (the default: SQLite, no broker, everything below `var/`; what `make demo` and the
+tests use) and `production`, which guesses nothing: what it needs and does not find is an error.
 Every variable is described in `docs/operations.md`.
 """
 
@@ -14,13 +14,13 @@ from secrets import token_urlsafe
 from typing import Any
 
 import environ
-from celery.schedules import schedule
 from csp.constants import NONE, SELF
 from django.core.exceptions import ImproperlyConfigured
 from django.core.management.utils import get_random_secret_key
 
-from leaderboard import environment, logs, openapi
-from leaderboard.environment import key_of_checkout, required
+from leaderboard.api import settings
+from leaderboard.ops import environment, logs
+from leaderboard.ops.environment import key_of_checkout, required
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environ.Env()
@@ -46,7 +46,7 @@ if not PRODUCTION:
 SECRET_KEY = required("TSTTC_SECRET_KEY", embedded="", by={"web"}) or key_of_checkout(
     DATA_DIR / "secret-key", get_random_secret_key
 )
-# Signs score receipts (see leaderboard/receipts.py); what former keys signed still verifies.
+# Signs score receipts (see leaderboard/submissions/receipts.py); what former keys signed still verifies.
 RECEIPT_KEY = required("TSTTC_RECEIPT_KEY", embedded="", by={"web"}) or key_of_checkout(
     DATA_DIR / "receipt-key", token_urlsafe
 )
@@ -67,11 +67,9 @@ INSTALLED_APPS = [
     "django.contrib.messages",
     "whitenoise.runserver_nostatic",
     "django.contrib.staticfiles",
-    "django.contrib.humanize",
     "allauth",
     "allauth.account",
     "csp",
-    "django_filters",
     "django_htmx",
     "django_structlog",
     "drf_spectacular",
@@ -80,17 +78,17 @@ INSTALLED_APPS = [
 ]
 MIDDLEWARE = [
     # First, so that every line that a request causes carries its id.
-    "leaderboard.web.request_log.RequestLogMiddleware",
+    "leaderboard.web.middleware.request_log.RequestLogMiddleware",
     # What anything below answers, from memory or from a view, gets the same headers.
-    "leaderboard.web.caching.HeadersMiddleware",
+    "leaderboard.web.middleware.response_headers.HeadersMiddleware",
     "django.middleware.security.SecurityMiddleware",
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "csp.middleware.CSPMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
-    "leaderboard.api.headers.ApiHeadersMiddleware",
+    "leaderboard.api.middleware.ApiHeadersMiddleware",
     # Before sessions and accounts, which somebody without either should not pay for.
-    "leaderboard.web.kept.KeptMiddleware",
+    "leaderboard.web.middleware.page_cache.PageCacheMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",
@@ -99,8 +97,8 @@ MIDDLEWARE = [
     "allauth.account.middleware.AccountMiddleware",
     "django_htmx.middleware.HtmxMiddleware",
     # Last on the way in: their pages need the rest, and nothing before them reads the body.
-    "leaderboard.web.limits.RateLimitMiddleware",
-    "leaderboard.web.limits.UploadLimitMiddleware",
+    "leaderboard.web.middleware.request_limits.RateLimitMiddleware",
+    "leaderboard.web.middleware.request_limits.UploadLimitMiddleware",
 ]
 ROOT_URLCONF = "leaderboard.urls"
 WSGI_APPLICATION = "leaderboard.wsgi.application"
@@ -114,7 +112,7 @@ TEMPLATES = [
                 "django.template.context_processors.request",
                 "django.contrib.auth.context_processors.auth",
                 "django.contrib.messages.context_processors.messages",
-                "leaderboard.web.context.site",
+                "leaderboard.web.context_processors.site",
             ],
         },
     }
@@ -154,7 +152,7 @@ APPLICATION_ROLE = env.str("TSTTC_APPLICATION_ROLE", default="")
 APPLICATION_PASSWORD = env.str("TSTTC_APPLICATION_PASSWORD", default="")
 
 # Prediction files, aligned arrays and public manifests, all named by their digest: in a local directory, or
-# in an S3-compatible service that web and workers on several machines share (see leaderboard/s3.py).
+# in an S3-compatible service that web and workers on several machines share (see leaderboard/storage/s3.py).
 FILES_URL = env.str("TSTTC_FILES_URL", default="")
 if FILES_URL and not FILES_URL.startswith("s3://"):
     raise ImproperlyConfigured("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
@@ -170,10 +168,10 @@ if PRODUCTION:
     }
 
 STORAGES: dict[str, dict[str, Any]] = {
-    "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": FILES_URL}}
+    "files": {"BACKEND": "leaderboard.storage.s3.S3FileStore", "OPTIONS": {"url": FILES_URL}}
     if FILES_URL
     else {
-        "BACKEND": "leaderboard.files.DurableFileSystemStorage",
+        "BACKEND": "leaderboard.storage.files.DurableFileSystemStorage",
         "OPTIONS": {"location": str(FILES_DIR)},
     },
     "default": {
@@ -196,16 +194,16 @@ STATICFILES_DIRS = [BASE_DIR / "static", ("examples", BASE_DIR / "examples")]
 MAX_PREDICTIONS_BYTES = env.int("TSTTC_MAX_PREDICTIONS_BYTES", default=20_000_000)
 DATA_UPLOAD_MAX_MEMORY_SIZE = 1_000_000  # form fields; the file itself is streamed to disk
 DATA_UPLOAD_MAX_NUMBER_FIELDS = 100
-FILE_UPLOAD_HANDLERS = ["leaderboard.web.uploads.UnnamedFileUploadHandler"]
+FILE_UPLOAD_HANDLERS = ["leaderboard.web.middleware.upload_handlers.UnnamedFileUploadHandler"]
 
 # How long after a renaming a team or a method can be renamed again; 0: at once.
 RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
-# Whether teams have quotas (see leaderboard/quotas.py).
+# Whether teams have quotas (see leaderboard/quotas/quotas.py).
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
 
-# --- the life of an evaluation (seconds; see leaderboard/lifecycle.py) ----------------------------------
+# --- the life of an evaluation (seconds; see leaderboard/scoring/lifecycle.py) ------------------------------
 
 LEASE_S = env.float("TSTTC_LEASE_S", default=60.0)
 HEARTBEAT_S = env.float("TSTTC_HEARTBEAT_S", default=LEASE_S / 4)
@@ -217,7 +215,10 @@ if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
         "expected each to be shorter than the next."
     )
 SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
-POLL_S = env.float("TSTTC_POLL_S", default=5.0)
+# Without a broker nobody tells the workers, and somebody waits.
+POLL_S = env.float("TSTTC_POLL_S", default=5.0 if PRODUCTION else 0.5)
+# How often stored files that no submission names are removed (see leaderboard/workers/upkeep.py).
+CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.
 CHILD_MEMORY_BYTES = env.int("TSTTC_CHILD_MEMORY_BYTES", default=1_500_000_000)
@@ -227,38 +228,24 @@ CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=60)
 
 CELERY_BROKER_URL = required(
     "TSTTC_BROKER_URL",
-    embedded="filesystem://",
-    by={"web", "worker", "beat", "maintainer"},
+    embedded="memory://",
+    by={"web", "worker", "maintainer"},
     elsewhere="memory://",
 )
-CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any]
-if CELERY_BROKER_URL.startswith("filesystem"):
-    BROKER_DIR = DATA_DIR / "broker"
-    CELERY_BROKER_TRANSPORT_OPTIONS = {
-        "data_folder_in": str(BROKER_DIR / "messages"),
-        "data_folder_out": str(BROKER_DIR / "messages"),
-        "processed_folder": str(BROKER_DIR / "processed"),
-        "control_folder": str(BROKER_DIR / "control"),
-        "store_processed": False,
-        "polling_interval": 0.1,
-    }
-    for folder in ("messages", "processed", "control"):
-        (BROKER_DIR / folder).mkdir(parents=True, exist_ok=True)
-else:
-    CELERY_BROKER_TRANSPORT_OPTIONS = {
-        "visibility_timeout": 900,
-        "unacked_restore_interval": 10,
-        "unacked_restore_throttle": 1,
-        "socket_timeout": 5,
-        "socket_connect_timeout": 2,
-        "socket_keepalive": True,
-        "retry_on_timeout": True,
-        # Publishing happens inside a web request: fail fast, the sweep repeats the nudge.
-        "max_retries": 1,
-        "interval_start": 0,
-        "interval_step": 0.1,
-        "interval_max": 0.2,
-    }
+CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any] = {
+    "visibility_timeout": 900,
+    "unacked_restore_interval": 10,
+    "unacked_restore_throttle": 1,
+    "socket_timeout": 5,
+    "socket_connect_timeout": 2,
+    "socket_keepalive": True,
+    "retry_on_timeout": True,
+    # Publishing happens inside a web request: fail fast, workers look by themselves.
+    "max_retries": 1,
+    "interval_start": 0,
+    "interval_step": 0.1,
+    "interval_max": 0.2,
+}
 CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
 CELERY_BROKER_CONNECTION_MAX_RETRIES = None
 CELERY_TASK_PUBLISH_RETRY = False
@@ -274,19 +261,6 @@ CELERY_WORKER_PREFETCH_MULTIPLIER = 1
 CELERY_WORKER_MAX_MEMORY_PER_CHILD = env.int("TSTTC_WORKER_MAX_MEMORY_KB", default=1_000_000)
 CELERY_WORKER_SOFT_SHUTDOWN_TIMEOUT = 20
 CELERY_WORKER_HIJACK_ROOT_LOGGER = False
-CELERY_BEAT_SCHEDULE_FILENAME = str(DATA_DIR / "celerybeat-schedule")
-CELERY_BEAT_MAX_LOOP_INTERVAL = min(5.0, SWEEP_S)
-# How often stored files that no submission names are removed (see leaderboard/upkeep.py).
-CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
-CELERY_BEAT_SCHEDULE = {
-    "sweep": {
-        "task": "leaderboard.tasks.sweep",
-        "schedule": schedule(timedelta(seconds=SWEEP_S)),
-        # A sweep that waited longer than its own period has been overtaken by the next one.
-        "options": {"expires": max(2 * SWEEP_S, 5.0)},
-    },
-    "clean": {"task": "leaderboard.tasks.clean", "schedule": schedule(timedelta(seconds=CLEAN_S))},
-}
 
 # --- accounts --------------------------------------------------------------------------------------------
 
@@ -305,7 +279,7 @@ LOGOUT_REDIRECT_URL = "/"
 ACCOUNT_USER_MODEL_USERNAME_FIELD = None
 ACCOUNT_LOGIN_METHODS = {"email"}
 ACCOUNT_SIGNUP_FIELDS = ["email*", "password1*", "password2*"]
-ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.forms.SignupForm"
+ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.account.team_forms.SignupNameForm"
 ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
 ACCOUNT_SESSION_REMEMBER = True
 EMAIL_CONFIG = env.email_url("TSTTC_EMAIL_URL", default="consolemail://")
@@ -316,9 +290,9 @@ ACCOUNT_EMAIL_VERIFICATION = "mandatory" if env.str("TSTTC_EMAIL_URL", default="
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
-ACCOUNT_ADAPTER = "leaderboard.web.accounts.AccountAdapter"
-ACCOUNT_FORMS = {"signup": "leaderboard.web.accounts.SignupForm"}
-# Wrong passwords; the keys are an account at an address, and an account (see leaderboard/web/accounts.py).
+ACCOUNT_ADAPTER = "leaderboard.web.account.accounts.AccountAdapter"
+ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
+# Wrong passwords; the keys are an account at an address, and an account (see web/account/accounts.py).
 ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
 
 # --- API -------------------------------------------------------------------------------------------------
@@ -332,20 +306,22 @@ REST_KNOX = {
     "TOKEN_TTL": timedelta(days=90),
     "TOKEN_MODEL": KNOX_TOKEN_MODEL,
 }
-REST_FRAMEWORK = {**openapi.REST_FRAMEWORK, "NUM_PROXIES": TRUSTED_PROXIES}
+REST_FRAMEWORK = {**settings.REST_FRAMEWORK, "NUM_PROXIES": TRUSTED_PROXIES}
 # How often one account or one address may ask; counted by all web processes together.
 API_RATES: dict[str, str | None] = {
     "signed_in": "600/min",
     "visitor": "240/min",
     "submit": "60/min",
+    "as_of": "30/min",
     "revoke": "10/min",
     "refused": "60/min",
 }
-# What somebody sends on pages, and pages that one address has drawn anew by one process.
-PAGE_RATES: dict[str, str | None] = {"send": "60/min", "draw": "300/min"}
+# What somebody sends on pages, and pages that one address has drawn anew by one process: boards as of a time,
+# which take long, among all.
+PAGE_RATES: dict[str, str | None] = {"send": "60/min", "draw": "300/min", "as_of": "30/min"}
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
     API_RATES, PAGE_RATES = dict.fromkeys(API_RATES), dict.fromkeys(PAGE_RATES)
-SPECTACULAR_SETTINGS = openapi.SPECTACULAR_SETTINGS
+SPECTACULAR_SETTINGS = settings.SPECTACULAR_SETTINGS
 # Waiters that a web process holds at once; gunicorn has as many threads for them (deploy/gunicorn.conf.py).
 WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)
 
@@ -362,7 +338,7 @@ DJANGO_STRUCTLOG_STATUS_START_LOG_LEVEL = logging.DEBUG
 # A nudge is worth no line; what came of the evaluation is.
 DJANGO_STRUCTLOG_CELERY_TASK_START_LOG_LEVEL = logging.DEBUG
 DJANGO_STRUCTLOG_CELERY_TASK_SUCCESS_LOG_LEVEL = logging.DEBUG
-# Who may read /metrics; see leaderboard/web/health.py.
+# Who may read /metrics; see leaderboard/web/monitoring.py.
 METRICS_TOKEN = env.str("TSTTC_METRICS_TOKEN", default="")
 METRICS_NETWORKS = [*map(ip_network, env.list("TSTTC_METRICS_NETWORKS", default=["127.0.0.0/8", "::1/128"]))]
 
@@ -384,7 +360,7 @@ CONTENT_SECURITY_POLICY = {
 X_FRAME_OPTIONS = "DENY"
 SECURE_CONTENT_TYPE_NOSNIFF = True
 SECURE_REFERRER_POLICY = "same-origin"
-SESSION_ENGINE = "leaderboard.web.sessions"
+SESSION_ENGINE = "leaderboard.web.middleware.sessions"
 SESSION_COOKIE_SAMESITE = "Lax"
 CSRF_COOKIE_SAMESITE = "Lax"
 SESSION_COOKIE_HTTPONLY = True

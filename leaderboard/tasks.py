@@ -1,38 +1,24 @@
-"""Celery tasks: each is one call of a verb. A message carries no work, only the news that some is waiting."""
+"""Celery tasks: each calls one function. A message carries no work, only the news that some is waiting.
+
+`_` takes the arguments that messages of a former version still bear while an installation is upgraded.
+"""
 
 import random
 
 from celery import shared_task
 from django.utils import timezone
 
-from leaderboard import backlog, clock, queue, scoring, snapshots, upkeep
+from leaderboard.scoring import worker
+from leaderboard.workers import backlog
 
 
 @shared_task(name="leaderboard.tasks.nudge")
-def nudge(evaluation_id: str) -> None:
-    """Decide one waiting evaluation: the most urgent, which need not be the one that the message names."""
-    scoring.run_next(rng=random.Random())  # noqa: S311 - jitter, not a secret
+def nudge(*_: object) -> None:
+    """Decide the most urgent waiting evaluation."""
+    worker.run_next(rng=random.Random())  # noqa: S311 - jitter, not a secret
 
 
-@shared_task(name="leaderboard.tasks.sweep")
-def sweep() -> None:
-    """Take back what dead workers hold and nudge again what waits."""
-    queue.sweep(rng=random.Random())  # noqa: S311 - jitter, not a secret
-
-
-@shared_task(name="leaderboard.tasks.clean")
-def clean() -> None:
-    """Remove stored files that no submission names, and what has had its time."""
-    upkeep.clean(now=clock.database_now())
-
-
-@shared_task(name="leaderboard.tasks.infer")
-def infer(about: str) -> None:
-    """Do what waits behind submissions, whatever the message is about."""
+@shared_task(name="leaderboard.tasks.work_off")
+def work_off(*_: object) -> None:
+    """Do what waits behind submissions: boards to draw, intervals, comparisons, analyses."""
     backlog.work_off(now=timezone.now(), rng=random.Random())  # noqa: S311 - jitter, not a secret
-
-
-@shared_task(name="leaderboard.tasks.redraw")
-def redraw(split_id: str) -> None:
-    """Draw a split's board for its readers, if nobody has since it changed."""
-    snapshots.redraw(split_id=split_id, now=timezone.now())

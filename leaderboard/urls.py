@@ -4,8 +4,9 @@ from allauth.account.decorators import secure_admin_login
 from django.contrib import admin
 from django.urls import include, path, re_path
 
-from leaderboard.api.problems import NowhereView
-from leaderboard.web import health, receipt_views
+from leaderboard.api.exceptions import NowhereView
+from leaderboard.web import monitoring
+from leaderboard.web.submissions import receipt_views
 
 # Its own form knows no limit of how often one may guess.
 admin.site.login = secure_admin_login(admin.site.login)  # type: ignore[method-assign]  # the way that allauth documents
@@ -17,11 +18,11 @@ urlpatterns = [
     path(".well-known/tsttc-receipt-keys.json", receipt_views.receipt_keys, name="receipt_keys"),
     path("accounts/", include("allauth.urls")),
     path("admin/", admin.site.urls),
-    path("healthz", health.healthz, name="healthz"),
-    path("readyz", health.readyz, name="readyz"),
-    path("metrics", health.prometheus, name="metrics"),
+    path("healthz", monitoring.healthz, name="healthz"),
+    path("readyz", monitoring.readyz, name="readyz"),
+    path("metrics", monitoring.exposition, name="metrics"),
 ]
 
 # What no view has handled: an outage is told as such, everything else is a 500.
-handler400 = "leaderboard.web.outages.bad_request"
-handler500 = "leaderboard.web.outages.server_error"
+handler400 = "leaderboard.web.error_pages.bad_request"
+handler500 = "leaderboard.web.error_pages.server_error"

@@ -1,13 +1,12 @@
-"""When the boards change: a number for each split that goes up with everything that everybody may see.
+"""Versions of boards: a number for each split that rises with every public change.
 
-Whoever keeps a copy of a board (see `leaderboard/snapshots.py`) knows by this number whether it still holds.
+Whoever keeps a copy of a board (see `boards.snapshots`) knows by this number whether it still holds.
 It is raised inside the transaction that makes the change, so nobody ever sees the one without the other.
 """
 
 import uuid
 from collections.abc import Iterable
 from datetime import datetime
-from functools import partial
 from typing import Any
 
 from django.db import connection, transaction
@@ -15,33 +14,45 @@ from django.db.models import F
 from psycopg import Cursor
 from psycopg import Error as DriverError
 
-from leaderboard import audit, broker
 from leaderboard.models import BoardVersion, Evaluation, Split, Submission, Visibility
+from leaderboard.ops import broker
+
+# Names who changes boards among PostgreSQL's advisory locks: "board" in ASCII.
+_LOCK = 0x626F617264
+_CHECK_AND_LOCK = f"SET CONSTRAINTS ALL IMMEDIATE; SELECT pg_advisory_xact_lock({_LOCK})"
 
 
-def changed(split_id: str) -> None:
-    """What everybody sees of this split's boards has changed. To be called in the transaction of the change.
+def changed(*split_ids: str) -> None:
+    """What everybody sees of these splits' boards has changed. To be called in the transaction of the change.
 
-    Call it where the verb records its deed, last of all that it writes: it waits in the same line as the
-    audit trail, so the two cannot wait for each other, and whoever submits waits for neither.
+    Call it last of all that a verb writes: see `hold`.
     """
-    _hold()
-    _count(split_id)
+    hold()
+    _count(split_ids)
 
 
-def _hold() -> None:
+def _count(split_ids: Iterable[str]) -> None:
+    for split_id in split_ids:
+        if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
+            BoardVersion.objects.create(split_id=split_id, number=1)
+    # Workers hear of it, once for each event, to draw boards and to compute intervals. Robust: the rows are
+    # committed by then, and a reader draws what no worker has drawn.
+    transaction.on_commit(broker.work_off, robust=True)
+
+
+def hold() -> None:
+    """Let nobody else change a board until the transaction ends; to be called where it ends soon.
+
+    Whoever has this waits for nobody's row. Foreign keys that are checked at COMMIT would wait there for
+    whoever holds a row that they name, and waits for this. So those of all rows written until now are checked
+    before it is taken. Whoever only submits or records takes no notice.
+    """
     if not transaction.get_connection().in_atomic_block:
-        raise RuntimeError("boards.changed was called outside of the transaction of the change")
-    audit.hold()
-
-
-def _count(split_id: str) -> None:
-    if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
-        BoardVersion.objects.create(split_id=split_id, number=1)
-    # Robust: the rows are committed by then, and a reader draws what no worker has drawn.
-    transaction.on_commit(partial(broker.redraw, split_id), robust=True)
-    # What makes a board another one may make its rank ranges others as well; where not, that is soon seen.
-    transaction.on_commit(partial(broker.infer, split_id), robust=True)
+        raise RuntimeError("a board was changed outside of the transaction of the change")
+    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
+    if connection.vendor == "postgresql":
+        with connection.cursor() as cursor:
+            cursor.execute(_CHECK_AND_LOCK)
 
 
 def number(split_id: str) -> int:
@@ -54,7 +65,7 @@ _STATE = "SELECT coalesce(sum(number), 0) FROM leaderboard_boardversion"
 
 
 def state() -> int:
-    """How often anything that everybody sees has changed: as long as it is the same, so is all of that."""
+    """The sum of all versions: the key of everything cached that any board appears in."""
     # The driver itself where it can be had, with a prepared statement: this is asked before every answer, and
     # is all that most of them ask.
     driver = connection.connection
@@ -80,9 +91,7 @@ def _is_watched() -> bool:
 
 def changed_everywhere() -> None:
     """The same for every split: a team's name, say, may stand on each of them."""
-    _hold()
-    for split_id in Split.objects.order_by("name").values_list("name", flat=True):
-        _count(split_id)
+    changed(*Split.objects.order_by("name").values_list("name", flat=True))
 
 
 def times_passed(*, now: datetime) -> int:
@@ -108,20 +117,18 @@ def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
         # On no board, and yet with a page of its own: any of the numbers will do.
         split_ids = list(Split.objects.order_by("name").values_list("name", flat=True)[:1])
     if split_ids:
-        _hold()
-    for split_id in split_ids:
-        _count(split_id)
+        changed(*split_ids)
 
 
 def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
     """The same for the splits on whose boards these evaluations stand, just decided, for everybody to see.
 
     Private methods and editions in preparation change nothing that anybody else sees, also not this number.
+    Their intervals are to be computed all the same, so the workers hear of them.
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
-    _hold()
+    hold()
     shown = Evaluation.objects.filter(
         pk__in=list(evaluation_ids), edition__published_at__isnull=False
     ).exclude(submission__method__visibility=Visibility.PRIVATE)
-    for split_id in sorted(set(shown.order_by().values_list("edition__split", flat=True).distinct())):
-        _count(split_id)
+    _count(sorted(set(shown.order_by().values_list("edition__split", flat=True).distinct())))

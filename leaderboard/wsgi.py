@@ -5,7 +5,7 @@ import os
 from django.core.exceptions import ImproperlyConfigured
 from django.core.wsgi import get_wsgi_application
 
-from leaderboard import environment
+from leaderboard.ops import environment
 
 if environment.PROCESS != "web":
     # It would sign sessions and receipts with a key that ends with it.

@@ -1,43 +1,116 @@
-// Says how large the chosen file is, stops one over the limit before it is sent in vain, and takes a file that
-// is dropped anywhere on the form.
+// The form of a submission: the size of the chosen file, a check of it before it is sent (see check.js), a drop
+// zone, and how far the upload is. Without any of this the form works as well; then the server alone checks.
 "use strict";
 
-const form = document.querySelector("form[data-max-bytes]");
+const form = document.getElementById("submit");
 const input = form.querySelector("input[type=file]");
-const chosen = document.getElementById("chosen");
+const button = form.querySelector(".actions button");
+const byId = (id) => document.getElementById(id);
 const maxBytes = Number(form.dataset.maxBytes);
+const grouped = (n) => n.toLocaleString("en-GB");
+
+function element(tag, text = "", css = "") {
+  const made = document.createElement(tag);
+  made.textContent = text;
+  if (css) made.className = css;
+  return made;
+}
+
+// --- the check -----------------------------------------------------------------------------------------------
+
+const MAX_SHOWN = 20;
+let worker = null;
+let asked = 0;
+// What is known of the chosen file: "" nothing, "checking", "good", "bad"; `settled` calls whoever waits for it.
+let verdict = "";
+let settled = () => {};
+
+function say(...parts) {
+  byId("checked").replaceChildren(...parts);
+}
+
+function conclude(state, ...parts) {
+  verdict = state;
+  button.textContent = state === "bad" ? "Submit anyway" : "Submit";
+  say(...parts);
+  if (state !== "checking") settled();
+}
+
+function answered({ data }) {
+  if (data.id !== asked) return;
+  if (data.failed) conclude("", element("p", "The file could not be checked here. The server checks it.", "quiet"));
+  else if (data.n_problems === 0) {
+    const found = `${grouped(data.n_found)} of ${grouped(data.n_sequences)} sequences found.`;
+    conclude("good", element("p", `Checked: ${found} No problems.`, "good"));
+  } else conclude("bad", ...problems(data));
+}
+
+function problems({ n_problems: n, problems: all }) {
+  const head = element("p", `${grouped(n)} problem${n === 1 ? "" : "s"} in the file. The server would reject it.`, "bad");
+  const list = element("ol", "", "problems");
+  for (const { where, message, code } of all.slice(0, MAX_SHOWN)) {
+    const item = element("li");
+    if (where) item.append(element("code", where, "where"), " ");
+    item.append(`${message} `, element("span", code, "quiet code"));
+    list.append(item);
+  }
+  return [head, list];
+}
+
+function check() {
+  asked++;
+  const file = input.files[0];
+  const split = form.querySelector("input[name=split]:checked");
+  if (!file || file.size > maxBytes || !window.Worker) return conclude("");
+  if (file.size === 0) {
+    const message = "The file is empty; expected JSON text with a number for every sequence.";
+    return conclude("bad", ...problems({ n_problems: 1, problems: [{ where: "", message, code: "not-json" }] }));
+  }
+  if (!split) return conclude("", element("p", "Choose a split: then the file is checked here before it is sent.", "quiet"));
+  if (!worker) {
+    worker = new Worker(form.dataset.checker);
+    worker.addEventListener("message", answered);
+    worker.addEventListener("error", () => answered({ data: { id: asked, failed: true } }));
+  }
+  conclude("checking", element("p", "Checking the file…", "quiet"));
+  worker.postMessage({ id: asked, manifest: split.dataset.manifest, file });
+}
 
 function judge() {
   const file = input.files[0];
   input.setCustomValidity("");
-  chosen.textContent = "";
-  if (!file) return;
-  const found = file.size.toLocaleString("en-GB");
-  if (file.size > maxBytes) {
-    input.setCustomValidity(
-      `The file has ${found} bytes; expected at most ${maxBytes.toLocaleString("en-GB")} (${maxBytes / 1e6} MB).`,
-    );
-    input.reportValidity();
+  byId("chosen").textContent = "";
+  if (file) {
+    const found = grouped(file.size);
+    if (file.size > maxBytes) {
+      input.setCustomValidity(
+        `The file has ${found} bytes; expected at most ${grouped(maxBytes)} (${maxBytes / 1e6} MB).`,
+      );
+      input.reportValidity();
+    }
+    byId("chosen").textContent = `${found} bytes`;
   }
-  chosen.textContent = `${found} bytes`;
+  check();
 }
 
 input.addEventListener("change", judge);
+for (const split of form.querySelectorAll("input[name=split]")) split.addEventListener("change", check);
 judge();
 
-// Of a method that others see, its own sentence alone; of a new one none.
+// --- who sees the result: of a method that others see, its own sentence alone; of a new one none -----------------
+
 const method = form.querySelector("input[name=method]");
-const notices = document.getElementById("notices");
+const notices = byId("notices");
 const allNotices = [...notices.children];
 
 method.addEventListener("input", () => {
   const found = [...document.querySelectorAll("#methods option")].find((option) => option.value === method.value.trim());
-  const told = document.createElement("p");
-  told.textContent = found?.dataset.notice ?? "";
-  notices.replaceChildren(...(method.value.trim() ? [told] : allNotices));
+  const told = found?.dataset.notice ? [element("p", found.dataset.notice)] : [];
+  notices.replaceChildren(...(method.value.trim() ? told : allNotices));
 });
 
-// Beside the field a browser would open the file, and what was written on the page would be gone.
+// --- a file that is dropped: beside the form a browser would open it, and what was written would be gone ---------
+
 const hasFile = (event) => event.dataTransfer.types.includes("Files");
 const mark = (isOver) => form.classList.toggle("dropping", isOver);
 
@@ -60,9 +133,103 @@ document.addEventListener("drop", (event) => {
   input.dispatchEvent(new Event("change"));
 });
 
-// A second press while the file is on its way would only send it twice.
-form.addEventListener("submit", () => {
-  form.querySelector(".actions button").setAttribute("aria-disabled", "true");
-  form.addEventListener("submit", (event) => event.preventDefault());
+// --- sending ---------------------------------------------------------------------------------------------------
+
+let isBusy = false;
+
+function busy(is) {
+  isBusy = is;
+  button.setAttribute("aria-disabled", String(is));
+}
+
+function progress(words, share) {
+  byId("sending").hidden = !words;
+  byId("sending-words").textContent = words;
+  const bar = byId("sending").querySelector("progress");
+  if (share === null) bar.removeAttribute("value");
+  else bar.value = share;
+}
+
+function send() {
+  const request = new XMLHttpRequest();
+  request.open("POST", location.href);
+  request.setRequestHeader("Accept", "application/json, text/html");
+  request.upload.addEventListener("progress", ({ loaded, total }) => {
+    const percent = Math.round((100 * loaded) / total);
+    progress(loaded < total ? `Sending: ${percent} %` : "Sent. The server saves the file…", loaded < total ? loaded / total : null);
+  });
+  request.addEventListener("load", () => received(request));
+  request.addEventListener("error", () => lost());
+  progress("Sending…", 0);
+  request.send(new FormData(form));
+}
+
+function received(request) {
+  if (request.status === 201) {
+    location.assign(JSON.parse(request.responseText).page);
+    return;
+  }
+  progress("", 0);
+  busy(false);
+  const answer = new DOMParser().parseFromString(request.responseText, "text/html");
+  if (answer.getElementById("submit")) correct(answer);
+  else replace(answer);
+}
+
+// The sentences of a refusal go to their fields; all that was filled in stays, the chosen file as well.
+function correct(answer) {
+  byId("form-errors").replaceChildren(...answer.getElementById("form-errors").childNodes);
+  let first = null;
+  for (const place of form.querySelectorAll(".errors[id]")) {
+    const told = answer.getElementById(place.id);
+    place.replaceChildren(...(told?.childNodes ?? []));
+    const isWrong = place.textContent.trim() !== "";
+    const field = place.closest(".field, fieldset");
+    field.classList.toggle("wrong", isWrong);
+    const entry = field.querySelector("input, textarea, select");
+    if (isWrong) entry.setAttribute("aria-invalid", "true");
+    else entry.removeAttribute("aria-invalid");
+    if (isWrong) field.closest("details")?.setAttribute("open", "");
+    if (isWrong) first ??= entry;
+  }
+  (first ?? button).focus();
+}
+
+// Any other answer is a page of its own.
+function replace(answer) {
+  const main = answer.querySelector("main");
+  if (!main) return lost();
+  document.title = answer.title;
+  document.querySelector("main").replaceWith(main);
+  main.focus();
+}
+
+function lost() {
+  busy(false);
+  progress("", 0);
+  const words = "The connection was lost. You can submit the same file again safely: it counts once.";
+  const told = element("div", "", "form-errors");
+  told.setAttribute("role", "alert");
+  told.append(element("p", words));
+  byId("form-errors").replaceChildren(told);
+}
+
+// A file is sent once its check has ended; one with problems only if that is asked for once they are in sight.
+form.addEventListener("submit", async (event) => {
+  event.preventDefault();
+  if (isBusy) return;
+  busy(true);
+  if (verdict === "checking") {
+    await new Promise((resolve) => (settled = resolve));
+    if (verdict === "bad") {
+      busy(false);
+      button.focus();
+      return;
+    }
+  }
+  send();
 });
-window.addEventListener("pageshow", () => form.querySelector(".actions button").removeAttribute("aria-disabled"));
+window.addEventListener("pageshow", () => {
+  busy(false);
+  progress("", 0);
+});

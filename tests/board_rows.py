@@ -7,8 +7,8 @@ from datetime import timedelta
 from django.db import transaction
 from django.utils import timezone
 
-from evaluator.protocol import INTERVAL_NAMES, METRICS
-from leaderboard import boards
+from evaluator.metrics.protocol import split_name
+from leaderboard import versions
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -20,7 +20,7 @@ from leaderboard.models import (
     User,
     Visibility,
 )
-from leaderboard.names import look
+from leaderboard.people.names import skeleton
 
 
 def fill(edition: Edition, *, n: int, user: User, seed: int = 0) -> list[Method]:
@@ -28,7 +28,7 @@ def fill(edition: Edition, *, n: int, user: User, seed: int = 0) -> list[Method]
     now = timezone.now()
     first = Team.objects.count()
     names = [f"Team {first + i}" for i in range(n)]
-    teams = Team.objects.bulk_create(Team(name=name, look=look(name)) for name in names)
+    teams = Team.objects.bulk_create(Team(name=name, look=skeleton(name)) for name in names)
     methods = Method.objects.bulk_create(
         Method(
             team=team,
@@ -45,7 +45,7 @@ def fill(edition: Edition, *, n: int, user: User, seed: int = 0) -> list[Method]
     )
     score(edition, methods=methods, user=user, seed=seed)
     with transaction.atomic():
-        boards.changed(edition.split_id)
+        versions.changed(edition.split_id)
     return methods
 
 
@@ -90,7 +90,6 @@ def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int 
             is_with_best=i < 3,
         )
         for i, evaluation in enumerate(evaluations)
-        for metric in METRICS
-        for interval in INTERVAL_NAMES
+        for metric, interval in map(split_name, edition.rules.score_names)
         for value in [round(rng.uniform(8, 80), edition.decimals)]
     )

@@ -1,7 +1,7 @@
 """Small worlds for tests: a made-up ground truth, prediction files for it, people and their submissions."""
 
 import random
-from datetime import timedelta
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +11,16 @@ from django.db import transaction
 from django.utils import timezone
 
 import evaluator
-from leaderboard import backlog, boards, ground_truth, scoring, submissions, tokens
-from leaderboard import visibility as visibility_verbs
-from leaderboard.models import Edition, Split, Submission, User
+from leaderboard import versions
+from leaderboard.editions import ground_truth
+from leaderboard.methods import visibility as visibility_verbs
+from leaderboard.models import Edition, PublishedResult, QuotaOverride, Split, Submission, Team, User
+from leaderboard.people import tokens
+from leaderboard.quotas import quotas
+from leaderboard.scoring import worker
+from leaderboard.storage import truth_values
+from leaderboard.submissions import submissions
+from leaderboard.workers import backlog
 
 N_SEQUENCES = 120
 
@@ -39,36 +46,63 @@ def import_truth(tmp_path: Path, *, split: str = "test", **options: int) -> Edit
 
 def predictions(edition: Edition, *, factor: float = 1.1) -> bytes:
     """A valid file: the truth times a factor, so that a factor nearer to 1 is a better method."""
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     return evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * factor)
 
 
-def submit(
+def send(
     user: User,
-    data: bytes,
+    data: "bytes | ContentFile[Any]",
     *,
     split: str = "test",
     method: str = "Foo",
-    visibility: str = "PUBLIC",
+    now: datetime | None = None,
     **fields: str,
-) -> Submission:
-    """A submission through the verb, as the web form makes it, of a method that is then shown."""
-    submission = submissions.submit(
+) -> submissions.Submitted:
+    """What sending a file is answered, as the web form sends it."""
+    return submissions.submit(
         user=user,
         split_name=split,
         method_name=method,
-        upload=ContentFile(data, name="predictions.json"),
+        upload=ContentFile(data, name="predictions.json") if isinstance(data, bytes) else data,
         via=Submission.Via.WEB,
-        now=timezone.now(),
-        filename="predictions.json",
-        **fields,
-    ).submission
+        now=now or timezone.now(),
+        **{"filename": "predictions.json", **fields},
+    )
+
+
+def submit(user: User, data: bytes, *, visibility: str = "PUBLIC", **options: Any) -> Submission:
+    """A submission of a method that is then shown."""
+    submission = send(user, data, **options).submission
     if visibility != "PRIVATE" and submission.method.visibility == "PRIVATE":
         visibility_verbs.change(
             method=submission.method, visibility=visibility, actor=user, now=submission.submitted_at
         )
         submission.method.refresh_from_db()
     return submission
+
+
+def override(team: Team, *, split: str = "test", **options: Any) -> QuotaOverride:
+    """Rules of a team's own, without any limit that `options` does not give; by the command line."""
+    rules = {"limit": None, "window": timedelta(days=1), "min_gap": timedelta(0), "rejected_limit": None}
+    row = Split.objects.get(pk=split)
+    said = {"reason": "R", "actor": None, "now": timezone.now()}
+    return quotas.override(team=team, split=row, **{**rules, **said, **options})
+
+
+def quote(name: str, scores: dict[str, float]) -> PublishedResult:
+    """A row of the test board that is printed in a paper."""
+    return PublishedResult.objects.create(
+        split_id="test",
+        slug=name.lower(),
+        method_name=name,
+        authors="A",
+        source_title="T",
+        source_url="https://example.org",
+        source_table="1",
+        year=2023,
+        scores=scores,
+    )
 
 
 def token(user: User, **options: Any) -> str:
@@ -79,7 +113,7 @@ def token(user: User, **options: Any) -> str:
 def board_changed(split: str) -> None:
     """Say that a board is not what it was: for tests that write behind the verbs' backs."""
     with transaction.atomic():
-        boards.changed(split)
+        versions.changed(split)
 
 
 def infer_all() -> int:
@@ -90,6 +124,6 @@ def infer_all() -> int:
 def score_all() -> int:
     """Work through the queue in this process. Returns how many evaluations were decided."""
     n_decided = 0
-    while scoring.run_next(rng=random.Random(0)):
+    while worker.run_next(rng=random.Random(0)):
         n_decided += 1
     return n_decided

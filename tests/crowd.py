@@ -57,14 +57,15 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
     from django.db import transaction  # noqa: PLC0415
     from django.utils import timezone  # noqa: PLC0415
 
-    from leaderboard import files, lifecycle  # noqa: PLC0415
     from leaderboard.models import Method, Split, Submission, Team, User, Visibility  # noqa: PLC0415
-    from leaderboard.names import look  # noqa: PLC0415
+    from leaderboard.people.names import skeleton  # noqa: PLC0415
+    from leaderboard.scoring import lifecycle  # noqa: PLC0415
+    from leaderboard.storage import files  # noqa: PLC0415
 
     split = Split.objects.select_related("published_edition").get(pk=split_name)
     assert split.published_edition is not None
     teams = Team.objects.bulk_create(
-        Team(name=f"Team {split_name} {number}", look=look(f"Team {split_name} {number}"))
+        Team(name=f"Team {split_name} {number}", look=skeleton(f"Team {split_name} {number}"))
         for number in range(-(-n // METHODS_OF_A_TEAM))
     )
     now = timezone.now()
@@ -79,9 +80,9 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
         values = predictions(truth, number)
         digest, size_bytes = values.digest, 0
         if number < n_files:
-            kept = files.keep_predictions(ContentFile(contents(truth, number)), now=now)
+            kept = files.save_predictions(ContentFile(contents(truth, number)), now=now)
             digest, size_bytes = kept.digest, kept.size_bytes
-        files.keep_aligned(
+        files.save_aligned(
             evaluator.Predictions.from_arrays(ttc_s=values.ttc_s, manifest=truth.manifest, digest=digest)
         )
         submissions.append(
@@ -110,12 +111,12 @@ def main() -> None:
     import django  # noqa: PLC0415 - as above
 
     django.setup()
-    from leaderboard import ground_truth  # noqa: PLC0415
     from leaderboard.models import Split  # noqa: PLC0415
+    from leaderboard.storage import truth_values  # noqa: PLC0415
 
     edition = Split.objects.select_related("published_edition").get(pk=split_name).published_edition
     assert edition is not None
-    join(split_name=split_name, truth=ground_truth.load(edition.ground_truth_id), n=n, n_files=n)
+    join(split_name=split_name, truth=truth_values.load(edition.ground_truth_id), n=n, n_files=n)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Let all verbs that take locks meet, on PostgreSQL, fifty times: `python -m tests.deadlocks [rounds]`.
 
-The suite does one round (`tests/leaderboard/test_deadlocks.py`). This takes about half an hour and prints how
-many rounds, waits, deadlocks and answers 503 there were.
+The suite does one round (`tests/leaderboard/db/test_deadlocks.py`). This takes about half an hour and prints
+how many rounds, waits, deadlocks and answers 503 there were.
 """
 
 import os
@@ -15,7 +15,7 @@ N_ROUNDS = 50
 def main() -> int:
     """Run the tests with so many rounds."""
     os.environ["TSTTC_DEADLOCK_ROUNDS"] = sys.argv[1] if len(sys.argv) > 1 else str(N_ROUNDS)
-    files = "tests/leaderboard/test_deadlocks.py"
+    files = "tests/leaderboard/db/test_deadlocks.py"
     sys.argv[1:] = ["-q", "-s", "-p", "no:xdist", "--log-disable=leaderboard", files]
     return on_postgresql.main()
 

@@ -8,8 +8,10 @@ from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
 from evaluator import GroundTruth, evaluate, published, read_manifest, read_predictions
-from evaluator.protocol import SCORE_NAMES
-from leaderboard import benchmark, files, rescoring, standings
+from evaluator.metrics.protocol import SCORE_NAMES
+from leaderboard.benchmark import splits
+from leaderboard.boards import boards
+from leaderboard.editions import corrections
 from leaderboard.models import (
     Edition,
     Publication,
@@ -17,6 +19,7 @@ from leaderboard.models import (
     Submission,
     User,
 )
+from leaderboard.storage import files
 
 ANYBODY = AnonymousUser()
 FACTORS = (1.05, 1.1, 1.2, 1.4)
@@ -48,13 +51,13 @@ def extended(tmp_path: Path) -> Path:
 def open_edition(
     path: Path | None = None, *, actor: User | None = None, protocol: str | None = None
 ) -> Edition:
-    return rescoring.open_edition(
+    return corrections.open_edition(
         split_name="test", path=path, protocol=protocol, now=timezone.now(), actor=actor
     )
 
 
 def publish(edition: Edition, *, replaces: int | None = 1, leave_out: bool = False) -> Publication:
-    return rescoring.publish(
+    return corrections.publish(
         edition=edition,
         reason="Labels corrected.",
         now=timezone.now(),
@@ -65,13 +68,13 @@ def publish(edition: Edition, *, replaces: int | None = 1, leave_out: bool = Fal
 
 
 def roll_back(*, replaces: int = 2) -> Publication:
-    return rescoring.roll_back(
+    return corrections.roll_back(
         split_name="test", reason="A mistake.", now=timezone.now(), actor=None, replaces=replaces
     )
 
 
 def paper(slug: str = "later", *, split: str = "test", mid: float = 1.0) -> dict[str, Any]:
-    """A document of one row that a paper prints, such as those in leaderboard/published/."""
+    """A document of one row that a paper prints, such as those in leaderboard/benchmark/published/."""
     method = {"slug": slug, "name": slug.title(), "description": "", "uses_nerf": False, "latency_ms": None}
     return {
         "source": {
@@ -88,15 +91,15 @@ def paper(slug: str = "later", *, split: str = "test", mid: float = 1.0) -> dict
     }
 
 
-def quote(slug: str = "later", *, mid: float = 1.0) -> benchmark.Imported:
+def quote(slug: str = "later", *, mid: float = 1.0) -> splits.Imported:
     """Put a row of a paper on the board of the test split, in place of any that it has by that name."""
     document = paper(slug, mid=mid)
-    return benchmark.import_published(document=document, now=timezone.now(), is_replacing=True)
+    return splits.import_published(document=document, now=timezone.now(), is_replacing=True)
 
 
-def board_now() -> standings.Board:
+def board_now() -> boards.Board:
     split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
-    return standings.board(split=split, viewer=ANYBODY)
+    return boards.board(split=split, viewer=ANYBODY)
 
 
 def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) -> dict[str, float | None]:
@@ -108,3 +111,8 @@ def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) ->
     file = json.dumps({key: said[key] for key in truth.manifest.natural_keys}).encode()
     values = evaluate(read_predictions(file, manifest=truth.manifest), truth).flat()
     return {name: published(value, decimals=decimals) for name, value in values.items()}
+
+
+def changed_on() -> str:
+    """The day on which an edition last became the board."""
+    return f"{Publication.objects.latest('pk').at:%Y-%m-%d}"

@@ -160,7 +160,7 @@ def _tracks() -> Drawn:
         predictions = evaluator.read_predictions(data, manifest=truth.manifest)
         report = evaluator.evaluate(predictions, truth, keep_sequences=True)
         assert report.sequences is not None
-        errors.append(report.sequences.mid)
+        errors.append(report.sequences["mid"])
     # bag_stamp/cam_id/ts/track_id without the moment: the track.
     tracks = [(key.split("/")[0], key.split("/")[3]) for key in truth.manifest.natural_keys]
     _, index = np.unique(np.array(tracks), axis=0, return_inverse=True)

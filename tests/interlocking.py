@@ -18,8 +18,9 @@ from django.db import connection
 Deed = Callable[[], object]
 # Whether a statement is where to hold: by its number within the deed's transactions, and by its text.
 Place = Callable[[int, str], bool]
-# The last lock that a verb takes, after which it writes its deed and ends.
-AUDIT_LOCK = "SET CONSTRAINTS ALL IMMEDIATE"
+# The last lock that a verb takes which changes a board.
+BOARD_LOCK = "SET CONSTRAINTS ALL IMMEDIATE"
+EVENT = 'INSERT INTO "leaderboard_auditevent"'
 PATIENCE_S = 60.0
 LOOK_EVERY_S = 0.001
 
@@ -94,9 +95,14 @@ class Meeting:
         )
 
 
-def at_the_audit_lock(number: int, sql: str) -> bool:
-    """Where a verb holds everything that it will hold, and its foreign keys may still be unchecked."""
-    return AUDIT_LOCK in sql
+def at_the_board_lock(number: int, sql: str) -> bool:
+    """Where a verb that changes a board holds everything that it will hold."""
+    return BOARD_LOCK in sql
+
+
+def at_the_event(number: int, sql: str) -> bool:
+    """Where another verb does, and its foreign keys are still unchecked."""
+    return EVENT in sql
 
 
 def _done(deed: Deed, hold: Hold | None) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from django.db import connection
 from django.utils import timezone
 
-from leaderboard import invitations, tokens
 from leaderboard.models import (
     ApiToken,
     Edition,
@@ -24,7 +23,8 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.models.submissions import SentFile
-from leaderboard.names import look
+from leaderboard.people import invitations, tokens
+from leaderboard.people.names import skeleton
 
 DAY = timedelta(days=1)
 # What a scene adds to the world.
@@ -74,7 +74,8 @@ def scene(world: World) -> Scene:
         User(email=f"{address}@example.org") for address in _addresses()
     )
     team, alone = (
-        Team(name=f"Team {mark}", look=look(f"Team {mark}")) for mark in (uuid.uuid4().hex, uuid.uuid4().hex)
+        Team(name=f"Team {mark}", look=skeleton(f"Team {mark}"))
+        for mark in (uuid.uuid4().hex, uuid.uuid4().hex)
     )
     Team.objects.bulk_create([team, alone])
     Membership.objects.bulk_create(

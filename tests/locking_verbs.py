@@ -2,7 +2,6 @@
 
 import uuid
 from collections.abc import Callable, Mapping
-from datetime import timedelta
 from functools import partial
 from itertools import combinations
 from typing import Any
@@ -13,29 +12,11 @@ from django.core.files.base import ContentFile
 from django.test import Client
 from django.utils import timezone
 
-from evaluator.protocol import SCORE_NAMES
-from leaderboard import (
-    admissions,
-    bags,
-    boards,
-    cleaning,
-    clock,
-    comparisons,
-    files,
-    ground_truth,
-    idempotency,
-    inference,
-    invitations,
-    lifecycle,
-    methods,
-    questions,
-    quotas,
-    rescoring,
-    submissions,
-    teams,
-    tokens,
-    visibility,
-)
+from evaluator.metrics.protocol import SCORE_NAMES
+from leaderboard import versions
+from leaderboard.db import clock
+from leaderboard.editions import corrections, ground_truth
+from leaderboard.methods import methods, visibility
 from leaderboard.models import (
     Admission,
     Edition,
@@ -48,17 +29,16 @@ from leaderboard.models import (
     Team,
     User,
 )
+from leaderboard.people import invitations, teams, tokens
+from leaderboard.quotas import admissions, quotas
+from leaderboard.scoring import comparisons, confidence, lifecycle, questions, recording_sums
+from leaderboard.storage import files, orphans, truth_values
+from leaderboard.submissions import empty_methods, idempotency, submissions
 from tests import builders
-from tests.leaderboard import queue_rows
+from tests.leaderboard.web.maintain import queue_rows
 from tests.locking_scene import DAY, Scene
 
 Deed = Callable[[], object]
-RULES: dict[str, Any] = {
-    "limit": None,
-    "window": timedelta(days=1),
-    "min_gap": timedelta(0),
-    "rejected_limit": None,
-}
 
 
 def _submission(scene: Scene, user: User) -> Callable[[], submissions.Submitted]:
@@ -105,7 +85,7 @@ def _give_back(scene: Scene) -> Deed:
 
 
 def _hand_back(scene: Scene) -> Deed:
-    return partial(lifecycle.hand_back, _leases(9))
+    return partial(lifecycle.release, _leases(9))
 
 
 def _release(scene: Scene) -> Deed:
@@ -116,14 +96,15 @@ def _release(scene: Scene) -> Deed:
 
 
 def _infer(scene: Scene) -> Deed:
-    return partial(inference.infer, edition=_with_sums(scene), now=timezone.now())
+    edition = _with_sums(scene)
+    return lambda: confidence.infer(confidence.Entries.of(edition), now=timezone.now())
 
 
 def _with_sums(scene: Scene) -> Edition:
     edition = Edition.objects.select_related("ground_truth").get(pk=scene.world.edition.pk)
     for submission in Submission.objects.all():
         # The files of the scene are names alone; what inference reads of them is here.
-        sums = bags.path(edition, file=submission.sent_file)
+        sums = recording_sums.path(edition, file=submission.sent_file)
         sums.parent.mkdir(parents=True, exist_ok=True)
         sums.write_bytes(np.ones((edition.ground_truth.n_recordings, len(SCORE_NAMES))).tobytes())
     return edition
@@ -140,16 +121,17 @@ def _ask(scene: Scene, *, who: str) -> Deed:
 
 def _compare(scene: Scene) -> Deed:
     _with_sums(scene)
-    if not questions.waiting().exists():
+    waiting = questions.waiting(held=truth_values.readable_digests())
+    if not waiting.exists():
         _ask(scene, who="192.0.2.1")()
-    return partial(comparisons.compute, questions.waiting()[0], now=timezone.now())
+    return partial(comparisons.compute, waiting.all()[0], now=timezone.now())
 
 
 def _clean(scene: Scene) -> Deed:
     """A file that is gone already: it takes the same locks, and leaves no trace."""
     digest, now = f"sha256:{uuid.uuid4().hex}{uuid.uuid4().hex}", timezone.now()
-    orphan = cleaning.Orphan(files.predictions_name(digest), digest, 1, now - 2 * DAY)
-    return partial(cleaning.remove, orphan, now=now)
+    orphan = orphans.Orphan(files.predictions_name(digest), digest, 1, now - 2 * DAY)
+    return partial(orphans.remove, orphan, now=now)
 
 
 def _by_maintainer(scene: Scene) -> dict[str, Any]:
@@ -158,7 +140,7 @@ def _by_maintainer(scene: Scene) -> dict[str, Any]:
 
 def _publish(scene: Scene) -> Deed:
     return partial(
-        rescoring.publish,
+        corrections.publish,
         edition=scene.prepared,
         reason="Corrected.",
         replaces=1,
@@ -172,17 +154,17 @@ def _roll_back(scene: Scene) -> Deed:
         _publish(scene)()
     split = scene.world.edition.split_id
     return partial(
-        rescoring.roll_back, split_name=split, reason="Wrong.", replaces=2, **_by_maintainer(scene)
+        corrections.roll_back, split_name=split, reason="Wrong.", replaces=2, **_by_maintainer(scene)
     )
 
 
 def _discard(scene: Scene) -> Deed:
-    return partial(rescoring.discard, edition=scene.prepared, reason="Wrong.", **_by_maintainer(scene))
+    return partial(corrections.discard, edition=scene.prepared, reason="Wrong.", **_by_maintainer(scene))
 
 
 def _open(scene: Scene) -> Deed:
     split, digest = scene.world.edition.split_id, scene.truth.pk
-    return partial(rescoring.open_edition, split_name=split, digest=digest, **_by_maintainer(scene))
+    return partial(corrections.open_edition, split_name=split, digest=digest, **_by_maintainer(scene))
 
 
 def _import(scene: Scene) -> Deed:
@@ -192,10 +174,7 @@ def _import(scene: Scene) -> Deed:
 
 
 def _override(scene: Scene, team: Team) -> Deed:
-    split = scene.world.edition.split
-    return partial(
-        quotas.override, team=team, split=split, reason="A study.", **RULES, **_by_maintainer(scene)
-    )
+    return partial(builders.override, team, **_by_maintainer(scene))
 
 
 def _end_override(scene: Scene) -> Deed:
@@ -278,7 +257,26 @@ def _other_address(scene: Scene) -> Deed:
 
 def _times_passed(scene: Scene) -> Deed:
     Split.objects.filter(pk=scene.world.edition.split_id).update(opens_at=timezone.now() - DAY)
-    return partial(boards.times_passed, now=clock.database_now())
+    return partial(versions.times_passed, now=clock.database_now())
+
+
+def _delete_method(scene: Scene) -> Deed:
+    """Of a method that a rejected file made."""
+    now, edition = timezone.now(), scene.world.edition
+    method = Method.objects.create(team=scene.team, name=uuid.uuid4().hex)
+    sent = Submission.objects.create(
+        split=edition.split,
+        method=method,
+        submitted_by=scene.owner,
+        via=Submission.Via.WEB,
+        digest=f"sha256:{uuid.uuid4().hex}",
+        manifest_digest=edition.ground_truth.manifest_digest,
+        size_bytes=1,
+    )
+    Evaluation.objects.create(
+        submission=sent, edition=edition, status="REJECTED", finished_at=now, finished_attempt=0
+    )
+    return partial(empty_methods.delete, method=method, actor=scene.owner, now=now)
 
 
 VERBS: Mapping[str, Callable[[Scene], Deed]] = {
@@ -334,5 +332,6 @@ VERBS: Mapping[str, Callable[[Scene], Deed]] = {
     "show a method": _show,
     "reveal": lambda scene: partial(visibility.reveal_due, now=timezone.now()),
     "edit a method": lambda scene: _edit(scene, scene.public, {"description": uuid.uuid4().hex}),
+    "delete a method": _delete_method,
     "rename a method": lambda scene: _edit(scene, scene.private, {"name": uuid.uuid4().hex}),
 }

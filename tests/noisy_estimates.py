@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import evaluator
-from evaluator.scale import FRAME_RATE_HZ, scale_ratio_to_ttc, ttc_to_scale_ratio
+from evaluator.metrics.scale import FRAME_RATE_HZ, scale_ratio_to_ttc, ttc_to_scale_ratio
 
 Floats = NDArray[np.float64]
 

@@ -1,10 +1,13 @@
 """A page as a test reads it: its elements with their attributes and text, in order."""
 
+import re
 from dataclasses import dataclass, field
 from html.parser import HTMLParser
 
 from django.http import HttpResponse, HttpResponseBase
+from django.test import Client
 
+OUR_SCRIPT = re.compile(r"/static/[\w./-]+\.js")
 VOID = {"col", "meta", "link", "input", "br", "hr", "img", "path", "rect", "source", "mspace"}
 
 
@@ -84,6 +87,22 @@ def page(response: HttpResponseBase) -> Element:
     """The page in a response."""
     assert isinstance(response, HttpResponse)
     return read(response.content.decode())
+
+
+def get(client: Client, address: str = "/board/test/", status: int = 200) -> Element:
+    """The page at an address, which is answered with this status."""
+    response = client.get(address)
+    assert response.status_code == status, address
+    return page(response)
+
+
+def strange_scripts(root: Element) -> list[Element]:
+    """The scripts here that are more or other than a file of ours: nobody's text may become one."""
+    return [
+        script
+        for script in root.all("script")
+        if script.raw_text.strip() or not OUR_SCRIPT.fullmatch(script.attributes.get("src", ""))
+    ]
 
 
 def board_rows(root: Element) -> list[list[str]]:

@@ -16,7 +16,13 @@ PUBLIC = (
     ),
     *(API, f"{API}?sort=mid", f"{API}?nerf=no", "/api/v1/splits", "/api/v1/splits/test/editions"),
     *("/api/v1/splits/test/editions/1/board", "/api/v1/splits/test/changelog"),
-    *("/board/test/charts/", "/board/test.csv", "/board/test.tex?intervals=1", "/board/test.md?sort=rte"),
+    *(
+        "/board/test/charts/",
+        "/board/test/charts/progress.json",
+        "/board/test.csv",
+        "/board/test.tex?intervals=1",
+        "/board/test.md?sort=rte",
+    ),
     *("/board/test.bib", "/board/test/editions/1.csv", "/feed.atom", "/board/test/feed.atom"),
     *("/methods/{method}/badge.svg", "/methods/{method}/badge.svg?split=val", "/api/v1/methods/{method}"),
 )

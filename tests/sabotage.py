@@ -47,16 +47,23 @@ class OutOfDate(Exception):
     """The list does not fit the code any more."""
 
 
-LIFECYCLE = "leaderboard/lifecycle.py"
+LIFECYCLE = "leaderboard/scoring/lifecycle.py"
 INITIAL = "leaderboard/migrations/0001_initial.py"
-STEPS = "tests/leaderboard/test_lifecycle.py"
-STRIKES = "tests/leaderboard/test_lifecycle_strikes.py"
-QUEUE = "tests/leaderboard/test_queue.py"
-OUTAGES = "tests/leaderboard/test_outages.py"
-CHILD = "tests/leaderboard/test_quarantine.py"
-RUNS = "tests/leaderboard/test_quarantine_runs.py"
+STEPS = "tests/leaderboard/scoring/test_lifecycle.py"
+STRIKES = "tests/leaderboard/scoring/test_lifecycle_strikes.py"
+QUEUE = "tests/leaderboard/workers/test_queue.py"
+OUTAGES = "tests/leaderboard/errors/test_outages.py"
+CHILD = "tests/leaderboard/scoring/test_sandbox.py"
+RUNS = "tests/leaderboard/scoring/test_sandbox_runs.py"
 
 SABOTAGES = (
+    Sabotage(
+        "free text of an anonymous method is shown",
+        "leaderboard/methods/details.py",
+        "if not (is_masked and each.kind.is_free_text))",
+        "if True)",
+        "tests/leaderboard/methods/test_further_detail.py::test_a_detail_is_a_field_and_a_row_of_the_registry",
+    ),
     Sabotage(
         "finalise without the attempt",
         LIFECYCLE,
@@ -165,74 +172,74 @@ SABOTAGES = (
     ),
     Sabotage(
         "no sweep of expired leases",
-        "leaderboard/queue.py",
+        "leaderboard/workers/queue.py",
         "    lifecycle.release_expired(rng=rng)\n    visibility",
         "    visibility",
         f"{QUEUE}::test_sweep_takes_back_what_dead_workers_hold",
     ),
     Sabotage(
-        "no second nudge",
-        "leaderboard/queue.py",
-        "lifecycle.waiting_ids(limit=MAX_NUDGES_PER_SWEEP)",
-        "[]",
-        f"{QUEUE}::test_sweep_nudges_again_what_is_due_and_nothing_else",
+        "every worker sweeps",
+        "leaderboard/workers/queue.py",
+        "bool(SweepBeat.objects.filter(is_due).update(",
+        "bool(SweepBeat.objects.update(",
+        f"{QUEUE}::test_workers_that_ask_at_the_same_moment_sweep_once",
     ),
     Sabotage(
         "workers wait for messages",
-        "leaderboard/queue.py",
-        "        while not stopping.is_set() and scoring.run_next(rng=rng):",
-        "        while False:",
+        "leaderboard/workers/queue.py",
+        "    while not stopping.is_set() and worker.run_next(rng=rng):",
+        "    while False:",
         f"{QUEUE}::test_a_look_decides_everything_that_waits",
     ),
     Sabotage(
         "one thread for all looks",
-        "leaderboard/queue.py",
-        "            look.start()\n            look.join()",
-        "            look.run()",
+        "leaderboard/workers/queue.py",
+        "            once.start()\n            once.join()",
+        "            once.run()",
         f"{QUEUE}::test_poller_looks_again_after_a_look_that_broke",
     ),
     Sabotage(
         "everybody waits for a broker that hangs",
-        "leaderboard/broker.py",
-        "    if _rest:\n        return False\n",
-        "",
-        "tests/leaderboard/test_broker.py"
+        "leaderboard/ops/broker.py",
+        "    if _rest or connections is None:",
+        "    if connections is None:",
+        "tests/leaderboard/ops/test_broker.py"
         "::test_a_broker_that_hangs_is_given_up_and_then_left_alone_for_a_while",
     ),
     Sabotage(
         "no flush before the rename",
-        "leaderboard/files.py",
+        "leaderboard/storage/files.py",
         "                os.fsync(out.fileno())\n",
         "",
         f"{OUTAGES}::test_file_is_flushed_before_it_is_renamed_and_its_directories_after",
     ),
     Sabotage(
         "no flush of the directories",
-        "leaderboard/files.py",
+        "leaderboard/storage/files.py",
         "                os.fsync(descriptor)\n",
         "                pass\n",
         f"{OUTAGES}::test_file_is_flushed_before_it_is_renamed_and_its_directories_after",
     ),
     Sabotage(
         "a full disk is any error",
-        "leaderboard/outages.py",
+        "leaderboard/errors/outages.py",
         "isinstance(fault, OSError) and fault.errno in FULL",
         "False",
         f"{OUTAGES}::test_full_disk_is_a_507_problem_and_leaves_nothing",
     ),
     Sabotage(
         "an absent database is any error",
-        "leaderboard/outages.py",
+        "leaderboard/errors/outages.py",
         "isinstance(fault, OperationalError | InterfaceError)",
         "False",
         f"{OUTAGES}::test_absent_database_is_a_503_problem",
     ),
     Sabotage(
         "no size limit",
-        "leaderboard/submissions.py",
+        "leaderboard/submissions/submissions.py",
         "    if upload.size > settings.MAX_PREDICTIONS_BYTES:",
         "    if False:",
-        "tests/leaderboard/test_submit.py::test_file_over_the_limit_is_refused_with_both_sizes",
+        "tests/leaderboard/submissions/test_submit.py::test_file_over_the_limit_is_refused_with_both_sizes",
     ),
     Sabotage(
         "no memory limit for the child",
@@ -264,28 +271,42 @@ SABOTAGES = (
     ),
     Sabotage(
         "the child inherits the credentials",
-        "leaderboard/quarantine.py",
-        "env=environment",
-        "env=os.environ | environment",
+        "leaderboard/scoring/fork_server.py",
+        '        "PATH": os.defpath,',
+        "        **os.environ,",
         f"{CHILD}::test_child_has_no_credentials_in_its_environment",
     ),
     Sabotage(
+        "the fork server keeps what the worker has open",
+        "evaluator/predictions/fork_server.py",
+        "    os.closerange(N_DESCRIPTORS, resource.getrlimit(resource.RLIMIT_NOFILE)[0])\n    gc.freeze()",
+        "    gc.freeze()",
+        f"{CHILD}::test_server_has_no_descriptor_but_a_socket_and_no_credentials",
+    ),
+    Sabotage(
+        "the end of the fork server blames the file",
+        "leaderboard/scoring/sandbox.py",
+        '    raise ChildNotReady("the process that starts reading processes ended")',
+        '    raise ChildDied("the process that starts reading processes ended")',
+        f"{CHILD}::test_server_that_ends_while_a_child_reads_takes_it_along_and_blames_no_file",
+    ),
+    Sabotage(
         "a child that cannot start blames the file",
-        "leaderboard/scoring.py",
-        "OUR_FAULTS = (OSError, quarantine.ChildNotReady, TruthDamaged)",
+        "leaderboard/scoring/worker.py",
+        "OUR_FAULTS = (OSError, sandbox.ChildNotReady, TruthDamaged)",
         "OUR_FAULTS = (OSError, TruthDamaged)",
         f"{RUNS}::test_reader_that_cannot_start_is_not_held_against_the_file",
     ),
     Sabotage(
         "a claim whose answer was lost waits for its lease",
-        "leaderboard/scoring.py",
-        "        return _insist(lambda: _leases_of(token))",
+        "leaderboard/scoring/worker.py",
+        "        return _retry_on_disconnect(lambda: _leases_of(token))",
         "        raise",
         f"{RUNS}::test_claim_whose_answer_was_lost_is_found_by_its_token",
     ),
     Sabotage(
         "a silent database ends the run",
-        "leaderboard/scoring.py",
+        "leaderboard/scoring/worker.py",
         "            connection.close()\n            return True",
         "            connection.close()\n            return False",
         f"{RUNS}::test_database_that_is_away_ends_no_run",

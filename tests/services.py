@@ -31,6 +31,15 @@ _MARK_S = 3600
 # The number of the lock that a crowd on PostgreSQL holds.
 _CROWD = 20230901
 
+# For tests of several writers at once, which SQLite does not have. Their module imports `connection`.
+ON_POSTGRESQL = [
+    pytest.mark.services,
+    pytest.mark.django_db(transaction=True),
+    pytest.mark.skipif(
+        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
+    ),
+]
+
 
 class ServiceMissing(RuntimeError):
     """A service that a test needs cannot be reached from here."""

@@ -7,6 +7,7 @@ as JSON.
 import json
 import os
 from datetime import timedelta
+from importlib import import_module
 from typing import Any
 
 import django
@@ -29,6 +30,13 @@ def fill(apps: Any) -> None:
 
     user = make("User", email="ada+ci@example.org")
     team = make("Team", name="Owls", look="owls")
+    audit = import_module("leaderboard.models.audit")
+    tip = audit.GENESIS
+    for number in range(3):
+        said = {"at": now, "verb": "tried", "noun": "Door", "noun_id": str(number), "details": {}}
+        new = audit.chained_hash(previous_hash=tip, actor_id=user.pk, **said)
+        make("AuditEvent", actor=user, **said, previous_hash=tip, hash=new)
+        tip = new
     method = make("Method", team=team, name="Owl", visibility="PUBLIC", shown_at=now)
     split = apps.get_model("leaderboard", "Split").objects.get(pk="test")
     split.quota_window, split.quota_min_gap = timedelta(0), timedelta(days=99_999)
@@ -83,6 +91,10 @@ def main() -> None:
         )
 
     split = present.get_model("leaderboard", "Split").objects.get(pk="test")
+    audit = import_module("leaderboard.audit")
+    audit.record(verb="tried", noun="Door", noun_id="new")
+    audit.seal()
+    chain = audit.verify()
     found = {
         "manifests": rows("Submission", "manifest_digest", "submitted_at"),
         "n_added": rows("TruthComparison", "n_added"),
@@ -90,6 +102,7 @@ def main() -> None:
         "rules": [split.quota_window.days, split.quota_min_gap.days, split.closes_at],
         "is_shown": rows("Team", "is_shown"),
         "mailboxes": rows("User", "mailbox"),
+        "audit": [chain.n_events, list(chain.breaks)],
     }
     print(json.dumps(found))  # noqa: T201 - for whoever started this
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator import differences, ranges, uncertainty
+from evaluator.scoring import differences, ranges, uncertainty
 from tests import error_models
 from tests.error_models import Model
 

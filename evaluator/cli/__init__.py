@@ -11,7 +11,9 @@ import sys
 
 import click
 
+from evaluator.cli import plugins
 from evaluator.cli.access import login, logout, publish, quota
+from evaluator.cli.boards import board
 from evaluator.cli.comparisons import compare
 from evaluator.cli.completion import completion
 from evaluator.cli.connection import version
@@ -20,7 +22,6 @@ from evaluator.cli.exits import MEANINGS, Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.offline import check, manifest, score
 from evaluator.cli.receipts import receipt, verify
-from evaluator.cli.standings import board
 from evaluator.cli.submissions import status, submit
 
 __all__ = ["main"]
@@ -45,7 +46,15 @@ class _Group(click.Group):
             ctx.exit(Exit.INTERRUPTED)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        return list(self.commands)  # in the order in which they are used, not of the alphabet
+        # In the order in which they are used, not of the alphabet; those of other packages after them.
+        return [*self.commands, *(name for name in plugins.found() if name not in self.commands)]
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        own = self.commands.get(cmd_name)
+        if own is not None:
+            return own
+        point = plugins.found().get(cmd_name)
+        return None if point is None else plugins.loaded(point)
 
 
 def _show_version(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:

@@ -11,25 +11,25 @@ import click
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
-from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable
-from evaluator.cli.options import TOKEN_VARIABLE, json_option, sendable, slug, url_option
-from evaluator.cli.places import keep_server_of_login, server_of_login
+from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
+from evaluator.cli.options import json_option, sendable, slug, url_option
+from evaluator.cli.paths import keep_server_of_login, server_of_login
 from evaluator.cli.tokens import account, checked, forget_token, keep_token, required_keyring
 
 if TYPE_CHECKING:
-    from evaluator.answers import Foreseen, Quota
+    from evaluator.client.answers import Foreseen, Quota
 
 N_MOVED_TOLD = 5  # rows whose rank changes; the first show what the others do
 
 
-@click.command(short_help="Keep a token in the keyring of this machine.")
+@click.command(short_help="Save a token in the keyring of this machine.")
 @url_option
 @json_option
 def login(*, url: str, as_json: bool) -> None:
-    """Keep a token in the operating system's keyring, once the server has accepted it.
+    """Save a token in the keyring of the operating system, after the server has accepted it.
 
-    The token is asked for, without showing it, or read from standard input. Other commands then find it, and
-    this leaderboard, by themselves. TSTTC_TOKEN, where it is set, comes before it. Make a token at /tokens/.
+    The command prompts for the token without showing it, or reads it from standard input. Other commands then
+    use the token and this leaderboard. TSTTC_TOKEN takes precedence if set. Create a token at /tokens/.
 
     \b
     Examples:
@@ -44,11 +44,11 @@ def login(*, url: str, as_json: bool) -> None:
     try:
         keep_server_of_login(url)
     except OSError as error:
-        click.echo(f"The address could not be kept ({error.strerror}); name it with --server.", err=True)
+        click.echo(f"The address could not be saved ({error.strerror}); name it with --server.", err=True)
     if as_json:
         echo_json({"server": url, "keyring": keyring})
         return
-    click.echo(f"The token is good, and kept for {url} ({printable(keyring)}).")
+    click.echo(f"The token is valid and saved for {url} ({printable(keyring)}).")
 
 
 @click.command(short_help="Remove the token from the keyring.")
@@ -57,7 +57,7 @@ def login(*, url: str, as_json: bool) -> None:
 def logout(*, url: str, as_json: bool) -> None:
     """Remove the token for a leaderboard from the keyring of this machine.
 
-    The token itself stays good until it ends or is revoked, which is done at /tokens/ of the leaderboard.
+    The token stays valid until it expires or you revoke it at /tokens/ of the leaderboard.
 
     \b
     Example:
@@ -70,7 +70,7 @@ def logout(*, url: str, as_json: bool) -> None:
         echo_json({"server": url, "was_kept": was_kept})
     elif was_kept:
         click.echo(
-            f"The token for {url} is removed from this machine. End it for good at {url.rstrip('/')}/tokens/"
+            f"The token for {url} is removed from this machine. Revoke it at {url.rstrip('/')}/tokens/"
         )
     else:
         click.echo(f"There was no token for {url} in a keyring of this machine.")
@@ -97,7 +97,7 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
                 f"The server names no quota for {split!r}; expected one of its splits.",
                 exit_code=Exit.REFUSED,
                 code="unknown-split",
-                hint="See all with: tsttc quota",
+                hint="Show all with: tsttc quota",
             )
     if as_json:
         echo_json([row.document for row in rows] if split is None else rows[0].document)
@@ -106,7 +106,7 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
         click.echo(line)
 
 
-@click.command(short_help="Show one of your methods to everybody.")
+@click.command(short_help="Publish one of your methods.")
 @click.argument("method", callback=sendable)
 @click.option(
     "--as",
@@ -114,24 +114,24 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
     type=click.Choice(["public", "anonymous"]),
     default="public",
     show_default=True,
-    help="With its name and team, or under a pseudonym.",
+    help="Publish with name and team, or under a pseudonym.",
 )
 @click.option(
     "--reveal-at",
     metavar="MOMENT",
     callback=sendable,
-    help="With --as anonymous: when it turns public by itself, such as 2027-03-01T00:00:00Z.",
+    help="With --as anonymous: when the method becomes public automatically, such as 2027-03-01T00:00:00Z.",
 )
-@click.option("--yes", is_flag=True, help="Do not ask; a job without a terminal has to say so.")
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation; required without a terminal.")
 @url_option
 @json_option
 def publish(
     *, method: str, visibility: str, reveal_at: str | None, yes: bool, url: str, as_json: bool
 ) -> None:
-    """Show METHOD, the name or id of one of your own, to everybody. Public is for ever.
+    """Publish METHOD, the name or id of a method of your team. This cannot be undone.
 
-    New methods are private: only your team sees them on the boards. An anonymous one shows its numbers under
-    a pseudonym, and can be made public later. Before it asks, it shows what everybody will see.
+    New methods are private: only your team sees them. An anonymous method shows its scores under
+    a pseudonym and can become public later. The command shows a preview before it asks for confirmation.
 
     \b
     Examples:
@@ -167,38 +167,40 @@ def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
     for line in _foreseen_in_words(foreseen):
         click.echo(line, err=True)
     meaning = {
-        "public": "with its name, team and scores, for ever: it can be withdrawn, not hidden again",
-        "anonymous": "its scores under a pseudonym, without name and team",
+        "public": "with its name, team and scores; this cannot be undone",
+        "anonymous": "with its scores under a pseudonym, without name and team; this cannot be undone",
     }[visibility]
-    words = f"This shows {printable(name)} to everybody, {meaning}."
+    words = f"This publishes {printable(name)}, {meaning}."
     if not sys.stdin.isatty():
         raise Failure(
             words,
             exit_code=Exit.USAGE,
             code="not-confirmed",
-            hint="Nothing was changed. Say --yes if it is meant.",
+            hint="Nothing was changed. Use --yes to confirm.",
             more={"preview": foreseen.document},
         )
     click.echo(words, err=True)
-    if not click.confirm("Go on?", err=True):
+    if not click.confirm("Publish?", err=True):
         raise Failure("Nothing was changed.", exit_code=Exit.USAGE, code="not-confirmed")
 
 
 def _foreseen_in_words(foreseen: Foreseen) -> Iterator[str]:
     """What everybody would see: the rows that it would have, and whose ranks would change."""
-    from evaluator.cli.values import texts_of  # noqa: PLC0415 -- the commands about tokens need no scores
+    from evaluator.cli.values import overall_of, texts_of  # noqa: PLC0415 -- others here need no scores
 
-    yield printable(f"Everybody will see {foreseen.name}, team {foreseen.team}:")
-    table = [[Cell(text, is_bold=True) for text in ("split", "rank", "of", "MiD", "RTE", "now")]]
+    yield printable(f"Everyone will see {foreseen.name}, team {foreseen.team}:")
+    errors = overall_of(name for sight in foreseen.splits for name in sight.after.scores)
+    headings = ("split", "rank", "of", *map(short_name, errors), "now")
+    table = [[Cell(text, is_bold=True) for text in headings]]
     for sight in foreseen.splits:
         ranks = [NO_VALUE if rank is None else f"{rank:,}" for rank in (sight.after.rank, sight.n_ranked)]
-        values = texts_of(sight.after, missing=NO_VALUE, scores=("mid", "rte"))
-        now = f"seen as {sight.before.method}" if sight.before else "not seen"
+        values = texts_of(sight.after, missing=NO_VALUE, scores=errors)
+        now = f"visible as {sight.before.method}" if sight.before else "not visible"
         table.append([Cell(printable(text)) for text in (sight.split, *ranks, *values, now)])
     if foreseen.splits:
-        yield from aligned(table, align="<>>..<")
+        yield from aligned(table, align=f"<>>{'.' * len(errors)}<")
     else:
-        yield "It has no scored submission on a board yet. What it scores from then on is seen at once."
+        yield "The method has no scored submission on a board yet."
     for sight in foreseen.splits:
         if sight.moved:
             told = [
@@ -214,7 +216,9 @@ def _asked(url: str) -> str:
     """The token from a terminal, which does not show it, or from standard input."""
     if not sys.stdin.isatty():
         return sys.stdin.readline()
-    click.echo(f"Make a token at {url.rstrip('/')}/tokens/ and paste it here; it is not shown.", err=True)
+    click.echo(
+        f"Create a token at {url.rstrip('/')}/tokens/ and paste it here; the input is hidden.", err=True
+    )
     text: str = click.prompt("Token", hide_input=True, err=True)
     return text
 
@@ -231,6 +235,3 @@ def _quota_in_words(rows: Sequence[Quota]) -> Iterator[str]:
     if said:
         yield ""
         yield from map(printable, said)
-
-
-__all__ = ["TOKEN_VARIABLE", "login", "logout", "publish", "quota"]

@@ -1,4 +1,4 @@
-"""The subcommand board: who leads."""
+"""The subcommand board: the ranked rows of a split."""
 
 from __future__ import annotations
 
@@ -9,15 +9,17 @@ from typing import TYPE_CHECKING
 
 import click
 
+from evaluator.cli import exports
 from evaluator.cli.connection import connect
-from evaluator.cli.failures import echo_json
-from evaluator.cli.layout import NO_VALUE, UNITS, Cell, aligned, printable, short_name, width_of
+from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
 from evaluator.cli.options import json_option, sendable, slug, url_option
-from evaluator.cli.values import authors_or_team, texts_of
-from evaluator.protocol import SCORE_NAMES
+from evaluator.cli.values import authors_or_team, overall_of, texts_of
+from evaluator.metrics.protocol import known_names
+from evaluator.tables import layouts
+from evaluator.tables.formats import FORMATS
 
 if TYPE_CHECKING:
-    from evaluator.answers import Board
+    from evaluator.client.answers import Board
 
 
 @click.command(short_help="Show the ranked results of a split.")
@@ -28,31 +30,31 @@ if TYPE_CHECKING:
     default="rank",
     show_default=True,
     metavar="COLUMN",
-    help=f"Order by rank, method, team, date, {', '.join(SCORE_NAMES)}; -COLUMN for the reverse.",
+    help=f"Sort by rank, method, team, date, {', '.join(known_names())}; -COLUMN for the reverse.",
 )
 @click.option(
     "--format",
     "as_format",
-    type=click.Choice(["table", "json", "csv", "latex", "markdown"]),
+    type=click.Choice(["table", *(each.name for each in FORMATS if each.on_command_line)]),
     default="table",
     show_default=True,
     help="What to print.",
 )
-@click.option("--mine", is_flag=True, help="With your own team's private and anonymous methods, marked.")
+@click.option("--mine", is_flag=True, help="Include the private and anonymous methods of your team, marked.")
 @click.option(
-    "--intervals", "has_intervals", is_flag=True, help="With the 95 % confidence interval of each value."
+    "--intervals", "has_intervals", is_flag=True, help="Show the 95 % confidence interval of each value."
 )
 @click.option(
     "--edition",
     type=click.IntRange(min=1),
     metavar="N",
-    help="The board of edition N, which stays as it is; without it the present one.",
+    help="The board of edition N (default: the current edition).",
 )
 @click.option(
     "--at",
     callback=sendable,
     metavar="MOMENT",
-    help="The board as it stood then: a date, or a time such as 2026-11-20T18:00:00Z.",
+    help="The board as of a date, or of a time such as 2026-11-20T18:00:00Z.",
 )
 @url_option
 @json_option
@@ -70,7 +72,7 @@ def board(
 ) -> None:
     """Show the ranked results of SPLIT (test by default): submissions and published baselines.
 
-    Needs no token, but for --mine. On a terminal the best value of a column is bold and the second
+    Needs no token, except with --mine. On a terminal the best value of a column is bold and the second
     underlined.
 
     \b
@@ -81,23 +83,16 @@ def board(
       tsttc board test --edition 1
     """
     if edition is not None and at:
-        raise click.UsageError("An edition's board has no other time: say --edition or --at.")
+        raise click.UsageError("--edition and --at exclude each other; give one of them.")
     with connect(url, with_token=mine) as client:
         found = client.board(split, sort=sort, edition=edition, at=at, has_intervals=has_intervals)
         address = client.board_page(found, sort=sort, at=at)
-    if as_json or as_format == "json":
-        echo_json(found.document)
-    elif as_format == "table":
+    chosen = next((each for each in FORMATS if each.name == ("json" if as_json else as_format)), None)
+    if chosen is None:
         _show(found, is_mine=mine)
     else:
-        from evaluator.cli import formats  # noqa: PLC0415 -- tables of signs for LaTeX, seldom needed
-
-        text = {
-            "csv": lambda: formats.as_csv(found, has_intervals=has_intervals),
-            "latex": lambda: formats.as_latex(found, address=address),
-            "markdown": lambda: formats.as_markdown(found, address=address),
-        }[as_format]()
-        click.echo(text, nl=False)
+        text = chosen.write(exports.export(found, address=address, has_intervals=has_intervals))
+        click.echo(text.replace("\r\n", "\n"), nl=False)  # as lines end here
 
 
 def _show(found: Board, *, is_mine: bool) -> None:
@@ -106,8 +101,8 @@ def _show(found: Board, *, is_mine: bool) -> None:
         click.echo(line)
     if is_mine:
         click.echo(
-            "\nPrivate methods of your team stand where they would; they take nobody's rank. "
-            "Others see anonymous ones under a pseudonym."
+            "\nOnly your team sees its private methods; they do not affect the public ranks. "
+            "Other teams see anonymous methods under a pseudonym."
         )
 
 
@@ -122,34 +117,32 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
     if not found.entries:
         yield "No results yet. Be the first: tsttc submit --help"
         return
-    yield UNITS
+    yield units(found.score_names)
     yield ""
-    lines = _table(found, texts=("team", "date"), scores=SCORE_NAMES)
+    lines = _table(found, texts=("team", "date"), scores=found.score_names)
     if width is not None and max(width_of(click.unstyle(line)) for line in lines) > width:
-        lines = _table(found, texts=(), scores=("mid", "rte"))
-        lines += ["", "Too narrow for all columns; a pipe or --json gets them."]
+        lines = _table(found, texts=(), scores=overall_of(found.score_names))
+        lines += ["", "The terminal is too narrow for all columns; use a pipe or --json."]
     yield from lines
     if any(entry.intervals for entry in found.entries):
-        from evaluator.layouts import BRACKETS  # noqa: PLC0415 -- only for a board with intervals
-
         yield ""
-        yield BRACKETS
+        yield layouts.BRACKETS
     if found.floor:
-        from evaluator.floors import floor_sentence  # noqa: PLC0415 -- loads numpy
+        from evaluator.scoring.floors import floor_sentence  # noqa: PLC0415 -- loads numpy
 
         yield ""
         yield floor_sentence(found.floor, decimals=found.decimals or 2)
 
 
 def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:
-    from evaluator.cli import formats  # noqa: PLC0415 -- only once there is a board to print
-    from evaluator.layouts import marked  # noqa: PLC0415 -- the same
-
     headings = ["rank", "method", *texts, *map(short_name, scores)]
     rows = [[Cell(text, is_bold=True) for text in headings]]
-    marks = {name: formats.marks_of(found, name) for name in scores}
+    marks = {name: exports.marks_of(found, name) for name in scores}
     for i, entry in enumerate(found.entries):
-        row = [Cell(formats.rank_text(entry)), Cell(marked(printable(entry.method), formats.mark_of(entry)))]
+        row = [
+            Cell(exports.rank_text(entry)),
+            Cell(layouts.marked(printable(entry.method), exports.mark_of(entry))),
+        ]
         row += [
             Cell(printable(authors_or_team(entry)) if name == "team" else printable(entry.date or ""))
             for name in texts
@@ -157,7 +150,7 @@ def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
         values = texts_of(entry, missing=NO_VALUE, scores=tuple(scores))
         for name, value in zip(scores, values, strict=True):
             best, second = marks[name]
-            text = value + formats.interval_text(entry, name)
+            text = value + exports.interval_text(entry, name)
             row.append(Cell(text, is_bold=i in best, is_underlined=i in second))
         rows.append(row)
     return aligned(rows, align="><" + "<" * len(texts) + "." * len(scores))

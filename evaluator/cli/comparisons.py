@@ -13,20 +13,21 @@ from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.gates import named
-from evaluator.cli.layout import NO_VALUE, UNITS, Cell, aligned, printable, short_name
+from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units
 from evaluator.cli.options import json_option, sendable, slug, url_option
 from evaluator.cli.reading import TABLE, bytes_of, naming
 from evaluator.cli.tokens import has_token
-from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import Found, others, p_cell, sentence
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.scoring.significance import Difference
+from evaluator.tables.sentences import others, p_cell, sentence
 
 if TYPE_CHECKING:
-    from evaluator.answers import Compared
+    from evaluator.client.answers import Compared
 
 Scores = Mapping[str, float | None]
 
 
-@click.command(short_help="Say how far two methods, or two files, differ beyond chance.")
+@click.command(short_help="Compare two methods or two files, with confidence intervals and p-values.")
 @click.argument("first", callback=sendable)
 @click.argument("second", callback=sendable)
 @click.option("--split", default="test", show_default=True, callback=slug, help="The board of the methods.")
@@ -35,17 +36,16 @@ Scores = Mapping[str, float | None]
     "truth_path",
     type=TABLE,
     metavar="FILE",
-    help="Ground truth that you have: FIRST and SECOND are prediction files, and nothing is sent.",
+    help="Ground truth: compare FIRST and SECOND as prediction files, offline.",
 )
 @url_option
 @json_option
 def compare(*, first: str, second: str, split: str, truth_path: Path | None, url: str, as_json: bool) -> None:
     """Compare FIRST with SECOND, methods of a board by name or id, or with --truth two prediction files.
 
-    Each column gets the difference, its 95 % confidence interval, and the p-value of a two-sided test, both
-    by whole recordings, since the sequences of one recording resemble each other. Below 0 the first is
-    better. The sentence below the table says what overall MiD means; then follow the other columns that
-    differ significantly.
+    Each column shows the difference, its 95 % confidence interval and the p-value of a two-sided test. Both
+    resample whole recordings, because sequences of one recording resemble each other. Negative means that
+    FIRST is better.
 
     \b
     Examples:
@@ -61,7 +61,7 @@ def compare(*, first: str, second: str, split: str, truth_path: Path | None, url
         ids = [entry.method_id for entry in entries if entry.method_id]
         if len(ids) < len(entries):
             raise Failure(
-                "A row that was published in a paper cannot be compared: nothing is known of its recordings.",
+                "A row quoted from a paper cannot be compared: papers do not report values per recording.",
                 exit_code=Exit.USAGE,
                 code="bad-comparison",
             )
@@ -82,33 +82,18 @@ def _server_s_words(
 ) -> Iterator[str]:
     edition = f" · edition {found.edition}" if found.edition is not None else ""
     yield printable(f"{found.split}{edition}")
-    yield UNITS
+    yield units(scores[0])
     yield ""
     yield from table(names, scores, found.differences(), decimals=found.decimals)
     said = found.pairs[0].sentence if found.pairs else ""
     if said or found.reason:
         yield ""
         yield printable(said or found.reason)
-    yield from _others(names, found.differences(), decimals=found.decimals)
-
-
-def _others(names: tuple[str, str], found: Mapping[str, Found], *, decimals: int = 2) -> Iterator[str]:
-    """What the columns beside overall MiD say."""
-    lead, said = others(*names, found, decimals=decimals)
-    if lead:
-        yield lead
-    for each in said:
-        yield f"  {printable(each)}"
+    yield from filter(None, (others(found.differences()),))
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool) -> None:
-    from evaluator import (  # noqa: PLC0415 -- numpy
-        compare_predictions,
-        evaluate,
-        published,
-        read_predictions,
-        read_truth,
-    )
+    from evaluator import compare_predictions, evaluate, published, read_predictions, read_truth  # noqa: PLC0415 -- numpy
 
     with naming(truth_path):
         truth = read_truth(truth_path)
@@ -139,36 +124,37 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
     for line in table((str(first), str(second)), (reports[0].flat(), reports[1].flat()), found):
         click.echo(line)
     click.echo("")
-    click.echo(UNITS)
+    click.echo(units(reports[0].flat()))
     names = str(first), str(second)
-    if "mid" in found:
-        click.echo(printable(sentence(*names, name="mid", found=found["mid"])))
-    for line in _others(names, found):
-        click.echo(line)
+    if PRIMARY in found:
+        click.echo(printable(sentence(*names, name=PRIMARY, found=found[PRIMARY])))
+    if lead := others(found):
+        click.echo(lead)
 
 
 def table(
     names: tuple[str, str],
     scores: tuple[Scores, Scores],
-    found: Mapping[str, Found],
+    found: Mapping[str, Difference],
     *,
     decimals: int = 2,
 ) -> list[str]:
     """Both results, and below them the difference of each column with its interval and p."""
-    from evaluator.report import format_published, published  # noqa: PLC0415 -- loads numpy
+    from evaluator.scoring.report import format_published, published  # noqa: PLC0415 -- loads numpy
 
-    rows = [[Cell(""), *(Cell(short_name(name), is_bold=True) for name in SCORE_NAMES)]]
+    columns = list(scores[0])
+    rows = [[Cell(""), *(Cell(short_name(name), is_bold=True) for name in columns)]]
     for name, values in zip(names, scores, strict=True):
         texts = [
-            format_published(values.get(score), decimals=decimals, missing=NO_VALUE) for score in SCORE_NAMES
+            format_published(values.get(score), decimals=decimals, missing=NO_VALUE) for score in columns
         ]
         rows.append([Cell(printable(name)), *map(Cell, texts)])
 
     def column(kind: str) -> list[Cell]:
-        values = [published(getattr(found.get(name), kind, None), decimals=decimals) for name in SCORE_NAMES]
+        values = [published(getattr(found.get(name), kind, None), decimals=decimals) for name in columns]
         return [Cell(NO_VALUE if value is None else f"{value:+.{decimals}f}") for value in values]
 
-    gaps = [found.get(name) for name in SCORE_NAMES]
+    gaps = [found.get(name) for name in columns]
     chances = [NO_VALUE if gap is None else p_cell(gap.p, gap.p_below) or NO_VALUE for gap in gaps]
 
     rows += [
@@ -177,4 +163,4 @@ def table(
         [Cell("95 % to"), *column("high")],
         [Cell("p"), *map(Cell, chances)],
     ]
-    return aligned(rows, align="<" + "." * len(SCORE_NAMES))
+    return aligned(rows, align="<" + "." * len(columns))

@@ -8,7 +8,7 @@ VARIABLE = "_TSTTC_COMPLETE"
 SHELLS = ("bash", "zsh", "fish")
 
 
-@click.command(short_help="Print what your shell needs to complete tsttc's words.")
+@click.command(short_help="Print the completion script for your shell.")
 @click.argument("shell", type=click.Choice(SHELLS))
 @click.pass_context
 def completion(context: click.Context, shell: str) -> None:

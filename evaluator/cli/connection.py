@@ -16,8 +16,8 @@ from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.tokens import token_for
 
 if TYPE_CHECKING:
-    from evaluator.answers import ClientError, Refused
-    from evaluator.client import Client
+    from evaluator.client.answers import ClientError, Refused
+    from evaluator.client.client import Client
 
 # A problem that names one of these is about the command's options; any other is about the file.
 OPTIONS = frozenset(
@@ -36,15 +36,15 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     Its errors leave as failures worded for a person.
     """
     bearer = token or (token_for(url) if with_token else None)
-    from evaluator.answers import ClientError  # noqa: PLC0415 -- loads msgspec
-    from evaluator.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
-    from evaluator.exchange import Patience  # noqa: PLC0415 -- the same
+    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)
     if bearer and site.scheme == "http" and site.hostname not in LOOPBACK_HOSTS:
         click.echo(f"Warning: the token goes to {url} unencrypted; use https where you can.", err=True)
     # A job may begin before its server has; a person who mistyped an address wants to hear of it at once.
-    patience = Patience(n_first_tries=1) if sys.stderr.isatty() else Patience()
+    patience = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
     try:
         with Client(url=url, token=bearer, user_agent=f"tsttc/{version()}", patience=patience) as client:
             yield client
@@ -64,16 +64,9 @@ def version() -> str:
 
 def in_words(error: ClientError, *, url: str) -> Failure:
     """What happened, whose fault it is and what to do next."""
-    from evaluator.answers import (  # noqa: PLC0415 -- loads msgspec
-        BadAnswer,
-        NotReady,
-        Redirected,
-        Refused,
-        TimedOut,
-        Unreachable,
-    )
+    from evaluator.client.answers import BadAnswer, NotReady, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
-    hint = "Check --server (or TSTTC_URL), your network, and whether the server is up."
+    hint = "Check --server (or TSTTC_URL), your network, and whether the server runs."
     exit_code = Exit.NETWORK
     more: dict[str, Any] = {}
     match error:
@@ -82,20 +75,20 @@ def in_words(error: ClientError, *, url: str) -> Failure:
         case Unreachable(was_connected=False):
             code, words = "unreachable", f"Nothing answers at {error.url} ({error.reason})."
         case Unreachable():
-            code, words = "cut-off", f"{error.url} gave no whole answer ({error.reason})."
-            hint = "Run the command again: a file that did arrive is not counted twice."
+            code, words = "cut-off", f"{error.url} gave an incomplete answer ({error.reason})."
+            hint = "Run the command again: the same file never counts twice."
         case Redirected():
-            code, words = "redirected", f"{error.url} points to {error.location}, which was not followed."
+            code, words = "redirected", f"{error.url} redirects to {error.location}, which is not followed."
         case BadAnswer():
-            code, words = "bad-answer", f"{error.url} gave no leaderboard's answer: {error.found}."
+            code, words = "bad-answer", f"{error.url} did not answer like a leaderboard: {error.found}."
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
             exit_code, code, words = Exit.TIMEOUT, "timeout", f"{_sentence(str(error))}{last}"
             more = {"submission": error.submission.document if error.submission else None}
-            hint = f"It goes on by itself; follow it with: tsttc status {error.submission_id} --watch"
+            hint = f"The evaluation continues; follow it with: tsttc status {error.submission_id} --watch"
         case NotReady():
             exit_code, code, words = Exit.TIMEOUT, "timeout", _sentence(str(error))
-            hint = "The workers are busy; ask again a little later."
+            hint = "The workers are busy; ask again later."
         case _:
             code, words = "client", _sentence(str(error))
     return Failure(words, exit_code=exit_code, code=code, hint=hint, more=more)
@@ -138,7 +131,7 @@ def exit_code_of(error: Refused) -> Exit:
 def _words_for(error: Refused) -> str:
     """For answers that are no problem document: whatever stands in between may have given them."""
     if error.status >= 500:
-        return f"The server failed ({error.status}: {error.title}). The fault is not yours."
+        return f"The server failed ({error.status}: {error.title}). This is not your fault."
     if error.status in {401, 403}:
         return f"The server does not accept the token ({error.status}: {error.title})."
     return f"The server refused ({error.status}: {error.title})."
@@ -147,17 +140,15 @@ def _words_for(error: Refused) -> str:
 def _hint_for(error: Refused, *, url: str) -> str:
     again = f"Try again in {duration(error.retry_after_s)}." if error.retry_after_s else ""
     if error.status == 401:
-        return (
-            f"Make a new one at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE} to it."
-        )
+        return f"Create a token at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE}."
     if error.status == 403 and error.code in WORDS_OF_403:
-        return f"Make one that is good for it at {url.rstrip('/')}/tokens/"
+        return f"Create a token with this scope at {url.rstrip('/')}/tokens/"
     if error.status == 404:
         return "Check the name, or the id, and --server."
     if error.status == 429:
-        return again or "See what is left with: tsttc quota"
+        return again or "Show your quota with: tsttc quota"
     if error.status >= 500:
-        return f"The fault is not yours. {again or 'Try again later.'}"
+        return f"This is not your fault. {again or 'Try again later.'}"
     return again
 
 

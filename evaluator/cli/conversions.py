@@ -7,17 +7,17 @@ from typing import Literal
 
 import click
 
-from evaluator.cli.options import predictions_argument
+from evaluator.cli.options import output_option, predictions_argument
 from evaluator.cli.reading import FOLDER, bytes_of, naming, write_bytes
 
 GAP = click.IntRange(1, 5)
 RATE = click.FloatRange(min=0, min_open=True)
 
 
-@click.command(short_help="Turn scale ratios into seconds and back, and anno_ids into natural keys.")
+@click.command(short_help="Convert scale ratios to seconds and back, and anno_ids to natural keys.")
 @predictions_argument
 @click.option(
-    "--frame-gap", type=GAP, metavar="G", help="PREDICTIONS has scale ratios of frames this far apart."
+    "--frame-gap", type=GAP, metavar="G", help="PREDICTIONS contains scale ratios of frames with this gap."
 )
 @click.option("--fps", "fps_hz", type=RATE, metavar="HZ", help="The same as a rate: 10 Hz / frame gap.")
 @click.option(
@@ -25,25 +25,17 @@ RATE = click.FloatRange(min=0, min_open=True)
     type=click.Choice(["ttc", "scale_ratio"]),
     default="ttc",
     show_default=True,
-    help="What to write: seconds, or scale ratios.",
+    help="Output: seconds or scale ratios.",
 )
-@click.option(
-    "--to-frame-gap", type=GAP, metavar="G", help="With --to scale_ratio: of frames this far apart (5)."
-)
+@click.option("--to-frame-gap", type=GAP, metavar="G", help="With --to scale_ratio: the frame gap (5).")
 @click.option("--to-fps", "to_fps_hz", type=RATE, metavar="HZ", help="The same as a rate.")
 @click.option(
     "--annotations",
     type=FOLDER,
     metavar="FOLDER",
-    help="Write natural keys: the anno_ids are those that the toolkit gave when it read this folder here.",
+    help="Write natural keys; the anno_ids are those of the toolkit for this folder on this machine.",
 )
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Write the file here instead of to standard output.",
-)
+@output_option("the file")
 def convert(
     *,
     predictions: Path,
@@ -55,15 +47,14 @@ def convert(
     annotations: Path | None,
     output: Path | None,
 ) -> None:
-    """Write PREDICTIONS, a JSON file or - for standard input, in another unit, at another rate, or with other
-    keys.
+    """Convert PREDICTIONS, a JSON file or - for standard input, to another unit, rate, or kind of keys.
 
-    An envelope says itself what its numbers are. A flat file, from key to number, has scale ratios if
+    An envelope states the kind of its values. A flat file, from key to number, contains scale ratios if
     --frame-gap or --fps is given, and seconds otherwise.
 
     The toolkit numbers the sequences in the order in which the file system lists the annotation files, which
-    differs between machines. With --annotations the result file of the toolkit gets natural keys, which mean
-    the same everywhere. Run this where the toolkit ran, on the folder that it read.
+    differs between machines. --annotations gives a result file of the toolkit natural keys, which mean the
+    same everywhere. Run the command on the machine and the folder on which the toolkit ran.
 
     \b
     Examples:
@@ -71,19 +62,19 @@ def convert(
       tsttc convert ratios.json --frame-gap 1 -o predictions.json
       tsttc convert predictions.json --to scale_ratio --to-frame-gap 3 -o ratios.json
     """
-    from evaluator.conversion import convert as converted  # noqa: PLC0415 -- loads numpy
+    from evaluator.predictions.conversion import convert as converted  # noqa: PLC0415 -- loads numpy
 
     if frame_gap is not None and fps_hz is not None:
-        raise click.UsageError("--frame-gap and --fps say the same thing; give one of them.")
+        raise click.UsageError("--frame-gap and --fps mean the same; give one of them.")
     if to_frame_gap is not None and to_fps_hz is not None:
-        raise click.UsageError("--to-frame-gap and --to-fps say the same thing; give one of them.")
+        raise click.UsageError("--to-frame-gap and --to-fps mean the same; give one of them.")
     if to == "ttc" and (to_frame_gap is not None or to_fps_hz is not None):
         raise click.UsageError(
             "Seconds have no rate: --to-frame-gap and --to-fps belong to --to scale_ratio."
         )
     natural_keys = None
     if annotations is not None:
-        from evaluator.numbering import read_numbering  # noqa: PLC0415 -- loads numpy
+        from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- loads numpy
 
         with naming(annotations):
             natural_keys = read_numbering(annotations).natural_keys

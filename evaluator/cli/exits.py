@@ -1,4 +1,4 @@
-"""The exit codes: whose turn it is. A script reads them, so they never change their meaning."""
+"""The exit codes. A script reads them, so their meaning never changes."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Exit(IntEnum):
 
 MEANINGS: Final[dict[Exit, str]] = {
     Exit.GOOD: "good",
-    Exit.REJECTED: "the file is at fault: rejected, too large, malformed, or a receipt that does not hold",
-    Exit.USAGE: "the command was called wrongly: an unknown option or name, a file that cannot be opened",
-    Exit.NETWORK: "the network: no leaderboard answers at the address, or not to the end",
-    Exit.AUTH: "the token: none, not accepted, or not good for this",
-    Exit.QUOTA: "not now: the quota is spent, or there were too many requests in a short time",
-    Exit.GATE: "a gate: --fail-if or --fail-if-worse-than holds, or cannot be judged",
-    Exit.SYSTEM: "the server failed; the fault is not yours",
-    Exit.REFUSED: "the server says no: no such thing, not open, cancelled",
-    Exit.TIMEOUT: "not done within --timeout; it goes on by itself",
+    Exit.REJECTED: "the file is at fault: rejected, too large, malformed, or an invalid receipt",
+    Exit.USAGE: "wrong usage: an unknown option or name, a file that cannot be opened",
+    Exit.NETWORK: "network: no leaderboard at the address, or an incomplete answer",
+    Exit.AUTH: "token: missing, not accepted, or without the necessary scope",
+    Exit.QUOTA: "not now: the quota is used up, or too many requests in a short time",
+    Exit.GATE: "gate: --fail-if or --fail-if-worse-than is true, or cannot be evaluated",
+    Exit.SYSTEM: "the server failed; this is not your fault",
+    Exit.REFUSED: "the server refused: not found, not open, cancelled",
+    Exit.TIMEOUT: "not finished within --timeout; the evaluation continues",
     Exit.INTERRUPTED: "interrupted with Ctrl-C",
 }
 """Every code in words, as docs/cli.md has them."""

@@ -11,8 +11,8 @@ import click
 from evaluator.cli.layout import printable
 
 if TYPE_CHECKING:
-    from evaluator.answers import Submission
-    from evaluator.client import Client
+    from evaluator.client.answers import Submission
+    from evaluator.client.client import Client
 
 INTERVALS_WITHIN_S = 10.0
 

@@ -1,7 +1,7 @@
 """Gates: conditions on scores that set the exit code, so that a CI job can stop on them.
 
-The grammar is `NAME OPERATOR NUMBER`, joined by `or`: names are the ten scores, operators > >= < <= == !=.
-Nothing is evaluated but that. The numbers compared are the published ones, with two decimals.
+The grammar is `NAME OPERATOR NUMBER`, joined by `or`: names of scores, operators > >= < <= == !=. Nothing is
+evaluated but that. The numbers compared are the published ones, with two decimals.
 """
 
 from __future__ import annotations
@@ -17,13 +17,13 @@ import click
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
-from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import p_text
-from evaluator.significance import SIGNIFICANT, is_significant, too_few_recordings
+from evaluator.metrics.protocol import PRIMARY, known_names
+from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_recordings
+from evaluator.tables.sentences import p_text
 
 if TYPE_CHECKING:
-    from evaluator.answers import Board, BoardEntry, Difference
-    from evaluator.client import Client
+    from evaluator.client.answers import Board, BoardEntry
+    from evaluator.client.client import Client
 
 OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
     ">=": operator.ge,
@@ -34,7 +34,7 @@ OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
     "<": operator.lt,
 }
 _CONDITION: Final = re.compile(
-    r"\s*(?P<name>[a-z_]+)\s*(?P<operator>>=|<=|==|!=|>|<)\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)\s*",
+    r"\s*(?P<name>[a-z0-9_]+)\s*(?P<operator>>=|<=|==|!=|>|<)\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)\s*",
     re.ASCII,
 )
 _OR: Final = re.compile(r"\bor\b", re.ASCII)
@@ -77,8 +77,8 @@ def _condition(text: str) -> Condition:
     if found is None:
         shown = text.strip() or "nothing"
         raise ValueError(f"found {shown!r}, expected NAME OPERATOR NUMBER, such as mid > 15.0")
-    if found["name"] not in SCORE_NAMES:
-        raise ValueError(f"found {found['name']!r}, expected one of {', '.join(SCORE_NAMES)}")
+    if found["name"] not in known_names():
+        raise ValueError(f"found {found['name']!r}, expected one of {', '.join(known_names())}")
     return Condition(found["name"], found["operator"], float(found["number"]))
 
 
@@ -90,7 +90,7 @@ def fail_if_option(command: Command) -> Command:
         multiple=True,
         metavar="CONDITION",
         callback=_conditions,
-        help='End with exit code 6 if this holds, such as "mid > 15.0 or rte > 20"; may be repeated.',
+        help='Exit with code 6 if the condition is true, such as "mid > 15.0 or rte > 20"; may be repeated.',
     )(command)
 
 
@@ -109,7 +109,7 @@ def judge(conditions: Sequence[Condition], scores: Scores | None, *, decimals: i
     missing = [condition for condition in conditions if condition.holds(known) is None]
     holding = [condition for condition in conditions if condition.holds(known)]
     if holding:
-        said = "; ".join(f"{c.name} is {known[c.name]:.{decimals}f}, and {c} was to fail" for c in holding)
+        said = "; ".join(f"{c.name} is {known[c.name]:.{decimals}f}, which matches {c}" for c in holding)
         raise Failure(f"The gate fails: {said}.", exit_code=Exit.GATE, code="gate-failed")
     if missing:
         names = ", ".join(dict.fromkeys(condition.name for condition in missing))
@@ -137,19 +137,11 @@ def told(
 def undecided(why: str, *, hint: str = "") -> Failure:
     """The failure of a gate for which something is missing."""
     return Failure(
-        f"The gate cannot be judged: {why}.", exit_code=Exit.GATE, code="gate-undecided", hint=hint
+        f"The gate cannot be evaluated: {why}.", exit_code=Exit.GATE, code="gate-undecided", hint=hint
     )
 
 
 # --- worse than another method ---------------------------------------------------------------------------
-
-
-@dataclass(frozen=True, slots=True)
-class Rival:
-    """The method that a file is not to be worse than, as the board had it before the file was sent."""
-
-    entry: BoardEntry
-    is_significant_only: bool
 
 
 def named(board: Board, name: str) -> BoardEntry:
@@ -163,7 +155,7 @@ def named(board: Board, name: str) -> BoardEntry:
             "on it.",
             exit_code=Exit.USAGE,
             code="unknown-method",
-            hint=f"See them with: tsttc board {board.split}",
+            hint=f"List them with: tsttc board {board.split}",
         )
     ids = ", ".join(f"{entry.method_id or 'published'} ({printable(entry.team or '')})" for entry in rows)
     raise Failure(
@@ -174,69 +166,71 @@ def named(board: Board, name: str) -> BoardEntry:
     )
 
 
-def rival(client: Client, *, split: str, method: str, own: str, is_significant_only: bool) -> Rival | None:
+def rival(
+    client: Client, *, split: str, method: str, own: str, is_significant_only: bool
+) -> BoardEntry | None:
     """Look the other method up; raises Failure where there can be no comparison, before anything is sent.
 
     None where it is the file's `own` method, and nothing of it is on the board yet.
     """
     board = client.board(split)
     if method == own and all(method not in {entry.method, entry.method_id} for entry in board.entries):
-        words = f"{printable(method)} is not on the board of {split} yet; there is nothing to be worse than."
+        words = f"{printable(method)} is not on the board of {split} yet; nothing to compare with."
         click.echo(words, err=True)
         return None
     entry = named(board, method)
-    if entry.scores.get("mid") is None:
+    if entry.scores.get(PRIMARY) is None:
         raise undecided(f"{printable(entry.method)} has no MiD on {split}")
     if is_significant_only and entry.method_id is None:
         raise undecided(
-            f"{printable(entry.method)} was published in a paper, and nothing is known of its recordings",
+            f"{printable(entry.method)} is quoted from a paper, which does not report values per recording",
             hint="Compare with it without --significant.",
         )
-    return Rival(entry=entry, is_significant_only=is_significant_only)
+    return entry
 
 
 def judge_against(
     client: Client,
-    found: Rival,
+    found: BoardEntry,
     *,
+    is_significant_only: bool,
     split: str,
     method_id: str | None,
     mid: float | None,
     decimals: int = 2,
 ) -> None:
     """Raise Failure if MiD is worse than the other method's; by more than chance, if only that counts."""
-    other, name = found.entry.scores["mid"], printable(found.entry.method)
+    other, name = found.scores[PRIMARY], printable(found.method)
     if mid is None or other is None:
         raise undecided("there is no value for mid")
     if mid <= other:
         return
-    words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.entry.n_decimals}f}"
-    if not found.is_significant_only:
+    words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.n_decimals}f}"
+    if not is_significant_only:
         raise _worse(words)
-    if method_id is None or found.entry.method_id is None:
-        raise undecided("the server does not say which method this is")
+    if method_id is None or found.method_id is None:
+        raise undecided("the server does not name the method")
     row = named(client.board(split), method_id)
-    if method_id == found.entry.method_id or row.scores.get("mid") != mid:
+    if method_id == found.method_id or row.scores.get(PRIMARY) != mid:
         raise undecided(
-            f"{words}, but the board compares methods, and has a better one of {printable(row.method)}",
-            hint="Send it under another method's name, or compare files: tsttc compare A B --truth TRUTH",
+            f"{words}, but the board shows a better submission of {printable(row.method)}",
+            hint="Submit under another method name, or compare files: tsttc compare A B --truth TRUTH",
         )
-    compared = client.compare(split, [method_id, found.entry.method_id])
-    difference = compared.differences().get("mid")
+    compared = client.compare(split, [method_id, found.method_id])
+    difference = compared.differences().get(PRIMARY)
     if compared.withheld:
         raise undecided(f"{words}. {compared.withheld.rstrip('.')}", hint="Compare without --significant.")
     if difference is None or difference.p_below is None:
         few = too_few_recordings(None if difference is None else difference.n_effective)
-        raise undecided(f"there are {few} to tell a difference from chance")
-    if is_significant(difference):
+        raise undecided(f"there are {few} for a p-value")
+    if difference.is_significant:
         raise _worse(f"{words}; {in_numbers(difference, decimals=decimals)}")
 
 
 def in_numbers(found: Difference, *, decimals: int = 2) -> str:
     """`+1.20 [+0.40, +2.00], p = 0.0030`: a difference, its 95 % interval, and p.
 
-    >>> from evaluator.answers import Difference
-    >>> in_numbers(Difference(difference=1.2, low=0.4, high=2.0, p=0.003))
+    >>> in_numbers(Difference(1.2, 0.4, 2.0, 0.003))
     '+1.20 [+0.40, +2.00], p = 0.0030'
     """
     if found.low is None or found.high is None or found.p_below is None:
@@ -260,5 +254,5 @@ def worse_than_options(command: Command) -> Command:
         "--fail-if-worse-than",
         "worse_than",
         metavar="METHOD",
-        help=f"End with exit code 6 if {short_name('mid')} is higher than this method's on the board.",
+        help=f"Exit with code 6 if {short_name(PRIMARY)} is higher than that of this method on the board.",
     )(command)

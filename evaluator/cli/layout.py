@@ -6,14 +6,13 @@ Bold and underline are ANSI codes, which click leaves out when the output is no 
 from __future__ import annotations
 
 import unicodedata
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import click
 
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
+from evaluator.metrics.protocol import OVERALL, grouped_names, interval_of, metric_of, split_name
 
-UNITS = "MiD ×10⁻⁴, RTE in %, lower is better; by true time to contact: c 0–3, s 3–6, l 6–20, n −20–0 s"
 NO_VALUE = "–"
 GAP = "  "
 
@@ -33,9 +32,21 @@ def short_name(score: str) -> str:
     >>> short_name("mid"), short_name("rte_crucial")
     ('MiD', 'RTE_c')
     """
-    metric, _, interval = score.partition("_")
-    heading = {"mid": "MiD", "rte": "RTE"}[metric]
-    return f"{heading}_{interval[0]}" if interval else heading
+    symbol, interval = metric_of(score).symbol, split_name(score)[1]
+    return symbol if interval == OVERALL else f"{symbol}_{interval[0]}"
+
+
+def units(scores: Iterable[str]) -> str:
+    """What the headings of these scores mean.
+
+    >>> units(["mid", "mid_crucial", "mid_negative", "rte"])
+    'MiD ×10⁻⁴, RTE %, lower is better; TTC ranges in s: c 0–3, n −20–0'
+    """
+    groups = grouped_names(scores)
+    found = dict.fromkeys(interval_of(name) for names in groups.values() for name in names)
+    ranges = ", ".join(f"{interval.letter} {interval.ends}" for interval in found if interval)
+    said = f"{', '.join(metric.heading for metric in groups)}, lower is better"
+    return f"{said}; TTC ranges in s: {ranges}" if ranges else said
 
 
 def printable(text: str) -> str:
@@ -105,9 +116,9 @@ def result_in_words(
     """One result as lines: the table, its units, and what was counted and truncated."""
     yield from score_table(scores, counts=counts, decimals=decimals)
     yield ""
-    yield UNITS
-    outside = f", {n_out_of_range:,} of them with |τ| > 20 s, which count in MiD and RTE alone"
-    yield f"{counts.get('overall', 0):,} sequences{outside if n_out_of_range else ''}."
+    yield units(scores)
+    outside = f", {n_out_of_range:,} of them in no TTC range, which count in the overall scores only"
+    yield f"{counts.get(OVERALL, 0):,} sequences{outside if n_out_of_range else ''}."
     cut = [f"{n:,} to {boundary} s" for boundary, n in truncated.items() if n]
     yield f"Truncated predictions: {', '.join(cut) or 'none'}."
 
@@ -115,19 +126,19 @@ def result_in_words(
 def score_table(
     scores: Mapping[str, float | None], *, counts: Mapping[str, int], decimals: int = 2
 ) -> list[str]:
-    """One result in the paper's column order, the counts of its intervals below it."""
-    from evaluator.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
+    """One result, below each value the number of sequences behind it."""
+    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    n_by_interval = [f"{counts[name]:,}" if name in counts else NO_VALUE for name in INTERVAL_NAMES]
+    behind = [counts.get(split_name(name)[1]) for name in scores]
     rows = [
-        [Cell(""), *(Cell(short_name(name), is_bold=True) for name in SCORE_NAMES)],
+        [Cell(""), *(Cell(short_name(name), is_bold=True) for name in scores)],
         [
             Cell("error"),
             *(
-                Cell(format_published(scores.get(name), decimals=decimals, missing=NO_VALUE))
-                for name in SCORE_NAMES
+                Cell(format_published(value, decimals=decimals, missing=NO_VALUE))
+                for value in scores.values()
             ),
         ],
-        [Cell("count"), *map(Cell, n_by_interval * 2)],
+        [Cell("count"), *(Cell(NO_VALUE if n is None else f"{n:,}") for n in behind)],
     ]
-    return aligned(rows, align="<" + "." * len(SCORE_NAMES))
+    return aligned(rows, align="<" + "." * len(scores))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,42 +12,41 @@ import click
 from evaluator.cli import gates
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import result_in_words
-from evaluator.cli.options import json_option, predictions_argument
+from evaluator.cli.options import json_option, output_option, predictions_argument
 from evaluator.cli.reading import FOLDER, TABLE, bytes_of, name_of, naming, write_bytes
 from evaluator.cli.warnings_in_words import (
-    as_documents,
     echo_warnings,
     numbering_in_words,
     numbering_warnings,
 )
-from evaluator.protocol import DEFAULT_PROTOCOL, PROTOCOLS
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 
 if TYPE_CHECKING:
     from evaluator import Manifest, Report
-    from evaluator.numbering import Numbering
+    from evaluator.truth.numbering import Numbering
 
 
-@click.command(short_help="Say whether a prediction file is complete and well-formed.")
+@click.command(short_help="Check whether a prediction file is complete and well-formed.")
 @predictions_argument
 @click.option(
     "--manifest",
     "manifest_path",
     type=TABLE,
     metavar="FILE",
-    help="The split's manifest, which says what sequences there are; its ground truth will do.",
+    help="The manifest of the split (list of sequences), or its ground truth.",
 )
 @click.option(
     "--annotations",
     type=FOLDER,
     metavar="FOLDER",
-    help="The toolkit's annotations: also say whether the toolkit numbers them here as the manifest does.",
+    help="The annotation folder of the toolkit: also check its numbering against the manifest.",
 )
 @json_option
 def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | None, as_json: bool) -> None:
-    """Say whether PREDICTIONS, a JSON file or - for standard input, is complete and well-formed.
+    """Check whether PREDICTIONS, a JSON file or - for standard input, is complete and well-formed.
 
-    The rules are the server's; nothing is sent anywhere. A warning is no fault: it says that the values
-    probably belong to other sequences. Without --manifest the sequences are those of --annotations.
+    The command uses the rules of the server and sends nothing. A warning is not an error: the values probably
+    belong to other sequences. Without --manifest, --annotations defines the sequences.
 
     \b
     Examples:
@@ -54,7 +54,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
       tsttc check results.json --annotations annotations/val/
     """
     from evaluator import read_predictions  # noqa: PLC0415 -- numpy, which --help can do without
-    from evaluator.plausibility import warnings_of  # noqa: PLC0415 -- as above
+    from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- as above
 
     sequences, numbering = _sequences(manifest_path, annotations)
     with naming(predictions):
@@ -70,7 +70,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
                 "n_sequences": sequences.n_sequences,
                 "n_renumbered": None if numbering is None else numbering.n_renumbered,
                 "problems": [],
-                "warnings": as_documents(warnings),
+                "warnings": [asdict(warning) for warning in warnings],
             }
         )
         return
@@ -84,7 +84,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
 def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Manifest, Numbering | None]:
     """The sequences to check against, and how the toolkit numbers them where a folder says so."""
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
-    from evaluator.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
+    from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
 
     sequences = None
     if manifest_path is not None:
@@ -99,7 +99,7 @@ def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Ma
     return sequences, None
 
 
-@click.command(short_help="Score a prediction file against ground truth that you have.")
+@click.command(short_help="Score a prediction file against your ground truth.")
 @predictions_argument
 @click.option(
     "--truth",
@@ -107,25 +107,25 @@ def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Ma
     type=TABLE,
     required=True,
     metavar="FILE",
-    help="Ground truth: a CSV file, or a folder of the toolkit's annotations.",
+    help="Ground truth: a CSV file or an annotation folder of the toolkit.",
 )
 @click.option(
     "--protocol",
     type=click.Choice(list(PROTOCOLS)),
     default=DEFAULT_PROTOCOL,
     show_default=True,
-    help="The rules: tsttc-1 is the board's, toolkit the dataset's own toolkit to the bit.",
+    help="Protocol: tsttc-1 as on the board; toolkit gives the numbers of the dataset's toolkit to the bit.",
 )
 @gates.fail_if_option
 @json_option
 def score(
     *, predictions: Path, truth_path: Path, protocol: str, fail_if: list[gates.Condition], as_json: bool
 ) -> None:
-    """Score PREDICTIONS, a JSON file or - for standard input, against ground truth that you have.
+    """Score PREDICTIONS, a JSON file or - for standard input, against your ground truth.
 
-    The numbers are the server's: two decimals as the board publishes them, all of float64 with --json. If you
-    have the dataset, name the folder of its annotations. A warning says that the predictions hardly
-    go with the true times; the usual cause is a file whose sequences are numbered in another order.
+    The scores equal those of the server: two decimals as on the board, full float64 with --json. If you have
+    the dataset, give its annotation folder. A warning means that the predictions hardly correlate with the
+    true times; the usual cause is another order of the sequences.
 
     \b
     Examples:
@@ -134,7 +134,7 @@ def score(
       tsttc score predictions.json --truth val.csv --fail-if "mid > 15.0 or rte > 13"
     """
     from evaluator import evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy, as above
-    from evaluator.plausibility import warnings_with_truth  # noqa: PLC0415 -- numpy, as above
+    from evaluator.predictions.plausibility import warnings_with_truth  # noqa: PLC0415 -- numpy, as above
 
     with naming(truth_path):
         truth = read_truth(truth_path)
@@ -145,29 +145,23 @@ def score(
     if not as_json:
         echo_warnings(warnings)
     gates.told(
-        {**report.as_dict(), "warnings": as_documents(warnings)},
+        {**report.as_dict(), "warnings": [asdict(warning) for warning in warnings]},
         show=lambda: click.echo("\n".join(_in_words(report))),
         judge=lambda: gates.judge(fail_if, report.flat()),
         as_json=as_json,
     )
 
 
-@click.command(short_help="Write the public half of ground truth: what sequences there are.")
+@click.command(short_help="Write the manifest of a ground truth: its public list of sequences.")
 @click.argument("truth", metavar="TRUTH_OR_FOLDER", type=TABLE)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Write the CSV table here instead of to standard output.",
-)
+@output_option("the CSV table")
 @json_option
 def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
     """Write the manifest of TRUTH_OR_FOLDER: every column of the ground truth but the values.
 
-    TRUTH_OR_FOLDER is a CSV file or a folder of the toolkit's annotations. The manifest is what
-    participants get; it gives the anno_id and the natural key of every sequence. Of a folder, standard error
-    is told whether the toolkit gives the same anno_ids on this machine.
+    TRUTH_OR_FOLDER is a CSV file or a folder of the toolkit's annotations. The manifest lists
+    the anno_id and the natural key of every sequence, without true values. For a folder, the command reports
+    on standard error whether the toolkit gives the same anno_ids on this machine.
 
     \b
     Examples:
@@ -175,7 +169,7 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
       tsttc manifest annotations/val/ -o manifest.csv
     """
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
-    from evaluator.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
+    from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
 
     numbering = None
     with naming(truth):
@@ -184,7 +178,7 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
         table = read_manifest(truth) if numbering is None else numbering.manifest
     if output is not None:
         if output.exists() and output.samefile(truth):
-            raise click.BadParameter("this is the ground truth itself; name another file.", param_hint="-o")
+            raise click.BadParameter("this is the ground truth itself; choose another file.", param_hint="-o")
         write_bytes(output, table.to_csv())
     if as_json:
         echo_json(

@@ -10,7 +10,7 @@ from urllib.parse import urlsplit
 
 import click
 
-from evaluator.cli.places import server_of_login
+from evaluator.cli.paths import server_of_login
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 TOKEN_VARIABLE = "TSTTC_TOKEN"  # noqa: S105 -- the name of a variable, not a token
@@ -27,6 +27,17 @@ def predictions_argument(command: Command) -> Command:
     """PREDICTIONS: a file, or `-` for standard input."""
     kind = click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path)
     return click.argument("predictions", type=kind)(command)
+
+
+def output_option(what: str) -> Callable[[Command], Command]:
+    """-o: where to write."""
+    return click.option(
+        "-o",
+        "--output",
+        type=click.Path(dir_okay=False, path_type=Path),
+        metavar="FILE",
+        help=f"Write {what} to this file (default: standard output).",
+    )
 
 
 def url_option(command: Command) -> Command:
@@ -54,7 +65,7 @@ def timeout_option(command: Command) -> Command:
         metavar="SECONDS",
         default=900.0,
         show_default=True,
-        help="Stop waiting after this time; the submission itself goes on.",
+        help="Stop waiting after this time; the evaluation continues.",
     )(command)
 
 
@@ -87,6 +98,6 @@ def _site(_context: click.Context, _parameter: click.Parameter, value: str) -> s
         raise click.BadParameter(f"found {value!r}, expected an address like https://example.org.")
     if parts.username or parts.password or parts.query or parts.fragment:
         raise click.BadParameter(
-            f"expected the site's address alone; a token belongs in the variable {TOKEN_VARIABLE}."
+            f"expected only the address of the site; a token belongs in the variable {TOKEN_VARIABLE}."
         )
     return value

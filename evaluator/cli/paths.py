@@ -1,4 +1,4 @@
-"""Where the command keeps what it may: settings that people can read, and copies that may be lost."""
+"""Paths of the configuration file and of the cache."""
 
 from __future__ import annotations
 

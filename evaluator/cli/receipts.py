@@ -12,8 +12,8 @@ import click
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
-from evaluator.cli.layout import UNITS, printable, score_table
-from evaluator.cli.options import json_option, slug, url_option
+from evaluator.cli.layout import printable, score_table, units
+from evaluator.cli.options import json_option, output_option, slug, url_option
 from evaluator.cli.reading import bytes_of, write_bytes
 
 if TYPE_CHECKING:
@@ -22,18 +22,12 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Get the signed receipt of a scored submission.")
 @click.argument("submission_id", metavar="ID", callback=slug)
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Write it here instead of to standard output.",
-)
+@output_option("it")
 @url_option
 def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
     """Get the signed receipt of submission ID: what it scored, in which edition, by which file, and when.
 
-    Put it beside the paper: who has it can check it without asking anybody.
+    Publish it with your paper: anyone can check it offline.
 
     \b
     Example:
@@ -59,15 +53,15 @@ def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
     "keys_path",
     type=click.Path(exists=True, dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="The site's keys, kept from before; without them they are fetched from --server.",
+    help="A saved copy of the site's keys (default: fetched from --server).",
 )
 @url_option
 @json_option
 def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: bool) -> None:
     """Check that the leaderboard signed RECEIPT, a file or - for standard input, and print what it says.
 
-    The site's keys are at /.well-known/tsttc-receipt-keys.json; with --keys nothing is asked of the network.
-    Never take them from whoever gave you the receipt.
+    The keys of the site are at /.well-known/tsttc-receipt-keys.json; with --keys the check works offline.
+    Never use keys that came with the receipt.
 
     \b
     Examples:
@@ -108,11 +102,11 @@ def _in_words(found: Verified) -> Iterator[str]:
         "predictions": found.file,
         "key": found.key_id,
     }
-    yield "The receipt holds."
+    yield "The receipt is valid."
     yield ""
     for name, text in facts.items():
         yield printable(f"{name:<12} {text}")
     yield ""
     yield from score_table(found.scores, counts=found.counts, decimals=found.decimals)
     yield ""
-    yield UNITS
+    yield units(found.scores)

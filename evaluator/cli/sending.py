@@ -6,7 +6,7 @@ import os
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO
@@ -14,14 +14,13 @@ from typing import TYPE_CHECKING, BinaryIO
 import click
 
 from evaluator.cli.failures import rejected
-from evaluator.cli.places import cache_folder
+from evaluator.cli.paths import cache_folder
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.problems import Rejected
 
 if TYPE_CHECKING:
-    from evaluator.answers import Submission
-    from evaluator.client import Client
-    from evaluator.truth import Manifest
+    from evaluator.client.client import Client
+    from evaluator.truth.truth import Manifest
 
 # What is larger is no prediction file, and the server says so without its being read here.
 LARGEST_CHECKED_BYTES = 64_000_000
@@ -45,9 +44,9 @@ def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> No
 
     A split without a manifest is left to the server, which says what is the matter with it.
     """
-    from evaluator.answers import Refused  # noqa: PLC0415 -- loads msgspec
-    from evaluator.plausibility import warnings_of  # noqa: PLC0415 -- loads numpy
-    from evaluator.predictions import read_predictions  # noqa: PLC0415 -- loads numpy
+    from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
+    from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- loads numpy
+    from evaluator.predictions.predictions import read_predictions  # noqa: PLC0415 -- loads numpy
 
     file.seek(0)
     data = file.read(LARGEST_CHECKED_BYTES + 1)
@@ -65,7 +64,7 @@ def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> No
         found = read_predictions(data, manifest=manifest)
     except Rejected as fault:
         name = "standard input" if name == "-" else name
-        raise rejected(name, fault, hint="Nothing was sent, so it costs nothing.") from None
+        raise rejected(name, fault, hint="Nothing was submitted; your quota is not used.") from None
     echo_warnings(warnings_of(found))
 
 
@@ -74,7 +73,7 @@ def manifest_of(client: Client, split: str) -> Manifest | None:
 
     A copy goes by its digest, and what does not have that digest is no copy.
     """
-    from evaluator.truth import read_manifest  # noqa: PLC0415 -- loads numpy
+    from evaluator.truth.truth import read_manifest  # noqa: PLC0415 -- loads numpy
 
     digest = client.manifest_digest(split)
     if digest is None:
@@ -108,38 +107,11 @@ def _keep(table: Path, kept: Path) -> None:
         return
 
 
-def sent(
-    client: Client,
-    file: BinaryIO,
-    *,
-    filename: str,
-    split: str,
-    method: str,
-    details: Mapping[str, str],
-    idempotency_key: str | None,
-) -> Submission:
-    """Send the file; on a terminal standard error shows how far it is."""
-    with _bar(_size_of(file), filename) as on_progress:
-        return client.submit(
-            file,
-            filename=filename,
-            split=split,
-            method=method,
-            details=details,
-            idempotency_key=idempotency_key,
-            on_progress=on_progress,
-        )
-
-
-def _size_of(file: BinaryIO) -> int:
-    return file.seek(0, os.SEEK_END)
-
-
 @contextmanager
-def _bar(n_bytes: int, filename: str) -> Iterator[Callable[[int], None] | None]:
-    """What to tell how many bytes are sent; None where nobody looks."""
+def progress(file: BinaryIO, filename: str) -> Iterator[BinaryIO]:
+    """The file, with a bar on a terminal that says how much of it is sent."""
     if not sys.stderr.isatty():
-        yield None
+        yield file
         return
     from rich.console import Console  # noqa: PLC0415 -- only a terminal needs it
     from rich.progress import BarColumn, DownloadColumn, Progress, TextColumn, TransferSpeedColumn  # noqa: PLC0415 -- as above
@@ -153,9 +125,5 @@ def _bar(n_bytes: int, filename: str) -> Iterator[Callable[[int], None] | None]:
         TransferSpeedColumn(),
     )
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(printable(filename), total=n_bytes)
-
-        def on_progress(n_sent: int) -> None:
-            bar.update(task, completed=n_sent)
-
-        yield on_progress
+        n_bytes = file.seek(0, os.SEEK_END)
+        yield bar.wrap_file(file, total=n_bytes, description=printable(filename))

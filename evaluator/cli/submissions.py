@@ -25,13 +25,14 @@ from evaluator.cli.options import (
     timeout_option,
     url_option,
 )
-from evaluator.cli.sending import opened, require_good, sent
+from evaluator.cli.sending import opened, progress, require_good
 from evaluator.cli.values import in_short
 from evaluator.cli.warnings_in_words import echo_warnings
+from evaluator.metrics.protocol import PRIMARY
 
 if TYPE_CHECKING:
-    from evaluator.answers import Submission
-    from evaluator.client import Client
+    from evaluator.client.answers import Submission
+    from evaluator.client.client import Client
 
 MAX_KEY_CHARACTERS = 255
 
@@ -47,19 +48,19 @@ def _key(_context: click.Context, _parameter: click.Parameter, value: str | None
     return value
 
 
-@click.command(short_help="Send a prediction file to the leaderboard.")
+@click.command(short_help="Submit a prediction file to the leaderboard.")
 @predictions_argument
-@click.option("--split", required=True, callback=slug, help="The split that it predicts: val, test, …")
+@click.option("--split", required=True, callback=slug, help="The split: val, test, …")
 @click.option(
     "--method",
     callback=sendable,
     required=True,
-    help="Name or id of the method; a new name makes a new one.",
+    help="Name or id of the method; a new name creates a new method.",
 )
 @click.option("--description", callback=sendable, help="One sentence about the method.")
-@click.option("--paper-url", callback=sendable, metavar="URL", help="Where the paper is.")
-@click.option("--code-url", callback=sendable, metavar="URL", help="Where the code is.")
-@click.option("--note", callback=sendable, help="A remark for yourself, shown beside the submission.")
+@click.option("--paper-url", callback=sendable, metavar="URL", help="Address of the paper.")
+@click.option("--code-url", callback=sendable, metavar="URL", help="Address of the code.")
+@click.option("--note", callback=sendable, help="A note for your team.")
 @click.option("--commit", callback=sendable, help="The commit that produced the file.")
 @click.option("--wait", is_flag=True, help="Wait for the scores.")
 @timeout_option
@@ -70,9 +71,9 @@ def _key(_context: click.Context, _parameter: click.Parameter, value: str | None
     callback=_key,
     envvar="TSTTC_IDEMPOTENCY_KEY",
     metavar="TEXT",
-    help="Requests under one key are one request, also those of another run of the job.",
+    help="Requests with the same key count as one request, also across runs of a job.",
 )
-@click.option("--no-check", is_flag=True, help="Send the file without checking it here first.")
+@click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
 @url_option
 @json_option
 def submit(
@@ -91,12 +92,11 @@ def submit(
     as_json: bool,
     **details: str | None,
 ) -> None:
-    """Send PREDICTIONS, a JSON file or - for standard input, to the leaderboard.
+    """Submit PREDICTIONS, a JSON file or - for standard input, to the leaderboard.
 
-    The file is checked here first, by the server's own code, so that a bad one costs nothing. Sending the
-    same file again is harmless: the server answers with the first submission. If others than your team see
-    the method's results, the command says so before it sends. A gate (--fail-if…) waits for the scores as
-    --wait does.
+    The command first checks the file with the code of the server. Submitting the same file again is safe:
+    the server answers with the first submission. If the method is public or anonymous, the command says so
+    before it submits. A gate (--fail-if…) waits for the scores like --wait.
 
     \b
     Examples:
@@ -117,15 +117,16 @@ def submit(
                 )
             notice = _notice_of(client, method)
             _warn(notice, err=as_json)
-            submission = sent(
-                client,
-                file,
-                filename=_name_to_send(predictions),
-                split=split,
-                method=method,
-                details={field: value for field, value in details.items() if value},
-                idempotency_key=idempotency_key,
-            )
+            filename = _name_to_send(predictions)
+            with progress(file, filename) as watched:
+                submission = client.submit(
+                    watched,
+                    filename=filename,
+                    split=split,
+                    method=method,
+                    details={field: value for field, value in details.items() if value},
+                    idempotency_key=idempotency_key,
+                )
         is_waiting = wait or bool(fail_if) or bool(worse_than)
         if is_waiting or not as_json:
             _announce(submission, site=url, err=as_json)
@@ -137,10 +138,11 @@ def submit(
         def judge() -> None:
             gates.judge(fail_if, submission.scores, decimals=submission.decimals)
             if rival is not None:
-                mid = (submission.scores or {}).get("mid")
+                mid = (submission.scores or {}).get(PRIMARY)
                 gates.judge_against(
                     client,
                     rival,
+                    is_significant_only=significant,
                     split=split,
                     method_id=submission.method_id,
                     mid=mid,
@@ -190,14 +192,12 @@ def status(
 
 def _require_rival(worse_than: str | None, significant: bool) -> None:
     if significant and not worse_than:
-        raise click.UsageError(
-            "--significant says how to judge --fail-if-worse-than METHOD, which is missing."
-        )
+        raise click.UsageError("--significant needs --fail-if-worse-than METHOD, which is missing.")
 
 
 def _notice_of(client: Client, method: str) -> str:
     """Who will see the results, in the server's words; empty where only the team will, or nobody may say."""
-    from evaluator.answers import Refused  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
 
     try:
         found = client.own_method(method)
@@ -220,7 +220,7 @@ def _announce(submission: Submission, *, site: str, err: bool) -> None:
     address = f"  {urljoin(site, submission.url)}" if submission.url else ""
     click.echo(printable(f"Submission {submission.id}{address}"), err=err)
     if not submission.is_new:
-        click.echo("This file was sent before; this is its first submission.", err=err)
+        click.echo("You already submitted this file; this is its first submission.", err=err)
 
 
 def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]) -> None:
@@ -232,13 +232,13 @@ def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]
         case "REJECTED":
             n_problems = submission.n_problems or len(submission.problems)
             message, exit_code = f"The file is rejected: {n_problems_in_words(n_problems)}.", Exit.REJECTED
-            hint = "It does not count against your quota. Check a corrected file with: tsttc check"
+            hint = "Your quota is not used. Check a corrected file with: tsttc check"
         case "SYSTEM_ERROR":
             message, exit_code = (
                 f"The server failed to score {named}. The fault is not the file's.",
                 Exit.SYSTEM,
             )
-            hint = "It does not count against your quota."
+            hint = "Your quota is not used."
         case "CANCELLED":
             message, exit_code, hint = f"{named} was cancelled, so it has no scores.", Exit.REFUSED, ""
         case _:
@@ -275,7 +275,7 @@ def _show(submission: Submission, named: str) -> None:
 
 def _say_if_private(client: Client, submission: Submission) -> None:
     """Who sends for the first time may wonder why the board does not show it."""
-    from evaluator.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
 
     if not (submission.is_new and submission.method_id):
         return
@@ -286,5 +286,5 @@ def _say_if_private(client: Client, submission: Submission) -> None:
     if method.visibility == "PRIVATE":
         name = printable(method.name)
         click.echo(
-            f'\n{name} is private: its results are your team\'s alone. Show them with: tsttc publish "{name}"'
+            f'\n{name} is private: only your team sees its results. Publish it with: tsttc publish "{name}"'
         )

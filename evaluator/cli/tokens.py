@@ -26,7 +26,7 @@ def token_for(url: str) -> str:
     kept = kept_token(url)
     if kept is None:
         raise _no_token(
-            f"There is no token: {TOKEN_VARIABLE} is not set, and tsttc login has kept none.", url
+            f"There is no token: {TOKEN_VARIABLE} is not set, and tsttc login has saved none.", url
         )
     return kept
 
@@ -44,11 +44,11 @@ def checked(text: str, *, named: str) -> str:
             f"{named} is empty; expected a token.",
             exit_code=Exit.AUTH,
             code="no-token",
-            hint="In a CI job, see whether the secret is there for this branch.",
+            hint="In a CI job, check that the secret is available for this branch.",
         )
     if not value.isascii() or not value.isprintable() or " " in value:
         raise Failure(
-            f"{named} is no token: it contains characters that no token has.",
+            f"{named} is not a token: it contains invalid characters.",
             exit_code=Exit.AUTH,
             code="no-token",
         )
@@ -60,7 +60,7 @@ def _no_token(words: str, url: str) -> Failure:
         words,
         exit_code=Exit.AUTH,
         code="no-token",
-        hint=f"Make one at {url.rstrip('/')}/tokens/, then: tsttc login, or export {TOKEN_VARIABLE}=…",
+        hint=f"Create one at {url.rstrip('/')}/tokens/, then: tsttc login, or export {TOKEN_VARIABLE}=…",
     )
 
 
@@ -85,7 +85,7 @@ def keep_token(url: str, token: str) -> str:
     try:
         backend.set_password(SERVICE, account(url), token)
     except (KeyringError, OSError) as error:
-        raise no_keyring(f"The keyring did not take the token ({error or type(error).__name__}).") from None
+        raise no_keyring(f"The keyring did not accept the token ({error or type(error).__name__}).") from None
     return backend.name
 
 
@@ -99,9 +99,7 @@ def forget_token(url: str) -> bool:
     try:
         backend.delete_password(SERVICE, account(url))
     except (KeyringError, OSError) as error:
-        raise no_keyring(
-            f"The keyring did not let go of the token ({error or type(error).__name__})."
-        ) from None
+        raise no_keyring(f"The keyring did not delete the token ({error or type(error).__name__}).") from None
     return True
 
 
@@ -109,7 +107,7 @@ def required_keyring() -> KeyringBackend:
     """The keyring; raises Failure with what to do on a machine without one."""
     backend = usable_keyring()
     if backend is None:
-        raise no_keyring("This machine has no keyring to keep a token in, as is usual without a desktop.")
+        raise no_keyring("This machine has no keyring, as is usual without a desktop.")
     return backend
 
 
@@ -131,7 +129,7 @@ def no_keyring(words: str) -> Failure:
         words,
         exit_code=Exit.AUTH,
         code="no-keyring",
-        hint=f"Do without it: export {TOKEN_VARIABLE}=… in your shell, or make it a secret of the CI job.",
+        hint=f"Use the environment: export {TOKEN_VARIABLE}=… in your shell, or a secret of the CI job.",
     )
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterable
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,8 +13,8 @@ from evaluator.cli.layout import printable
 from evaluator.problems import FileWarning
 
 if TYPE_CHECKING:
-    from evaluator.numbering import Numbering
-    from evaluator.predictions import Predictions
+    from evaluator.predictions.predictions import Predictions
+    from evaluator.truth.numbering import Numbering
 
 
 def echo_warnings(warnings: Iterable[FileWarning]) -> None:
@@ -24,22 +23,14 @@ def echo_warnings(warnings: Iterable[FileWarning]) -> None:
         click.echo(f"Warning: {printable(warning.message)}", err=True)
 
 
-def as_documents(warnings: Iterable[FileWarning]) -> list[dict[str, str]]:
-    """Each as its code and its message, as in the API."""
-    return [asdict(warning) for warning in warnings]
-
-
 def numbering_in_words(numbering: Numbering) -> str:
     """Whether the toolkit numbers the sequences of a folder on this machine as the manifest does."""
     if not numbering.n_renumbered:
-        return (
-            "The toolkit gives every sequence of the folder the manifest's anno_id: this machine lists the "
-            "files in the same order."
-        )
+        return "The toolkit numbers the folder like the manifest: the order of files is the same."
     n_sequences = numbering.manifest.n_sequences
     return (
-        f"The toolkit gives {numbering.n_renumbered:,} of the {n_sequences:,} sequences of the folder "
-        "another anno_id than the manifest: this machine lists the files in another order."
+        f"The toolkit numbers {numbering.n_renumbered:,} of the {n_sequences:,} sequences of the folder "
+        "differently from the manifest: the order of files is another one."
     )
 
 
@@ -47,20 +38,18 @@ def numbering_warnings(
     numbering: Numbering, found: Predictions, *, predictions: Path, annotations: Path
 ) -> list[FileWarning]:
     """A warning for a file of anno_ids that the toolkit has probably numbered otherwise than the manifest."""
-    from evaluator.plausibility import MAX_ROUGHNESS, roughness  # noqa: PLC0415 -- loads numpy
+    from evaluator.predictions.plausibility import MAX_ROUGHNESS, roughness  # noqa: PLC0415 -- loads numpy
 
     if found.keys != "anno_id" or not numbering.n_renumbered:
         return []
     as_manifest = roughness(numbering.manifest, found.ttc_s)
     as_toolkit = roughness(numbering.manifest, numbering.realigned(found.ttc_s))
-    origin = "If the toolkit has written the file"
+    origin = "If the toolkit wrote the file"
     if as_manifest is not None and as_toolkit is not None:
         if as_manifest <= MAX_ROUGHNESS < as_toolkit:
             return []  # it is smooth as it stands, so its anno_ids are the manifest's
         if as_toolkit <= MAX_ROUGHNESS < as_manifest:
-            origin = (
-                "The values are smooth in the toolkit's numbering alone, so the toolkit has written the file"
-            )
+            origin = "The values are smooth in the toolkit's numbering only, so the toolkit wrote the file"
     source = "-" if str(predictions) == "-" else shlex.quote(str(predictions))
     command = f"tsttc convert {source} --annotations {shlex.quote(str(annotations))} -o natural.json"
     return [

@@ -1,4 +1,4 @@
-"""What the leaderboard's API answers, as values, and how it fails to, as exceptions that state facts.
+"""Answers of the leaderboard's API as values, and its failures as exceptions that state facts.
 
 The shapes are lenient about what they do not use: a newer server may say more, and `document` keeps it all.
 """
@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from evaluator.problems import FileWarning, Problem
-from evaluator.significance import p_below
+from evaluator.scoring.significance import Difference
 
 FINAL_STATES = frozenset({"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"})
 
@@ -88,7 +88,7 @@ class Interval(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
-    """One row of a board: scores by their ten names, None where an interval has no value.
+    """One row of a board: scores by their names, None where a TTC range has no value.
 
     `decimals` are those that its values are printed with; None from a server that does not say.
 
@@ -142,12 +142,17 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     updated_at: str | None = None
 
     @property
+    def score_names(self) -> tuple[str, ...]:
+        """The names of its scores, in the server's order."""
+        return tuple(dict.fromkeys(name for entry in self.entries for name in entry.scores))
+
+    @property
     def updated(self) -> str:
         """When it last changed, to the second; empty where nothing is known."""
         return re.sub(r"\.\d+", "", self.updated_at or "")
 
 
-class Moved(msgspec.Struct, frozen=True, kw_only=True):
+class RankChange(msgspec.Struct, frozen=True, kw_only=True):
     """Another row of a board, whose rank changes."""
 
     method: str
@@ -155,7 +160,7 @@ class Moved(msgspec.Struct, frozen=True, kw_only=True):
     rank_after: int | None = None
 
 
-class Sight(msgspec.Struct, frozen=True, kw_only=True):
+class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
     """One split's board as it would be: its row before (None: there is none) and after, and who moves."""
 
     split: str
@@ -163,7 +168,7 @@ class Sight(msgspec.Struct, frozen=True, kw_only=True):
     before: BoardEntry | None = None
     edition: Any = None
     n_ranked: int | None = None
-    moved: list[Moved] = []
+    moved: list[RankChange] = []
 
 
 class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
@@ -172,29 +177,7 @@ class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
     name: str
     document: JSON
     team: str = ""
-    splits: list[Sight] = []
-
-
-class Difference(msgspec.Struct, frozen=True, kw_only=True):
-    """First minus second in one column: below 0 the first is better.
-
-    `low` and `high` are its 95 % interval, `p` that of the two-sided test, `p_below` the smallest of 0.001,
-    0.01 and 0.05 that p is below, else 1; None for too few recordings. Where p is None, as on a hidden split,
-    `p_below` judges alone; an older server gives p alone. `n_effective` is the effective number of
-    recordings.
-    """
-
-    difference: float
-    low: float | None = None
-    high: float | None = None
-    p: float | None = None
-    p_below: float | None = None
-    n_effective: float | None = None
-
-    def __post_init__(self) -> None:
-        """Give `p_below` where only p was given."""
-        if self.p_below is None and self.p is not None:
-            msgspec.structs.force_setattr(self, "p_below", p_below(self.p))
+    splits: list[BoardPreview] = []
 
 
 class Pair(msgspec.Struct, frozen=True, kw_only=True):

@@ -25,7 +25,7 @@ from urllib.parse import quote, urlencode, urlsplit
 
 import httpx
 
-from evaluator.answers import (
+from evaluator.client.answers import (
     JSON,
     Board,
     Compared,
@@ -38,7 +38,15 @@ from evaluator.answers import (
     TimedOut,
     Unreachable,
 )
-from evaluator.exchange import PASSING_STATUSES, Patience, checked, next_page, one, retry_after_s, rows
+from evaluator.client.exchange import (
+    PASSING_STATUSES,
+    RetryPolicy,
+    checked,
+    next_page,
+    one,
+    retry_after_s,
+    rows,
+)
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "::1", "localhost"})
 LONGEST_WAIT_S = (
@@ -46,21 +54,6 @@ LONGEST_WAIT_S = (
 )
 
 T = TypeVar("T")
-
-
-class _Counted:
-    """A file that tells how many of its bytes have been read, as often as they are sent."""
-
-    def __init__(self, file: BinaryIO, on_progress: Callable[[int], None]) -> None:
-        self._file = file
-        self._on_progress = on_progress
-        self.seek = file.seek
-        self.tell = file.tell
-
-    def read(self, size: int = -1, /) -> bytes:
-        data = self._file.read(size)
-        self._on_progress(self._file.tell())
-        return data
 
 
 @dataclass(kw_only=True)
@@ -73,7 +66,7 @@ class Client:
     url: str
     token: str | None = field(default=None, repr=False)
     timeout_s: float = 30.0
-    patience: Patience = field(default_factory=Patience)
+    patience: RetryPolicy = field(default_factory=RetryPolicy)
     user_agent: str = "tsttc"
     sleep: Callable[[float], None] = time.sleep
     monotonic_s: Callable[[], float] = time.monotonic
@@ -107,29 +100,26 @@ class Client:
         method: str,
         details: Mapping[str, str] | None = None,
         idempotency_key: str | None = None,
-        on_progress: Callable[[int], None] | None = None,
     ) -> Submission:
         """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
 
-        `file` must be seekable; it is streamed, never read whole, and `on_progress` is told how many of its
-        bytes are sent. `details` are the form's optional fields (description, paper_url, code_url, note,
-        commit). Requests under one `idempotency_key` are one request, however often they are made; without
-        one each call has its own. Raises ClientError.
+        `file` must be seekable; it is streamed, never read whole. `details` are the form's optional fields
+        (description, paper_url, code_url, note, commit). Requests under one `idempotency_key` are one
+        request, however often they are made; without one each call has its own. Raises ClientError.
         """
         fields = {"split": split, "method": method, **(details or {})}
         key = idempotency_key or fresh_key(file, fields)
-        body = _Counted(file, on_progress) if on_progress else file
 
         def send() -> httpx.Response:
             file.seek(0)
             return self._http.post(
                 self._address("submissions"),
                 data=fields,
-                files={"file": (filename, body, "application/json")},  # type: ignore[dict-item]  # reads, seeks and tells, which is all that is done with it
+                files={"file": (filename, file, "application/json")},
                 headers={"Idempotency-Key": json.dumps(key)},
             )
 
-        response = self._insist(send)
+        response = self._retry(send)
         # A request of this very call may have made it, of which only the answer was lost.
         is_ours = idempotency_key is None and "Idempotent-Replayed" in response.headers
         is_new = is_ours or response.status_code == httpx.codes.CREATED
@@ -168,13 +158,11 @@ class Client:
 
     def manifest(self, split: str) -> bytes:
         """The split's manifest, CSV: the ground truth's columns but the values. Raises ClientError."""
-        address = self._address("splits", split, "manifest")
-        return self._insist(lambda: self._get_as_anybody(address, accept="text/csv, */*")).content
+        return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*").content
 
     def manifest_digest(self, split: str) -> str | None:
         """The digest of that manifest; None for a split that has none yet. Raises ClientError."""
-        address = self._address("splits", split, "editions")
-        response = self._insist(lambda: self._get_as_anybody(address, accept="application/json"))
+        response = self._asked_by_anybody("splits", split, "editions", accept="application/json")
         for edition in rows(response, JSON):
             if edition.get("is_board"):
                 digest = edition.get("manifest")
@@ -183,8 +171,7 @@ class Client:
 
     def quota(self) -> list[Quota]:
         """What one's own team has left, split by split. Raises ClientError."""
-        address = self._address("quota")
-        return rows(self._insist(lambda: self._http.get(address)), Quota)
+        return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
         """Methods of a split's board, by id, side by side. Raises ClientError.
@@ -195,7 +182,7 @@ class Client:
         params = {"split": split, "m": list(methods)}
         address, n_asked = self._address("compare"), 0
         while True:
-            response = self._insist(lambda: self._http.get(address, params=params))
+            response = self._retry(lambda: self._http.get(address, params=params))
             found = one(response, Compared)
             if found.is_complete:
                 return found
@@ -211,7 +198,7 @@ class Client:
         address = self._address("methods")
         params: Mapping[str, str] = {}
         while True:
-            response = self._insist(partial(self._http.get, address, params=params))
+            response = self._retry(partial(self._http.get, address, params=params))
             named = (row for row in rows(response, Method) if name_or_id in {row.id, row.name})
             found, following = next(named, None), next_page(response)
             if found is not None or not following or following == params:
@@ -237,17 +224,16 @@ class Client:
         """
         address = self._address("methods", method_id, "visibility")
         body = {"visibility": visibility, "confirm": True, "reveal_at": reveal_at}
-        return one(self._insist(lambda: self._http.post(address, json=body)), Method)
+        return one(self._retry(lambda: self._http.post(address, json=body)), Method)
 
     def receipt(self, submission_id: str) -> bytes:
         """The signed receipt of a scored submission, JSON as it came. Raises ClientError."""
-        address = self._address("submissions", submission_id, "receipt")
-        return self._insist(lambda: self._http.get(address)).content
+        return self._asked("submissions", submission_id, "receipt").content
 
     def receipt_keys(self) -> bytes:
         """The keys that sign the site's receipts, or once did: a JSON Web Key Set. Raises ClientError."""
         address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
-        return self._insist(lambda: self._http.get(address)).content
+        return self._retry(lambda: self._http.get(address)).content
 
     def watch(self, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
         """Ask until the submission is final, giving every state seen, the final one last.
@@ -261,16 +247,16 @@ class Client:
         state, n_same = "", 0
         while True:
             asked_s = self.monotonic_s()
-            answer = self._look(submission_id, wait_s=until_s - asked_s if last else 0)
-            if answer.submission is not None:
-                last = answer.submission
+            found, again_s = self._look(submission_id, wait_s=until_s - asked_s if last else 0)
+            if found is not None:
+                last = found
                 yield last
                 if last.is_final:
                     return
             seen = last.state if last else ""
             state, n_same = seen, (n_same + 1 if seen == state else 1)  # a change of state: ask often again
-            delay_s = self.patience.delay_s(n_failed=n_same, retry_after_s=answer.retry_after_s, rng=self.rng)
-            delay_s = max(delay_s - (self.monotonic_s() - asked_s), answer.retry_after_s or 0.0)
+            delay_s = self.patience.delay_s(n_failed=n_same, retry_after_s=again_s, rng=self.rng)
+            delay_s = max(delay_s - (self.monotonic_s() - asked_s), again_s or 0.0)
             if self.monotonic_s() + delay_s >= until_s:
                 raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
             self.sleep(delay_s)
@@ -288,38 +274,40 @@ class Client:
             if self.monotonic_s() + delay_s >= until_s:
                 break
             self.sleep(delay_s)
-            submission = self._look(submission.id, wait_s=0).submission or submission
+            submission = self._look(submission.id, wait_s=0)[0] or submission
         return submission
 
-    def _look(self, submission_id: str, *, wait_s: float) -> _Glance:
-        """One question about a submission; a fault that passes by itself is no answer, not an error."""
+    def _look(self, submission_id: str, *, wait_s: float) -> tuple[Submission | None, float | None]:
+        """The answer to one question about a submission, and when to ask again where the server said it.
+
+        A fault that passes by itself is no answer, not an error.
+        """
         address = self._address("submissions", submission_id)
         # The first answer comes at once, so that whoever waits sees the place in the queue.
         wait = {"wait": str(int(min(wait_s, LONGEST_WAIT_S)))} if wait_s >= 1 else None
+        timeout_s = self.timeout_s + LONGEST_WAIT_S
         try:
-            response = self._checked(lambda: self._http.get(address, params=wait, timeout=self._longest_s))
+            response = self._checked(lambda: self._http.get(address, params=wait, timeout=timeout_s))
         except Unreachable:
-            return _Glance()
+            return None, None
         except Refused as refused:
             if refused.status not in PASSING_STATUSES:
                 raise
-            return _Glance(retry_after_s=refused.retry_after_s)
-        return _Glance(submission=one(response, Submission), retry_after_s=retry_after_s(response.headers))
-
-    @property
-    def _longest_s(self) -> float:
-        """For the answer to a question that the server may keep for a while."""
-        return self.timeout_s + LONGEST_WAIT_S
+            return None, refused.retry_after_s
+        return one(response, Submission), retry_after_s(response.headers)
 
     def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
-        address = self._address(*path)
-        return one(self._insist(lambda: self._http.get(address, params=params)), kind)
+        return one(self._asked(*path, params=params), kind)
 
-    def _get_as_anybody(self, address: str, *, accept: str) -> httpx.Response:
+    def _asked(self, *path: str, params: Mapping[str, str] | None = None) -> httpx.Response:
+        address = self._address(*path)
+        return self._retry(lambda: self._http.get(address, params=params))
+
+    def _asked_by_anybody(self, *path: str, accept: str) -> httpx.Response:
         """What everybody may read is read without the token, which may not be good for reading."""
-        request = self._http.build_request("GET", address, headers={"Accept": accept})
+        request = self._http.build_request("GET", self._address(*path), headers={"Accept": accept})
         request.headers.pop("Authorization", None)
-        return self._http.send(request)
+        return self._retry(lambda: self._http.send(request))
 
     def _address(self, *path: str) -> str:
         return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
@@ -337,7 +325,7 @@ class Client:
         self._was_answered = True
         return response
 
-    def _insist(self, send: Callable[[], httpx.Response]) -> httpx.Response:
+    def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
         """Send until answered, as often as the patience goes, as long as trying again makes sense."""
         n_failed = 0
         while True:
@@ -345,13 +333,11 @@ class Client:
                 return self._checked(send)
             except (Unreachable, Refused) as fault:
                 n_failed += 1
-                if n_failed >= self._n_tries() or not self._may_pass(fault):
+                n_tries = self.patience.n_tries if self._was_answered else self.patience.n_first_tries
+                if n_failed >= n_tries or not self._may_pass(fault):
                     raise
                 delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
             self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng))
-
-    def _n_tries(self) -> int:
-        return self.patience.n_tries if self._was_answered else self.patience.n_first_tries
 
     def _may_pass(self, fault: Unreachable | Refused) -> bool:
         if isinstance(fault, Unreachable):
@@ -359,12 +345,6 @@ class Client:
             # any other fault is a mistake in the address more often than a pause.
             return self._was_answered or fault.was_refused
         return self.patience.may_pass(fault)
-
-
-@dataclass(frozen=True, slots=True)
-class _Glance:
-    submission: Submission | None = None
-    retry_after_s: float | None = None
 
 
 def fresh_key(file: BinaryIO, fields: Mapping[str, str]) -> str:

@@ -12,7 +12,7 @@ from typing import TypeVar
 import httpx
 import msgspec
 
-from evaluator.answers import BadAnswer, Redirected, Refused, Unreachable
+from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
 from evaluator.problems import Problem
 
 T = TypeVar("T")
@@ -21,7 +21,7 @@ QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Patience:
+class RetryPolicy:
     """How often and how long to try again: delays grow by `factor`, each shortened by up to `jitter`.
 
     As it stands it bears with a server that is away for a quarter of a minute, as for a restart, and for ten

@@ -7,6 +7,7 @@ gap; α < 1 is an approaching object. All functions are elementwise on float64 a
 
 from __future__ import annotations
 
+import math
 from typing import Final
 
 import numpy as np
@@ -75,3 +76,12 @@ def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
     tau = np.asarray(ttc_s, dtype=np.float64)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         return np.asarray(1.0 / ((1.0 / (tau * 10.0) + 1.0) + 1e-6))
+
+
+def exact_log(values: Floats) -> Floats:
+    """The C library's natural logarithm, as the dataset's toolkit takes it; NaN where it has none."""
+    with np.errstate(invalid="ignore"):
+        positive = values > 0
+    logs = np.full(values.shape, math.nan)
+    logs[positive] = np.fromiter(map(math.log, values[positive].tolist()), dtype=np.float64)
+    return logs

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Final, Literal, TypeGuard
 
 import numpy as np
 
-from evaluator.documents import Document, Members, kind_of, parse, read_document
+from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
+from evaluator.predictions.documents import Document, Members, kind_of, parse, read_document
 from evaluator.problems import Findings, listed, pointer, quoted
-from evaluator.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
-from evaluator.truth import Manifest
+from evaluator.truth.truth import Manifest
 
 KeyKind = Literal["anno_id", "natural_key"]
+Place = Callable[[str], str]
+"""The JSON pointer to the member of a name."""
+Fault = Callable[[object], tuple[str, str] | None]
+"""Code and message for a value that cannot be taken."""
 
 ZERO_MESSAGE: Final = "The value is 0; expected a time to contact other than 0, negative when moving away."
 
@@ -38,7 +42,7 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
     keys = _check_keys(document.predictions, manifest, findings, document.pointer)
     ttc = document.unit == "ttc"
     values = _column(
-        document.predictions, manifest, findings, document.pointer, _seconds_fault if ttc else _ratio_fault
+        document.predictions, manifest, findings, document.pointer, seconds_fault if ttc else ratio_fault
     )
     if not ttc:
         fps_hz = read_rates(document, manifest, findings)
@@ -55,27 +59,32 @@ def read_slowly(data: bytes, manifest: Manifest) -> Aligned:
 
 def read_rates(document: Document, manifest: Manifest, findings: Findings) -> Floats:
     """The pair rates in Hz, (n,) or (); faults are noted."""
+
+    def by_key(members: Members, place: Place, fault: Fault) -> Floats:
+        _check_keys(members, manifest, findings, place)
+        return _column(members, manifest, findings, place, fault)
+
+    return rates_of(document, findings, by_key)
+
+
+def rates_of(
+    document: Document, findings: Findings, by_key: Callable[[Members, Place, Fault], Floats]
+) -> Floats:
+    """The pair rates in Hz, () or what `by_key` makes of an object of rates; faults are noted."""
     is_gap = document.rate_name == "frame_gap"
     fault = _gap_fault if is_gap else _fps_fault
+    name = str(document.rate_name)
     if isinstance(document.rate, Members):
-        name = str(document.rate_name)
-
-        def place(key: str) -> str:
-            return pointer(name, key)
-
-        _check_keys(document.rate, manifest, findings, place)
-        rates = _column(document.rate, manifest, findings, place, fault)
+        rates = by_key(document.rate, lambda key: pointer(name, key), fault)
     else:
         problem = fault(document.rate)
         if problem:
-            findings.add(problem[0], problem[1], f"/{document.rate_name}")
+            findings.add(problem[0], problem[1], f"/{name}")
         rates = np.array(math.nan if problem else document.rate, dtype=np.float64)
     return fps_of_gap(rates) if is_gap else rates
 
 
-def _check_keys(
-    members: Members, manifest: Manifest, findings: Findings, place: Callable[[str], str]
-) -> KeyKind:
+def _check_keys(members: Members, manifest: Manifest, findings: Findings, place: Place) -> KeyKind:
     """Note missing, unknown, duplicate and mixed keys; return the kind of most known keys."""
     by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
     names = [name for name, _ in members]
@@ -91,13 +100,7 @@ def _check_keys(
             "or its natural keys bag_stamp/cam_id/ts/track_id."
         )
         findings.group("unknown-keys", message, place(unknown[0]), n_faults=len(unknown))
-    repeated = [name for name, count in Counter(names).items() if count > 1]
-    if repeated:
-        message = (
-            f"{_n(len(repeated), 'key appears', 'keys appear')} more than once: "
-            f"{listed([quoted(name) for name in repeated])}; expected every key once."
-        )
-        findings.group("duplicate-keys", message, place(repeated[0]), n_faults=len(repeated))
+    require_once(names, findings, place)
     if id_names and natural_names:
         rare = id_names if kind == "natural_key" else natural_names
         message = (
@@ -118,27 +121,27 @@ def _check_keys(
     return kind
 
 
-Fault = Callable[[object], tuple[str, str] | None]
-
-
-def _column(
-    members: Members, manifest: Manifest, findings: Findings, place: Callable[[str], str], fault: Fault
-) -> Floats:
-    """The values by row of the manifest, NaN where none is given or usable; faults are noted."""
+def _column(members: Members, manifest: Manifest, findings: Findings, place: Place, fault: Fault) -> Floats:
     by_id, by_natural_key = manifest.row_of_id, manifest.row_of_natural_key
-    values = np.full(manifest.n_sequences, math.nan)
-    for name, value in members:
-        problem = fault(value)
-        if problem:
+    rows = [by_id.get(name, by_natural_key.get(name)) for name, _ in members]
+    return column(members, rows, findings, place, fault, n=manifest.n_sequences)
+
+
+def column(
+    members: Members, rows: Iterable[int | None], findings: Findings, place: Place, fault: Fault, *, n: int
+) -> Floats:
+    """The values (n,) by the row of each member, NaN where none is given or usable; faults are noted."""
+    values = np.full(n, math.nan)
+    for (name, value), row in zip(members, rows, strict=True):
+        if problem := fault(value):
             findings.add(problem[0], problem[1], place(name))
-            continue
-        row = by_id.get(name, by_natural_key.get(name))
-        if row is not None:
+        elif row is not None:
             values[row] = value
     return values
 
 
-def _seconds_fault(value: object) -> tuple[str, str] | None:
+def seconds_fault(value: object) -> tuple[str, str] | None:
+    """Code and message for what is no time to contact."""
     if problem := _number_fault(value, "a number of seconds"):
         return problem
     if value == 0:
@@ -146,7 +149,8 @@ def _seconds_fault(value: object) -> tuple[str, str] | None:
     return None
 
 
-def _ratio_fault(value: object) -> tuple[str, str] | None:
+def ratio_fault(value: object) -> tuple[str, str] | None:
+    """Code and message for what is no scale ratio."""
     if problem := _number_fault(value, "a scale ratio greater than 0"):
         return problem
     if isinstance(value, int | float) and not value > 0:
@@ -179,6 +183,17 @@ def _gap_fault(value: object) -> tuple[str, str] | None:
 
 def _is_number(value: object) -> TypeGuard[int | float]:
     return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def require_once(names: list[str], findings: Findings, place: Place) -> None:
+    """Note keys that appear more than once."""
+    repeated = [name for name, count in Counter(names).items() if count > 1]
+    if repeated:
+        message = (
+            f"{_n(len(repeated), 'key appears', 'keys appear')} more than once: "
+            f"{listed([quoted(name) for name in repeated])}; expected every key once."
+        )
+        findings.group("duplicate-keys", message, place(repeated[0]), n_faults=len(repeated))
 
 
 def _n(count: int, one: str, many: str) -> str:

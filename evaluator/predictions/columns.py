@@ -5,8 +5,8 @@ keys are compared with the manifest's as 64-bit words, then overwritten with spa
 the object is a JSON list of numbers for a fast parser. Files with other keys, or another layout, are parsed
 into a dictionary.
 
-Both ways accept only what the strict reading (`evaluator.alignment`) accepts, with the same result, and
-answer None for everything else: finding words for a fault is the strict reading's business.
+Both ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
+result, and answer None for everything else: finding words for a fault is the strict reading's business.
 
 Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has 2n
 quotation marks, (2) what stands between each odd one and the next is, byte for byte, the key of another
@@ -26,12 +26,12 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.alignment import Aligned, KeyKind, read_rates
-from evaluator.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
+from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
+from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
+from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
 from evaluator.problems import Findings, Rejected
-from evaluator.scale import Floats, scale_ratio_to_ttc
-from evaluator.truth import Manifest
-from evaluator.words import WORD_BYTES, KeyWords, Rows, Words
+from evaluator.truth.packed_keys import WORD_BYTES, KeyWords, Rows, Words
+from evaluator.truth.truth import Manifest
 
 _WHITE_SPACE: Final = b" \t\r\n"
 _PAD: Final = b" " * WORD_BYTES

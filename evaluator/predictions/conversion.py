@@ -1,17 +1,12 @@
-"""A prediction file in another unit or at another rate: the same times to contact, said otherwise."""
+"""Conversion of a prediction file to another unit or frame rate."""
 
 from __future__ import annotations
 
-import math
-from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
-from evaluator.alignment import ZERO_MESSAGE
-from evaluator.documents import Document, Members, Unit, kind_of, parse, read_document
-from evaluator.problems import Findings, listed, pointer, quoted
-from evaluator.scale import (
+from evaluator.metrics.scale import (
     FRAME_RATE_HZ,
     N_FRAMES,
     Floats,
@@ -19,7 +14,19 @@ from evaluator.scale import (
     scale_ratio_to_ttc,
     ttc_to_scale_ratio,
 )
-from evaluator.writing import write_predictions
+from evaluator.predictions.alignment import (
+    ZERO_MESSAGE,
+    Fault,
+    Place,
+    column,
+    rates_of,
+    ratio_fault,
+    require_once,
+    seconds_fault,
+)
+from evaluator.predictions.documents import Document, Members, Unit, parse, read_document
+from evaluator.predictions.writing import write_predictions
+from evaluator.problems import Findings, listed, quoted
 
 
 def convert(
@@ -45,20 +52,18 @@ def convert(
     document = read_document(parse(data))
     _require_one_rate(document, fps_hz, frame_gap)
     findings = Findings()
-    names = _names(document, findings)
+    names = [name for name, _ in document.predictions]
+    require_once(names, findings, document.pointer)
     if natural_keys is not None:
         _require_anno_ids(names, natural_keys, findings, document.pointer)
-    values = _numbers(document.predictions, findings, document.pointer)
     is_ratio = document.unit == "scale_ratio" or fps_hz is not None or frame_gap is not None
+    fault = ratio_fault if is_ratio else seconds_fault
+    values = column(document.predictions, range(len(names)), findings, document.pointer, fault, n=len(names))
     rates: Floats | None = None
     if document.unit == "scale_ratio":
         rates = _rates(document, names, findings)
     elif is_ratio:
         rates = np.asarray(fps_hz if fps_hz is not None else fps_of_gap(_gap(frame_gap)))
-    if is_ratio:
-        for row in np.flatnonzero(values <= 0).tolist():
-            message = f"The value is {values[row]!s}; expected a scale ratio greater than 0."
-            findings.add("not-positive", message, document.pointer(names[row]))
     findings.raise_if_any()
     ttc_s = values if rates is None else scale_ratio_to_ttc(values, fps_hz=rates)
     meta = document.meta
@@ -115,18 +120,8 @@ def _gap(frame_gap: int | None) -> int:
     return frame_gap
 
 
-def _names(document: Document, findings: Findings) -> list[str]:
-    names = [name for name, _ in document.predictions]
-    repeated = [name for name, count in Counter(names).items() if count > 1]
-    if repeated:
-        shown = listed([quoted(name) for name in repeated])
-        message = f"{len(repeated):,} keys appear more than once: {shown}; expected every key once."
-        findings.group("duplicate-keys", message, document.pointer(repeated[0]), n_faults=len(repeated))
-    return names
-
-
 def _require_anno_ids(
-    names: list[str], natural_keys: Mapping[str, str], findings: Findings, place: Callable[[str], str]
+    names: list[str], natural_keys: Mapping[str, str], findings: Findings, place: Place
 ) -> None:
     """Note every way in which the keys of the file are not the anno_ids of the folder."""
     if names and set(natural_keys.values()).issuperset(names):
@@ -153,45 +148,20 @@ def _require_anno_ids(
         findings.group("missing-keys", message, place(missing[0]), n_faults=len(missing))
 
 
-def _numbers(members: Members, findings: Findings, place: object) -> Floats:
-    """The values of an object, NaN where one is no number; faults are noted."""
-    values = np.full(len(members), math.nan)
-    for row, (name, value) in enumerate(members):
-        where = place(name) if callable(place) else ""
-        if isinstance(value, bool) or not isinstance(value, int | float):
-            findings.add("not-a-number", f"The value is {kind_of(value)}; expected a number.", where)
-        elif math.isnan(value):
-            findings.add("nan", "The value is NaN; expected a number.", where)
-        else:
-            values[row] = value
-    return values
-
-
 def _rates(document: Document, names: list[str], findings: Findings) -> Floats:
     """The pair rates in Hz, (n,) or (); faults are noted."""
-    name, rate = str(document.rate_name), document.rate
-    if not isinstance(rate, Members):
-        rates = _numbers(Members([(name, rate)]), findings, lambda key: f"/{key}")
-        return np.asarray(_checked_rates(rates, [name], name, findings)[0])
-    by_key = dict(rate)
-    missing = [key for key in names if key not in by_key]
-    if missing:
-        message = (
-            f"{len(missing):,} keys have no {name}: {listed(missing)}; expected one for each prediction."
-        )
-        findings.group("missing-keys", message, pointer(name, missing[0]), n_faults=len(missing))
-    chosen = Members((key, by_key.get(key, 1)) for key in names)
-    rates = _numbers(chosen, findings, lambda key: pointer(name, key))
-    return _checked_rates(rates, names, name, findings)
 
+    def by_key(members: Members, place: Place, fault: Fault) -> Floats:
+        given = dict(members)
+        missing = [key for key in names if key not in given]
+        if missing:
+            message = (
+                f"{len(missing):,} keys have no {document.rate_name}: {listed(missing)}; "
+                "expected one for each prediction."
+            )
+            findings.group("missing-keys", message, place(missing[0]), n_faults=len(missing))
+        row_of = {name: row for row, name in enumerate(names)}
+        rows = [row_of.get(key) for key, _ in members]
+        return column(members, rows, findings, place, fault, n=len(names))
 
-def _checked_rates(rates: Floats, names: list[str], name: str, findings: Findings) -> Floats:
-    is_gap = name == "frame_gap"
-    is_good = np.isin(rates, range(1, N_FRAMES)) if is_gap else np.isfinite(rates) & (rates > 0)
-    expected = (
-        f"a whole number of frames from 1 to {N_FRAMES - 1}" if is_gap else "a finite rate greater than 0"
-    )
-    for row in np.flatnonzero(~is_good & ~np.isnan(rates)).tolist():
-        where = f"/{name}" if names[row] == name else pointer(name, names[row])
-        findings.add("bad-rate", f"{name} is {rates[row]:g}; expected {expected}.", where)
-    return fps_of_gap(np.where(is_good, rates, 1)) if is_gap else rates
+    return rates_of(document, findings, by_key)

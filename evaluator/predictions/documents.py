@@ -1,7 +1,7 @@
 """The strict reading of a prediction file: every object as its list of members, every fault in words.
 
-This path decides what a file means. The columnar path (`evaluator.columns`) is only a faster way to the same
-result for files without surprises; it hands over whatever is unusual.
+This path decides what a file means. The columnar path (`evaluator.predictions.columns`) is only a faster way
+to the same result for files without surprises; it hands over whatever is unusual.
 """
 
 from __future__ import annotations
@@ -27,6 +27,21 @@ FIELDS: Final = ("unit", "fps", "frame_gap", "meta", "predictions")
 # Also matches a text that never ends, or looking for its end would begin anew at every mark inside it.
 _STRING: Final = re.compile(rb'"(?:[^"\\]|\\.)*+(?:"|\\?\Z)', re.DOTALL)
 BYTE_ORDER_MARK: Final = b"\xef\xbb\xbf"
+EMPTY_MESSAGE: Final = "The file is empty; expected JSON text with a number for every sequence."
+# What people send by mistake, by its first bytes.
+_LOOKS_LIKE: Final = {
+    b"\xff\xfe": "UTF-16",
+    b"\xfe\xff": "UTF-16",
+    b"\x89PNG": "a PNG image",
+    b"\xff\xd8\xff": "a JPEG image",
+    b"%PDF": "a PDF document",
+    b"\x1f\x8b": "a gzip archive; unpack it first",
+    b"PK\x03\x04": "a ZIP archive or a NumPy .npz file; send the JSON file itself",
+    b"\x93NUMPY": "a NumPy .npy file",
+    b"\x89HDF": "an HDF5 file",
+    b"\x80": "a Python pickle",
+    b"anno_id,": "a CSV table",
+}
 
 
 class Members(list[tuple[str, object]]):
@@ -61,10 +76,13 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
     try:
         text = body.decode("utf-8")
     except UnicodeDecodeError as error:
-        hint = " The file looks like UTF-16." if data[:2] in {b"\xff\xfe", b"\xfe\xff"} else ""
         start = error.start + len(data) - len(body)
-        message = f"Byte {start:,} of the file is not UTF-8; expected JSON text encoded in UTF-8.{hint}"
+        message = (
+            f"Byte {start:,} of the file is not UTF-8; expected JSON text encoded in UTF-8.{_hint(data)}"
+        )
         raise reject("not-utf8", message, f"byte {start}") from None
+    if not body.strip(b" \t\r\n"):
+        raise reject("not-json", EMPTY_MESSAGE)
     n_members = body.count(b",") + 1
     if max_members is not None and n_members > max_members:
         message = f"The file has up to {n_members:,} members and items; expected at most {max_members:,}."
@@ -87,8 +105,14 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
         where = f"line {error.lineno}, column {error.colno}"
         found = quoted(text[error.pos : error.pos + 20]) if error.pos < len(text) else "the end of the file"
         fault = error.msg[0].lower() + error.msg[1:].removesuffix(" at").removesuffix(" starting")
-        message = f"The text is not JSON: {fault}, found {found}."
+        message = f"The text is not JSON: {fault}, found {found}.{_hint(data)}"
         raise reject("not-json", message, where) from None
+
+
+def _hint(data: bytes) -> str:
+    """What a file is that begins so, in a sentence; empty where its first bytes say nothing."""
+    kind = next((kind for start, kind in _LOOKS_LIKE.items() if data.startswith(start)), "")
+    return f" The file looks like {kind}." if kind else ""
 
 
 def read_document(value: object) -> Document:

@@ -17,10 +17,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.predictions import Predictions
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.predictions import Predictions
 from evaluator.problems import FileWarning
-from evaluator.scale import Floats
-from evaluator.truth import GroundTruth, Manifest
+from evaluator.truth.truth import GroundTruth, Manifest
 
 MAX_STEP_NS: Final = 1_000_000_000
 """Windows of one track that end this close together are neighbours; in the dataset they are 0.6 s apart."""

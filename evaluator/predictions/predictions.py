@@ -10,19 +10,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from evaluator.alignment import read_slowly
-from evaluator.columns import read_column
-from evaluator.documents import Unit
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.alignment import KeyKind, read_slowly
+from evaluator.predictions.columns import read_column
+from evaluator.predictions.documents import Unit
 from evaluator.problems import pointer, reject
-from evaluator.scale import Floats
-from evaluator.truth import Manifest
-
-KeyKind = Literal["anno_id", "natural_key"]
+from evaluator.truth.truth import Manifest
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""What changed between two revisions of a ground truth, and how a file for one is read for the other.
+"""Revisions of a ground truth: the changes between two, and reading a file for one with the other.
 
 Sequences are told apart by their natural keys (bag_stamp/cam_id/ts/track_id). An anno_id is a number of one
 manifest and means nothing in another.
@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.predictions import Predictions
+from evaluator.predictions.predictions import Predictions
 from evaluator.problems import Problem, Rejected, listed, pointer, quoted
-from evaluator.truth import GroundTruth, Manifest
+from evaluator.truth.truth import GroundTruth, Manifest
 
 Rows = NDArray[np.intp]
 

@@ -1,4 +1,4 @@
-"""The child process in which untrusted bytes are parsed: `python -m evaluator.quarantine`.
+"""The child process in which untrusted bytes are parsed: `python -m evaluator.predictions.sandbox`.
 
 It writes `READY` to its standard output, reads a prediction file from its standard input, and writes one line
 of JSON, followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the
@@ -6,18 +6,16 @@ first untrusted byte is read it gives up memory, processor time, new processes a
 sockets included. A child that ends before `READY` has seen nothing of the file.
 """
 
-import codecs
 import json
 import sys
 from pathlib import Path
 
-import msgspec
 import numpy as np
 
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, limit, obey_the_parent_alone
-from evaluator.predictions import read_predictions
+from evaluator.predictions.predictions import read_predictions
 from evaluator.problems import Rejected
-from evaluator.truth import Manifest
+from evaluator.truth.truth import Manifest
 
 
 def warm_up(manifest: Manifest) -> None:
@@ -35,9 +33,6 @@ def warm_up(manifest: Manifest) -> None:
             read_predictions(sample, manifest=manifest)
         except Rejected:
             continue
-    for library in (codecs, msgspec):
-        if library.__name__ not in sys.modules:
-            raise RuntimeError(f"{library.__name__} is not loaded")
 
 
 def answer(data: bytes, *, manifest: Manifest) -> bytes:

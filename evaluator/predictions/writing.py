@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from evaluator.documents import parse, read_document
+from evaluator.metrics.scale import N_FRAMES
+from evaluator.predictions.documents import parse, read_document
 from evaluator.problems import Findings, pointer, quoted
-from evaluator.scale import N_FRAMES
-from evaluator.truth import Manifest
+from evaluator.truth.truth import Manifest
 
 
 def write_predictions(
@@ -49,6 +49,16 @@ def write_predictions(
     if path is not None:
         Path(path).write_bytes(data)
     return data
+
+
+def template(manifest: Manifest) -> bytes:
+    """A prediction file without values, to be filled in: every anno_id of the manifest, in its order.
+
+    Each value is `null`. That is JSON, which any program reads, and no number: arithmetic on it fails, and a
+    file in which one is left is rejected with its place, where a number would be scored in silence.
+    """
+    members = ",\n".join(f'"{name}": null' for name in manifest.anno_id_keys)
+    return f"{{\n{members}\n}}\n".encode()
 
 
 def _values(

@@ -1,4 +1,4 @@
-"""Whether two entries differ by more than chance: a test, and the interval that belongs to it.
+"""The difference of two entries: a sign-flip test, and the confidence interval that belongs to it.
 
 Both come from the same random signs. D_g is the sum of errors of recording g of the first entry less that of
 the second, n_g the number of its sequences. Signs split the recordings into two halves, + and −; were neither
@@ -7,19 +7,20 @@ entry better, whatever stands in one half could as well stand in the other.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from evaluator.predictions import Predictions
-from evaluator.protocol import DEFAULT_PROTOCOL, SCORE_NAMES, Protocol, get_protocol
-from evaluator.report import published
-from evaluator.scale import Floats
-from evaluator.scoring import Scorer
-from evaluator.significance import SIGNIFICANT, cut_off, detectable_difference, is_significant, p_below
-from evaluator.truth import GroundTruth
-from evaluator.uncertainty import degrees_of, generator_of, usable_columns
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.predictions import Predictions
+from evaluator.scoring.report import published
+from evaluator.scoring.scoring import Scorer
+from evaluator.scoring.significance import SIGNIFICANT, Difference, cut_off, p_below
+from evaluator.scoring.uncertainty import degrees_of, generator_of, usable_columns
+from evaluator.truth.truth import GroundTruth
 
 N_SIGN_FLIPS: Final = 9_999
 P_DECIMALS: Final = 4
@@ -29,45 +30,6 @@ PUBLISHED_DECIMALS: Final = get_protocol(DEFAULT_PROTOCOL).decimals
 _BLOCK: Final = 1_000
 # Beside the sum of the differences' sizes, what is below this is left of rounding.
 _NO_SUM: Final = 1e-12
-
-
-@dataclass(frozen=True, slots=True)
-class Difference:
-    """First minus second in one column: below 0 the first is better.
-
-    `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
-    are too few recordings. `p_below` is the smallest of 0.001, 0.01 and 0.05 that p is below, else 1: it is
-    what judges, and follows from p where it is not given. `n_effective` is the effective number of
-    recordings.
-    """
-
-    difference: float
-    low: float | None
-    high: float | None
-    p: float | None
-    p_below: float | None = None
-    n_effective: float | None = None
-
-    def __post_init__(self) -> None:
-        """Give `p_below` where p says it."""
-        if self.p_below is None and self.p is not None:
-            object.__setattr__(self, "p_below", p_below(self.p))
-
-    @property
-    def is_significant(self) -> bool:
-        """Whether p is below 5 %: of this column alone, whatever else was looked at."""
-        return is_significant(self)
-
-    @property
-    def detectable_difference(self) -> float | None:
-        """The smallest difference that four of five such tests would have found; None for one found."""
-        return detectable_difference(self)
-
-    def turned(self) -> Difference:
-        """The same seen from the other side: second minus first."""
-        low = None if self.high is None else 0.0 - self.high
-        high = None if self.low is None else 0.0 - self.low
-        return Difference(0.0 - self.difference, low, high, self.p, self.p_below, self.n_effective)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -86,6 +48,12 @@ def sign_flips(
     differences: Floats, counts: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS
 ) -> SignFlips:
     """Test and interval of every column of `differences` by their `counts`, (G, columns) both.
+
+        p = (1 + #{|Σ ±D_g| ≥ |Σ D_g|}) / (R + 1)
+
+    Since both entries have the same sequences, ΣD_g / n is the difference of their means, and no ratio has to
+    be linearised. The test assumes that D_g is symmetric where neither is better, as likely to be −D_g. A
+    recording is turned as a whole, since its sequences are not independent. Without any difference p is 1.
 
     The p of a difference δ is that of the test of D_g − δ n_g. With a sum of S₊ over n₊ sequences in the one
     half, S₋ over n₋ in the other, a vector of signs counts against δ if its two halves disagree about it,
@@ -146,30 +114,18 @@ def _ends(lower: Floats, upper: Floats) -> tuple[Floats, Floats]:
     return low, np.partition(upper, n_flips - k, axis=1)[:, n_flips - k]
 
 
-def sign_flip_p(differences: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS) -> Floats:
-    """Two-sided p of every column of `differences` (G, columns) by the cluster sign-flip test.
-
-        p = (1 + #{|Σ ±D_g| ≥ |Σ D_g|}) / (R + 1)
-
-    Since both entries have the same sequences, ΣD_g / n is the difference of their means, and no ratio has to
-    be linearised. The test assumes that D_g is symmetric where neither is better, as likely to be −D_g. A
-    recording is turned as a whole, since its sequences are not independent. Recordings without sequences in
-    an interval have D_g = 0 and change nothing. Without any difference p is 1.
-    """
-    return sign_flips(differences, np.ones_like(differences), rng=rng, n_flips=n_flips).p
-
-
 def difference(
     first: Floats,
     second: Floats,
     counts: Floats,
     *,
+    names: Sequence[str],
     signs: np.random.Generator,
     n_flips: int = N_SIGN_FLIPS,
 ) -> dict[str, Difference]:
-    """Compare the sums of two entries over the same sequences, (G, 10) each; nothing is rounded.
+    """Compare the sums of two entries over the same sequences, (G, columns) each; nothing is rounded.
 
-    A column without sequences is absent.
+    `names` are those of the columns, a protocol's `score_names`. A column without sequences is absent.
     """
     gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
     found = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
@@ -183,7 +139,7 @@ def difference(
             p=float(found.p[i]) if is_known[i] else None,
             n_effective=float(degrees[i]),
         )
-        for i, name in enumerate(SCORE_NAMES)
+        for i, name in enumerate(names)
         if n[i] > 0
     }
 
@@ -256,6 +212,7 @@ def compare_predictions(
         one.bags.sums,
         other.bags.sums,
         one.bags.counts,
+        names=rules.score_names,
         signs=generator_of(truth.digest, purpose="signs"),
         n_flips=n_flips,
     )

@@ -8,17 +8,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from evaluator.predictions import Predictions
-from evaluator.protocol import DEFAULT_PROTOCOL, SCORE_NAMES, Protocol
-from evaluator.report import format_published
-from evaluator.scoring import evaluate
-from evaluator.truth import GroundTruth
-
-_LABELS = {"mid": ("MiD", ""), "rte": ("RTE", " %")}
+from evaluator.metrics.protocol import (
+    DEFAULT_PROTOCOL,
+    OVERALL,
+    Protocol,
+    column_words,
+    known_names,
+    metric_of,
+    split_name,
+)
+from evaluator.predictions.predictions import Predictions
+from evaluator.scoring.report import format_published
+from evaluator.scoring.scoring import evaluate
+from evaluator.truth.truth import GroundTruth
 
 
 def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL) -> dict[str, float | None]:
-    """The ten scores of the ground truth itself; None for an interval without sequences."""
+    """The scores of the ground truth itself; None for a TTC range without sequences."""
     predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
     return evaluate(predictions, truth, protocol=protocol).flat()
 
@@ -33,14 +39,10 @@ not the ground truth.
     """
     if not floor or not any(floor.values()):
         return ""
-    values = {name: floor[name] for name in SCORE_NAMES if floor.get(name) is not None}
-    shown = [name for name, value in values.items() if value or name in _LABELS]
-    parts = []
-    for name in shown:
-        metric, _, interval = name.partition("_")
-        label, unit = _LABELS[metric]
-        column = f"{label} on {interval}" if interval else label
-        parts.append(f"{column} {format_published(values[name], decimals=decimals)}{unit}")
+    values = {name: floor[name] for name in known_names() if floor.get(name) is not None}
+    shown = [name for name, value in values.items() if value or split_name(name)[1] == OVERALL]
+    texts = {name: format_published(values[name], decimals=decimals) for name in shown}
+    parts = [f"{column_words(name)} {text}{metric_of(name).unit_of_value}" for name, text in texts.items()]
     rest = " and 0 in every other column" if len(shown) < len(values) else ""
     return (
         f"Floor: the ground truth itself, submitted as predictions, scores {', '.join(parts)}{rest}. No file "

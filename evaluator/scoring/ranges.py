@@ -1,4 +1,4 @@
-"""Where each entry of a board may stand: all pairs of a column compared at once, quoted rows among them.
+"""Rank ranges: all pairs of a column compared at once, published results among them.
 
 A quoted row was printed in a paper and has no recordings. Its value v is known as exactly as it was printed:
 14.8 may have been anything from 14.75 to 14.85. In recording g an entry of exactly that value would have the
@@ -16,8 +16,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.scale import Floats
-from evaluator.uncertainty import CONFIDENCE, Booleans, Weights
+from evaluator.metrics.scale import Floats
+from evaluator.scoring.uncertainty import CONFIDENCE, Booleans, Weights
 
 N_RANK_FLIPS: Final = 2_000
 """All pairs are compared at once, 19,900 of 200 entries; their critical value is read from so many draws."""

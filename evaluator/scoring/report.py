@@ -7,40 +7,38 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from evaluator.protocol import METRICS
-from evaluator.scale import Floats
+from evaluator.metrics.protocol import OVERALL, score_name
+from evaluator.metrics.scale import Floats
 
 
 @dataclass(frozen=True, slots=True)
 class IntervalScore:
-    """Mean errors over one interval. An interval without sequences has no value: None, never 0."""
+    """Mean errors over one TTC range, by metric. One without sequences has no value: None, never 0."""
 
-    mid: float | None
-    rte: float | None
+    means: Mapping[str, float | None]
     count: int
+
+    @property
+    def mid(self) -> float | None:
+        """The mean motion-in-depth error."""
+        return self.means["mid"]
+
+    @property
+    def rte(self) -> float | None:
+        """The mean relative TTC error."""
+        return self.means["rte"]
 
     def as_dict(self) -> dict[str, float | int | None]:
         """The score as plain data. Written out: `dataclasses.asdict` copies for longer than scoring takes."""
-        return {"mid": self.mid, "rte": self.rte, "count": self.count}
+        return {**self.means, "count": self.count}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class SequenceErrors:
-    """Both errors of every sequence, float64 (n,) in the manifest's order.
+class RecordingSums:
+    """Sums of errors per recording ("bag"), and how many sequences each sum has.
 
-    For a hidden split they never leave the worker.
-    """
-
-    mid: Floats
-    rte: Floats
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class BagSums:
-    """Sums of both errors per recording ("bag"), and how many sequences each sum has.
-
-    Both are float64 (G, 10): the recordings as in `Manifest.recordings`, the columns as in `SCORE_NAMES`. For
-    a hidden split they never leave the worker.
+    Both are float64 (G, columns): the recordings as in `Manifest.recordings`, the columns as in the
+    protocol's `score_names`. For a hidden split they never leave the worker.
     """
 
     sums: Floats
@@ -49,10 +47,12 @@ class BagSums:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the predictions scored: means per interval, counts, and what was truncated at which boundary.
+    """What the predictions scored: means per TTC range, counts, and what was truncated at which boundary.
 
-    `scores` runs overall, crucial, small, large, negative; `n_out_of_range` counts the sequences that lie in
-    no interval. `sequences` and `bags` are kept only on request and are no part of the JSON.
+    `scores` runs as the protocol's `interval_names`: overall, crucial, …; `n_out_of_range` counts the
+    sequences that lie in no range. Only on request, and no part of the JSON: `sequences`, by metric the
+    errors of every sequence, float64 (n,) in the manifest's order, and `bags`. For a hidden split neither
+    leaves the worker.
     """
 
     protocol: str
@@ -62,8 +62,8 @@ class Report:
     n_out_of_range: int
     truncated: Mapping[str, int]
     scores: Mapping[str, IntervalScore]
-    sequences: SequenceErrors | None = None
-    bags: BagSums | None = None
+    sequences: Mapping[str, Floats] | None = None
+    bags: RecordingSums | None = None
 
     def as_dict(self) -> dict[str, object]:
         """The report as plain data, in the shape of `tsttc score --json`."""
@@ -82,11 +82,11 @@ class Report:
         return json.dumps(self.as_dict(), allow_nan=False)
 
     def flat(self) -> dict[str, float | None]:
-        """The ten numbers under `SCORE_NAMES`, in that order."""
+        """The numbers under the protocol's `score_names`, in that order."""
         return {
-            metric if name == "overall" else f"{metric}_{name}": getattr(score, metric)
-            for metric in METRICS
-            for name, score in self.scores.items()
+            score_name(metric, interval): score.means[metric]
+            for metric in self.scores[OVERALL].means
+            for interval, score in self.scores.items()
         }
 
 

@@ -1,15 +1,15 @@
 """Scoring: the metric specification of the TSTTC benchmark.
 
-Two errors per sequence, from the true time to contact τ (seconds from the target frame, never truncated) and
-the predicted τ̂ (truncated by the protocol), in float64:
+The errors of each sequence, from the true time to contact τ (seconds from the target frame, never truncated)
+and the predicted τ̂ (truncated by the protocol), in float64:
 
     α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶)
     MiD    = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴
     RTE    = |(τ̂ − τ) / τ| · 100 %
 
-A score is the mean over an interval of the *true* τ, closed at both ends: crucial [0, 3], small [3, 6],
-large [6, 20], negative [−20, 0] seconds. `overall` is the mean over all sequences, also those beyond ±20 s.
-An interval without sequences has no value.
+A score is the mean of an error over a range of the *true* τ, closed at both ends. `overall` is the mean over
+all sequences, also those in no range, beyond ±20 s. A range without sequences has no value. Which metrics and
+ranges there are says the protocol.
 
 `tsttc-1` truncates τ̂ to [−20, −0.15] ∪ [0.05, 20], to the nearest boundary of the same sign, so that
 α₁₀(τ̂) stays within [1/3, 3]. `toolkit` truncates to [−20, 20] only and refuses τ̂ whose α₁₀ is not positive
@@ -26,14 +26,14 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.alignment import ZERO_MESSAGE
-from evaluator.metrics import depth_error, relative_ttc_error
-from evaluator.predictions import Predictions
+from evaluator.metrics.metrics import Terms
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, OVERALL, Protocol, get_protocol
+from evaluator.metrics.scale import Floats, scale_ratio_10hz
+from evaluator.predictions.alignment import ZERO_MESSAGE
+from evaluator.predictions.predictions import Predictions
 from evaluator.problems import Findings
-from evaluator.protocol import DEFAULT_PROTOCOL, INTERVAL_NAMES, METRICS, Protocol, get_protocol
-from evaluator.report import BagSums, IntervalScore, Report, SequenceErrors
-from evaluator.scale import Floats, scale_ratio_10hz
-from evaluator.truth import GroundTruth
+from evaluator.scoring.report import IntervalScore, RecordingSums, Report
+from evaluator.truth.truth import GroundTruth
 
 
 def evaluate(
@@ -47,7 +47,7 @@ def evaluate(
     """Score `predictions` against `truth`.
 
     Raises `Rejected` for values that the protocol forbids, `ValueError` for an unknown protocol and for
-    predictions that were aligned with another manifest. With `keep_sequences` the report carries both errors
+    predictions that were aligned with another manifest. With `keep_sequences` the report carries the errors
     of every sequence, with `keep_bags` their sums per recording.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
@@ -69,10 +69,9 @@ def evaluate_many(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Errors:
-    """Both errors in ascending τ, and how many predictions went to each boundary of the protocol."""
+    """Errors by metric in ascending τ, and how many predictions went to each boundary of the protocol."""
 
-    mid: Floats
-    rte: Floats
+    of: dict[str, Floats]
     n_truncated: tuple[int, ...]
 
 
@@ -87,7 +86,7 @@ class Scorer:
         self._truth = truth
         self._protocol = protocol
         tau = truth.ascending_ttc_s
-        self._slices = {"overall": slice(0, len(tau))} | {
+        self._slices = {OVERALL: slice(0, len(tau))} | {
             i.name: slice(
                 int(np.searchsorted(tau, i.low_s, side="left")),
                 int(np.searchsorted(tau, i.high_s, side="right")),
@@ -96,26 +95,31 @@ class Scorer:
         }
 
     @cached_property
+    def _n_out_of_range(self) -> int:
+        """Sequences that lie in no range of the protocol."""
+        return self._truth.n_outside(self._protocol.intervals)
+
+    @cached_property
     def _recordings(self) -> NDArray[np.int64]:
         """The recording of every sequence, in ascending τ."""
         return self._truth.manifest.recording_index[self._truth.ascending_rows]
 
     @cached_property
-    def bag_counts(self) -> Floats:
-        """Sequences per recording in every column: the counts of all `BagSums` of this truth."""
+    def recording_counts(self) -> Floats:
+        """Sequences per recording in every column: the counts of all `RecordingSums` of this truth."""
         n_bags = self._truth.manifest.n_recordings
-        parts = [self._recordings[part] for part in self._slices.values()] * len(METRICS)
+        parts = [self._recordings[part] for part in self._slices.values()] * len(self._protocol.metrics)
         counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)
         return counts.astype(np.float64)
 
-    def _bag_sums(self, errors: _Errors) -> BagSums:
+    def _recording_sums(self, errors: _Errors) -> RecordingSums:
         n_bags = self._truth.manifest.n_recordings
         columns = [
             np.bincount(self._recordings[part], weights=values[part], minlength=n_bags)
-            for values in (errors.mid, errors.rte)
+            for values in errors.of.values()
             for part in self._slices.values()
         ]
-        return BagSums(sums=np.stack(columns, axis=1), counts=self.bag_counts)
+        return RecordingSums(sums=np.stack(columns, axis=1), counts=self.recording_counts)
 
     def report(
         self, predictions: Predictions, *, keep_sequences: bool = False, keep_bags: bool = False
@@ -128,25 +132,25 @@ class Scorer:
             truth_digest=self._truth.digest,
             predictions_digest=predictions.digest,
             n_sequences=self._truth.n_sequences,
-            n_out_of_range=self._truth.n_out_of_range,
+            n_out_of_range=self._n_out_of_range,
             truncated=dict(zip(self._protocol.boundaries, errors.n_truncated, strict=True)),
-            scores={name: self._score(errors, self._slices[name]) for name in INTERVAL_NAMES},
+            scores={name: self._score(errors, part) for name, part in self._slices.items()},
             sequences=self._in_file_order(errors) if keep_sequences else None,
-            bags=self._bag_sums(errors) if keep_bags else None,
+            bags=self._recording_sums(errors) if keep_bags else None,
         )
 
     def _score(self, errors: _Errors, part: slice) -> IntervalScore:
         count = part.stop - part.start
         if count == 0:
-            return IntervalScore(None, None, 0)
-        mid, rte = (float(np.add.reduce(values[part])) / count for values in (errors.mid, errors.rte))
-        return IntervalScore(mid, rte, count)
+            return IntervalScore(dict.fromkeys(errors.of), 0)
+        means = {name: float(np.add.reduce(values[part])) / count for name, values in errors.of.items()}
+        return IntervalScore(means, count)
 
-    def _in_file_order(self, errors: _Errors) -> SequenceErrors:
-        mid, rte = np.empty_like(errors.mid), np.empty_like(errors.rte)
-        mid[self._truth.ascending_rows] = errors.mid
-        rte[self._truth.ascending_rows] = errors.rte
-        return SequenceErrors(mid, rte)
+    def _in_file_order(self, errors: _Errors) -> dict[str, Floats]:
+        found = {name: np.empty_like(values) for name, values in errors.of.items()}
+        for name, values in errors.of.items():
+            found[name][self._truth.ascending_rows] = values
+        return found
 
     def _errors(self, predictions: Predictions) -> _Errors:
         truth = self._truth
@@ -157,9 +161,9 @@ class Scorer:
         # here.
         if not (alpha.min() > 0.0 and alpha.max() < np.inf):
             _refuse(predictions, self._protocol)
-        mid = depth_error(truth.ascending_log_scale_ratio, alpha)
-        rte = relative_ttc_error(predicted, truth.ascending_ttc_s)
-        return _Errors(mid, rte, n_truncated)
+        terms = Terms(predicted, truth.ascending_ttc_s, alpha, truth.ascending_log_scale_ratio)
+        errors = {metric.name: metric.function(terms) for metric in self._protocol.metrics}
+        return _Errors(errors, n_truncated)
 
 
 def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:

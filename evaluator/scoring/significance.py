@@ -1,9 +1,10 @@
-"""When a number counts as known well enough: bounds, and the words for what falls short of them."""
+"""Significance: the bounds, and the words for what falls short of them."""
 
 from __future__ import annotations
 
 import math
-from typing import Final, Protocol
+from dataclasses import dataclass
+from typing import Final
 
 SIGNIFICANT: Final = 0.05
 P_CLASSES: Final = (0.001, 0.01, SIGNIFICANT)
@@ -16,26 +17,6 @@ MIN_DEGREES: Final = 8.0
 _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
 
 
-class Judged(Protocol):
-    """Something that was tested."""
-
-    @property
-    def p_below(self) -> float | None:
-        """The smallest of `P_CLASSES` that p is below, else 1; None where there is no p."""
-
-
-class Interval(Judged, Protocol):
-    """A tested difference with its 95 % confidence interval."""
-
-    @property
-    def low(self) -> float | None:
-        """Its lower end."""
-
-    @property
-    def high(self) -> float | None:
-        """Its upper end."""
-
-
 def p_below(p: float) -> float:
     """The smallest of `P_CLASSES` that `p` is below, else 1. Of p as it was computed, never of a rounded one.
 
@@ -45,20 +26,49 @@ def p_below(p: float) -> float:
     return next((bound for bound in P_CLASSES if p < bound), 1.0)
 
 
-def is_significant(found: Judged) -> bool:
-    """Whether p is below 5 %: of this column alone, whatever else was looked at."""
-    return found.p_below is not None and found.p_below <= SIGNIFICANT
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """First minus second in one column: below 0 the first is better. Computed here or told by a server.
 
-
-def detectable_difference(found: Interval) -> float | None:
-    """The smallest difference that four of five such tests would have found (80 % power).
-
-    1.43 half widths of the 95 % confidence interval: (z of 97.5 % + z of 80 %) / z of 97.5 %. None for a
-    difference that is significant, and where there is no interval.
+    `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
+    are too few recordings. `p_below` is the smallest of `P_CLASSES` that p is below, else 1: it is what
+    judges, alone where p is not told, and follows from p where it is not given. `n_effective` is the
+    effective number of recordings.
     """
-    if found.low is None or found.high is None or is_significant(found):
-        return None
-    return _DETECTABLE * (found.high - found.low) / 2
+
+    difference: float
+    low: float | None = None
+    high: float | None = None
+    p: float | None = None
+    p_below: float | None = None
+    n_effective: float | None = None
+
+    def __post_init__(self) -> None:
+        """Give `p_below` where p says it."""
+        if self.p_below is None and self.p is not None:
+            object.__setattr__(self, "p_below", p_below(self.p))
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether p is below 5 %: of this column alone, whatever else was looked at."""
+        return self.p_below is not None and self.p_below <= SIGNIFICANT
+
+    @property
+    def detectable_difference(self) -> float | None:
+        """The smallest difference that four of five such tests would have found (80 % power).
+
+        1.43 half widths of the 95 % confidence interval: (z of 97.5 % + z of 80 %) / z of 97.5 %. None for a
+        difference that is significant, and where there is no interval.
+        """
+        if self.low is None or self.high is None or self.is_significant:
+            return None
+        return _DETECTABLE * (self.high - self.low) / 2
+
+    def turned(self) -> Difference:
+        """The same seen from the other side: second minus first."""
+        low = None if self.high is None else 0.0 - self.high
+        high = None if self.low is None else 0.0 - self.low
+        return Difference(0.0 - self.difference, low, high, self.p, self.p_below, self.n_effective)
 
 
 def too_few_recordings(n_effective: float | None) -> str:

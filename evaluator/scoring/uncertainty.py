@@ -1,4 +1,4 @@
-"""How sure a mean is: resampling whole recordings.
+"""Confidence intervals of means: a bootstrap over recordings.
 
 Sequences of one recording ("bag") resemble each other, so 28,600 of them know less than 28,600 independent
 ones would. What is drawn anew here is therefore the recording, never the sequence. With S_g and n_g the sum
@@ -7,8 +7,9 @@ of an error and the number of sequences of recording g, a published mean is θ =
     θ⁽ᵇ⁾ = Σ w_bg S_g / Σ w_bg n_g        w_bg ~ Exp(1), b = 1 … B
 
 is what it might have been (a Bayesian bootstrap of recordings). An Exp(1) weight is never 0, so no interval
-of the ground truth runs empty. One matrix of weights belongs to a ground truth and is shared by all that is
-scored against it. `evaluator.differences` compares two entries, `evaluator.ranges` all of a board.
+of the ground truth runs empty. One matrix of weights belongs to a ground truth and is shared by all that
+is scored against it. `evaluator.scoring.differences` compares two entries, `evaluator.scoring.ranges` all
+of a board.
 
 Everything is a function of the sums and of the seed: the same numbers give the same answer, in whatever order
 they come. Arrays have one row for each recording and one column for each score name.
@@ -24,13 +25,13 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.predictions import Predictions
-from evaluator.protocol import DEFAULT_PROTOCOL, SCORE_NAMES, Protocol, get_protocol
-from evaluator.report import BagSums
-from evaluator.scale import Floats
-from evaluator.scoring import Scorer
-from evaluator.significance import MIN_DEGREES
-from evaluator.truth import GroundTruth
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.predictions import Predictions
+from evaluator.scoring.report import RecordingSums
+from evaluator.scoring.scoring import Scorer
+from evaluator.scoring.significance import MIN_DEGREES
+from evaluator.truth.truth import GroundTruth
 
 CONFIDENCE: Final = 0.95
 N_RESAMPLES: Final = 10_000
@@ -198,9 +199,9 @@ def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
     return Bootstrap(counts, rng=generator_of(truth_digest, purpose="weights"))
 
 
-def bag_sums(
+def recording_sums(
     predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
-) -> BagSums:
+) -> RecordingSums:
     """Sums per recording of one set of predictions; raises as `evaluator.evaluate` does."""
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     bags = Scorer(truth, rules).report(predictions, keep_bags=True).bags
@@ -211,10 +212,11 @@ def bag_sums(
 def confidence_intervals(
     predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
 ) -> dict[str, tuple[float, float] | None]:
-    """The 95 % interval of each of the ten numbers, as the board shows it; None where there is none."""
-    bags = bag_sums(predictions, truth, protocol=protocol)
+    """The 95 % interval of each number, as the board shows it; None where there is none."""
+    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
+    bags = recording_sums(predictions, truth, protocol=rules)
     low, high = (ends[0] for ends in bootstrap_of(truth.digest, bags.counts).intervals(bags.sums[None]))
     return {
         name: (float(low[i]), float(high[i])) if np.isfinite(low[i]) else None
-        for i, name in enumerate(SCORE_NAMES)
+        for i, name in enumerate(rules.score_names)
     }

@@ -1,4 +1,4 @@
-"""Texts of strangers inside LaTeX, BibTeX, Markdown and CSV: shown as they are, without power around them.
+"""Escaping of foreign texts in LaTeX, BibTeX, Markdown and CSV: shown as they are, without effect.
 
 LaTeX comes out as ASCII that every engine takes, with no package but booktabs.
 """
@@ -84,7 +84,11 @@ _FORMULA: Final = re.compile(r"(?P<before>[;\t\r\n|])(?=[\s\"']*[=+\-@＝＋－�
 _FORMULA_AT_START: Final = re.compile(r"[ \"]*[=+\-@\t\r\n＝＋－＠]")
 # A number of a table that must stay one; everything else is a text.
 _CSV_NUMBER: Final = re.compile(r"[0-9]+(\.[0-9]+)?")
-_MARKDOWN: Final = re.compile(r"([\\`*_{}\[\]()#+!|~$^=-])")
+# What is markup wherever it stands in a line; "#" and "$" on GitHub (a number of an issue, mathematics).
+_MARKDOWN: Final = re.compile(r"([\\`*_\[\]|~#$])")
+# What makes a list, a heading or a rule of a line that begins with it.
+_MARKDOWN_START: Final = re.compile(r"^([0-9]{1,9}(?=[.)](?: |$))|(?=[-+=]))")
+_WEB_ADDRESS: Final = re.compile(r"https?://[!-;=?-~]+")
 
 
 def one_line(text: str) -> str:
@@ -137,10 +141,20 @@ def markdown(text: str) -> str:
     >>> print(markdown("a|b *c* <i> www.example.org"))
     a\|b \*c\* &lt;i&gt; www&#46;example.org
     """
-    plain = one_line(text).replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    plain = re.sub(r"&(?=#?\w+;)", "&amp;", one_line(text)).replace("<", "&lt;").replace(">", "&gt;")
     plain = _MARKDOWN.sub(r"\\\1", plain)
+    plain = _MARKDOWN_START.sub(r"\1\\", plain)
     plain = re.sub(r"(?i)\b(www)\.", r"\1&#46;", plain)
     return plain.replace("://", "&#58;//").replace("@", "&#64;")
+
+
+def markdown_address(url: str) -> str:
+    """An address of ours as a link of Markdown; what is no such address, as text.
+
+    >>> print(markdown_address("https://example.org/board/test/?sort=rte"), markdown_address("<b>"))
+    <https://example.org/board/test/?sort=rte> &lt;b&gt;
+    """
+    return f"<{url}>" if _WEB_ADDRESS.fullmatch(url) else markdown(url)
 
 
 def guarded(text: str) -> str:

@@ -5,22 +5,20 @@ The site's exports and the command line print their boards by this, so that the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import unicodedata
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
-from evaluator.escaping import latex, latex_comment, markdown
-from evaluator.protocol import INTERVAL_NAMES, METRICS
+from evaluator.metrics.protocol import grouped_names, metric_of, split_name
+from evaluator.tables.escaping import latex, latex_comment, markdown, markdown_address
 
 ABSENT: Final = "–"
 BRACKETS: Final = (
     "In square brackets: 95 % confidence interval, bootstrap over recordings. In round brackets behind a "
     "rank: rank range at 95 %."
 )
-_SYMBOLS: Final = {"mid": "MiD", "rte": "RTE"}
-_LATEX_UNITS: Final = {"mid": r"$\times 10^{-4}$", "rte": r"\%"}
-_UNITS: Final = {"mid": "×10⁻⁴", "rte": "%"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +57,24 @@ class Origin:
     has_own_rows: bool = False
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Export:
+    """A board as writers take it; each reads once what it needs. The site and the command make it.
+
+    `rows` are those of a table, without what was withdrawn, `records` all rows by the names of `columns`:
+    numbers as they are published, None where nothing is known. `references` are BibTeX entries of the papers
+    that rows name, `document` is the API's.
+    """
+
+    origin: Origin
+    rows: Iterable[Row]
+    columns: Sequence[str]
+    records: Iterable[Mapping[str, object]]
+    scores: Sequence[str] = ()  # of its tables
+    references: Iterable[str] = ()
+    document: Mapping[str, object] | None = None
+
+
 def about(origin: Origin) -> tuple[str, ...]:
     """The lines that stand above or below a table: enough to find it again when the board has moved on."""
     lines = [f"TSTTC leaderboard, {origin.split}: {origin.address}"]
@@ -75,8 +91,8 @@ def about(origin: Origin) -> tuple[str, ...]:
         lines.append(f"As of {origin.moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC")
     if origin.has_own_rows:
         lines.append(
-            "Not what everybody sees: rows marked (private) are seen by one team alone, and others see those "
-            "marked (anonymous) under a pseudonym"
+            "Not public: only one team sees rows marked (private), and other teams see rows marked "
+            "(anonymous) under a pseudonym"
         )
     return tuple(lines)
 
@@ -93,7 +109,7 @@ def mark_of(*, visibility: str, pseudonym: str | None) -> str:
 
 
 def marked(name: str, mark: str) -> str:
-    """A name with what is said of its row.
+    """A name with the note of its row.
 
     >>> marked("Owl", "private"), marked("Owl", "")
     ('Owl (private)', 'Owl')
@@ -128,38 +144,28 @@ def rank_text(rank: int | None, *, low: int | None = None, high: int | None = No
     return f"{text} ({low}{f'–{high}' if high != low else ''})"
 
 
-def columns(metrics: Sequence[str] = METRICS) -> tuple[str, ...]:
-    """The names of the columns of these errors, in the paper's order.
-
-    >>> columns(["rte"])
-    ('rte', 'rte_crucial', 'rte_small', 'rte_large', 'rte_negative')
-    """
-    return tuple(
-        metric if name == "overall" else f"{metric}_{name}" for metric in metrics for name in INTERVAL_NAMES
-    )
-
-
-def as_latex(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str] = METRICS) -> str:
+def as_latex(export: Export) -> str:
     r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined.
 
-    `about` are lines of comment above it. With intervals, they stand small behind their values, and a comment
-    says what the brackets are.
+    Comments above it say what it was taken from. With intervals, they stand small behind their values, and a
+    comment says what the brackets are.
     """
-    n = len(INTERVAL_NAMES)
-    groups = [
-        rf"\multicolumn{{{n}}}{{c}}{{{_SYMBOLS[metric]} ({_LATEX_UNITS[metric]}) $\downarrow$}}"
-        for metric in metrics
-    ]
-    rules = [rf"\cmidrule(lr){{{4 + i * n}-{3 + (i + 1) * n}}}" for i in range(len(metrics))]
+    rows, columns = list(export.rows), export.scores
+    groups, rules, last = [], [], 3
+    for metric, names in grouped_names(columns).items():
+        heading = f"{latex(metric.symbol)} ({_latex_unit(metric.unit)})"
+        groups.append(rf"\multicolumn{{{len(names)}}}{{c}}{{{heading} $\downarrow$}}")
+        rules.append(rf"\cmidrule(lr){{{last + 1}-{last + len(names)}}}")
+        last += len(names)
     return "\n".join(
         [
-            *map(latex_comment, [*about, *_caption(rows)]),
+            *map(latex_comment, [*about(export.origin), *_caption(rows)]),
             r"% It needs \usepackage{booktabs}.",
-            rf"\begin{{tabular}}{{rll{'r' * n * len(metrics)}}}",
+            rf"\begin{{tabular}}{{rll{'r' * len(columns)}}}",
             r"\toprule",
             rf" & & & {' & '.join(groups)} \\",
             " ".join(rules),
-            rf"Rank & Method & Team & {' & '.join(list(INTERVAL_NAMES) * len(metrics))} \\",
+            rf"Rank & Method & Team & {' & '.join(split_name(name)[1] for name in columns)} \\",
             r"\midrule",
             *map(latex_row, rows),
             r"\bottomrule",
@@ -192,14 +198,26 @@ def _latex_cell(cell: Cell) -> str:
     return text
 
 
+def _latex_unit(unit: str) -> str:
+    r"""A unit as LaTeX has it, a power of ten as mathematics.
+
+    >>> print(_latex_unit("×10⁻⁴"), _latex_unit("%"))
+    $\times 10^{-4}$ \%
+    """
+    if not unit.startswith("×10"):
+        return latex(unit)
+    return rf"$\times 10^{{{unicodedata.normalize('NFKC', unit[3:]).replace('−', '-')}}}$"
+
+
 def _latex_number(text: str) -> str:
     return text.replace("–", "--").replace("−", "$-$")
 
 
-def as_markdown(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[str] = METRICS) -> str:
-    """A table of GitHub's Markdown. The best of a column is bold, the second italic; `about` stands below."""
-    names = [f"{_SYMBOLS[metric]} {name}" for metric in metrics for name in INTERVAL_NAMES]
-    units = ", ".join(f"{_SYMBOLS[metric]} in {_UNITS[metric]}" for metric in metrics)
+def as_markdown(export: Export) -> str:
+    """A table of GitHub's Markdown. The best of a column is bold, the second italic; below is its origin."""
+    rows = list(export.rows)
+    names = [f"{metric_of(name).symbol} {split_name(name)[1]}" for name in export.scores]
+    units = ", ".join(metric.heading for metric in grouped_names(export.scores))
     lines = [
         _line(["Rank", "Method", "Team", *names]),
         _line(["---:", "---", "---", *["---:"] * len(names)]),
@@ -210,7 +228,11 @@ def as_markdown(rows: Sequence[Row], *, about: Sequence[str], metrics: Sequence[
         "",
         f"{units}; lower is better. Best of a column **bold**, second *italic*.",
     ]
-    for line in (*_caption(rows), *map(markdown, about)):
+    first, *others = about(export.origin)
+    # The address comes last in its line, and is a link.
+    words = markdown(first.removesuffix(export.origin.address))
+    source = f"{words} {markdown_address(export.origin.address)}"
+    for line in (*_caption(rows), source, *map(markdown, others)):
         lines += ["", line]
     return "\n".join([*lines, ""])
 

@@ -1,52 +1,14 @@
-"""What the differences of two methods mean, in words: the same on pages and on the command line."""
+"""Sentences about the difference of two methods: the same on pages and on the command line."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, Protocol
+from typing import Final
 
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
-from evaluator.significance import (
-    SIGNIFICANT,
-    detectable_difference,
-    is_significant,
-    too_few_recordings,
-)
+from evaluator.metrics.protocol import PRIMARY, column_words, metric_of
+from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_recordings
 
-_INTERVAL_WORDS: Final = {"overall": "", **{name: f" on {name}" for name in INTERVAL_NAMES[1:]}}
-_METRIC_WORDS: Final = {"mid": ("MiD", ""), "rte": ("RTE", " percentage points")}
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
-
-
-class Found(Protocol):
-    """A difference, computed here or by the server: first minus second, its 95 % interval, and p.
-
-    The interval and p are None where there are too few recordings.
-    """
-
-    @property
-    def difference(self) -> float:
-        """First minus second, in the column's unit."""
-
-    @property
-    def low(self) -> float | None:
-        """Lower end of its interval."""
-
-    @property
-    def high(self) -> float | None:
-        """Upper end of its interval."""
-
-    @property
-    def p(self) -> float | None:
-        """Of the two-sided test."""
-
-    @property
-    def p_below(self) -> float | None:
-        """The smallest of 0.001, 0.01 and 0.05 that p is below, else 1: what judges."""
-
-    @property
-    def n_effective(self) -> float | None:
-        """The effective number of recordings."""
 
 
 def p_text(p: float | None, below: float | None = None) -> str:
@@ -78,24 +40,21 @@ def p_cell(p: float | None, below: float | None) -> str:
 
 
 def sentence(
-    first: str, second: str, *, name: str, found: Found, decimals: int = 2, withheld: str = ""
+    first: str, second: str, *, name: str, found: Difference, decimals: int = 2, withheld: str = ""
 ) -> str:
     """What a difference in one column means, in words; `decimals` are those in which values are published.
 
     `withheld` says why there is no interval, in a sentence, where it is not for too few recordings.
 
-    >>> from evaluator.differences import Difference
     >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
     "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
     >>> sentence("A", "B", name="rte", found=Difference(0.7, 0.2, 1.2, 0.02))  # doctest: +ELLIPSIS
     "A's RTE is 0.70 percentage points higher than B's (95 % confidence interval: 0.20 to 1.20 higher; ...
     >>> print(sentence("Two frames", "B", name="mid", found=Difference(-2.0, -2.5, 0.3, 0.0812)))
     Two frames' MiD is 2.0 lower than B's (95 % confidence interval: 0.3 higher to 2.5 lower; p = 0.0812). \
-That is not significant. A difference above 2.0 would have been found in four of five such tests.
+The difference is not significant. The test detects a difference above 2.0 with 80 % power.
     """
-    metric, _, interval = name.partition("_")
-    label, unit = _METRIC_WORDS[metric]
-    column = f"{label}{_INTERVAL_WORDS[interval or 'overall']}"
+    column, unit = column_words(name), metric_of(name).unit_of_difference
     if round(found.difference, decimals) == 0:
         alike = f"{first} and {second} have the same {column} to {_DECIMALS_IN_WORDS[decimals]}."
         return f"{alike} {withheld}".rstrip()
@@ -110,12 +69,12 @@ That is not significant. A difference above 2.0 would have been found in four of
         return f"{gap}; there are {too_few_recordings(found.n_effective)} to say whether that is significant."
     ends = _ends(found.difference, found.low, found.high, digits)
     told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p, found.p_below)})."
-    detectable = detectable_difference(found)
+    detectable = found.detectable_difference
     if detectable is None:
         return told
     return (
-        f"{told} That is not significant. A difference above {_amount(detectable, digits)}{unit} would have "
-        "been found in four of five such tests."
+        f"{told} The difference is not significant. The test detects a difference above "
+        f"{_amount(detectable, digits)}{unit} with 80 % power."
     )
 
 
@@ -146,7 +105,7 @@ def _amount(value: float, digits: int) -> str:
     return f"{max(abs(value), unit) if value else 0.0:.{digits}f}"
 
 
-def _digits(found: Found, decimals: int) -> int:
+def _digits(found: Difference, decimals: int) -> int:
     """As many as give the half width two digits, enough to tell the difference, never more than published."""
     if found.low is None or found.high is None:
         return decimals
@@ -156,31 +115,21 @@ def _digits(found: Found, decimals: int) -> int:
     return min(decimals, max(fewest, next((n for n in (0, 1) if round(smallest, n)), 2)))
 
 
-def others(
-    first: str, second: str, found: Mapping[str, Found], *, decimals: int = 2
-) -> tuple[str, tuple[str, ...]]:
-    """Beside overall MiD: how many columns differ significantly, of how many, and a sentence for each.
+def others(found: Mapping[str, Difference]) -> str:
+    """How many columns besides overall MiD differ significantly; empty where no column has a p.
 
-    A look through nine columns finds some by chance, so the first text says how many columns were tested and
-    what that means. It is empty where no column has a p.
-
-    >>> from evaluator.differences import Difference
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
-    >>> others("A", "B", {"mid": far, "mid_small": alike})
-    ('No other column differs significantly.', ())
-    >>> others("A", "B", {"mid": alike, "mid_small": far, "rte": alike})[0]
-    'Of 2 other columns 1 differs significantly, each by itself (of twenty columns of equals, one does):'
+    >>> others({"mid": far, "mid_small": alike, "rte": alike})
+    'None of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
+    >>> others({"mid": alike, "mid_small": far, "rte": alike})
+    '1 of the 2 other metrics differs significantly (α = 0.05, uncorrected).'
     """
-    tested = [name for name in SCORE_NAMES[1:] if name in found and found[name].p_below is not None]
-    told = [name for name in tested if is_significant(found[name])]
-    if not told:
-        return ("No other column differs significantly." if tested else ""), ()
-    columns = "column" if len(tested) == 1 else "columns"
-    differ = "differs" if len(told) == 1 else "differ"
-    lead = (
-        f"Of {len(tested)} other {columns} {len(told)} {differ} significantly, each by itself "
-        "(of twenty columns of equals, one does):"
-    )
-    return lead, tuple(
-        sentence(first, second, name=name, found=found[name], decimals=decimals) for name in told
+    tested = [name for name, gap in found.items() if name != PRIMARY and gap.p_below is not None]
+    if not tested:
+        return ""
+    n_different = sum(found[name].is_significant for name in tested)
+    differ = "differs" if n_different <= 1 else "differ"
+    return (
+        f"{n_different or 'None'} of the {len(tested)} other metrics {differ} significantly "
+        f"(α = {SIGNIFICANT:g}, uncorrected)."
     )

@@ -1,4 +1,4 @@
-"""The child process in which annotation files are read: `python -m evaluator.annotation_child`.
+"""The child process in which annotation files are read: `python -m evaluator.truth.annotation_child`.
 
 It writes `READY` to its standard output. Its standard input then gives it files, each as a line of JSON
 (`name`, `n_bytes`) and its content; it answers each with an empty line. At the end of its input it writes
@@ -7,23 +7,20 @@ the problems. Like the child that reads prediction files it gives up everything 
 by the largest file, time by the size of each.
 """
 
-import codecs
 import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
 from typing import IO, Final
 
-from evaluator.annotations import read_files
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, allow_cpu, limit, obey_the_parent_alone
 from evaluator.problems import Rejected
+from evaluator.truth.annotations import read_files
 
-BASE_CPU_S: Final = 10
-BYTES_PER_CPU_S: Final = 500_000
+BASE_CPU_S: Final = 1
+BYTES_PER_CPU_S: Final = 2_000_000
 """A sixth of what a slow core reads."""
 MAX_CPU_S: Final = 24 * 3600
-CODECS: Final = ("ascii", "latin-1", "raw-unicode-escape", "unicode-escape", "utf-8")
-"""Those of the texts in a pickle."""
 
 
 def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes]]:
@@ -40,8 +37,6 @@ def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes
 
 def warm_up() -> None:
     """Run every branch that imports late, since nothing can be opened afterwards."""
-    for name in CODECS:
-        codecs.lookup(name)
     try:
         read_files([("", b"cos\nsystem\n.")], with_ttc=True)
     except Rejected as rejected:
@@ -49,17 +44,19 @@ def warm_up() -> None:
 
 
 def main() -> None:
-    """Arguments: memory limit in bytes, and 1 where true times are read, else 0."""
+    """Arguments: memory limit in bytes; 1 where true times are read, else 0; the same for boxes."""
     obey_the_parent_alone()
     warm_up()
-    memory_bytes, with_ttc = int(sys.argv[1]), sys.argv[2] == "1"
+    memory_bytes, with_ttc, with_boxes = int(sys.argv[1]), sys.argv[2] == "1", sys.argv[3] == "1"
     limit(memory_bytes=memory_bytes, cpu_s=MAX_CPU_S)
     answers = sys.stdout.buffer
     answers.write(READY)
     answers.flush()
     try:
-        found = read_files(files_of(sys.stdin.buffer, answers), with_ttc=with_ttc)
-        answer = {"table": asdict(found.table), "n_sequences": found.n_sequences}
+        files = files_of(sys.stdin.buffer, answers)
+        found = read_files(files, with_ttc=with_ttc, with_boxes=with_boxes)
+        table, counts = asdict(found.table), found.n_sequences
+        answer = {"table": table, "n_sequences": counts, "boxes": found.boxes}
         line = json.dumps(answer).encode()
     except Rejected as rejected:
         line = json.dumps(rejected.as_dict()).encode()

@@ -5,7 +5,8 @@ them in the order in which the file system lists the files, which differs betwee
 order is the same.
 
 On Linux the pickles are read by a child process that has little memory and time, and may open nothing
-(`annotation_child`). Elsewhere they are read here: what a pickle may do is bounded in any case.
+(`annotation_child`). Other systems have no such limits, and the files are read here. No pickle runs code on
+either, but there one that was made for it may take all memory, or never end.
 """
 
 from __future__ import annotations
@@ -15,13 +16,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any, Final
 
-from evaluator.annotations import AnnotatedFiles, read_files
 from evaluator.problems import Problem, Rejected, reject
-from evaluator.tables import Table
+from evaluator.truth.annotations import AnnotatedFiles, read_files
+from evaluator.truth.csv_tables import Table
 
 MAX_FILE_BYTES: Final = 128 * 1024 * 1024
 """The largest annotation file that is read, far above that of a recording of minutes."""
@@ -34,23 +35,13 @@ _BYTES_PER_BYTE: Final = 32
 _EXTENSION: Final = ".pkl"
 
 
-@dataclass(frozen=True, slots=True)
-class AnnotationFolder:
-    """The sequences of a folder in the order of its sorted files, numbered so.
-
-    `n_sequences` counts those of each file, and `listed` is the order in which the file system lists the
-    files: indices of the sorted ones.
-    """
-
-    table: Table
-    n_sequences: list[int]
-    listed: list[int]
-
-
-def read_annotations(folder: Path, *, with_ttc: bool) -> AnnotationFolder:
+def read_annotations(folder: Path, *, with_ttc: bool, with_boxes: bool = False) -> AnnotatedFiles:
     """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
 
+    They stand in the order of the sorted files, numbered so.
+
     Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
+    With `with_boxes`, the boxes of all frames are read too.
     Raises `Rejected` for a folder without such files, for files that cannot be read or ask for more memory or
     time than their size warrants, for pickles that ask for foreign code and for files of another structure.
     """
@@ -62,8 +53,8 @@ def read_annotations(folder: Path, *, with_ttc: bool) -> AnnotationFolder:
     files = sorted(listed, key=lambda path: path.relative_to(folder).parts)
     place = {path: index for index, path in enumerate(files)}
     read = _read_apart if HAS_LIMITS else _read_here
-    found = read(folder, files, with_ttc=with_ttc)
-    return AnnotationFolder(found.table, found.n_sequences, [place[path] for path in listed])
+    found = read(folder, files, with_ttc=with_ttc, with_boxes=with_boxes)
+    return replace(found, listed=[place[path] for path in listed])
 
 
 def list_files(folder: Path) -> list[Path]:
@@ -97,14 +88,18 @@ def _contents(folder: Path, files: Sequence[Path]) -> Iterator[tuple[str, bytes]
         yield name, data
 
 
-def _read_here(folder: Path, files: Sequence[Path], *, with_ttc: bool) -> AnnotatedFiles:
-    return read_files(_contents(folder, files), with_ttc=with_ttc)
+def _read_here(folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool) -> AnnotatedFiles:
+    try:
+        return read_files(_contents(folder, files), with_ttc=with_ttc, with_boxes=with_boxes)
+    except MemoryError:
+        message = "Reading the files needs more memory than there is; expected annotations of the toolkit."
+        raise reject("too-large", message, folder.name) from None
 
 
 # --- the child's parent ----------------------------------------------------------------------------------
 
 
-def _read_apart(folder: Path, files: Sequence[Path], *, with_ttc: bool) -> AnnotatedFiles:
+def _read_apart(folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool) -> AnnotatedFiles:
     """The same by a child process, which gets one file after the other."""
     largest = max(path.stat().st_size for path in files)
     memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * min(largest, MAX_FILE_BYTES)
@@ -112,13 +107,14 @@ def _read_apart(folder: Path, files: Sequence[Path], *, with_ttc: bool) -> Annot
         sys.executable,
         "-P",
         "-m",
-        "evaluator.annotation_child",
+        "evaluator.truth.annotation_child",
         str(memory_bytes),
         str(int(with_ttc)),
+        str(int(with_boxes)),
     ]
     environment = {
         "PATH": os.defpath,
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).resolve().parents[1]), *filter(None, sys.path)]),
+        "PYTHONPATH": os.pathsep.join([str(Path(__file__).resolve().parents[2]), *filter(None, sys.path)]),
         "PYTHONDONTWRITEBYTECODE": "1",
         "OPENBLAS_NUM_THREADS": "1",
     }
@@ -206,4 +202,4 @@ def _decoded(line: bytes) -> AnnotatedFiles:
     if "problems" in answer:
         problems = [Problem(**problem) for problem in answer["problems"]]
         raise Rejected(problems, n_problems=answer["n_problems"])
-    return AnnotatedFiles(Table(**answer["table"]), answer["n_sequences"])
+    return AnnotatedFiles(Table(**answer["table"]), answer["n_sequences"], boxes=answer["boxes"])

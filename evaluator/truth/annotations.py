@@ -11,14 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final, cast
 
-from evaluator.pickles import load_plain
-from evaluator.plain_values import Attributes
+from evaluator.metrics.scale import N_FRAMES
 from evaluator.problems import Findings, quoted, reject
-from evaluator.scale import N_FRAMES
-from evaluator.tables import Table, name_fault
+from evaluator.truth.csv_tables import Table, name_fault
+from evaluator.truth.pickles import Attributes, FewNumbers, load_plain
 
 Camera = dict[float, list[Attributes]]
 """The objects that one camera sees, by timestamp."""
@@ -26,10 +25,17 @@ Camera = dict[float, list[Attributes]]
 
 @dataclass(frozen=True, slots=True)
 class AnnotatedFiles:
-    """The sequences of some files, in their order: a row for each, and how many each file has."""
+    """The sequences of some files, in their order: a row for each, and how many each file has.
+
+    `listed` is the order in which the file system lists the files of a folder: indices of the sorted ones.
+    `boxes` holds, where they are asked for, the 24 numbers of each sequence: x1, y1, x2, y2 of its frames in
+    the order of time, as parts of the image's width and height.
+    """
 
     table: Table
     n_sequences: list[int]
+    listed: list[int] = field(default_factory=list)
+    boxes: list[list[float]] = field(default_factory=list)
 
 
 FRAME_STEP_NS: Final = 100_000_000
@@ -39,23 +45,29 @@ MAX_OBJECTS: Final = 2_000_000
 _MAX_STAMP: Final = 4_096
 
 
-def read_files(files: Iterable[tuple[str, bytes]], *, with_ttc: bool) -> AnnotatedFiles:
+def read_files(
+    files: Iterable[tuple[str, bytes]], *, with_ttc: bool, with_boxes: bool = False
+) -> AnnotatedFiles:
     """Cut the sequences out of annotation files, given by name and content; one row each, from its target.
 
     Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
+    With `with_boxes`, every frame needs its `box2d`.
     Raises `Rejected` for pickles that ask for foreign code and for files of another structure.
     """
     table, findings, places, n_sequences = Table(), Findings(), list[str](), list[int]()
+    boxes = list[list[float]]()
     for name, data in files:
         first = len(places)
         for camera in _cameras(data, name):
             for sequence in cut_sequences(camera):
                 places.append(f"{name}, sequence {len(places)}")
                 _add_row(table, sequence[-1], findings, places[-1], with_ttc=with_ttc)
+                if with_boxes:
+                    boxes.append([x for seen in sequence for x in _box(seen, findings, places[-1])])
         n_sequences.append(len(places) - first)
     findings.raise_if_any()
     table.places = places
-    return AnnotatedFiles(table, n_sequences)
+    return AnnotatedFiles(table, n_sequences, boxes=boxes)
 
 
 def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[Attributes]]:
@@ -162,3 +174,18 @@ def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *
     else:
         found = "absent" if ttc_s is None else f"a {type(ttc_s).__name__}"
         findings.add("bad-field", f"ttc_imu is {found}; expected a number of seconds.", place)
+
+
+def _box(seen: Attributes, findings: Findings, place: str) -> list[float]:
+    """The four numbers of `box2d`."""
+    box = seen.get("box2d")
+    numbers = box.numbers if isinstance(box, FewNumbers) else box
+    if isinstance(numbers, list | tuple) and len(numbers) == 4 and all(map(_is_number, numbers)):
+        return [float(number) for number in numbers]
+    found = "absent" if box is None else f"a {type(box).__name__} of other content"
+    findings.add("bad-field", f"box2d is {found}; expected four numbers, x1, y1, x2 and y2.", place)
+    return [math.nan] * 4
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) < 1e308

@@ -15,10 +15,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.annotation_folders import read_annotations
+from evaluator.metrics.scale import Floats
 from evaluator.problems import Findings, listed
-from evaluator.scale import Floats
-from evaluator.truth import Manifest
+from evaluator.truth.annotation_folders import read_annotations
+from evaluator.truth.truth import Manifest
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +64,13 @@ def read_numbering(folder: str | Path, *, manifest: Manifest | None = None) -> N
     ).astype(np.intp)
     if manifest is None or manifest.digest == own.digest:
         return Numbering(own, rows)
-    _require_the_same(own.natural_keys, manifest.natural_keys, folder.name)
+    require_the_same(own.natural_keys, manifest.natural_keys, folder.name)
     keys, row_of = own.natural_keys, manifest.row_of_natural_key
     return Numbering(manifest, np.array([row_of[keys[row]] for row in rows.tolist()], dtype=np.intp))
 
 
-def _require_the_same(own: Sequence[str], wanted: Sequence[str], where: str) -> None:
+def require_the_same(own: Sequence[str], wanted: Sequence[str], where: str) -> None:
+    """Raise `Rejected` where a folder's natural keys are not those of a manifest, whatever their order."""
     findings = Findings()
     for code, missing, words in (
         ("missing-keys", sorted(set(wanted) - set(own)), "The folder lacks sequences of the manifest ({})"),

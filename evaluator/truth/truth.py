@@ -12,7 +12,7 @@ change the digest.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -20,13 +20,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.annotation_folders import read_annotations
-from evaluator.metrics import exact_log
+from evaluator.metrics.protocol import Interval
+from evaluator.metrics.scale import Floats, exact_log, scale_ratio_10hz
 from evaluator.problems import Findings, quoted, reject
-from evaluator.protocol import INTERVALS
-from evaluator.scale import Floats, scale_ratio_10hz
-from evaluator.tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
-from evaluator.words import KeyWords
+from evaluator.truth.annotation_folders import read_annotations
+from evaluator.truth.csv_tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
+from evaluator.truth.packed_keys import KeyWords
 
 Integers = NDArray[np.int64]
 
@@ -189,15 +188,13 @@ class GroundTruth:
         """ln α₁₀(τ) in ascending τ, the truth's part of every MiD."""
         return exact_log(scale_ratio_10hz(self.ascending_ttc_s))
 
-    @cached_property
-    def interval_counts(self) -> dict[str, int]:
-        """Sequences of each interval, closed at both ends; those at a shared end count twice."""
-        return {i.name: int(np.count_nonzero(_inside(self.ttc_s, i.low_s, i.high_s))) for i in INTERVALS}
+    def counts_of(self, intervals: Iterable[Interval]) -> dict[str, int]:
+        """Sequences of each TTC range by its name; those at an end that two share count twice."""
+        return {i.name: int(np.count_nonzero(_inside(self.ttc_s, i.low_s, i.high_s))) for i in intervals}
 
-    @cached_property
-    def n_out_of_range(self) -> int:
-        """Sequences that lie in no interval."""
-        inside = [_inside(self.ttc_s, i.low_s, i.high_s) for i in INTERVALS]
+    def n_outside(self, intervals: Iterable[Interval]) -> int:
+        """Sequences that lie in none of these TTC ranges."""
+        inside = [_inside(self.ttc_s, i.low_s, i.high_s) for i in intervals]
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))
 
     def to_table(self) -> Table:

@@ -1,4 +1,4 @@
-"""One's own account over the API: what is left, and the end of a token."""
+"""The user's quota, and the revocation of leaked tokens."""
 
 from typing import cast
 
@@ -9,32 +9,33 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import deadlines, teams, tokens
 from leaderboard.api.authentication import split_of
-from leaderboard.api.bodies import DocumentParser
-from leaderboard.api.problems import problem
+from leaderboard.api.exceptions import problem
+from leaderboard.api.parsers import LimitedJSONParser
+from leaderboard.api.schema import errors
 from leaderboard.api.serializers import (
-    ErrorSerializer,
     LeakedTokenSerializer,
     QuotaSerializer,
     RevokedSerializer,
 )
-from leaderboard.api.throttles import RevokeThrottle
+from leaderboard.api.throttling import RevokeThrottle
 from leaderboard.models import Scope, Split, User
+from leaderboard.people import teams, tokens
+from leaderboard.quotas import deadlines
 
 
 class QuotaView(APIView):
-    """What one's own team has left."""
+    """The remaining quota of the user's team."""
 
-    # Who may only submit has to know when.
+    # A token that can only submit needs to know when it may.
     token_scopes = (Scope.READ, Scope.SUBMIT)
 
     @extend_schema(operation_id="quota", responses=QuotaSerializer(many=True))
     def get(self, request: Request) -> Response:
-        """For each split: how many submissions are left, and when the next slot opens."""
+        """For each split: remaining submissions, and when the next slot opens."""
         now = timezone.now()
         user = cast("User", request.user)
-        team = teams.present_team_of(user=user)
+        team = teams.current_team_of(user=user)
         only = split_of(request.auth)
         splits = Split.objects.filter(pk=only) if only is not None else Split.objects.all()
         rows = [deadlines.left(team=team, user=user, split=split, now=now) for split in splits]
@@ -42,11 +43,11 @@ class QuotaView(APIView):
 
 
 class RevokeView(APIView):
-    """The end of a token that somebody found where it should not be."""
+    """The revocation of a leaked token by whoever found it."""
 
     authentication_classes = ()
     permission_classes = [AllowAny]
-    parser_classes = [DocumentParser]
+    parser_classes = [LimitedJSONParser]
     throttle_classes = [RevokeThrottle]
 
     @extend_schema(
@@ -54,12 +55,11 @@ class RevokeView(APIView):
         request=LeakedTokenSerializer,
         responses={
             200: RevokedSerializer,
-            (422, "application/problem+json"): ErrorSerializer,
-            (429, "application/problem+json"): ErrorSerializer,
+            **errors(422, 429),
         },
     )
     def post(self, request: Request) -> Response:
-        """Revoke a leaked token. Needs no account; what it says does not tell whether the token was one."""
+        """Revoke a leaked token. Needs no account; the response does not reveal whether it was a token."""
         asked = LeakedTokenSerializer(data=request.data)
         if not asked.is_valid():
             sentence = "No token was sent; expected a JSON object with the text 'token'."

@@ -1,4 +1,4 @@
-"""Bearer tokens: whose they are, and what they are good for."""
+"""Authentication by bearer token, and the limits of tokens."""
 
 from collections.abc import Collection
 from typing import Any
@@ -10,19 +10,19 @@ from rest_framework import exceptions
 from rest_framework.permissions import SAFE_METHODS
 from rest_framework.request import Request
 
-from leaderboard import tokens
 from leaderboard.models import ApiToken, Scope, User
+from leaderboard.people import tokens
 
 
 class BearerAuthentication(TokenAuthentication):
     """`Authorization: Bearer tsttc_…`, and nowhere else.
 
-    A token's limits are looked at here, before any view, so that no view can forget them. Asking needs the
-    scope `read` and everything else `submit`; a view whose `token_scopes` says otherwise needs one of those.
+    A token's limits are checked here, before any view, so that no view can forget them. Safe methods need the
+    scope `read` and all others `submit`, unless the view's `token_scopes` names the accepted ones.
     """
 
     def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
-        """Who it is. Raises `AuthenticationFailed`, or `PermissionDenied` for what the token is not for."""
+        """The user and the token. Raises `AuthenticationFailed`, or `PermissionDenied` beyond its limits."""
         found: tuple[User, ApiToken] | None = super().authenticate(request)
         if found is not None:
             view = request.parser_context["view"]
@@ -33,10 +33,10 @@ class BearerAuthentication(TokenAuthentication):
         return found
 
     def authenticate_credentials(self, token: bytes) -> tuple[User, ApiToken]:
-        """The token's owner, and the token. Raises `AuthenticationFailed`."""
+        """The token's owner and the token. Raises `AuthenticationFailed`."""
         try:
             row = tokens.use(secret=token.decode("latin-1"), now=timezone.now())
-        except tokens.Unusable as fault:
+        except tokens.UnusableToken as fault:
             raise exceptions.AuthenticationFailed(str(fault), code=fault.code) from None
         return row.user, row
 
@@ -51,17 +51,17 @@ def _require_scope(token: ApiToken, wanted: Collection[Scope]) -> None:
 
 
 def require_split(token: object, split_name: str) -> None:
-    """Raise `PermissionDenied` for a token that is good for another split alone."""
+    """Raise `PermissionDenied` for a token that is limited to another split."""
     only = split_of(token)
     if only is not None and only != split_name:
         raise exceptions.PermissionDenied(
-            f"The token is good for the split {only!r} alone; expected that, found {split_name[:80]!r}.",
+            f"The token is valid for the split {only!r} only; expected that, found {split_name[:80]!r}.",
             code="token-split",
         )
 
 
 def split_of(token: object) -> str | None:
-    """The only split that a request's token is good for; None without such a limit."""
+    """The only split that a request's token is valid for; None without such a limit."""
     return token.split_id if isinstance(token, ApiToken) else None
 
 
@@ -72,7 +72,7 @@ class BearerScheme(OpenApiAuthenticationExtension):
     name = "bearer"
 
     def get_security_definition(self, auto_schema: Any) -> dict[str, str]:
-        """The scheme as OpenAPI names it."""
+        """The scheme in OpenAPI's terms."""
         return {
             "type": "http",
             "scheme": "bearer",

@@ -1,62 +1,61 @@
-"""The shapes of comparisons."""
+"""Serializers of comparisons."""
 
 from typing import Any
 
 from drf_spectacular.utils import extend_schema_field
 from rest_framework import serializers
 
-from evaluator import Difference, published, sentences
-from evaluator.protocol import SCORE_NAMES
-from leaderboard.api.serializers import EntrySerializer
-from leaderboard.comparisons import Compared, Pair
+from evaluator import Difference, published
+from evaluator.tables import sentences
+from leaderboard.api.serializers import DECIMALS, EDITION, SPLIT, EntrySerializer, NamedSerializer
+from leaderboard.scoring.comparisons import Compared, Pair
 
 
 class DifferenceSerializer(serializers.Serializer[Difference]):
-    """First minus second in one column; below 0 the first is better."""
+    """First minus second in one column; negative: the first is better."""
 
-    difference = serializers.FloatField(help_text="In the column's unit.")
+    difference = serializers.FloatField(help_text="Difference in the column's unit.")
     low = serializers.FloatField(
         allow_null=True,
-        help_text="Lower end of its 95 % confidence interval; null: too few recordings, or not told of "
-        "this pair.",
+        help_text="Lower end of the 95 % confidence interval; null: too few recordings, or withheld.",
     )
     high = serializers.FloatField(
         allow_null=True,
-        help_text="Upper end of its 95 % confidence interval; null: too few recordings, or not told of "
-        "this pair.",
+        help_text="Upper end of the 95 % confidence interval; null: too few recordings, or withheld.",
     )
     p = serializers.FloatField(
         allow_null=True,
-        help_text="Of the two-sided cluster sign-flip test, four decimals; null: too few recordings, not "
-        "told of this pair, or the ground truth is hidden, and `p_below` says what is told.",
+        help_text="p-value of the two-sided cluster sign-flip test, four decimals; null: too few recordings, "
+        "withheld, or the ground truth is hidden and only `p_below` is published.",
     )
     p_below = serializers.FloatField(
         allow_null=True,
         help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few recordings, "
-        "or not told of this pair.",
+        "or withheld.",
     )
     n_effective = serializers.FloatField(
         allow_null=True,
-        help_text="Effective number of recordings in this column; below 8 there is no interval and no p.",
+        help_text="Effective number of recordings in this column; below 8 there is no confidence interval "
+        "and no p.",
     )
     is_significant = serializers.BooleanField(
-        help_text="Whether p, as it was computed, is below 0.05; of ten columns and several pairs, some are "
-        "by chance."
+        help_text="Whether p is below 0.05, uncorrected: among many columns and several pairs expect false "
+        "positives."
     )
     detectable_difference = serializers.SerializerMethodField(
-        help_text="The smallest difference that four of five such tests would have found (80 % power); null: "
-        "this one is significant, or there are too few recordings."
+        help_text="The smallest difference that the test detects with 80 % power; null: this one is "
+        "significant, or there are too few recordings."
     )
     sentence = serializers.SerializerMethodField(
-        help_text="What it means, in words. Its p is of this column and pair alone, whatever else one asks."
+        help_text="The result as a sentence. Its p is uncorrected, for this column and pair alone."
     )
 
     def get_detectable_difference(self, found: Difference) -> float | None:
-        """Rounded as differences are."""
+        """Rounded like the differences."""
         return published(found.detectable_difference, decimals=self.context["decimals"])
 
     def get_sentence(self, found: Difference) -> str:
-        """Of this column."""
+        """The sentence for this column."""
         return sentences.sentence(
             **self.context["names"],
             name=self.field_name or "",
@@ -66,57 +65,55 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         )
 
 
-class DifferencesSerializer(serializers.Serializer[Any]):
-    """A difference for each of the ten names."""
+class DifferencesSerializer(NamedSerializer):
+    """A difference for each score."""
 
-    def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
-        """One nullable difference for each."""
-        text = "Null: one of the two has no value in this column."
-        return {name: DifferenceSerializer(allow_null=True, help_text=text) for name in SCORE_NAMES}
+    def child(self, name: str, **options: Any) -> DifferenceSerializer:
+        """The difference of one score."""
+        text = "Null: one of the two has no score in this column."
+        return DifferenceSerializer(allow_null=True, help_text=text, **options)
 
 
 class PairSerializer(serializers.Serializer[Pair]):
-    """Two of the methods."""
+    """A pair of the methods."""
 
-    first = serializers.UUIDField(source="first.method_id", help_text="Id of the one method.")
-    second = serializers.UUIDField(source="second.method_id", help_text="Id of the other.")
+    first = serializers.UUIDField(source="first.method_id", help_text="Id of the first method.")
+    second = serializers.UUIDField(source="second.method_id", help_text="Id of the second method.")
     differences = serializers.SerializerMethodField(
-        help_text="First minus second, by column; null while a worker computes it."
+        help_text="First minus second, by score name; null until computed."
     )
     sentence = serializers.SerializerMethodField(
-        help_text="What the difference in MiD means, in words; empty while it is computed."
+        help_text="The difference in MiD as a sentence; empty until computed."
     )
     withheld = serializers.CharField(
         allow_blank=True,
-        help_text="Why nothing but the difference of the published values is told of these two; else empty.",
+        help_text="Why only the difference of the published scores is available for this pair; else empty.",
     )
 
     @extend_schema_field(DifferencesSerializer(allow_null=True))
     def get_differences(self, pair: Pair) -> dict[str, Any] | None:
-        """All ten names, once they are computed."""
+        """All scores, once computed."""
         if pair.differences is None:
             return None
-        found = {name: pair.differences.get(name) for name in SCORE_NAMES}
+        found = {name: pair.differences.get(name) for name in pair.first.scores}
         names = {"first": pair.first.method, "second": pair.second.method}
         context = {"names": names, "decimals": pair.first.decimals, "withheld": pair.withheld}
         return dict(DifferencesSerializer(found, context=context).data)
 
     def get_sentence(self, pair: Pair) -> str:
-        """Of the overall MiD."""
+        """The sentence for the overall MiD."""
         return pair.sentence()
 
 
 class ComparedSerializer(serializers.Serializer[Compared]):
     """Two to five methods of one board side by side."""
 
-    split = serializers.CharField(source="split.name", help_text="Name of the split.")
-    edition = serializers.IntegerField(source="edition.number", help_text="Number of the edition.")
-    decimals = serializers.IntegerField(
-        source="edition.decimals", help_text="With how many decimals the edition publishes."
-    )
+    split = serializers.CharField(source="split.name", help_text=SPLIT)
+    edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
+    decimals = serializers.IntegerField(source="edition.decimals", help_text=DECIMALS)
     is_complete = serializers.BooleanField(
-        help_text="Whether every pair is computed; if not, ask again after Retry-After seconds."
+        help_text="Whether every pair is computed; if not, repeat the request after Retry-After seconds."
     )
-    reason = serializers.CharField(help_text="Why there are no intervals, where there are none.")
-    entries = EntrySerializer(many=True, help_text="The methods' rows, in the order asked for.")
-    pairs = PairSerializer(many=True, help_text="Every two of them.")
+    reason = serializers.CharField(help_text="Why there are no confidence intervals, if there are none.")
+    entries = EntrySerializer(many=True, help_text="The methods' rows, in the requested order.")
+    pairs = PairSerializer(many=True, help_text="Every pair of them.")

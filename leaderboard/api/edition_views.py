@@ -1,4 +1,4 @@
-"""Editions over the API: history for everybody, progress and preview for maintainers."""
+"""Editions: history for everybody, progress and preview for maintainers."""
 
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema
@@ -7,36 +7,35 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import preview, rescoring
-from leaderboard.api import listing
-from leaderboard.api.serializers import (
+from leaderboard.api import pagination
+from leaderboard.api.edition_serializers import (
     EditionSerializer,
-    ErrorSerializer,
     PreviewSerializer,
     PublicationSerializer,
     RescoringSerializer,
 )
+from leaderboard.api.schema import errors
+from leaderboard.editions import corrections, preview
 from leaderboard.models import Edition, Publication, Split
 
-NOT_FOUND = {(404, "application/problem+json"): ErrorSerializer}
 EDITIONS = Edition.objects.select_related("split__published_edition", "ground_truth")
 
 
 class EditionsView(APIView):
-    """Every edition that was ever published."""
+    """All editions that were ever published."""
 
     permission_classes = [AllowAny]
 
     @extend_schema(
         operation_id="list_editions",
-        parameters=listing.PARAMETERS,
-        responses={200: EditionSerializer(many=True), **NOT_FOUND},
+        parameters=pagination.PARAMETERS,
+        responses={200: EditionSerializer(many=True), **errors(404)},
     )
     def get(self, request: Request, split: str) -> Response:
-        """The newest first, a page at a time; `Link` names the next page."""
+        """Published editions, newest first, in pages; `Link` names the next page."""
         get_object_or_404(Split, pk=split)
         rows = EDITIONS.filter(split=split).exclude(published_at=None)
-        page = listing.page_of(rows, request, order="-number")
+        page = pagination.page_of(rows, request, order="-number")
         data = EditionSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says
         return Response(data, headers=page.headers)
 
@@ -48,28 +47,28 @@ class ChangelogView(APIView):
 
     @extend_schema(
         operation_id="changelog",
-        parameters=listing.PARAMETERS,
-        responses={200: PublicationSerializer(many=True), **NOT_FOUND},
+        parameters=pagination.PARAMETERS,
+        responses={200: PublicationSerializer(many=True), **errors(404)},
     )
     def get(self, request: Request, split: str) -> Response:
-        """Which edition became the board, when and why; the newest first, a page at a time."""
+        """Which edition was published when and why; newest first, in pages."""
         get_object_or_404(Split, pk=split)
         rows = Publication.objects.filter(split=split).select_related("edition", "replaced")
-        page = listing.page_of(rows, request, order="-at")
+        page = pagination.page_of(rows, request, order="-at")
         data = PublicationSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says
         return Response(data, headers=page.headers)
 
 
 class ProgressView(APIView):
-    """How far the re-scoring of an edition is; for maintainers."""
+    """Progress of the re-scoring of an edition; for maintainers."""
 
     permission_classes = [IsAdminUser]
 
-    @extend_schema(operation_id="edition_progress", responses={200: RescoringSerializer, **NOT_FOUND})
+    @extend_schema(operation_id="edition_progress", responses={200: RescoringSerializer, **errors(404)})
     def get(self, request: Request, split: str, number: int) -> Response:
-        """Counts, rate and time left."""
+        """Counts, rate and remaining time. For maintainers."""
         edition = get_object_or_404(EDITIONS, split=split, number=number)
-        return Response(RescoringSerializer(rescoring.progress(edition)).data)
+        return Response(RescoringSerializer(corrections.progress(edition)).data)
 
 
 class PreviewView(APIView):
@@ -77,8 +76,8 @@ class PreviewView(APIView):
 
     permission_classes = [IsAdminUser]
 
-    @extend_schema(operation_id="edition_preview", responses={200: PreviewSerializer, **NOT_FOUND})
+    @extend_schema(operation_id="edition_preview", responses={200: PreviewSerializer, **errors(404)})
     def get(self, request: Request, split: str, number: int) -> Response:
-        """Totals, and one row for each submission."""
+        """Totals, and one row for each submission. For maintainers."""
         edition = get_object_or_404(EDITIONS, split=split, number=number)
         return Response(PreviewSerializer(preview.preview(edition)).data)

@@ -1,4 +1,4 @@
-"""Errors of the API, in one shape: RFC 9457 `application/problem+json`."""
+"""Exceptions of the API, and how each becomes a problem document (RFC 9457 `application/problem+json`)."""
 
 from typing import Any, NoReturn
 
@@ -12,25 +12,29 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
-from leaderboard import (
-    admissions,
-    comparisons,
-    filters,
-    idempotency,
-    outages,
-    problem_codes,
-    questions,
-    quotas,
-    rates,
-    receipts,
-    rescoring,
-    standings,
-    submissions,
-)
+from leaderboard.api.throttling import MalformedTokenThrottle, UnauthorizedThrottle
+from leaderboard.boards import boards, filters
+from leaderboard.errors import outages, problem_codes
+from leaderboard.errors.refusals import NotMaintainer, Refused
+from leaderboard.ops import rate_limits
+from leaderboard.quotas import admissions, quotas
+from leaderboard.scoring import comparisons, questions
+from leaderboard.submissions import idempotency, receipts, submissions
+
+# Codes of authentication that follow a query for the token.
+LOOKED_UP = {
+    "token-unknown",
+    "token-expired",
+    "token-revoked",
+    "token-scope",
+    "token-split",
+    "account-closed",
+}
+UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
 
 
 class BadValue(Exception):
-    """A parameter of the request has a value that it cannot have."""
+    """An invalid value of a query parameter."""
 
     def __init__(self, code: str, name: str, found: str, expected: str) -> None:
         super().__init__(f"The parameter '{name}' is {found[:60]!r}; expected {expected}.")
@@ -38,17 +42,24 @@ class BadValue(Exception):
         self.where = name
 
 
-def edition_number(text: str) -> int:
-    """A parameter that names an edition. Raises `BadValue`."""
-    if not (text.isascii() and text.isdecimal() and len(text) < 10):
-        raise BadValue("bad-edition", "edition", text, "the number of an edition")
+def whole_number(text: str, *, name: str, code: str, limits: range, expected: str) -> int:
+    """A parameter that is a whole number within limits. Raises `BadValue`."""
+    if not (text.isascii() and text.isdecimal() and len(text) < 10 and int(text) in limits):
+        raise BadValue(code, name, text, expected)
     return int(text)
+
+
+def edition_number(text: str) -> int:
+    """The parameter `edition`. Raises `BadValue`."""
+    return whole_number(
+        text, name="edition", code="bad-edition", limits=range(10**9), expected="the number of an edition"
+    )
 
 
 def problem(
     *, status: int, code: str, detail: str, where: str = "", headers: dict[str, str] | None = None
 ) -> Response:
-    """One problem as a response."""
+    """The response with one problem."""
     return Response(
         problem_codes.document(status=status, code=code, detail=detail, where=where),
         status=status,
@@ -58,8 +69,14 @@ def problem(
 
 
 def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | None:
-    """Translate what the verbs raise; everything else keeps the framework's status."""
-    return _outage(exc) or _of_a_verb(exc) or _of_the_request(exc) or _of_the_framework(exc, context)
+    """The problem document of an exception; one failed authentication too many from an address is a 429."""
+    if isinstance(exc, UNAUTHORIZED):
+        # Such a request ends before the throttles of its view are asked.
+        is_known = exc.get_codes() in LOOKED_UP
+        throttle = UnauthorizedThrottle() if is_known else MalformedTokenThrottle()
+        if not throttle.allow_request(context["request"], context["view"]):
+            exc = exceptions.Throttled(throttle.wait())
+    return _outage(exc) or _domain_error(exc) or _bad_request(exc) or _framework_error(exc, context)
 
 
 def _outage(exc: Exception) -> Response | None:
@@ -69,12 +86,11 @@ def _outage(exc: Exception) -> Response | None:
     return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)
 
 
-# What verbs raise beside `submissions.Refused`: status, code, and the input at fault.
-OF_VERBS: dict[type[Exception], tuple[int, str, str]] = {
-    standings.UnknownColumn: (400, "unknown-column", "sort"),
-    standings.BadMoment: (400, "bad-moment", "at"),
-    rescoring.Refused: (409, "edition-refused", ""),
-    rescoring.NotMaintainer: (403, "not-maintainer", ""),
+# What the domain raises besides `Refused`: status, code, and the input at fault.
+DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
+    boards.UnknownColumn: (400, "unknown-column", "sort"),
+    boards.BadTime: (400, "bad-moment", "at"),
+    NotMaintainer: (403, "not-maintainer", ""),
     idempotency.BadKey: (400, "bad-idempotency-key", "Idempotency-Key"),
     idempotency.KeyReused: (409, "idempotency-key-reused", "Idempotency-Key"),
     comparisons.BadComparison: (400, comparisons.BadComparison.code, "m"),
@@ -83,11 +99,11 @@ OF_VERBS: dict[type[Exception], tuple[int, str, str]] = {
 }
 
 
-def _of_a_verb(exc: Exception) -> Response | None:
+def _domain_error(exc: Exception) -> Response | None:
     match exc:
-        case submissions.Refused():
+        case Refused():
             status = 413 if isinstance(exc, submissions.TooLarge) else 422
-            if exc.code in {"split-not-open", "split-closed"}:
+            if exc.code in {"split-not-open", "split-closed", "edition-refused"}:
                 status = 409
             if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):
                 status = 403
@@ -99,14 +115,14 @@ def _of_a_verb(exc: Exception) -> Response | None:
         case receipts.NoReceipt():
             status = 404 if exc.code == "edition-unknown" else 409
             return problem(status=status, code=exc.code, detail=str(exc))
-    if type(exc) not in OF_VERBS:
+    if type(exc) not in DOMAIN_ERRORS:
         return None
-    status, code, where = OF_VERBS[type(exc)]
+    status, code, where = DOMAIN_ERRORS[type(exc)]
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
 def _not_yet(exc: quotas.QuotaExceeded | questions.TooManyWaiting) -> Response:
-    """What is taken later."""
+    """A request that will be accepted later."""
     if isinstance(exc, quotas.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:
@@ -115,8 +131,8 @@ def _not_yet(exc: quotas.QuotaExceeded | questions.TooManyWaiting) -> Response:
     return problem(status=429, code=exc.code, detail=str(exc), where=exc.field, headers=headers)
 
 
-def _of_the_request(exc: Exception) -> Response | None:
-    """What is wrong with a request before any verb has seen it."""
+def _bad_request(exc: Exception) -> Response | None:
+    """Problems of a request that no domain function has seen yet."""
     if isinstance(exc, BadValue):
         return problem(status=400, code=exc.code, detail=str(exc), where=exc.where)
     if isinstance(exc, RequestDataTooBig):
@@ -124,12 +140,14 @@ def _of_the_request(exc: Exception) -> Response | None:
         return problem(status=413, code="too-large", detail=sentence)
     if isinstance(exc, SuspiciousOperation | BadRequest | UnreadablePostError):
         # Its own text is about Django's settings.
-        sentence = "The request is malformed, or was broken off; expected it whole, as the API describes it."
+        sentence = (
+            "The request is malformed or incomplete; expected a complete request, as the API describes it."
+        )
         return problem(status=400, code="bad-request", detail=sentence)
     return None
 
 
-def _of_the_framework(exc: Exception, context: dict[str, Any]) -> Response | None:
+def _framework_error(exc: Exception, context: dict[str, Any]) -> Response | None:
     match exc:
         case Http404():
             exc = exceptions.NotFound("There is nothing at this address that you may see.")
@@ -147,7 +165,7 @@ def _of_the_framework(exc: Exception, context: dict[str, Any]) -> Response | Non
 def _sentence(exc: Exception) -> str:
     if isinstance(exc, exceptions.Throttled):
         wait_s: float = getattr(exc, "wait", None) or 0
-        return rates.refusal(wait_s)
+        return rate_limits.refusal(wait_s)
     detail = getattr(exc, "detail", "")
     text = (
         str(detail)
@@ -158,11 +176,11 @@ def _sentence(exc: Exception) -> str:
 
 
 class NowhereView(APIView):
-    """Every address below /api/ that is none: answered in the shape of the others."""
+    """Any other path below /api/: a 404 as a problem document, not as a page."""
 
     permission_classes = [AllowAny]
     schema = None
 
     def initial(self, request: Request, *args: Any, **kwargs: Any) -> NoReturn:
-        """Before anything is asked of the request: whoever asks, there is nothing here."""
+        """Answer before authentication and throttling."""
         raise Http404

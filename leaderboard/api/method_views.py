@@ -1,4 +1,4 @@
-"""Methods over the API: what is said of them, and who sees them."""
+"""Methods: their details and their visibility."""
 
 from datetime import UTC, datetime
 from typing import Any, cast
@@ -12,36 +12,35 @@ from rest_framework import exceptions
 from rest_framework.permissions import IsAuthenticatedOrReadOnly
 from rest_framework.request import Request
 from rest_framework.response import Response
+from rest_framework.utils.serializer_helpers import ReturnDict
 from rest_framework.views import APIView
 
-from leaderboard import methods, visibility
-from leaderboard.api import listing
+from leaderboard.api import pagination
 from leaderboard.api.authentication import split_of
-from leaderboard.api.bodies import DocumentParser
-from leaderboard.api.method_shapes import (
+from leaderboard.api.exceptions import BadValue
+from leaderboard.api.method_serializers import (
     ForeseenSerializer,
     MethodChangesSerializer,
     MethodSerializer,
     ShowSerializer,
 )
-from leaderboard.api.problems import BadValue
-from leaderboard.api.serializers import ErrorSerializer
+from leaderboard.api.parsers import LimitedJSONParser
+from leaderboard.api.schema import errors
+from leaderboard.boards import visibility_preview
+from leaderboard.errors.refusals import Refused
+from leaderboard.methods import methods, visibility
 from leaderboard.models import Method, User, Visibility
-from leaderboard.texts import Refused
-
-NOT_FOUND = {(404, "application/problem+json"): ErrorSerializer}
-REFUSED = {**NOT_FOUND, (422, "application/problem+json"): ErrorSerializer}
 
 
-def _shape(method: Method, request: Request) -> dict[str, Any]:
-    return cast("dict[str, Any]", MethodSerializer(method, context={"viewer": request.user}).data)
+def _data(method: Method, request: Request) -> ReturnDict[str, Any]:
+    return MethodSerializer(method, context={"viewer": request.user}).data
 
 
 def _own(request: Request, method_id: UUID) -> Method:
-    """One of one's own team's methods; with a token for one split none, since a method is on every split."""
+    """A method of the user's team. Tokens for one split are refused, since a method is on every split."""
     if split_of(request.auth) is not None:
         raise exceptions.PermissionDenied(
-            "The token is good for one split alone; expected one for every split, since methods are on all.",
+            "The token is valid for one split only; expected one for all splits, since methods are on all.",
             code="token-split",
         )
     return get_object_or_404(Method.objects.of(request.user).select_related("team"), pk=method_id)
@@ -54,42 +53,42 @@ def _fields(request: Request) -> dict[str, Any]:
 
 
 class MethodsView(APIView):
-    """One's own team's methods."""
+    """The methods of your team."""
 
     @extend_schema(
         operation_id="list_methods",
-        parameters=listing.PARAMETERS,
-        responses={200: MethodSerializer(many=True), (400, "application/problem+json"): ErrorSerializer},
+        parameters=pagination.PARAMETERS,
+        responses={200: MethodSerializer(many=True), **errors(400)},
     )
     def get(self, request: Request) -> Response:
-        """Every one of them, by name, a page at a time; `Link` names the next page."""
+        """Your team's methods by name, in pages; `Link` names the next page."""
         rows = Method.objects.of(request.user).select_related("team")
-        page = listing.page_of(rows, request, order="name")
-        return Response([_shape(row, request) for row in page.rows], headers=page.headers)
+        page = pagination.page_of(rows, request, order="name")
+        return Response([_data(row, request) for row in page.rows], headers=page.headers)
 
 
 class MethodView(APIView):
     """One method."""
 
-    parser_classes = [DocumentParser]
+    parser_classes = [LimitedJSONParser]
     permission_classes = [IsAuthenticatedOrReadOnly]
 
-    @extend_schema(operation_id="method", responses={200: MethodSerializer, **NOT_FOUND})
+    @extend_schema(operation_id="method", responses={200: MethodSerializer, **errors(404)})
     def get(self, request: Request, method_id: UUID) -> Response:
-        """What is said of it; of an anonymous one that is not one's own, what it shows."""
+        """A method and its details; of another team's anonymous method only what is public."""
         rows = Method.objects.visible_to(request.user).select_related("team")
-        return Response(_shape(get_object_or_404(rows, pk=method_id), request))
+        return Response(_data(get_object_or_404(rows, pk=method_id), request))
 
     @extend_schema(
         operation_id="edit_method",
         request=MethodChangesSerializer,
-        responses={200: MethodSerializer, **REFUSED},
+        responses={200: MethodSerializer, **errors(404, 422)},
     )
     def patch(self, request: Request, method_id: UUID) -> Response:
-        """Say something else of one's own method; what the body does not name stays, null takes back."""
+        """Edit a method of your team: fields left out stay as they are, null clears a field."""
         found = _own(request, method_id)
         edited = methods.edit(method=found, changes=_fields(request), actor=cast("User", request.user))
-        return Response(_shape(edited, request))
+        return Response(_data(edited, request))
 
 
 AS = OpenApiParameter(
@@ -97,50 +96,49 @@ AS = OpenApiParameter(
     str,
     required=True,
     enum=[Visibility.ANONYMOUS, Visibility.PUBLIC],
-    description="How it would be shown.",
+    description="The visibility to preview.",
 )
 
 
 class VisibilityView(APIView):
-    """Who sees a method."""
+    """The visibility of a method."""
 
-    parser_classes = [DocumentParser]
+    parser_classes = [LimitedJSONParser]
 
     @extend_schema(
         operation_id="foresee_method",
         parameters=[AS],
-        responses={200: ForeseenSerializer, (400, "application/problem+json"): ErrorSerializer, **REFUSED},
+        responses={200: ForeseenSerializer, **errors(400, 404, 422)},
     )
     def get(self, request: Request, method_id: UUID) -> Response:
-        """What everybody would see of one's own method if it were shown: its rows, and whose ranks change."""
+        """Preview the publication of your method: its public rows, and the ranks that would change."""
         found, now = _own(request, method_id), timezone.now()
         wanted = request.query_params.get("as", "")
         if wanted not in (Visibility.ANONYMOUS, Visibility.PUBLIC):
             raise BadValue("bad-visibility", "as", wanted, "ANONYMOUS or PUBLIC")
         visibility.require_possible(found, visibility=wanted, reveal_at=None, now=now)
-        return Response(ForeseenSerializer(visibility.preview(method=found, visibility=wanted, now=now)).data)
+        foreseen = visibility_preview.preview(method=found, visibility=wanted, now=now)
+        return Response(ForeseenSerializer(foreseen).data)
 
     @extend_schema(
-        operation_id="show_method", request=ShowSerializer, responses={200: MethodSerializer, **REFUSED}
+        operation_id="show_method",
+        request=ShowSerializer,
+        responses={200: MethodSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, method_id: UUID) -> Response:
-        """Show one's own method to everybody, anonymous or public. Cannot be taken back: needs `confirm`."""
-        found = _own(request, method_id)
-        fields = _fields(request)
+        """Publish your method, anonymous or public. Cannot be undone: needs `confirm`."""
+        found, fields = _own(request, method_id), _fields(request)
         if fields.get("confirm") is not True:
-            raise Refused(
-                "not-confirmed",
-                "Showing a method cannot be taken back; expected the field 'confirm' to be true.",
-                field="confirm",
-            )
-        shown = visibility.change(
+            sentence = "Publishing a method cannot be undone; expected the field 'confirm' to be true."
+            raise Refused("not-confirmed", sentence, field="confirm")
+        published = visibility.change(
             method=found,
             visibility=str(fields.get("visibility", "")),
             reveal_at=_moment(fields.get("reveal_at")),
             actor=cast("User", request.user),
             now=timezone.now(),
         )
-        return Response(_shape(shown, request))
+        return Response(_data(published, request))
 
 
 def _moment(value: object) -> datetime | None:

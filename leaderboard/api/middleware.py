@@ -1,7 +1,7 @@
-"""Headers of every answer of the API: what is left of the limits, and whether it is known already.
+"""Headers of every response of the API: rate limits and ETag.
 
-`RateLimit-Policy` and `RateLimit` are those of draft-ietf-httpapi-ratelimit-headers, with a limit for each
-of the throttles that counted the request.
+`RateLimit-Policy` and `RateLimit` follow draft-ietf-httpapi-ratelimit-headers, with one limit for each
+throttle that counted the request.
 """
 
 import hashlib
@@ -10,44 +10,44 @@ from collections.abc import Callable
 
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
-from leaderboard.api.throttles import Counted, counted
-from leaderboard.keeping import is_known
+from leaderboard.api.throttling import Throttle, counted
+from leaderboard.http import is_known
 
 Next = Callable[[HttpRequest], HttpResponse]
 
 
 class ApiHeadersMiddleware:
-    """Sets them on what views below /api/ answer."""
+    """Set the headers of responses below /api/."""
 
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Answer, with the headers."""
+        """The response with its headers."""
         response = self._get_response(request)
         if not request.path.startswith("/api/"):
             return response
         response = _conditional(request, response)
-        limits = counted(request)
-        if limits:
-            response["RateLimit-Policy"] = ", ".join(_policy(limit) for limit in limits)
-            response["RateLimit"] = ", ".join(_left(limit) for limit in limits)
+        throttles = counted(request)
+        if throttles:
+            response["RateLimit-Policy"] = ", ".join(_policy(each) for each in throttles)
+            response["RateLimit"] = ", ".join(_remaining(each) for each in throttles)
         return response
 
 
-def _policy(limit: Counted) -> str:
-    return f'"{limit.name}";q={limit.rate.n};w={limit.rate.period_s:g}'
+def _policy(throttle: Throttle) -> str:
+    return f'"{throttle.scope}";q={throttle.rate.n};w={throttle.rate.period_s:g}'
 
 
-def _left(limit: Counted) -> str:
-    # With nothing left: until the next request is let through. Otherwise nobody has to wait.
-    return f'"{limit.name}";r={limit.answer.n_left};t={math.ceil(limit.answer.wait_s)}'
+def _remaining(throttle: Throttle) -> str:
+    n_left = throttle.answer.n_left if throttle.answer else 0
+    return f'"{throttle.scope}";r={n_left};t={math.ceil(throttle.wait() or 0)}'
 
 
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
-    """The answer with its ETag, or 304 for a program that has it already.
+    """The response with an ETag, or 304 if the client has that already.
 
-    What is kept for everybody has one of its own, and a file, which is not made for nothing, says it itself.
+    Cached responses have an ETag of their own, and so have files, which are streamed.
     """
     if request.method not in {"GET", "HEAD"} or response.status_code != 200:
         return response

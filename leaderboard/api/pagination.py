@@ -1,6 +1,6 @@
-"""Lists a page at a time: `limit` rows after the row named by `after`, and a `Link` to the next page.
+"""Pagination by row: `limit` rows after the row named by `after`, and a `Link` to the next page.
 
-A page begins behind a row and not at a number, so rows that come in meanwhile move nothing.
+A page begins after a row and not at an offset, so new rows do not shift it.
 """
 
 from dataclasses import dataclass
@@ -12,33 +12,24 @@ from django.db.models import Model, Q, QuerySet
 from drf_spectacular.utils import OpenApiParameter
 from rest_framework.request import Request
 
-from leaderboard.api.problems import BadValue
-from leaderboard.keeping import NEVER
+from leaderboard.api.exceptions import BadValue, whole_number
+from leaderboard.api.schema import response_header
+from leaderboard.http import NEVER
 
 Row = TypeVar("Row", bound=Model)
 MOST = 100
 
 QUERY = {"limit": NEVER, "after": NEVER}
 PARAMETERS = [
-    OpenApiParameter("limit", int, description=f"Rows of a page, 1 to {MOST}; without it {MOST}."),
-    OpenApiParameter(
-        "Link",
-        str,
-        OpenApiParameter.HEADER,
-        description='The next page, rel="next"; absent on the last one.',
-        response=[200],
-    ),
-    OpenApiParameter(
-        "after",
-        str,
-        description="The page behind this row, as the header `Link` of the page before names it.",
-    ),
+    OpenApiParameter("limit", int, description=f"Rows per page, 1 to {MOST}; default {MOST}."),
+    response_header("Link", str, 'The next page, rel="next"; absent on the last page.', statuses=[200]),
+    OpenApiParameter("after", str, description="The page after this row, as named by the header `Link`."),
 ]
 
 
 @dataclass(frozen=True)
 class Page(Generic[Row]):
-    """Some rows of a list, and the headers that say how it goes on."""
+    """Some rows of a list, and the header that links to the next page."""
 
     rows: list[Row]
     headers: dict[str, str]
@@ -49,7 +40,13 @@ def page_of(rows: QuerySet[Row], request: Request, *, order: str) -> Page[Row]:
 
     Raises `BadValue`.
     """
-    limit = _limit(request)
+    limit = whole_number(
+        request.query_params.get("limit", str(MOST)),
+        name="limit",
+        code="bad-limit",
+        limits=range(1, MOST + 1),
+        expected=f"a whole number from 1 to {MOST}",
+    )
     is_descending, column = order.startswith("-"), order.removeprefix("-")
     sign = "-" if is_descending else ""
     after = request.query_params.get("after")
@@ -64,24 +61,17 @@ def page_of(rows: QuerySet[Row], request: Request, *, order: str) -> Page[Row]:
     found = found[:limit]
     query = request.query_params.copy()
     query["after"] = str(found[-1].pk)
-    # The site's own address, whatever host this was asked of: others may be answered with the same.
+    # The site's own URL, whatever the Host header says: the response may be cached for others.
     address = f"{settings.SITE_URL}{request.path}?{query.urlencode()}"
     return Page(found, {"Link": f'<{address}>; rel="next"'})
 
 
-def _limit(request: Request) -> int:
-    text = request.query_params.get("limit", str(MOST))
-    if not (text.isascii() and text.isdecimal() and len(text) < 5 and 1 <= int(text) <= MOST):
-        raise BadValue("bad-limit", "limit", text, f"a whole number from 1 to {MOST}")
-    return int(text)
-
-
 def _row(rows: QuerySet[Row], after: str) -> Row:
-    refusal = BadValue("bad-cursor", "after", after, "the row that the header Link of the page before names")
+    error = BadValue("bad-cursor", "after", after, "the row that the header Link of the page before names")
     try:
         row = rows.filter(pk=after).first()
     except (ValueError, OverflowError, ValidationError):
-        raise refusal from None
+        raise error from None
     if row is None:
-        raise refusal
+        raise error
     return row

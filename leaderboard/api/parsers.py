@@ -1,4 +1,4 @@
-"""JSON that programs send and get: read so that no document makes the reader fail, written in one form."""
+"""The parser and renderer of JSON: robust against hostile documents, one form for all clients."""
 
 import io
 from collections.abc import Mapping
@@ -9,21 +9,21 @@ from rest_framework.parsers import JSONParser
 from rest_framework.renderers import JSONRenderer
 
 MAX_BYTES: Final = 100_000
-"""Everything that can be said of a method takes a third of it, even with every character escaped."""
+"""All details of a method take a third of it, even with every character escaped."""
 
 
-class TooLarge(exceptions.APIException):
-    """The document is larger than anything that is asked for."""
+class BodyTooLarge(exceptions.APIException):
+    """The document is larger than any that the API expects."""
 
     status_code = 413
     default_code = "too_large"
     default_detail = f"The document is too large; expected at most {MAX_BYTES:,} bytes."
 
 
-class DocumentParser(JSONParser):
-    """JSON as the framework reads it; one that is nested too deeply is malformed like any other.
+class LimitedJSONParser(JSONParser):
+    """JSON as the framework reads it; a document nested too deeply is malformed like any other.
 
-    Its size is limited as well: as Python's objects a document can take thirty times its bytes.
+    Its size is limited: as Python objects a document can take thirty times its bytes.
     """
 
     def parse(
@@ -32,18 +32,18 @@ class DocumentParser(JSONParser):
         media_type: str | None = None,
         parser_context: Mapping[str, Any] | None = None,
     ) -> Any:
-        """The document. Raises `ParseError` or `TooLarge`."""
+        """The document. Raises `ParseError` or `BodyTooLarge`."""
         data = stream.read(MAX_BYTES + 1)
         if len(data) > MAX_BYTES:
-            raise TooLarge
+            raise BodyTooLarge
         try:
             return super().parse(io.BytesIO(data), media_type, parser_context)
         except RecursionError:
             raise exceptions.ParseError("JSON parse error - nested too deeply") from None
 
 
-class DocumentRenderer(JSONRenderer):
-    """JSON in one form, whatever `Accept` says of its indent: one reader's answer is kept for the others."""
+class UniformJSONRenderer(JSONRenderer):
+    """JSON in one form, whatever indent `Accept` asks for: responses are cached for all clients."""
 
     def get_indent(self, accepted_media_type: str, renderer_context: Mapping[str, Any]) -> None:
-        """None ever."""
+        """Always None."""

@@ -1,4 +1,4 @@
-"""Score receipts over the API: for the submission's own team."""
+"""Score receipts, for the submission's own team."""
 
 from typing import cast
 
@@ -8,12 +8,12 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import receipts
-from leaderboard.api.problems import edition_number
-from leaderboard.api.receipt_shapes import ReceiptSerializer
-from leaderboard.api.serializers import ErrorSerializer
+from leaderboard.api.exceptions import edition_number
+from leaderboard.api.receipt_serializers import ReceiptSerializer
+from leaderboard.api.schema import errors
 from leaderboard.api.views import visible
 from leaderboard.models import User
+from leaderboard.submissions import receipts
 
 
 class ReceiptView(APIView):
@@ -25,19 +25,16 @@ class ReceiptView(APIView):
             OpenApiParameter(
                 "edition",
                 int,
-                description="Number of a published edition in which the submission is scored; without it, "
-                "the one that is the board.",
+                description="Number of a published edition that scored the submission; default: the current.",
             ),
         ],
         responses={
             200: ReceiptSerializer,
-            (400, "application/problem+json"): ErrorSerializer,
-            (404, "application/problem+json"): ErrorSerializer,
-            (409, "application/problem+json"): ErrorSerializer,
+            **errors(400, 404, 409),
         },
     )
     def get(self, request: Request, submission_id: str) -> Response:
-        """What a submission scored, signed, for its team: check it offline with `tsttc verify`."""
+        """The signed scores of a submission, for its team; verify them offline with `tsttc verify`."""
         text = request.query_params.get("edition")
         number = edition_number(text) if text is not None else None
         rows = visible(request).filter(method__team__memberships__user=cast("User", request.user))

@@ -1,38 +1,102 @@
-"""What the schema says of every operation alike: errors that any may give, and headers that all have."""
+"""What all operations share in the schema: errors and headers, path parameters, examples."""
 
 from collections.abc import Mapping
 from typing import Any
 
-from leaderboard import problem_codes
-from leaderboard.api import descriptions
+from drf_spectacular.utils import OpenApiParameter
+
+from evaluator.metrics.protocol import known_names
+from leaderboard.api.serializers import ErrorSerializer
+from leaderboard.errors import problem_codes
+from leaderboard.methods.details import DETAILS
 
 Node = dict[str, Any]
 
 PROBLEM: Node = {problem_codes.MEDIA_TYPE: {"schema": {"$ref": "#/components/schemas/Error"}}}
-# Whatever is asked, and whoever asks: name, description.
+# Answers of every operation: status, name, description.
 ALWAYS: Mapping[str, tuple[str, str]] = {
     "400": ("Malformed", "The request is malformed."),
-    "401": ("SignInFailed", "The sign-in is not valid, or there is none where one is needed."),
+    "401": ("SignInFailed", "The credentials are invalid, or missing where an account is needed."),
     "403": ("Forbidden", "The account or the token may not do this."),
     "404": ("NotFound", "There is nothing at this address that you may see."),
-    "406": ("NotAcceptable", "The header Accept asks for a form that this address does not have."),
-    "429": ("TooMany", "Too many requests in a short time; Retry-After says when to come back."),
-    "503": ("Away", "Something that we need does not answer; Retry-After says when to ask again."),
+    "406": ("NotAcceptable", "The header Accept asks for a format that this path does not offer."),
+    "429": ("TooMany", "Too many requests in a short time; repeat after Retry-After seconds."),
+    "503": ("Away", "A service that we need does not answer; repeat after Retry-After seconds."),
 }
 WITH_A_BODY: Mapping[str, tuple[str, str]] = {
     "413": ("TooLarge", "The body is too large."),
-    "415": ("UnknownBody", "The body's type is not taken here."),
+    "415": ("UnknownBody", "The content type of the body is not accepted."),
 }
 HEADERS: Mapping[str, str] = {
-    "RateLimit-Policy": "The limits that hold for whoever asks: name, requests (q), seconds (w).",
-    "RateLimit": "What is left of them: name, requests (r), seconds until there are more (t).",
-    "Retry-After": "Seconds until asking again is worth it.",
+    "RateLimit-Policy": "The limits of the client: name, requests (q), seconds (w).",
+    "RateLimit": "What remains of them: name, requests (r), seconds until there are more (t).",
+    "Retry-After": "Seconds after which to repeat the request.",
 }
 RETRY = {"429", "503"}
+PATH_PARAMETERS: Mapping[str, str] = {
+    "split": "Name of the split.",
+    "number": "Number of the edition.",
+    "submission_id": "Id of the submission.",
+    "method_id": "Id of the method.",
+}
+# What a value looks like: by the format of its field, else by the field's type and name.
+FORMATS: Mapping[str, str] = {
+    "uuid": "0f8b1c2d-3e4f-4a5b-8c6d-7e8f9a0b1c2d",
+    "date-time": "2026-11-21T10:00:00Z",
+    "uri": "https://leaderboard.example.org/",
+}
+DIGEST = "sha256:" + "5de94cec" * 8
+EXAMPLES: Mapping[str, Mapping[str, Any]] = {
+    "string": {
+        "split": "test",
+        "protocol": "tsttc-1",
+        "ground_truth": DIGEST,
+        "manifest": DIGEST,
+        "digest": DIGEST,
+        "method": "Deep Scale",
+        "team": "Owls",
+        "description": "Scale regression on six frames.",
+        "paper_url": "https://example.org/paper",
+        "code_url": "https://example.org/code",
+        "date": "2026-11-21",
+        "sort": "rank",
+        "reason": "Corrected labels of three recordings.",
+        "type": "https://leaderboard.example.org/docs/api/#problem-quota-exceeded",
+        "code": "quota-exceeded",
+        "where": "/predictions/12",
+        "note": "learning rate 1e-4",
+        "commit": "0a1b2c3",
+    },
+    "integer": {
+        "number": 1,
+        "edition": 3,
+        "n_sequences": 28600,
+        "n_recordings": 120,
+        "size_bytes": 600_000,
+        "status": 429,
+    },
+    "number": {
+        **dict.fromkeys(known_names(), 15.03),
+        "estimate_s": 12.5,
+        "rate_per_s": 3.6,
+    },
+    "object": {"truncated": {"20": 3}},
+}
+DETAIL_EXAMPLES: Mapping[str, Any] = {detail.name: detail.example for detail in DETAILS}
+
+
+def errors(*statuses: int) -> dict[tuple[int, str], type[ErrorSerializer]]:
+    """The problem documents that an operation answers with these statuses, for `extend_schema`."""
+    return {(status, problem_codes.MEDIA_TYPE): ErrorSerializer for status in statuses}
+
+
+def response_header(name: str, of: type, description: str, *, statuses: list[int | str]) -> OpenApiParameter:
+    """A header of an operation's responses with these statuses, for `extend_schema`."""
+    return OpenApiParameter(name, of, OpenApiParameter.HEADER, description=description, response=statuses)
 
 
 def complete(result: Node, generator: Any, **kwargs: Any) -> Node:
-    """A drf-spectacular hook: give every operation the answers and headers that all of them have."""
+    """A drf-spectacular hook: add the answers, headers and examples that no view declares."""
     components = result["components"]
     components["headers"] = {
         name: {"description": about, "schema": {"type": "string"}} for name, about in HEADERS.items()
@@ -45,21 +109,28 @@ def complete(result: Node, generator: Any, **kwargs: Any) -> Node:
         for operation in path.values():
             _complete(operation["responses"], has_body="requestBody" in operation)
             for parameter in operation.get("parameters", []):
-                _describe(parameter, descriptions.PARAMETERS.get(parameter["name"]))
-    for shape, node in result["components"]["schemas"].items():
-        for name, field in node.get("properties", {}).items():
-            _describe(field, descriptions.of(shape, name))
+                _describe_path_parameter(parameter)
+    for schema in components["schemas"].values():
+        for name, field in schema.get("properties", {}).items():
+            _add_example(field, name)
     return result
 
 
-def _describe(node: Node, said: descriptions.Said | None) -> None:
-    """What the serializer or the view says stays."""
-    if said is None:
-        return
-    node.setdefault("description", said.text)
-    if said.example is not None:
-        node = node.get("schema", node)
-        node.setdefault("examples", [said.example])
+def _describe_path_parameter(parameter: Node) -> None:
+    """Path parameters have no serializer and no `OpenApiParameter` that could describe them."""
+    if parameter["in"] == "path":
+        parameter["description"] = PATH_PARAMETERS[parameter["name"]]
+        _add_example(parameter["schema"], parameter["name"])
+
+
+def _add_example(field: Node, name: str) -> None:
+    if name in DETAIL_EXAMPLES:
+        field["examples"] = [DETAIL_EXAMPLES[name]]
+    types = field.get("type", [])
+    for each in [types] if isinstance(types, str) else types:
+        example = FORMATS.get(field.get("format", "")) or EXAMPLES.get(each, {}).get(name)
+        if example is not None and "enum" not in field:
+            field["examples"] = [example]
 
 
 def _headers(status: str) -> Node:
@@ -68,7 +139,7 @@ def _headers(status: str) -> Node:
 
 
 def _complete(responses: Node, *, has_body: bool) -> None:
-    """What an operation says itself stays, with the headers; the rest is a reference."""
+    """Add headers to the declared answers, and references to the shared ones."""
     shared = {**ALWAYS, **(WITH_A_BODY if has_body else {})}
     for status, response in responses.items():
         response.setdefault("headers", {}).update(_headers(status))

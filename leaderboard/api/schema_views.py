@@ -10,6 +10,9 @@ from drf_spectacular.views import SpectacularAPIView
 from rest_framework.permissions import AllowAny
 from rest_framework.renderers import BaseRenderer
 from rest_framework.request import Request
+from rest_framework.response import Response
+
+from leaderboard.api.parsers import UniformJSONRenderer
 
 
 class SchemaView(SpectacularAPIView):
@@ -26,6 +29,11 @@ class SchemaView(SpectacularAPIView):
             content_type=f"{renderer.media_type}; charset=utf-8",
             headers={"Content-Disposition": f'inline; filename="tsttc-openapi.{renderer.format}"'},
         )
+
+    def handle_exception(self, exc: Exception) -> Response:
+        """A problem document is JSON whatever form of the schema the request accepts."""
+        self.request.accepted_renderer = UniformJSONRenderer()
+        return super().handle_exception(exc)
 
 
 @cache

@@ -1,320 +1,339 @@
-"""The shapes that programs see. A field once here stays."""
+"""Serializers of boards, splits, quotas and errors. A field once here stays."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, Final
 
 from django.conf import settings
 from django.urls import reverse
 from django.utils import timezone
 from rest_framework import serializers
 
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
-from leaderboard import deadlines, preview, rescoring
-from leaderboard.entries import Details, Entry, Interval
-from leaderboard.models import Edition, Publication, Split, Visibility
-from leaderboard.quotas import Quota
-from leaderboard.standings import Board
+from evaluator.metrics.protocol import (
+    OVERALL,
+    PROTOCOLS,
+    Protocol,
+    interval_of,
+    known_intervals,
+    known_names,
+    metric_of,
+)
+from evaluator.metrics.protocol import Interval as TTCRange
+from leaderboard.boards.boards import Board
+from leaderboard.boards.rows import Entry, Interval
+from leaderboard.methods import details
+from leaderboard.methods.details import Details
+from leaderboard.models import Split, Visibility
+from leaderboard.quotas import deadlines
+from leaderboard.quotas.quotas import Quota
 
-_DECIMALS = "With how many decimals the edition publishes values, intervals and differences."
+SPLIT: Final = "Name of the split."
+EDITION: Final = "Number of the edition."
+PROTOCOL: Final = "Name of the protocol: the rules for computing scores."
+DECIMALS: Final = "Decimals that the edition publishes of scores, confidence intervals and differences."
+GROUND_TRUTH: Final = "Digest of the ground truth."
+N_SEQUENCES: Final = "Number of sequences in the ground truth."
+N_RECORDINGS: Final = "Number of recordings that the sequences come from."
+OPENS_AT: Final = "When submissions open; null: as soon as there is ground truth."
+CLOSES_AT: Final = "When submissions close; null: never."
+METHOD_ID: Final = "Id of the method; null for a result quoted from a paper."
+PAPER_URL: Final = "URL of the paper."
+CODE_URL: Final = "URL of the code."
+DETAILS: Final = "What the method uses and costs, as stated by its team."
+# For sources such as `edition.protocol`: null where there is no edition.
+NULLABLE: Final[dict[str, Any]] = {"default": None, "allow_null": True}
 
 
-class ScoresSerializer(serializers.Serializer[Any]):
-    """The ten published numbers: MiD in 10⁻⁴, RTE in percent."""
+class NamedSerializer(serializers.Serializer[Any]):
+    """Values by the names of scores that an edition has by its protocol; required are those of every one."""
+
+    known = staticmethod(known_names)
+
+    @staticmethod
+    def names_of(rules: Protocol) -> Iterable[str]:
+        """Those of the known names that a protocol has."""
+        return rules.score_names
+
+    def child(self, name: str, **options: Any) -> serializers.Field[Any, Any, Any, Any]:
+        """The field of one name."""
+        raise NotImplementedError
 
     def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
-        """One nullable number for each of the ten names."""
-        return {name: serializers.FloatField(allow_null=True) for name in SCORE_NAMES}
+        """A field for each known name."""
+        common = set.intersection(*(set(self.names_of(rules)) for rules in PROTOCOLS.values()))
+        return {name: self.child(name, required=name in common) for name in self.known()}
+
+    def to_representation(self, instance: Mapping[str, Any]) -> dict[str, Any]:
+        """What there is, in the order of the fields."""
+        return {
+            name: None if instance[name] is None else field.to_representation(instance[name])
+            for name, field in self.fields.items()
+            if name in instance
+        }
 
 
-class CountsSerializer(serializers.Serializer[Any]):
-    """Sequences overall and per interval."""
+def _sequences(interval: TTCRange | None) -> str:
+    return f"those with {interval.low_s:g} s ≤ τ ≤ {interval.high_s:g} s" if interval else "all sequences"
 
-    def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
-        """One count for each interval."""
-        return {name: serializers.IntegerField() for name in INTERVAL_NAMES}
+
+class ScoresSerializer(NamedSerializer):
+    """The published scores: MiD in 10⁻⁴, RTE in percent."""
+
+    def child(self, name: str, **options: Any) -> serializers.FloatField:
+        """The number of one score."""
+        metric, of = metric_of(name), _sequences(interval_of(name))
+        text = f"{metric.title} ({metric.unit}), mean over {of}; lower is better; null: there are none."
+        return serializers.FloatField(allow_null=True, help_text=text, **options)
+
+
+class CountsSerializer(NamedSerializer):
+    """Number of sequences, overall and in each TTC range."""
+
+    known = staticmethod(lambda: (OVERALL, *known_intervals()))
+
+    @staticmethod
+    def names_of(rules: Protocol) -> Iterable[str]:
+        """Overall, and its TTC ranges."""
+        return rules.interval_names
+
+    def child(self, name: str, **options: Any) -> serializers.IntegerField:
+        """One count."""
+        text = f"Number of sequences: {_sequences(known_intervals().get(name))}."
+        return serializers.IntegerField(help_text=text, **options)
 
 
 class ProblemSerializer(serializers.Serializer[Any]):
-    """One fault of a file."""
+    """One problem of a file or a request."""
 
-    code = serializers.CharField()
-    message = serializers.CharField()
-    where = serializers.CharField(allow_blank=True)
+    code = serializers.CharField(help_text="Stable code for programs.")
+    message = serializers.CharField(help_text="What is wrong, what was found and what was expected.")
+    where = serializers.CharField(
+        allow_blank=True,
+        help_text="JSON pointer into the file (`/predictions/12`), position in it (`line 3, column 8`), "
+        "name of a form field or parameter, or empty.",
+    )
 
 
 class WarningSerializer(serializers.Serializer[Any]):
-    """What is probably wrong with a file that was scored all the same."""
+    """A probable mistake in a file that was scored nevertheless."""
 
-    code = serializers.CharField()
-    message = serializers.CharField()
+    code = serializers.CharField(help_text="Stable code for programs, listed in docs/file-format.md.")
+    message = serializers.CharField(help_text="What was found, what was expected and the probable cause.")
 
 
 class ErrorSerializer(serializers.Serializer[Any]):
     """RFC 9457 problem details."""
 
-    type = serializers.CharField()
-    title = serializers.CharField()
-    status = serializers.IntegerField()
-    code = serializers.CharField()
-    detail = serializers.CharField()
-    problems = ProblemSerializer(many=True)
+    type = serializers.CharField(help_text="URL of the explanation of the code.")
+    title = serializers.CharField(help_text="Name of the HTTP status.")
+    status = serializers.IntegerField(help_text="HTTP status.")
+    code = serializers.CharField(help_text="Stable code for programs, listed in docs/api.md.")
+    detail = serializers.CharField(help_text="What is wrong, what was found and what was expected.")
+    problems = ProblemSerializer(many=True, help_text="Every problem found.")
 
 
 class SlotsSerializer(serializers.Serializer[Quota]):
-    """What the team has left on a split."""
+    """A team's remaining submissions to a split."""
 
-    limit = serializers.IntegerField(
-        allow_null=True, help_text="Submissions within the window; null: any number."
-    )
-    used = serializers.IntegerField(help_text="Scored or waiting, within the window.")
-    left = serializers.IntegerField(allow_null=True)
+    limit = serializers.IntegerField(allow_null=True, help_text="Submissions per window; null: no limit.")
+    used = serializers.IntegerField(help_text="Submissions in the window that are scored or waiting.")
+    left = serializers.IntegerField(allow_null=True, help_text="Remaining submissions; null: no limit.")
     next_slot_at = serializers.DateTimeField(
-        allow_null=True, help_text="When the next submission is taken; null: now, or never if the limit is 0."
+        allow_null=True,
+        help_text="When the next submission is accepted; null: now, or never if the limit is 0.",
     )
 
 
 class QuotaSerializer(SlotsSerializer):
-    """What the team has left on one of the splits, with the rules."""
+    """A team's remaining submissions to a split, with the rules."""
 
-    split = serializers.CharField()
-    is_open = serializers.BooleanField(help_text="Whether the split and the quota let a submission in now.")
-    window_s = serializers.FloatField(source="rules.window_s", help_text="The rolling window.")
+    split = serializers.CharField(help_text=SPLIT)
+    is_open = serializers.BooleanField(help_text="Whether the split and the quota accept a submission now.")
+    window_s = serializers.FloatField(source="rules.window_s", help_text="Length of the rolling window.")
     min_gap_s = serializers.FloatField(
-        source="rules.min_gap_s", help_text="Least time between two submissions."
+        source="rules.min_gap_s", help_text="Minimum time between submissions."
     )
     rejected_used = serializers.IntegerField(
-        source="n_rejected",
-        help_text="Files of the last 24 hours that were rejected, or cancelled by the team.",
+        source="n_rejected", help_text="Files rejected, or cancelled by the team, in the last 24 hours."
     )
-    rejected_limit = serializers.IntegerField(source="rules.rejected_limit", allow_null=True)
-    sentence = serializers.CharField(help_text="The same in words.")
+    rejected_limit = serializers.IntegerField(
+        source="rules.rejected_limit",
+        allow_null=True,
+        help_text="Rejected and cancelled files accepted per 24 hours; null: no limit.",
+    )
+    sentence = serializers.CharField(help_text="The same as a sentence.")
 
 
 class LeakedTokenSerializer(serializers.Serializer[Any]):
-    """A token that leaked."""
+    """A leaked token."""
 
-    token = serializers.CharField(max_length=1000, help_text="The whole token, as it was found.")
+    token = serializers.CharField(max_length=1000, help_text="The complete token as found.")
 
 
 class RevokedSerializer(serializers.Serializer[Any]):
-    """The same for every token, whether it was one or not."""
+    """The same answer for every text, whether or not it was a token."""
 
-    detail = serializers.CharField(default="If that was a token of this leaderboard, it is revoked now.")
+    detail = serializers.CharField(
+        default="If that was a token of this leaderboard, it is revoked now.",
+        help_text="The same sentence for every text.",
+    )
 
 
 class SplitSerializer(serializers.Serializer[Split]):
-    """A split and what may be done with it."""
+    """A split and its published edition."""
 
-    split = serializers.CharField(source="name")
-    title = serializers.CharField()
-    description = serializers.CharField()
-    is_open = serializers.SerializerMethodField(help_text="Whether it takes submissions.")
-    opens_at = serializers.DateTimeField(allow_null=True)
-    closes_at = serializers.DateTimeField(allow_null=True)
-    needs_admission = serializers.BooleanField(help_text="Whether it takes files of admitted teams alone.")
-    is_hidden = serializers.BooleanField()
-    is_simulated = serializers.BooleanField()
-    edition = serializers.IntegerField(source="published_edition.number", default=None, allow_null=True)
-    protocol = serializers.CharField(source="published_edition.protocol", default=None, allow_null=True)
-    decimals = serializers.IntegerField(
-        source="published_edition.decimals", default=None, allow_null=True, help_text=_DECIMALS
+    split = serializers.CharField(source="name", help_text=SPLIT)
+    title = serializers.CharField(help_text="Title of the split.")
+    description = serializers.CharField(help_text="Description of the split.")
+    is_open = serializers.SerializerMethodField(help_text="Whether the split accepts submissions.")
+    opens_at = serializers.DateTimeField(allow_null=True, help_text=OPENS_AT)
+    closes_at = serializers.DateTimeField(allow_null=True, help_text=CLOSES_AT)
+    needs_admission = serializers.BooleanField(help_text="Whether only admitted teams may submit.")
+    is_hidden = serializers.BooleanField(help_text="Whether the true values are hidden.")
+    is_simulated = serializers.BooleanField(help_text="Whether the true values come from a simulation.")
+    edition = serializers.IntegerField(
+        source="published_edition.number",
+        help_text="Number of the published edition; null: none yet.",
+        **NULLABLE,
     )
+    protocol = serializers.CharField(source="published_edition.protocol", help_text=PROTOCOL, **NULLABLE)
+    decimals = serializers.IntegerField(source="published_edition.decimals", help_text=DECIMALS, **NULLABLE)
     ground_truth = serializers.CharField(
-        source="published_edition.ground_truth_id", default=None, allow_null=True
+        source="published_edition.ground_truth_id", help_text=GROUND_TRUTH, **NULLABLE
     )
     n_sequences = serializers.IntegerField(
-        source="published_edition.ground_truth.n_sequences", default=None, allow_null=True
+        source="published_edition.ground_truth.n_sequences", help_text=N_SEQUENCES, **NULLABLE
     )
 
     def get_is_open(self, split: Split) -> bool:
-        """Whether there is ground truth, and this is the time."""
+        """Whether there is ground truth and now is between opening and closing."""
         return deadlines.is_open(split, now=timezone.now())
 
 
-class DetailsSerializer(serializers.Serializer[Details]):
-    """What a method uses and costs, as its team says; null or empty where nothing was said."""
+FIELD_OF: Final[Mapping[type, type[serializers.Field[Any, Any, Any, Any]]]] = {
+    str: serializers.CharField,
+    int: serializers.IntegerField,
+    float: serializers.FloatField,
+    bool: serializers.BooleanField,
+}
 
-    n_frames = serializers.IntegerField(allow_null=True, help_text="Frames used, 2 to 6.")
-    cameras = serializers.CharField(allow_blank=True, help_text="ONE or SEVERAL.")
-    box_source = serializers.CharField(allow_blank=True, help_text="GIVEN, DETECTED or NONE.")
-    uses_nerf = serializers.BooleanField(allow_null=True)
-    uses_extra_data = serializers.BooleanField(allow_null=True)
-    pretraining = serializers.CharField(allow_blank=True)
-    n_parameters = serializers.IntegerField(allow_null=True)
-    latency_ms = serializers.FloatField(allow_null=True)
-    hardware = serializers.CharField(allow_blank=True)
+
+class DetailsSerializer(serializers.Serializer[Details]):
+    """What a method uses and costs, as stated by its team; null or empty: not specified."""
+
+    def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
+        """One field for each detail of the registry."""
+        fields = {}
+        for detail in details.DETAILS:
+            empty: dict[str, Any] = {"allow_null" if detail.kind.empty is None else "allow_blank": True}
+            fields[detail.name] = FIELD_OF[detail.kind.type](**empty, help_text=detail.meaning)
+        return fields
 
 
 class UncertaintySerializer(serializers.Serializer[Interval]):
-    """The confidence interval of one value and its rank range, at 95 %; null where they are not known."""
+    """The 95 % confidence interval and rank range of one score; null where unknown."""
 
     low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95 % confidence interval.")
-    high = serializers.FloatField(allow_null=True, help_text="Its upper end.")
+    high = serializers.FloatField(allow_null=True, help_text="Upper end of the 95 % confidence interval.")
     rank_low = serializers.IntegerField(
-        allow_null=True, help_text="The rank range in this column: its best rank."
+        allow_null=True, help_text="Best rank of the rank range in this column."
     )
-    rank_high = serializers.IntegerField(allow_null=True, help_text="Its worst rank.")
+    rank_high = serializers.IntegerField(allow_null=True, help_text="Worst rank of the rank range.")
     is_with_best = serializers.BooleanField(
         allow_null=True,
-        help_text="May be the best of the column at 95 %: `rank_low` is 1, rows quoted from papers counted.",
+        help_text="Whether it may be the best of the column at 95 %: `rank_low` is 1, counting quoted rows.",
     )
 
 
 class EntrySerializer(serializers.Serializer[Entry]):
     """One row of a board."""
 
-    rank = serializers.IntegerField(allow_null=True)
-    method = serializers.CharField()
-    method_id = serializers.UUIDField(allow_null=True)
-    team = serializers.CharField()
-    kind = serializers.ChoiceField(choices=["submission", "published"])
+    rank = serializers.IntegerField(
+        allow_null=True, help_text="By published MiD, shared by ties; null: no MiD."
+    )
+    method = serializers.CharField(help_text="Name of the method.")
+    method_id = serializers.UUIDField(allow_null=True, help_text=METHOD_ID)
+    team = serializers.CharField(help_text="Name of the team.")
+    kind = serializers.ChoiceField(
+        choices=["submission", "published"],
+        help_text="A submission scored here, or a result quoted from a paper.",
+    )
     visibility = serializers.ChoiceField(
-        choices=Visibility.choices, help_text="PRIVATE rows are your team's: nobody else's board has them."
+        choices=Visibility.choices, help_text="Rows that are PRIVATE are visible to your team alone."
     )
     pseudonym = serializers.SerializerMethodField(
-        help_text="Of your team's own anonymous row: what everybody else reads in place of its name."
+        help_text="Name that others see in your team's own anonymous row; null in every other row."
     )
-    date = serializers.CharField(source="date_text")
-    description = serializers.CharField(allow_blank=True)
-    paper_url = serializers.CharField(allow_blank=True)
-    code_url = serializers.CharField(allow_blank=True)
+    date = serializers.CharField(source="date_text", help_text="Day of the submission, or year of the paper.")
+    description = serializers.CharField(allow_blank=True, help_text="Description of the method by its team.")
+    paper_url = serializers.CharField(allow_blank=True, help_text=PAPER_URL)
+    code_url = serializers.CharField(allow_blank=True, help_text=CODE_URL)
     source = serializers.CharField(  # type: ignore[assignment]  # the row's own name, also one of the field's
-        allow_blank=True, help_text="The citation of a published row."
+        allow_blank=True, help_text="Citation of a quoted row."
     )
-    withdrawn_at = serializers.DateTimeField(allow_null=True, help_text="The team withdrew it: no values.")
+    withdrawn_at = serializers.DateTimeField(
+        allow_null=True, help_text="When the team withdrew the submission; it has no scores."
+    )
     is_unscorable = serializers.BooleanField(
-        help_text="In a former edition: the published one's ground truth cannot score this file."
+        help_text="In a former edition: whether the published edition cannot score this file."
     )
-    details = DetailsSerializer()
+    details = DetailsSerializer(help_text=DETAILS)
     n_attempts = serializers.IntegerField(
         allow_null=True,
-        help_text="Scored submissions of the team's public methods to the split; anonymous: its own.",
+        help_text="Scored submissions of the team's public methods to the split; anonymous: of the method.",
     )
-    scores = ScoresSerializer()
+    scores = ScoresSerializer(help_text="The ten published scores.")
     decimals = serializers.IntegerField(
-        help_text="With how many decimals its values are printed: those of a paper as they were, all others "
-        "and their intervals as the edition publishes."
+        help_text="Decimals of the scores and their confidence intervals: as printed in the paper, else as "
+        "the edition publishes."
     )
     intervals = serializers.DictField(
         child=UncertaintySerializer(),
-        help_text="By the names of the scores, where they are computed; empty unless `intervals=1`.",
+        help_text="Confidence intervals by score name, where computed; empty unless `intervals=1`.",
     )
 
     def get_pseudonym(self, entry: Entry) -> str | None:
-        """Null for every row that the reader does not see under another name than others."""
+        """The pseudonym, or null in rows that everybody sees under the same name."""
         return entry.pseudonym or None
 
     def to_representation(self, instance: Entry) -> dict[str, Any]:
-        """The row; its intervals, which are most of its bytes, for who asks."""
+        """The row, with its confidence intervals (most of its bytes) only if requested."""
         if instance.intervals and not self.context.get("has_intervals"):
             instance = replace(instance, intervals={})
         return super().to_representation(instance)
 
 
 class BoardSerializer(serializers.Serializer[Board]):
-    """A ranked board: one split in one edition."""
+    """The board of a split in one edition."""
 
-    split = serializers.CharField(source="split.name")
-    edition = serializers.IntegerField(source="edition.number", default=None, allow_null=True)
-    protocol = serializers.CharField(source="edition.protocol", default=None, allow_null=True)
-    decimals = serializers.IntegerField(
-        source="edition.decimals", default=None, allow_null=True, help_text=_DECIMALS
+    split = serializers.CharField(source="split.name", help_text=SPLIT)
+    edition = serializers.IntegerField(
+        source="edition.number", help_text="Number of the edition shown; null: none is published.", **NULLABLE
     )
-    ground_truth = serializers.CharField(source="edition.ground_truth_id", default=None, allow_null=True)
+    protocol = serializers.CharField(source="edition.protocol", help_text=PROTOCOL, **NULLABLE)
+    decimals = serializers.IntegerField(source="edition.decimals", help_text=DECIMALS, **NULLABLE)
+    ground_truth = serializers.CharField(source="edition.ground_truth_id", help_text=GROUND_TRUTH, **NULLABLE)
     n_sequences = serializers.IntegerField(
-        source="edition.ground_truth.n_sequences", default=None, allow_null=True
+        source="edition.ground_truth.n_sequences", help_text=N_SEQUENCES, **NULLABLE
     )
     n_recordings = serializers.IntegerField(
-        source="edition.ground_truth.n_recordings", default=None, allow_null=True
+        source="edition.ground_truth.n_recordings", help_text=N_RECORDINGS, **NULLABLE
     )
     floor = ScoresSerializer(
         source="edition.floor",
-        default=None,
-        allow_null=True,
-        help_text="The scores of the ground truth itself, submitted as predictions: no file scores lower, "
+        help_text="Scores of the ground truth itself, submitted as predictions: no file scores lower, "
         "because the protocol truncates predictions and not the ground truth. Null: not computed yet.",
+        **NULLABLE,
     )
-    at = serializers.DateTimeField(allow_null=True, help_text="The time that was asked for, if any.")
-    updated_at = serializers.DateTimeField(allow_null=True)
-    is_open = serializers.BooleanField(help_text="Whether its split takes submissions.")
-    opens_at = serializers.DateTimeField(source="split.opens_at", allow_null=True)
-    closes_at = serializers.DateTimeField(source="split.closes_at", allow_null=True)
-    sort = serializers.CharField()
-    entries = EntrySerializer(many=True)
-
-
-class EditionSerializer(serializers.Serializer[Edition]):
-    """An edition that was published: the frame of a ranking, quotable for ever."""
-
-    split = serializers.CharField(source="split_id")
-    edition = serializers.IntegerField(source="number")
-    protocol = serializers.CharField()
-    decimals = serializers.IntegerField(help_text=_DECIMALS)
-    ground_truth = serializers.CharField(source="ground_truth_id")
-    manifest = serializers.CharField(source="ground_truth.manifest_digest")
-    n_sequences = serializers.IntegerField(source="ground_truth.n_sequences")
-    n_recordings = serializers.IntegerField(source="ground_truth.n_recordings")
-    published_at = serializers.DateTimeField()
-    is_board = serializers.SerializerMethodField(help_text="Whether it is the board now.")
-    url = serializers.SerializerMethodField()
-
-    def get_is_board(self, edition: Edition) -> bool:
-        """Whether the split points at it."""
-        return edition.split.published_edition_id == edition.pk
-
-    def get_url(self, edition: Edition) -> str:
-        """Its permanent page."""
-        return absolute("edition", edition.split_id, edition.number)
-
-
-class PublicationSerializer(serializers.Serializer[Publication]):
-    """One line of a split's public changelog."""
-
-    at = serializers.DateTimeField()
-    kind = serializers.CharField()
-    edition = serializers.IntegerField(source="edition.number")
-    replaced = serializers.IntegerField(source="replaced.number", default=None, allow_null=True)
-    reason = serializers.CharField()
-    n_left_out = serializers.SerializerMethodField()
-
-    def get_n_left_out(self, publication: Publication) -> int:
-        """How many submissions were knowingly left out: unfinished, or rejected and scored before."""
-        return len(publication.left_out)
-
-
-class RescoringSerializer(serializers.Serializer[rescoring.Progress]):
-    """How far the re-scoring of an edition is."""
-
-    n_total = serializers.IntegerField()
-    n_done = serializers.IntegerField()
-    n_waiting = serializers.IntegerField()
-    n_scored = serializers.IntegerField()
-    n_rejected = serializers.IntegerField()
-    n_failed = serializers.IntegerField(help_text="By our fault.")
-    n_cancelled = serializers.IntegerField()
-    percent = serializers.IntegerField()
-    rate_per_s = serializers.FloatField(allow_null=True)
-    left_s = serializers.FloatField(allow_null=True)
-
-
-class PreviewSerializer(serializers.Serializer[preview.Preview]):
-    """What publishing an edition would change."""
-
-    edition = serializers.IntegerField(source="edition.number")
-    replaces = serializers.IntegerField()
-    n_added = serializers.IntegerField(source="truth.n_added", default=None, allow_null=True)
-    n_removed = serializers.IntegerField(source="truth.n_removed", default=None, allow_null=True)
-    n_changed_sequences = serializers.IntegerField(source="truth.n_changed", default=None, allow_null=True)
-    n_renumbered = serializers.IntegerField(source="truth.n_renumbered", default=None, allow_null=True)
-    n_changed = serializers.IntegerField()
-    n_moved = serializers.IntegerField()
-    n_newly_rejected = serializers.IntegerField()
-    progress = RescoringSerializer()
-    changes = serializers.SerializerMethodField()
-
-    def get_changes(self, found: preview.Preview) -> list[dict[str, Any]]:
-        """One flat row for each submission."""
-        return preview.rows(found)
+    at = serializers.DateTimeField(allow_null=True, help_text="Time requested by `at`; null: now.")
+    updated_at = serializers.DateTimeField(
+        allow_null=True, help_text="When the newest row was added, or the edition published."
+    )
+    is_open = serializers.BooleanField(help_text="Whether the split accepts submissions.")
+    opens_at = serializers.DateTimeField(source="split.opens_at", allow_null=True, help_text=OPENS_AT)
+    closes_at = serializers.DateTimeField(source="split.closes_at", allow_null=True, help_text=CLOSES_AT)
+    sort = serializers.CharField(help_text="Column by which the rows are sorted; `-`: descending.")
+    entries = EntrySerializer(many=True, help_text="The rows in the requested order.")
 
 
 def absolute(name: str, *args: object) -> str:

@@ -8,16 +8,16 @@ REST_FRAMEWORK: Final[dict[str, Any]] = {
         "rest_framework.authentication.SessionAuthentication",
     ],
     "DEFAULT_PERMISSION_CLASSES": ["rest_framework.permissions.IsAuthenticated"],
-    "DEFAULT_RENDERER_CLASSES": ["leaderboard.api.bodies.DocumentRenderer"],
+    "DEFAULT_RENDERER_CLASSES": ["leaderboard.api.parsers.UniformJSONRenderer"],
     "DEFAULT_PARSER_CLASSES": [
         "rest_framework.parsers.MultiPartParser",
-        "leaderboard.api.bodies.DocumentParser",
+        "leaderboard.api.parsers.LimitedJSONParser",
     ],
     "DEFAULT_SCHEMA_CLASS": "drf_spectacular.openapi.AutoSchema",
-    "EXCEPTION_HANDLER": "leaderboard.api.refusals.exception_handler",
+    "EXCEPTION_HANDLER": "leaderboard.api.exceptions.exception_handler",
     "DEFAULT_THROTTLE_CLASSES": [
-        "leaderboard.api.throttles.SignedInThrottle",
-        "leaderboard.api.throttles.VisitorThrottle",
+        "leaderboard.api.throttling.SignedInThrottle",
+        "leaderboard.api.throttling.VisitorThrottle",
     ],
 }
 SPECTACULAR_SETTINGS: Final[dict[str, Any]] = {

@@ -1,12 +1,10 @@
-"""How often one may ask: per account, else per address, which nobody can choose for themselves.
+"""Throttles: requests per account, else per address, counted for all web processes together.
 
-All web processes count together (see leaderboard/rates.py).
-The address is the one that the connection comes from, or with `TSTTC_TRUSTED_PROXIES` the one that our own
-proxy wrote down; what a visitor puts into X-Forwarded-For before that counts for nothing.
+The address is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one that our own proxy wrote down;
+whatever a client puts into X-Forwarded-For is ignored. See leaderboard/ops/rate_limits.py.
 """
 
 import time
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from django.conf import settings
@@ -14,54 +12,47 @@ from django.http import HttpRequest
 from rest_framework.request import Request
 from rest_framework.throttling import BaseThrottle
 
-from leaderboard import rates
+from leaderboard.ops import rate_limits
 
 if TYPE_CHECKING:  # views make their classes with these
     from rest_framework.views import APIView
 
 
-@dataclass(frozen=True)
-class Counted:
-    """That a request was counted: by which throttle, at which rate, and what it found."""
-
-    name: str
-    rate: rates.Rate
-    answer: rates.Answer
-
-
-def counted(request: HttpRequest) -> list[Counted]:
-    """The throttles that counted this request, for its answer's headers; a list to add to."""
-    found: list[Counted] = request.__dict__.setdefault("_counted", [])
+def counted(request: HttpRequest) -> list["Throttle"]:
+    """The throttles that counted this request, for the headers of its response; a list to append to."""
+    found: list[Throttle] = request.__dict__.setdefault("_counted", [])
     return found
 
 
 class Throttle(BaseThrottle):
-    """A rate of the settings, which may be none. After it was asked, `answer` says what it found."""
+    """A rate of `settings.API_RATES`, which may be None; `rate` and `answer` are set once it has counted."""
 
     scope = ""
-    answer: rates.Answer | None = None
+    rate: rate_limits.Rate
+    answer: rate_limits.Decision | None = None
 
     def allow_request(self, request: Request, view: "APIView") -> bool:
-        """Count this request. The rate is read anew, so that settings hold."""
+        """Count this request."""
         text: str | None = settings.API_RATES[self.scope]
         identity = self.identity(request) if text else None
-        if text and identity is not None:
-            rate = rates.rate_of(text)
-            self.answer = self.take(f"{self.scope}:{identity}", rate)
-            counted(request._request).append(Counted(self.scope, rate, self.answer))
-        return self.answer is None or self.answer.is_allowed
+        if not text or identity is None:
+            return True
+        self.rate = rate_limits.rate_of(text)
+        self.answer = self.take(f"{self.scope}:{identity}")
+        counted(request._request).append(self)
+        return self.answer.is_allowed
 
-    def take(self, who: str, rate: rates.Rate) -> rates.Answer:
-        """Count it where all processes see it."""
-        return rates.take(who=who, rate=rate, now_s=time.time())
+    def take(self, who: str) -> rate_limits.Decision:
+        """Count the request in the database, where all processes see it."""
+        return rate_limits.take(who=who, rate=self.rate, now_s=time.time())
 
     def wait(self) -> float | None:
-        """Seconds until the next request is let through."""
+        """Seconds until the next request is allowed."""
         return self.answer.wait_s if self.answer else None
 
     def identity(self, request: Request) -> object | None:
-        """Who is counted; None: not this throttle's concern."""
-        raise NotImplementedError
+        """Who is counted: the address. None: this throttle does not apply."""
+        return rate_limits.address_of(request)
 
 
 class SignedInThrottle(Throttle):
@@ -81,7 +72,7 @@ class VisitorThrottle(Throttle):
 
     def identity(self, request: Request) -> object | None:
         """The address."""
-        return None if request.user.is_authenticated else rates.address_of(request)
+        return None if request.user.is_authenticated else super().identity(request)
 
 
 class SubmitThrottle(SignedInThrottle):
@@ -90,34 +81,39 @@ class SubmitThrottle(SignedInThrottle):
     scope = "submit"
 
     def identity(self, request: Request) -> object | None:
-        """The account, when it sends something."""
+        """The account, if it sends something."""
         return super().identity(request) if request.method == "POST" else None
 
 
+class AsOfThrottle(Throttle):
+    """Boards as of a time, which take long to read, of one account or one address."""
+
+    scope = "as_of"
+
+    def identity(self, request: Request) -> object | None:
+        """The account, else the address, if it asks for a time."""
+        if not request.query_params.get("at"):
+            return None
+        return request.user.pk if request.user.is_authenticated else super().identity(request)
+
+
 class RevokeThrottle(Throttle):
-    """Reports of leaked tokens from one address."""
+    """Reports of leaked tokens from one address, signed in or not."""
 
     scope = "revoke"
 
-    def identity(self, request: Request) -> object | None:
-        """The address, also of who is signed in."""
-        return rates.address_of(request)
 
-
-# --- requests that are turned away before any view ----------------------------------------------------------
-
-
-class RefusedThrottle(RevokeThrottle):
-    """Requests from one address whose token opens nothing: they end before the throttles above are asked."""
+class UnauthorizedThrottle(Throttle):
+    """Requests from one address that fail authentication, before the throttles above are asked."""
 
     scope = "refused"
 
 
-class MalformedThrottle(RefusedThrottle):
-    """The same without the database, which what is no token at all never reaches."""
+class MalformedTokenThrottle(UnauthorizedThrottle):
+    """The same in memory: a malformed token never reaches the database."""
 
-    memory = rates.InMemory()
+    memory = rate_limits.InMemory()
 
-    def take(self, who: str, rate: rates.Rate) -> rates.Answer:
-        """Count it in this process."""
-        return self.memory.take(who=who, rate=rate, now_s=time.time())
+    def take(self, who: str) -> rate_limits.Decision:
+        """Count the request in this process."""
+        return self.memory.take(who=who, rate=self.rate, now_s=time.time())

@@ -8,14 +8,14 @@ from leaderboard.api import (
     board_views,
     compare_views,
     edition_views,
-    listing,
     method_views,
+    pagination,
     receipt_views,
     schema_views,
     submission_views,
     views,
 )
-from leaderboard.keeping import kept
+from leaderboard.http import cacheable
 
 urlpatterns = [
     path("submissions", submission_views.SubmissionsView.as_view(), name="api-submissions"),
@@ -24,7 +24,7 @@ urlpatterns = [
     ),
     path("submissions/<uuid:submission_id>/receipt", receipt_views.ReceiptView.as_view(), name="api-receipt"),
     path("methods", method_views.MethodsView.as_view(), name="api-methods"),
-    path("methods/<uuid:method_id>", kept(method_views.MethodView.as_view()), name="api-method"),
+    path("methods/<uuid:method_id>", cacheable(method_views.MethodView.as_view()), name="api-method"),
     path(
         "methods/<uuid:method_id>/visibility",
         method_views.VisibilityView.as_view(),
@@ -33,21 +33,21 @@ urlpatterns = [
     path("quota", account_views.QuotaView.as_view(), name="api-quota"),
     path("tokens/revoke", account_views.RevokeView.as_view(), name="api-revoke-token"),
     path("compare", compare_views.CompareView.as_view(), name="api-compare"),
-    path("splits", kept(views.SplitsView.as_view()), name="api-splits"),
+    path("splits", cacheable(views.SplitsView.as_view()), name="api-splits"),
     path(
         "splits/<slug:split>/board",
-        kept(board_views.BoardView.as_view(), board_views.PARAMETERS),
+        cacheable(board_views.BoardView.as_view(), board_views.PARAMETERS),
         name="api-board",
     ),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),
     path(
         "splits/<slug:split>/editions",
-        kept(edition_views.EditionsView.as_view(), listing.QUERY),
+        cacheable(edition_views.EditionsView.as_view(), pagination.QUERY),
         name="api-editions",
     ),
     path(
         "splits/<slug:split>/editions/<int:number>/board",
-        kept(board_views.EditionBoardView.as_view(), board_views.PARAMETERS),
+        cacheable(board_views.EditionBoardView.as_view(), board_views.PARAMETERS),
         name="api-edition-board",
     ),
     path(
@@ -62,7 +62,7 @@ urlpatterns = [
     ),
     path(
         "splits/<slug:split>/changelog",
-        kept(edition_views.ChangelogView.as_view(), listing.QUERY),
+        cacheable(edition_views.ChangelogView.as_view(), pagination.QUERY),
         name="api-changelog",
     ),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),

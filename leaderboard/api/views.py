@@ -1,4 +1,4 @@
-"""The API's doors: each view calls one verb."""
+"""Views of splits and of withdrawing, and the rows that several views look up."""
 
 from typing import cast
 
@@ -11,37 +11,54 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard import files, outcomes, submissions
 from leaderboard.api.authentication import split_of
-from leaderboard.api.serializers import ErrorSerializer, SplitSerializer
-from leaderboard.api.submission_shapes import SubmissionSerializer
-from leaderboard.keeping import is_known
-from leaderboard.models import Split, Submission, User
+from leaderboard.api.schema import errors
+from leaderboard.api.serializers import SplitSerializer
+from leaderboard.api.submission_serializers import SubmissionSerializer
+from leaderboard.boards import snapshots
+from leaderboard.http import is_known
+from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
+from leaderboard.storage import files
+from leaderboard.submissions import outcomes, submissions
 
 
 def visible(request: Request) -> SubmissionQuerySet:
-    """The submissions that whoever asks may see, with a token for one split only those to it."""
+    """The submissions visible to the user; with a token for one split only those to that split."""
     rows = Submission.objects.visible_to(request.user).select_related("method__team", "split")
     only = split_of(request.auth)
     return rows.filter(split=only) if only is not None else rows
 
 
+def current_split(request: Request, name: str) -> Split:
+    """A split as the cache has it. Raises `Http404`."""
+    splits = snapshots.splits_of(request._request)
+    found = next((split for split in splits if split.pk == name), None)
+    if found is None:
+        raise Http404
+    return found
+
+
+def published_edition(split: str | Split, number: int) -> Edition:
+    """A published edition. Raises `Http404`."""
+    return get_object_or_404(snapshots.editions(), split=split, number=number)
+
+
 class WithdrawView(APIView):
-    """Withdraw one's own submission."""
+    """Withdraw a submission."""
 
     @extend_schema(
         operation_id="withdraw",
         request=None,
-        responses={200: SubmissionSerializer, (404, "application/problem+json"): ErrorSerializer},
+        responses={200: SubmissionSerializer, **errors(404, 422)},
     )
     def post(self, request: Request, submission_id: str) -> Response:
-        """Cancel what waits; what was published leaves a tombstone. Cannot be undone."""
+        """Cancel a waiting submission; a published one leaves a tombstone row. Cannot be undone."""
         submission = get_object_or_404(visible(request), pk=submission_id)
         now = timezone.now()
         submissions.withdraw(submission=submission, actor=cast("User", request.user), now=now)
-        (told,) = outcomes.of([submission], now=now)
-        return Response(SubmissionSerializer(told).data)
+        (outcome,) = outcomes.of([submission], now=now)
+        return Response(SubmissionSerializer(outcome).data)
 
 
 class SplitsView(APIView):
@@ -51,7 +68,7 @@ class SplitsView(APIView):
 
     @extend_schema(operation_id="list_splits", responses=SplitSerializer(many=True))
     def get(self, request: Request) -> Response:
-        """Every split with its published edition."""
+        """All splits with their published editions."""
         rows = Split.objects.select_related("published_edition__ground_truth")
         return Response(SplitSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
@@ -63,7 +80,7 @@ class ManifestView(APIView):
 
     @extend_schema(
         operation_id="manifest",
-        responses={(200, "text/csv"): str, (404, "application/problem+json"): ErrorSerializer},
+        responses={(200, "text/csv"): str, **errors(404)},
     )
     def get(self, request: Request, split: str) -> HttpResponseBase:
         """All columns of the ground truth but the time to contact, as CSV."""

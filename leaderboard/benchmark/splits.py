@@ -12,11 +12,11 @@ from django.core.exceptions import ValidationError
 from django.db import transaction
 from django.utils import timezone
 
-from evaluator.protocol import SCORE_NAMES
-from leaderboard import audit, boards
+from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
+from leaderboard import audit, versions
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import PublishedResult, Split, User
 from leaderboard.models.benchmark import SINCE_EVER
-from leaderboard.texts import Refused
 
 PUBLISHED_DIR = Path(__file__).parent / "published"
 
@@ -44,7 +44,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
     {
         "name": "demo",
         "title": "Demo",
-        "description": "A simulated set for trying things out. Its numbers mean nothing for the road.",
+        "description": "Simulated data, for testing only.",
         "position": 2,
         "is_hidden": False,
         "is_simulated": True,
@@ -111,7 +111,7 @@ def import_published(
                 details={"added": found["added"], "replaced": found["replaced"]},
             )
             for split_id in split_ids:
-                boards.changed(split_id)
+                versions.changed(split_id)
     return Imported(**{outcome: tuple(names) for outcome, names in found.items()})
 
 
@@ -142,7 +142,7 @@ def _sound_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
         raise Refused(
             "bad-value",
             f"The document lacks {error} or has it in another form; expected one such as those in "
-            "leaderboard/published/.",
+            "leaderboard/benchmark/published/.",
         ) from None
     known = set(Split.objects.values_list("name", flat=True))
     for row in rows:
@@ -151,11 +151,11 @@ def _sound_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
             raise Refused(
                 "unknown-split", f"There is no split {row['split_id']!r}; expected one of {expected}."
             )
-        if set(row["scores"]) != set(SCORE_NAMES) or not all(_is_score(x) for x in row["scores"].values()):
+        if not _are_named(row["scores"]) or not all(map(_is_score, row["scores"].values())):
             raise Refused(
                 "bad-value",
-                f"The values of the row {row['slug']!r} of {row['split_id']} are no ten numbers from 0; "
-                f"expected one or null for each of {', '.join(SCORE_NAMES)}.",
+                f"The values of the row {row['slug']!r} of {row['split_id']} are no numbers from 0, one for "
+                f"each name of a protocol; expected one or null for each of {', '.join(SCORE_NAMES)}.",
             )
         try:
             PublishedResult(**row).full_clean(validate_unique=False, validate_constraints=False)
@@ -168,6 +168,10 @@ def _sound_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
     return rows
 
 
+def _are_named(scores: Mapping[str, object]) -> bool:
+    return any(scores.keys() == set(protocol.score_names) for protocol in PROTOCOLS.values())
+
+
 def _is_score(value: object) -> bool:
     if value is None:
         return True
@@ -175,7 +179,7 @@ def _is_score(value: object) -> bool:
 
 
 def _rows_of(document: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The rows of one paper's main table; see `leaderboard/published/` for the form."""
+    """The rows of one paper's main table; see `leaderboard/benchmark/published/` for the form."""
     source = document["source"]
     methods = {method["slug"]: method for method in document["methods"]}
     for split_name, rows in document["results"].items():

@@ -1,6 +1,7 @@
-"""Who stands where: the board of a split in one edition, submissions and published rows together."""
+"""Boards: the rows of a split in one edition, submissions and published results together, at any time."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, time
 from uuid import UUID
@@ -10,22 +11,22 @@ from django.db.models import Count, Exists, OuterRef, Q
 from django.utils import timezone
 from django.utils.dateparse import parse_date, parse_datetime
 
-from evaluator import ranking
-from evaluator.protocol import SCORE_NAMES
-from leaderboard import deadlines
-from leaderboard.entries import (
+from evaluator.metrics import ranking
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol, known_names
+from leaderboard.boards.filters import Filters
+from leaderboard.boards.ranking import PRIMARY, Place, in_ranks, key, listed
+from leaderboard.boards.rows import (
     Entry,
     Scored,
     flat_scores,
     named,
     profile_of,
+    public_reason,
     published_entry,
-    reason_told,
     scored_in,
     scores_in,
     submitted_entry,
 )
-from leaderboard.filters import Filters
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -39,12 +40,12 @@ from leaderboard.models import (
     days,
 )
 from leaderboard.models.methods import MethodQuerySet
-from leaderboard.order import PRIMARY, Place, in_ranks, key, listed
+from leaderboard.quotas import deadlines
 
-__all__ = ["Board", "Entry", "board", "everybodys", "flat_scores", "scores_in", "with_own"]
+__all__ = ["Board", "Entry", "board", "flat_scores", "public_rows", "scores_in", "with_own"]
 
 TEXT_COLUMNS = ("rank", "method", "team", "date")
-SORTABLE = (*TEXT_COLUMNS, *SCORE_NAMES)
+SORTABLE = (*TEXT_COLUMNS, *known_names())
 SORTS = (*SORTABLE, *(f"-{name}" for name in SORTABLE))
 """Every order that an address can ask for."""
 
@@ -52,15 +53,19 @@ SORTS = (*SORTABLE, *(f"-{name}" for name in SORTABLE))
 class UnknownColumn(ValueError):
     """The board has no such column to sort by."""
 
-    def __init__(self, column: str) -> None:
+    field = "sort"
+
+    def __init__(self, column: str, *, known: Sequence[str]) -> None:
         super().__init__(
-            f"The board cannot be sorted by {column!r}; expected one of {', '.join(SORTABLE)}, "
+            f"The board cannot be sorted by {column!r}; expected one of {', '.join(known)}, "
             "with a leading '-' for the reverse."
         )
 
 
-class BadMoment(ValueError):
+class BadTime(ValueError):
     """The text is no point in time."""
+
+    field = "at"
 
     def __init__(self, text: str) -> None:
         super().__init__(
@@ -81,23 +86,38 @@ class Board:
     is_open: bool = field(default=False)
     deadline: str = ""  # in a sentence, where there is one
     filters: Filters = field(default_factory=Filters)
-    n_in_all: int = 0  # rows before the filters
+    unfiltered: tuple[Entry, ...] = ()  # all rows, before the filters, in no order
     n_submissions: int = 0  # those of them that are submissions
     n_left_behind: int = 0  # where there is none: those that former editions scored and this one does not
 
+    @property
+    def n_in_all(self) -> int:
+        """How many rows there are before the filters."""
+        return len(self.unfiltered)
 
-def parse_moment(text: str) -> datetime:
-    """A point in time from a date (its end, in UTC) or an ISO time. Raises `BadMoment`."""
+    @property
+    def rules(self) -> Protocol:
+        """The protocol that its numbers follow."""
+        return rules_of(self.edition)
+
+
+def rules_of(edition: Edition | None) -> Protocol:
+    """The protocol of a board: its edition's, and the default one before there is any."""
+    return edition.rules if edition else get_protocol(DEFAULT_PROTOCOL)
+
+
+def parse_time(text: str) -> datetime:
+    """A point in time from a date (its end, in UTC) or an ISO time. Raises `BadTime`."""
     try:
         # The date first: an ISO time may leave out its time of day, and would then mean the day's beginning.
         moment = parse_date(text) or parse_datetime(text)
         if moment is None:
-            raise BadMoment(text)
+            raise BadTime(text)
         if not isinstance(moment, datetime):
             return datetime.combine(moment, time.max, tzinfo=UTC)
         return moment.astimezone(UTC) if moment.tzinfo else moment.replace(tzinfo=UTC)
     except (ValueError, OverflowError):
-        raise BadMoment(text) from None
+        raise BadTime(text) from None
 
 
 def board(
@@ -108,45 +128,24 @@ def board(
     sort: str = "rank",
     at: datetime | None = None,
     filters: Filters | None = None,
+    read: "Callable[..., tuple[Entry, ...]] | None" = None,
 ) -> Board:
     """The board of a split in one edition (the published one unless named), as `viewer` may see it.
 
     With `at` the board as it stood then: the edition that was published, with what it had scored by then of
-    what had been shown by then. Ranks are by published MiD among everything that everybody sees, whatever
-    the filters; ties share a rank; a row without that value has none. Each method is represented by the best
-    of its standing submissions; one whose submissions were all withdrawn leaves a row without values. Rows
-    that only the viewer's own team sees carry the rank that they would have, and take nobody's place. Raises
-    `UnknownColumn`.
+    what had been shown by then. Methods are told as everybody sees them now: one that is anonymous is so on
+    every board of the past, and the board of a moment knows all that happened to it on that day. Ranks are by
+    published MiD among everything that everybody sees, whatever the filters; ties share a rank; a row without
+    that value has none. Each method is represented by the best of its standing submissions; one whose
+    submissions were all withdrawn leaves a row without values. Rows that only the viewer's own team sees
+    carry the rank that they would have, and take nobody's place.
+    `read` gives the rows that everybody sees, from a cache say; else they are read as `public_rows` does.
+    Raises `UnknownColumn`.
     """
-    require_column(sort)
     edition = edition or (edition_at(split, at) if at else split.published_edition)
-    shown = everybodys(split=split, edition=edition, at=at)
-    return arranged(
-        with_own(shown, split=split, edition=edition, viewer=viewer, at=at),
-        split=split,
-        edition=edition,
-        sort=sort,
-        at=at,
-        filters=filters,
-    )
-
-
-def require_column(sort: str) -> None:
-    """Raise `UnknownColumn` for what no board can be sorted by."""
-    if sort.removeprefix("-") not in SORTABLE:
-        raise UnknownColumn(sort)
-
-
-def arranged(
-    entries: Sequence[Entry],
-    *,
-    split: Split,
-    edition: Edition | None,
-    sort: str = "rank",
-    at: datetime | None = None,
-    filters: Filters | None = None,
-) -> Board:
-    """A board of ranked rows: those that fit the filters, in the order of one column."""
+    require_column(sort, rules=rules_of(edition))
+    shown = (read or public_rows)(split=split, edition=edition, at=at)
+    entries = with_own(shown, split=split, edition=edition, viewer=viewer, at=at)
     filters, now = filters or Filters(), timezone.now()
     n_submissions = sum(entry.kind == "submission" for entry in entries)
     dates = [entry.listed_at for entry in entries if entry.listed_at]
@@ -162,10 +161,17 @@ def arranged(
         is_open=deadlines.is_open(split, now=now),
         deadline=deadlines.sentence_of(split, now=now),
         filters=filters,
-        n_in_all=len(entries),
+        unfiltered=entries,
         n_submissions=n_submissions,
         n_left_behind=0 if n_submissions or edition is None or at else _n_left_behind(edition),
     )
+
+
+def require_column(sort: str, *, rules: Protocol | None = None) -> None:
+    """Raise `UnknownColumn` for what a board of this protocol cannot be sorted by; without one, no board."""
+    known = (*TEXT_COLUMNS, *(rules.score_names if rules else known_names()))
+    if sort.removeprefix("-") not in known:
+        raise UnknownColumn(sort, known=known)
 
 
 def _n_left_behind(edition: Edition) -> int:
@@ -193,26 +199,26 @@ def edition_at(split: Split, at: datetime) -> Edition | None:
 # --- what everybody sees ---------------------------------------------------------------------------------
 
 
-def everybodys(
+def public_rows(
     *,
     split: Split,
     edition: Edition | None,
     at: datetime | None = None,
-    supposed: Method | None = None,
+    assuming_visible: Method | None = None,
 ) -> tuple[Entry, ...]:
     """The rows that everybody sees, ranked and marked, untouched by readers and private methods.
 
     `supposed` is a method with a visibility that it does not have yet: the rows as they would be then.
     """
     quoted = PublishedResult.objects.on_board(split, edition, at=at)
-    entries = [published_entry(result) for result in quoted]
+    entries = [published_entry(result, rules=rules_of(edition)) for result in quoted]
     if edition is not None:
         shown = Method.objects.shown(at=at)
-        if supposed is not None:
-            shown = shown | Method.objects.filter(pk=supposed.pk)
-        rows = _best_of_each(shown, split=split, edition=edition, at=at, supposed=supposed)
-        attempts = _attempts(shown, split=split, at=at, supposed=supposed)
-        entries += [replace(row, n_attempts=attempts.of(row)) for row in rows]
+        if assuming_visible is not None:
+            shown = shown | Method.objects.filter(pk=assuming_visible.pk)
+        rows = _best_of_each(shown, split=split, edition=edition, at=at, assuming_visible=assuming_visible)
+        attempts = _attempts(shown, split=split, at=at, assuming_visible=assuming_visible)
+        entries += [replace(row, n_attempts=attempts.get(row.method_id, 0)) for row in rows]
     return in_ranks(entries)
 
 
@@ -222,12 +228,14 @@ def _best_of_each(
     split: Split,
     edition: Edition,
     at: datetime | None,
-    supposed: Method | None = None,
+    assuming_visible: Method | None = None,
 ) -> list[Entry]:
     """One row for each of these methods, without its rank: the best of its submissions, masked if need be."""
-    rows = Evaluation.objects.filter(
+    scored_rows = Evaluation.objects.filter(
         edition=edition, status=Status.SCORED, submission__method__in=methods
-    ).select_related("submission__method__team")
+    )
+    # No row says anything of reports and problems, which are long.
+    rows = scored_rows.select_related("submission__method__team").defer("report", "problems")
     if at is not None:
         rows = rows.filter(_finished_by(at, method="submission__method"))
     # Before their scores, which are written with them; in an order of their own, so that bytes keep theirs.
@@ -237,16 +245,16 @@ def _best_of_each(
     best: dict[UUID, tuple[Place, Entry]] = {}
     for evaluation in evaluations:
         submission = evaluation.submission
-        if supposed is not None and submission.method_id == supposed.pk:
-            submission.method = supposed
+        if assuming_visible is not None and submission.method_id == assuming_visible.pk:
+            submission.method = assuming_visible
         method, withdrawn_at = submission.method, submission.withdrawn_at
         if at is not None and withdrawn_at is not None and withdrawn_at > method.known_until(at):
             withdrawn_at = None
         if withdrawn_at and not method.was_shown_before(withdrawn_at):
-            continue  # nobody saw it: no stone for what was never there
+            continue  # it was never public: no tombstone row
         entry = submitted_entry(
             evaluation,
-            scored.get(evaluation.pk) or Scored(),
+            scored.get(evaluation.pk) or Scored.nothing(edition.rules),
             profile=profile_of(method, is_masked=method.is_masked),
             decimals=edition.decimals,
             withdrawn_at=withdrawn_at,
@@ -277,30 +285,22 @@ def unscorable_in(edition: Edition, *, split: Split) -> dict[UUID, str]:
         status=Status.REJECTED,
         submission__in=Evaluation.objects.filter(edition=edition, status=Status.SCORED).values("submission"),
     )
-    return {pk: reason_told(problems) for pk, problems in rejected.values_list("submission", "problems")}
-
-
-@dataclass(frozen=True)
-class Attempts:
-    """How many scored submissions each method has, and the public ones of each team together."""
-
-    by_method: Mapping[UUID, int]
-    by_team: Mapping[UUID, int]
-    team_of: Mapping[UUID, UUID]
-
-    def of(self, row: Entry) -> int:
-        """What a row says: a named one of all that its team shows, an anonymous one of nothing but itself."""
-        if row.method_id is None:
-            return 0
-        if row.visibility == Visibility.PUBLIC:
-            return self.by_team.get(self.team_of[row.method_id], 0)
-        return self.by_method.get(row.method_id, 0)
+    return {pk: public_reason(problems) for pk, problems in rejected.values_list("submission", "problems")}
 
 
 def _attempts(
-    methods: MethodQuerySet, *, split: Split, at: datetime | None, supposed: Method | None = None
-) -> Attempts:
-    """Counted are submissions that were scored in a published edition: those that cost a slot for good."""
+    methods: MethodQuerySet,
+    *,
+    split: Split,
+    at: datetime | None,
+    assuming_visible: Method | None = None,
+    of_teams: bool = True,
+) -> Mapping[UUID | None, int]:
+    """How many attempts each method's row tells: a public one all that its team shows, another one its own.
+
+    Counted are submissions that were scored in a published edition: those that cost a slot for good. Without
+    `of_teams` every method tells its own.
+    """
     scored = Evaluation.objects.filter(
         submission=OuterRef("pk"), status=Status.SCORED, edition__published_at__isnull=False
     )
@@ -312,16 +312,14 @@ def _attempts(
         .values_list("method", "method__team", "method__visibility")
         .annotate(n=Count("pk"))
     )
-    by_method, by_team = dict[UUID, int](), dict[UUID, int]()
-    team_of: dict[UUID, UUID] = {}
+    teller_of: dict[UUID | None, UUID] = {}
+    told = Counter[UUID]()
     for method_id, team_id, visibility, n in rows:
-        by_method[method_id] = n
-        team_of[method_id] = team_id
-        if supposed is not None and method_id == supposed.pk:
-            visibility = supposed.visibility  # noqa: PLW2901 - as if it were
-        if visibility == Visibility.PUBLIC:
-            by_team[team_id] = by_team.get(team_id, 0) + n
-    return Attempts(by_method=by_method, by_team=by_team, team_of=team_of)
+        if assuming_visible is not None and method_id == assuming_visible.pk:
+            visibility = assuming_visible.visibility  # noqa: PLW2901 - as if it were
+        teller_of[method_id] = team_id if of_teams and visibility == Visibility.PUBLIC else method_id
+        told[teller_of[method_id]] += n
+    return {method_id: told[teller] for method_id, teller in teller_of.items()}
 
 
 # --- what a reader's own team sees beside ----------------------------------------------------------------
@@ -375,7 +373,7 @@ def _private_rows(
     methods = Method.objects.filter(pk__in=hidden)
     by_id = {method.pk: method for method in methods.select_related("team")}
     rows = _best_of_each(methods, split=split, edition=edition, at=at)
-    attempts = _attempts(methods, split=split, at=at)
+    attempts = _attempts(methods, split=split, at=at, of_teams=False)
     public = [entry.scores[PRIMARY] for entry in shown]
     return [
         replace(
@@ -383,7 +381,7 @@ def _private_rows(
             visibility=Visibility.PRIVATE,
             pseudonym="",
             rank=ranking.rank([*public, row.scores[PRIMARY]])[-1],
-            n_attempts=attempts.by_method.get(row.method_id, 0),
+            n_attempts=attempts.get(row.method_id, 0),
         )
         for row in rows
         if row.method_id is not None

@@ -1,14 +1,13 @@
-"""The order of a board: who is better, which ranks and marks that makes, and how rows are listed."""
+"""Ranking: ranks, marks, and the order in which rows are listed."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 
-from evaluator import ranking
-from evaluator.protocol import SCORE_NAMES
-from leaderboard.entries import Entry, placed
+from evaluator.metrics import ranking
+from evaluator.metrics.protocol import PRIMARY
+from leaderboard.boards.rows import Entry, placed
 
-PRIMARY = "mid"
 Place = tuple[bool, float, datetime]
 
 
@@ -20,22 +19,16 @@ def key(value: float | None, submitted_at: datetime) -> Place:
 def in_ranks(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     """The same rows with their ranks, and with the best and the second of each column marked."""
     ranks = ranking.rank([entry.scores[PRIMARY] for entry in entries])
-    return tuple(_marked([placed(entry, rank) for entry, rank in zip(entries, ranks, strict=True)]))
-
-
-def _marked(entries: list[Entry]) -> list[Entry]:
-    best: dict[int, set[str]] = {}
-    second: dict[int, set[str]] = {}
-    for name in SCORE_NAMES:
-        firsts, seconds = ranking.best_and_second([entry.scores[name] for entry in entries])
-        for index in firsts:
-            best.setdefault(index, set()).add(name)
-        for index in seconds:
-            second.setdefault(index, set()).add(name)
-    return [
-        replace(entry, best=frozenset(best.get(i, ())), second=frozenset(second.get(i, ())))
-        for i, entry in enumerate(entries)
-    ]
+    names = list(entries[0].scores) if entries else []
+    marks = {name: ranking.best_and_second([entry.scores[name] for entry in entries]) for name in names}
+    return tuple(
+        replace(
+            placed(entry, rank),
+            best=frozenset(name for name, (best, _) in marks.items() if i in best),
+            second=frozenset(name for name, (_, second) in marks.items() if i in second),
+        )
+        for i, (entry, rank) in enumerate(zip(entries, ranks, strict=True))
+    )
 
 
 def listed(entries: Sequence[Entry], *, by: str) -> list[Entry]:
@@ -46,7 +39,7 @@ def listed(entries: Sequence[Entry], *, by: str) -> list[Entry]:
     )
 
     def value(entry: Entry) -> str | float | int | None:
-        if column in SCORE_NAMES:
+        if column in entry.scores:
             return entry.scores[column]
         if column == "rank":
             return entry.rank

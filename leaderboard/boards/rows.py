@@ -1,16 +1,17 @@
-"""What a row of a board is, and what of a method a reader is told.
+"""The row of a board, and the details of a method that a reader may see.
 
 Rows are made from evaluations and from results printed in papers. An anonymous method is masked here, once,
 for every page and format: whatever is made of an `Entry` or a `Profile` later cannot tell what neither holds.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
 from uuid import UUID
 
-from evaluator.protocol import SCORE_NAMES
+from evaluator.metrics.protocol import PRIMARY, Protocol, score_name
+from leaderboard.methods.details import Details, details_of, stated
 from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility, days
 from leaderboard.models.benchmark import SINCE_EVER
 from leaderboard.models.methods import MethodQuerySet
@@ -23,21 +24,6 @@ _INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
 
 
 @dataclass(frozen=True)
-class Details:
-    """What a method uses and costs, as its team says; empty or None where nothing was said."""
-
-    n_frames: int | None = None
-    cameras: str = ""
-    box_source: str = ""
-    uses_nerf: bool | None = None
-    uses_extra_data: bool | None = None
-    pretraining: str = ""
-    n_parameters: int | None = None
-    latency_ms: float | None = None
-    hardware: str = ""
-
-
-@dataclass(frozen=True)
 class Profile:
     """What a reader is told of a method: everything, or what an anonymous one shows."""
 
@@ -46,7 +32,7 @@ class Profile:
     description: str = ""
     paper_url: str = ""
     code_url: str = ""
-    details: Details = field(default_factory=Details)
+    details: Details = field(default_factory=stated)
 
 
 @dataclass(frozen=True)
@@ -62,7 +48,7 @@ class Interval:
 
 @dataclass(frozen=True)
 class Entry:
-    """One row of a board. `scores` maps the ten names to published values; None where there is none."""
+    """One row of a board. `scores` has the names of its edition's protocol; None for no value."""
 
     kind: str  # "submission" or "published"
     method: str
@@ -80,7 +66,7 @@ class Entry:
     code_url: str = ""
     source: str = ""  # a published row's citation
     source_title: str = ""  # of the paper in it
-    details: Details = field(default_factory=Details)
+    details: Details = field(default_factory=stated)
     # Scored submissions of the team's public methods to the split; of an anonymous or private one its own.
     n_attempts: int | None = None
     intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
@@ -114,17 +100,11 @@ class Entry:
         return f"{self.date:%Y-%m-%d}" if self.date else str(self.year or "")
 
 
-def details_of(method: Method) -> Details:
-    """A method's typed details."""
-    return Details(**{name: getattr(method, name) for name in Details.__dataclass_fields__})
-
-
 def profile_of(method: Method, *, is_masked: bool = False) -> Profile:
-    """What is said of a method. Masked: its pseudonym, and those details that are choices or numbers."""
-    details = details_of(method)
+    """The profile of a method. Masked: its pseudonym, and its details but for free texts."""
+    details = details_of(method, is_masked=is_masked)
     if is_masked:
-        told = asdict(details) | {"pretraining": "", "hardware": ""}
-        return Profile(name=method.pseudonym, team=ANONYMOUS_TEAM, details=Details(**told))
+        return Profile(name=method.pseudonym, team=ANONYMOUS_TEAM, details=details)
     return Profile(
         name=method.name,
         team=method.team.name,
@@ -135,21 +115,21 @@ def profile_of(method: Method, *, is_masked: bool = False) -> Profile:
     )
 
 
-def published_entry(result: PublishedResult) -> Entry:
-    """The row of a result that is printed in a paper."""
+def published_entry(result: PublishedResult, *, rules: Protocol) -> Entry:
+    """The row of a result that is printed in a paper, on a board of this protocol."""
     return Entry(
         kind="published",
         method=result.method_name,
         team=result.authors,
         description=result.description,
-        scores={name: result.scores.get(name) for name in SCORE_NAMES},
+        scores={name: result.scores.get(name) for name in rules.score_names},
         decimals=printed_decimals(result.scores.values()),
         year=result.year,
         paper_url=result.source_url,
         code_url=result.code_url,
         source=f"{result.authors} ({result.year}). {result.source_title}. {result.source_table}.",
         source_title=result.source_title,
-        details=Details(uses_nerf=result.uses_nerf, latency_ms=result.latency_ms, hardware=result.hardware),
+        details=stated(uses_nerf=result.uses_nerf, latency_ms=result.latency_ms, hardware=result.hardware),
         shown_at=result.added_at if result.added_at > SINCE_EVER else None,
     )
 
@@ -188,21 +168,21 @@ def submitted_entry(
         kind="submission",
         **named(profile),
         decimals=decimals,
-        scores=flat_scores([]) if withdrawn_at else scored.values,
-        intervals={} if withdrawn_at else scored.intervals,
-        date=days.told(submission.submitted_at, is_masked=method.is_masked),
+        scores=dict.fromkeys(scored.values) if withdrawn_at else scored.values,
+        intervals={} if withdrawn_at else scored.ordered_intervals(),
+        date=days.truncate_to_day(submission.submitted_at, is_masked=method.is_masked),
         method_id=submission.method_id,
         submission_id=submission.pk,
         evaluation_id=evaluation.pk,
         visibility=method.visibility,
-        shown_at=days.told_or_none(method.shown_at, is_masked=method.is_masked),
-        withdrawn_at=days.told_or_none(withdrawn_at, is_masked=method.is_masked),
+        shown_at=days.truncate_to_day_or_none(method.shown_at, is_masked=method.is_masked),
+        withdrawn_at=days.truncate_to_day_or_none(withdrawn_at, is_masked=method.is_masked),
         unscorable=unscorable,
     )
 
 
-def reason_told(problems: Iterable[Mapping[str, str]]) -> str:
-    """The code of why an edition cannot score a file that another one scored, as far as it is told.
+def public_reason(problems: Iterable[Mapping[str, str]]) -> str:
+    """The public code of the reason why an edition cannot score a file that another one scored.
 
     >>> reason_told([{"code": "not-finite"}, {"code": "missing-keys"}]), reason_told([{"code": "not-finite"}])
     ('missing-keys', 'other')
@@ -216,24 +196,30 @@ def reason_told(problems: Iterable[Mapping[str, str]]) -> str:
 
 @dataclass(frozen=True)
 class Scored:
-    """The ten values of an evaluation, and the intervals of those that have one."""
+    """The values of an evaluation by the names of its protocol, and the intervals of those that have one."""
 
-    values: dict[str, float | None] = field(default_factory=lambda: dict.fromkeys(SCORE_NAMES))
+    values: dict[str, float | None]
     intervals: dict[str, Interval] = field(default_factory=dict)
 
+    @classmethod
+    def nothing(cls, rules: Protocol) -> "Scored":
+        """No value under any of the names."""
+        return cls(dict.fromkeys(rules.score_names))
 
-def flat_scores(scores: Iterable[Score]) -> dict[str, float | None]:
-    """The ten names and their values; None where an interval is empty."""
-    values: dict[str, float | None] = dict.fromkeys(SCORE_NAMES)
-    for score in scores:
-        values[score_name(score.metric, score.interval)] = score.value
-    return values
+    def ordered_intervals(self) -> dict[str, Interval]:
+        """The intervals in the order of the values, so that a row has the same bytes whenever it is read."""
+        return {name: self.intervals[name] for name in self.values if name in self.intervals}
 
 
-def scored_of(scores: Iterable[Score]) -> Scored:
+def flat_scores(evaluation: Evaluation) -> dict[str, float | None]:
+    """The names of its protocol and their values; None where a TTC range is empty."""
+    return scored_of(evaluation).values
+
+
+def scored_of(evaluation: Evaluation) -> Scored:
     """The values of one evaluation with their intervals."""
-    found = Scored()
-    for score in scores:
+    found = Scored.nothing(evaluation.edition.rules)
+    for score in evaluation.scores.all():
         name = score_name(score.metric, score.interval)
         found.values[name] = score.value
         inferred = [getattr(score, column) for column in _INFERRED]
@@ -243,7 +229,7 @@ def scored_of(scores: Iterable[Score]) -> Scored:
 
 
 def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
-    """The ten names and their values of every evaluation in an edition: one query, whatever their number."""
+    """The values of every evaluation in an edition: one query, whatever their number."""
     return {pk: scored.values for pk, scored in scored_in(edition).items()}
 
 
@@ -263,7 +249,7 @@ def scored_in(
     ):
         scored = found.get(pk)
         if scored is None:
-            scored = found[pk] = Scored()
+            scored = found[pk] = Scored.nothing(edition.rules)
         name = score_name(metric, interval)
         scored.values[name] = value
         known = inferred if has_ranges else inferred[:2]
@@ -274,15 +260,10 @@ def scored_in(
 
 def placed(entry: Entry, rank: int | None) -> Entry:
     """The row with its rank. A range that does not hold it is of the board before, and left out."""
-    found = entry.intervals.get("mid", Interval())
+    found = entry.intervals.get(PRIMARY, Interval())
     if rank is None or found.rank_low is None or found.rank_high is None:
         return replace(entry, rank=rank)
     if found.rank_low <= rank <= found.rank_high:
         return replace(entry, rank=rank)
     unplaced = replace(found, rank_low=None, rank_high=None, is_with_best=None)
-    return replace(entry, rank=rank, intervals={**entry.intervals, "mid": unplaced})
-
-
-def score_name(metric: str, interval: str) -> str:
-    """The name of a value of a board; an error's alone is that of the overall one."""
-    return metric if interval == "overall" else f"{metric}_{interval}"
+    return replace(entry, rank=rank, intervals={**entry.intervals, PRIMARY: unplaced})

@@ -1,18 +1,17 @@
 """The database's clock: the one that processes on several machines agree on."""
 
 from datetime import datetime, timedelta
-from typing import Any
 
-from django.db.models import DateTimeField, ExpressionWrapper, Value
+from django.db.models.expressions import CombinedExpression
 from django.db.models.functions import Now
 from django.utils import timezone
 
 from leaderboard.models import Split
 
 
-def after(seconds: float) -> "ExpressionWrapper[Any]":
+def after(seconds: float) -> CombinedExpression:
     """`seconds` from now, to be evaluated by the database."""
-    return ExpressionWrapper(Now() + Value(timedelta(seconds=seconds)), output_field=DateTimeField())
+    return Now() + timedelta(seconds=seconds)
 
 
 def database_now() -> datetime:

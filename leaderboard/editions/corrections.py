@@ -1,41 +1,35 @@
-"""Editions: re-score everything beside the board, look before switching, switch at once, and back.
+"""Corrections: re-score everything in a new edition, look, publish it at once, and roll back.
 
 A correction is a new edition (ground truth × protocol) in which every standing submission is evaluated anew.
 Publishing it moves one pointer; nothing that was ever published is changed.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
 from django.db import transaction
 from django.db.models import Count, Min, Q
 
-from evaluator.protocol import get_protocol
-from leaderboard import audit, clock, ground_truth, lifecycle
+from evaluator.metrics.protocol import get_protocol
+from leaderboard import audit
+from leaderboard.db import clock
+from leaderboard.editions import ground_truth
+from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status, Submission, User
-
-
-class NotMaintainer(Exception):
-    """Only maintainers open, publish, roll back and discard editions."""
-
-    def __init__(self) -> None:
-        super().__init__("Only maintainers may change editions.")
-
-
-class Refused(Exception):
-    """The edition cannot be changed like that; the text says why and what to do."""
+from leaderboard.models.submissions import SubmissionQuerySet
+from leaderboard.scoring import lifecycle
 
 
 @dataclass(frozen=True)
-class Progress:
+class RescoringProgress:
     """How far the re-scoring of an edition is."""
 
     n_total: int
     n_scored: int
     n_rejected: int
-    n_failed: int  # by our fault
+    n_failed: int  # system errors
     n_cancelled: int
     rate_per_s: float | None
     left_s: float | None
@@ -74,12 +68,13 @@ def open_edition(
     twice. `actor` None is the machine's command line.
     Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file is at fault; nothing changes then.
     """
-    _require_maintainer(actor)
+    require_maintainer(actor, to="change editions")
     split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
     if split is None or split.published_edition is None:
         raise Refused(
+            "edition-refused",
             f"The split {split_name!r} has no published edition to correct; "
-            f"open it with: manage.py import_truth {split_name} PATH"
+            f"open it with: manage.py import_truth {split_name} PATH",
         )
     protocol = protocol or split.published_edition.protocol
     get_protocol(protocol)
@@ -99,10 +94,11 @@ def open_edition(
             )
         elif edition.pk == split.published_edition_id:
             raise Refused(
+                "edition-refused",
                 f"{edition} has this ground truth, protocol and number of decimals ({decimals}), and is the "
-                "board already."
+                "current board already.",
             )
-        queue_standing(edition)
+        queue_active(edition)
     return edition
 
 
@@ -113,28 +109,29 @@ def _imported(split: Split, digest: str | None) -> GroundTruth:
     row = split.ground_truths.filter(digest=digest).first()
     if row is None:
         raise Refused(
-            f"The split {split.pk!r} has no ground truth {digest[:80]!r}; import it with --truth first."
+            "edition-refused",
+            f"The split {split.pk!r} has no ground truth {digest[:80]!r}; import it with --truth first.",
         )
     return row
 
 
-def queue_standing(edition: Edition) -> int:
+def standing(edition: Edition) -> SubmissionQuerySet:
+    """Every standing submission of an edition's split, in the order in which they came."""
+    rows = Submission.objects.standing().filter(split=edition.split_id)
+    return rows.select_related("method__team").order_by("submitted_at")
+
+
+def queue_active(edition: Edition) -> int:
     """Queue every standing submission that this edition has no evaluation of. Returns how many that were.
 
     The caller holds the split's row, so that no new submission slips between.
     """
-    missing = list(
-        Submission.objects.standing()
-        .filter(split=edition.split_id)
-        .exclude(evaluations__edition=edition)
-        .order_by("submitted_at")
-        .values_list("pk", flat=True)
-    )
+    missing = list(standing(edition).exclude(evaluations__edition=edition).values_list("pk", flat=True))
     lifecycle.enqueue_many(submission_ids=missing, edition=edition)
     return len(missing)
 
 
-def progress(edition: Edition) -> Progress:
+def progress(edition: Edition) -> RescoringProgress:
     """How far an edition is, with a rate from its first start to now by the database's clock."""
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
 
@@ -150,25 +147,17 @@ def progress(edition: Edition) -> Progress:
         first=Min("started_at"),
     )
     first = counts.pop("first")
-    n_done = counts["n_scored"] + counts["n_rejected"] + counts["n_failed"] + counts["n_cancelled"]
-    n_waiting = counts["n_total"] - n_done
-    rate = left_s = None
-    if first is not None and n_done and n_waiting:
-        rate = n_done / max((clock.database_now() - first).total_seconds(), 0.001)
-        left_s = n_waiting / rate
-    return Progress(**counts, rate_per_s=rate, left_s=left_s)
+    found = RescoringProgress(**counts, rate_per_s=None, left_s=None)
+    if first is None or not found.n_done or not found.n_waiting:
+        return found
+    rate_per_s = found.n_done / max((clock.database_now() - first).total_seconds(), 0.001)
+    return replace(found, rate_per_s=rate_per_s, left_s=found.n_waiting / rate_per_s)
 
 
 def unfinished(edition: Edition) -> list[Submission]:
     """Standing submissions of the split that this edition has neither scored nor rejected."""
     done = Evaluation.objects.filter(edition=edition, status__in=[Status.SCORED, Status.REJECTED])
-    return list(
-        Submission.objects.standing()
-        .filter(split=edition.split_id)
-        .exclude(pk__in=done.values("submission"))
-        .select_related("method__team")
-        .order_by("submitted_at")
-    )
+    return list(standing(edition).exclude(pk__in=done.values("submission")))
 
 
 def newly_rejected(edition: Edition) -> list[Submission]:
@@ -176,11 +165,7 @@ def newly_rejected(edition: Edition) -> list[Submission]:
     here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
     board = Evaluation.objects.filter(edition=edition.split.published_edition_id, status=Status.SCORED)
     return list(
-        Submission.objects.standing()
-        .filter(pk__in=here.values("submission"))
-        .filter(pk__in=board.values("submission"))
-        .select_related("method__team")
-        .order_by("submitted_at")
+        standing(edition).filter(pk__in=here.values("submission")).filter(pk__in=board.values("submission"))
     )
 
 
@@ -201,17 +186,17 @@ def publish(
     changelog then tells.
     Raises `NotMaintainer` or `Refused`.
     """
-    _require_maintainer(actor)
+    require_maintainer(actor, to="change editions")
     reason = _reason(reason)
     with transaction.atomic():
         edition, split = _locked(edition)
         if edition.discarded_at or edition.pk == split.published_edition_id:
-            state = "was discarded" if edition.discarded_at else "is the board already"
-            raise Refused(f"{edition} {state}; there is nothing to publish.")
+            state = "was discarded" if edition.discarded_at else "is the current board already"
+            raise Refused("edition-refused", f"{edition} {state}; there is nothing to publish.")
         _require_same_board(split, replaces)
         waiting, losing = unfinished(edition), newly_rejected(edition)
         if (waiting or losing) and not leave_out:
-            raise Refused(_left_out_sentence(edition, waiting, losing))
+            raise Refused("edition-refused", _left_out_sentence(edition, waiting, losing))
         return ground_truth.make_board(
             edition=edition,
             kind=Publication.Kind.PUBLISHED,
@@ -229,7 +214,7 @@ def roll_back(
 
     What was submitted since is queued for it. Raises `NotMaintainer` or `Refused`.
     """
-    _require_maintainer(actor)
+    require_maintainer(actor, to="change editions")
     reason = _reason(reason)
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).get(pk=split_name)
@@ -237,7 +222,8 @@ def roll_back(
         former = predecessor(split)
         if former is None:
             raise Refused(
-                f"{split.published_edition or split.pk} replaced no edition; there is nothing to go back to."
+                "edition-refused",
+                f"{split.published_edition or split.pk} replaced no edition; it cannot be rolled back.",
             )
         publication = ground_truth.make_board(
             edition=former,
@@ -246,7 +232,7 @@ def roll_back(
             now=now,
             actor=actor,
         )
-        queue_standing(publication.edition)
+        queue_active(publication.edition)
     return publication
 
 
@@ -267,12 +253,12 @@ def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None)
 
     Raises `NotMaintainer` or `Refused`.
     """
-    _require_maintainer(actor)
+    require_maintainer(actor, to="change editions")
     reason = _reason(reason)
     with transaction.atomic():
         edition, _ = _locked(edition)
         if not edition.is_in_preparation:
-            raise Refused(f"{edition} is not in preparation; there is nothing to discard.")
+            raise Refused("edition-refused", f"{edition} is not in preparation; there is nothing to discard.")
         edition.discarded_at = now
         edition.save(update_fields=["discarded_at"])
         lifecycle.cancel_edition(edition=edition)
@@ -289,24 +275,19 @@ def _locked(edition: Edition) -> tuple[Edition, Split]:
     return edition, split
 
 
-def _require_maintainer(actor: User | None) -> None:
-    if actor is not None and not actor.is_maintainer:
-        raise NotMaintainer
-
-
 def _require_same_board(split: Split, replaces: int | None) -> None:
     published = split.published_edition.number if split.published_edition else None
     if published != replaces:
         raise Refused(
-            f"The board of {split.pk!r} is edition {published}, not {replaces} as when you looked; "
-            "look again first."
+            "edition-refused",
+            f"The current edition of {split.pk!r} is {published}, no longer {replaces}; look again.",
         )
 
 
 def _reason(text: str) -> str:
     text = " ".join(text.split())
     if not text:
-        raise Refused("No reason was given; expected a sentence for the public changelog.")
+        raise Refused("edition-refused", "No reason was given; expected a sentence for the public changelog.")
     return text[:1000]
 
 
@@ -314,14 +295,14 @@ def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: 
     said = []
     if waiting:
         said.append(
-            f"{edition} is not finished: {len(waiting)} standing submissions are neither scored nor "
-            f"rejected: {_named(waiting)}. Wait, retry them, or leave them out knowingly."
+            f"{edition} is not finished: {len(waiting)} submissions are neither scored nor "
+            f"rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
         )
     if losing:
         entries = "1 entry" if len(losing) == 1 else f"{len(losing)} entries"
         said.append(
             f"{edition} rejects {entries} that the board scores: {_named(losing)}. "
-            "Leave them out knowingly, or correct the ground truth."
+            "Confirm that they are left out, or correct the ground truth."
         )
     return " ".join(said)
 

@@ -1,29 +1,23 @@
-"""Ground truth: read by a maintainer, kept in a private directory, loaded by workers only.
+"""Ground truth: imported by a maintainer, and published as an edition of its split.
 
 The database has its digest and counts; the file store has its public manifest; the values are nowhere else.
 """
 
 import dataclasses
-import os
-import tempfile
 from collections.abc import Collection, Sequence
 from datetime import datetime
-from functools import lru_cache
 from pathlib import Path
 
-from django.conf import settings
 from django.db import transaction
 from django.db.models import Max
 
 import evaluator
-from evaluator.protocol import get_protocol
-from evaluator.revisions import Comparison, compare
-from leaderboard import audit, boards, files, seeds
+from evaluator.metrics.protocol import INTERVALS, OVERALL, get_protocol, known_intervals
+from evaluator.predictions.revisions import Comparison, compare
+from leaderboard import audit, versions
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
-
-
-class Refused(Exception):
-    """The import cannot be done; the text says why and what to do."""
+from leaderboard.storage import files, truth_values
 
 
 def import_truth(
@@ -44,9 +38,10 @@ def import_truth(
             return existing
         if split.published_edition is not None:
             raise Refused(
+                "edition-refused",
                 f"The split {split.pk!r} has {split.published_edition} with other ground truth "
                 f"({split.published_edition.ground_truth.short_digest}) or rules; open a correction beside "
-                f"it with: manage.py open_edition {split.pk} --truth {path.name}"
+                f"it with: manage.py open_edition {split.pk} --truth {path.name}",
             )
         edition = new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
         make_board(
@@ -68,16 +63,13 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
     if split is None:
         known = ", ".join(Split.objects.values_list("name", flat=True))
-        raise Refused(f"There is no split {split_name!r}; expected one of {known}.")
+        raise Refused("unknown-split", f"There is no split {split_name!r}; expected one of {known}.")
     truth = evaluator.read_truth(path)
     old = split.published_edition.ground_truth if split.published_edition else None
     counts = _compared(old, truth)
-    _keep_values(truth, is_hidden=split.is_hidden)
-    files.keep_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
+    truth_values.save(truth, is_hidden=split.is_hidden)
+    files.save_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
     with transaction.atomic():
-        # The split before the audit trail, as every verb takes them: two that did it the other way round
-        # could wait for each other.
-        Split.objects.select_for_update(no_key=True).get(pk=split.pk)
         row, is_new = GroundTruth.objects.get_or_create(
             digest=truth.digest,
             defaults={
@@ -87,16 +79,18 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
                 "n_sequences": truth.manifest.n_sequences,
                 "n_recordings": truth.manifest.n_recordings,
                 "counts": {
-                    "overall": truth.n_sequences,
-                    **truth.interval_counts,
-                    "out_of_range": truth.n_out_of_range,
+                    OVERALL: truth.n_sequences,
+                    **truth.counts_of(known_intervals().values()),
+                    "out_of_range": truth.n_outside(INTERVALS),
                 },
                 "imported_at": now,
                 "imported_by": actor,
             },
         )
         if row.split_id != split.pk:
-            raise Refused(f"This ground truth belongs to the split {row.split_id!r} already.")
+            raise Refused(
+                "edition-refused", f"This ground truth belongs to the split {row.split_id!r} already."
+            )
         if old is not None and counts is not None:
             _keep_comparison(old, row, counts)
         if is_new:
@@ -108,7 +102,7 @@ def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> Comparis
     """What changed since `old`; None if there is nothing else. Raises `evaluator.Rejected` for no overlap."""
     if old is None or old.digest == truth.digest:
         return None
-    comparison = compare(load(old.digest), truth)
+    comparison = compare(truth_values.load(old.digest), truth)
     if comparison.n_added == truth.n_sequences:
         message = (
             f"None of the {truth.n_sequences:,} sequences is in the published manifest of "
@@ -149,7 +143,7 @@ def uncompared(*, held: Collection[str]) -> list[tuple[GroundTruth, GroundTruth]
 
 def count_changes(old: GroundTruth, new: GroundTruth) -> None:
     """Count what differs between two ground truths, for whoever asks later. Raises as `load` does."""
-    _keep_comparison(old, new, compare(load(old.digest), load(new.digest)))
+    _keep_comparison(old, new, compare(truth_values.load(old.digest), truth_values.load(new.digest)))
 
 
 def new_edition(
@@ -198,7 +192,6 @@ def make_board(
         edition.save(update_fields=["published_at"])
     split.published_edition = edition
     split.save(update_fields=["published_edition"])
-    boards.changed(split.pk)
     audit.record(
         verb=kind.lower(),
         noun="Edition",
@@ -206,6 +199,7 @@ def make_board(
         actor=actor,
         details={"edition": str(edition), "reason": reason, "left_out": list(left_out)},
     )
+    versions.changed(split.pk)
     return Publication.objects.create(
         split=split,
         edition=edition,
@@ -216,62 +210,3 @@ def make_board(
         reason=reason,
         left_out=list(left_out),
     )
-
-
-def values_path(digest: str) -> Path:
-    """Where the worker finds the values of this digest."""
-    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.npz"
-
-
-def manifest_path(digest: str) -> Path:
-    """Where the worker finds the manifest of the ground truth of this digest, without the values."""
-    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.manifest.npz"
-
-
-def is_marked_hidden(digest: str) -> bool:
-    """Whether the values of this digest were imported as hidden ones, whatever the database says today.
-
-    Who can write into the database could call a split open; the private directory tells workers otherwise.
-    """
-    return _mark_path(digest).exists()
-
-
-def _mark_path(digest: str) -> Path:
-    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.hidden"
-
-
-def _keep_values(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
-    """Write values and manifest to the private directory: whole or not at all, readable by its owner only.
-
-    Hidden ones are marked as such, before they can be read.
-    """
-    directory = Path(settings.GROUND_TRUTH_DIR)
-    directory.mkdir(parents=True, exist_ok=True, mode=0o700)
-    if is_hidden:
-        _mark_path(truth.digest).touch(mode=0o600)
-    for part, target in ((truth, values_path(truth.digest)), (truth.manifest, manifest_path(truth.digest))):
-        if target.exists():
-            continue
-        handle, temporary = tempfile.mkstemp(dir=directory, suffix=".npz")
-        os.close(handle)
-        part.save(Path(temporary))
-        with Path(temporary).open("rb") as written:
-            os.fsync(written.fileno())
-        Path(temporary).replace(target)
-    seeds.ensure()
-
-
-def held() -> frozenset[str]:
-    """The digests whose values this process can read: what it may take on. Empty without any access."""
-    try:
-        found = list(Path(settings.GROUND_TRUTH_DIR).iterdir())
-    except OSError:
-        return frozenset()
-    values = (path for path in found if path.suffix == ".npz" and not path.stem.endswith(".manifest"))
-    return frozenset(f"sha256:{path.stem}" for path in values if os.access(path, os.R_OK))
-
-
-@lru_cache(maxsize=2)
-def load(digest: str) -> evaluator.GroundTruth:
-    """The values of this digest, for a worker. Raises `OSError` if this process has no access to them."""
-    return evaluator.GroundTruth.load(values_path(digest))

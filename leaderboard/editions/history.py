@@ -1,11 +1,11 @@
-"""What became of editions: when each was the board, what replaced it, what a correction did to an entry."""
+"""The history of editions: when each was published, what replaced it, how a correction changed an entry."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from django.db.models import Count
+from django.db.models import Count, QuerySet
 
-from leaderboard import rescoring
+from leaderboard.editions import corrections
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -19,7 +19,7 @@ from leaderboard.models import (
 
 
 @dataclass(frozen=True)
-class Past:
+class EditionRecord:
     """An edition that was published, and what became of it."""
 
     edition: Edition
@@ -53,61 +53,45 @@ class Rescored:
     new: Evaluation | None
 
 
-def changelog(split: Split) -> tuple[Publication, ...]:
+def changelog(split: Split) -> QuerySet[Publication]:
     """Every change of a split's board, the newest first."""
-    return tuple(
-        split.publications.select_related("edition__ground_truth", "replaced__ground_truth").order_by(
-            "-at", "-pk"
-        )
-    )
+    rows = split.publications.select_related("edition__ground_truth", "replaced__ground_truth")
+    return rows.order_by("-at", "-pk")
 
 
 def latest_change(split: Split) -> Publication | None:
     """How the present board became the board; None if it replaced none."""
-    latest = (
-        split.publications.select_related("edition__ground_truth", "replaced__ground_truth")
-        .order_by("-at", "-pk")
-        .first()
-    )
+    latest = changelog(split).first()
     return latest if latest and latest.replaced_id else None
 
 
-def history(split: Split, publications: tuple[Publication, ...]) -> tuple[Past, ...]:
+def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionRecord, ...]:
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
     # All at once, since each edition that followed another asks for one.
     has_followed = any(publication.replaced_id for publication in publications)
     compared = list(TruthComparison.objects.filter(new__split=split).order_by("pk")) if has_followed else []
-    return tuple(_past(edition, split, publications, compared) for edition in published.order_by("-number"))
+    return tuple(record_of(each, publications, compared) for each in published.order_by("-number"))
 
 
-def past(edition: Edition) -> Past:
-    """What became of one edition that was published."""
-    return _past(edition, edition.split, changelog(edition.split))
-
-
-def _past(
+def record_of(
     edition: Edition,
-    split: Split,
-    publications: tuple[Publication, ...],
+    publications: Iterable[Publication] | None = None,
     compared: Sequence[TruthComparison] | None = None,
-) -> Past:
-    own = tuple(p for p in publications if p.edition_id == edition.pk)
-    replaced_by = next((p for p in publications if p.replaced_id == edition.pk), None)
-    is_board = split.published_edition_id == edition.pk
+) -> EditionRecord:
+    """What became of one published edition; with the changelog and the comparisons where they are at hand."""
+    log = changelog(edition.split) if publications is None else publications
+    own = tuple(each for each in log if each.edition_id == edition.pk)
+    replaced_by = next((each for each in log if each.replaced_id == edition.pk), None)
+    is_board = edition.split.published_edition_id == edition.pk
     followed = own[-1].replaced if own else None
-    return Past(
+    return EditionRecord(
         edition=edition,
         followed=followed,
         change=change_of_truth(followed.ground_truth, edition.ground_truth, compared) if followed else None,
         replaced_by=None if is_board else replaced_by,
         publications=own,
     )
-
-
-def truth_change(old: Edition, new: Edition) -> TruthChange | None:
-    """What differs between the ground truths of two editions; None if these two were never compared."""
-    return change_of_truth(old.ground_truth, new.ground_truth)
 
 
 def change_of_truth(
@@ -153,30 +137,30 @@ def rescored(submission: Submission) -> Rescored | None:
 
 
 @dataclass(frozen=True)
-class Desk:
+class MaintainerOverview:
     """What a maintainer finds of one split."""
 
     split: Split
     published: Edition | None
     former: tuple[Edition, ...]  # published once, and replaced
-    in_preparation: tuple[tuple[Edition, rescoring.Progress], ...]
+    in_preparation: tuple[tuple[Edition, corrections.RescoringProgress], ...]
     system_errors: tuple[tuple[Edition, int], ...]
     predecessor: Edition | None  # what rolling back returns to
 
 
-def desk(split: Split) -> Desk:
-    """The editions of a split as maintainers see them, and what failed by our fault."""
+def maintainer_overview(split: Split) -> MaintainerOverview:
+    """The editions of a split as maintainers see them, and system errors."""
     rows = list(split.editions.select_related("ground_truth", "split").order_by("-number"))
     published = next((e for e in rows if e.pk == split.published_edition_id), None)
     failed = Evaluation.objects.filter(status=Status.SYSTEM_ERROR, submission__withdrawn_at=None)
     n_failed = dict(
         failed.filter(edition__in=rows).values_list("edition").annotate(n=Count("pk")).order_by("edition")
     )
-    return Desk(
+    return MaintainerOverview(
         split=split,
         published=published,
         former=tuple(e for e in rows if e.published_at and e != published),
-        in_preparation=tuple((e, rescoring.progress(e)) for e in rows if e.is_in_preparation),
+        in_preparation=tuple((e, corrections.progress(e)) for e in rows if e.is_in_preparation),
         system_errors=tuple((e, n_failed[e.pk]) for e in rows if e.pk in n_failed),
-        predecessor=rescoring.predecessor(split),
+        predecessor=corrections.predecessor(split),
     )

@@ -2,23 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any, Final
+from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
 
-from evaluator.protocol import SCORE_NAMES
-from leaderboard import editions, rescoring, standings
+from leaderboard.boards import boards
+from leaderboard.editions import corrections, history
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Evaluation, Status, Submission
 
 ABSENT = "ABSENT"  # not evaluated in that edition
-COLUMNS: Final = (
-    *("submission", "method", "team", "old_status", "new_status", "old_rank", "new_rank"),
-    *(f"{side}_{name}" for side in ("old", "new", "delta") for name in SCORE_NAMES),
-    "reason",
-    "n_renumbered",
-)
-"""Of the flat rows, in their order."""
 
 
 @dataclass(frozen=True)
@@ -39,14 +33,14 @@ class Change:
     old_rank: int | None
     new_rank: int | None
     problems: tuple[Mapping[str, str], ...] = ()
-    n_problems: int = 0
     old_decimals: int = 2
     new_decimals: int = 2
 
     @property
     def delta(self) -> dict[str, float | None]:
         """New minus old published values; None where either is missing."""
-        return {name: _difference(self.old[name], self.new[name]) for name in SCORE_NAMES}
+        names = dict.fromkeys([*self.old, *self.new])
+        return {name: _difference(self.old.get(name), self.new.get(name)) for name in names}
 
     @property
     def rank_change(self) -> int:
@@ -68,13 +62,28 @@ class Preview:
     edition: Edition
     published: Edition
     changes: tuple[Change, ...]
-    progress: rescoring.Progress
-    truth: editions.TruthChange | None  # between the two; None if these were never compared
+    progress: corrections.RescoringProgress
+    truth: history.TruthChange | None  # between the two; None if these were never compared
 
     @property
     def replaces(self) -> int:
         """The edition that this was compared with; publishing asks for it again."""
         return self.published.number
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The names of the scores of either edition."""
+        rules = (self.published.rules, self.edition.rules)
+        return tuple(dict.fromkeys(name for each in rules for name in each.score_names))
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Of the flat rows, in their order."""
+        return (
+            *("submission", "method", "team", "old_status", "new_status", "old_rank", "new_rank"),
+            *(f"{side}_{name}" for side in ("old", "new", "delta") for name in self.names),
+            *("reason", "n_renumbered"),
+        )
 
     @property
     def n_changed(self) -> int:
@@ -98,18 +107,15 @@ class Preview:
 def preview(edition: Edition) -> Preview:
     """Compare an edition with the published one of its split, the greatest change of rank first.
 
-    Raises `rescoring.Refused` if the split has no published edition.
+    Raises `Refused` if the split has no published edition.
     """
     published = edition.split.published_edition
     if published is None:
-        raise rescoring.Refused(f"The split {edition.split_id!r} has no published edition to compare with.")
+        raise Refused(
+            "edition-refused", f"The split {edition.split_id!r} has no published edition to compare with."
+        )
     old, new = _side(published), _side(edition)
-    changes = [
-        _change(submission, old, new)
-        for submission in Submission.objects.standing()
-        .filter(split=edition.split_id)
-        .select_related("method__team")
-    ]
+    changes = [_change(submission, old, new) for submission in corrections.standing(edition)]
     changes.sort(
         key=lambda c: (-c.rank_change, c.new_rank or 10**6, c.method.casefold(), str(c.submission_id))
     )
@@ -117,13 +123,13 @@ def preview(edition: Edition) -> Preview:
         edition=edition,
         published=published,
         changes=tuple(changes),
-        progress=rescoring.progress(edition),
-        truth=editions.truth_change(published, edition),
+        progress=corrections.progress(edition),
+        truth=history.change_of_truth(published.ground_truth, edition.ground_truth),
     )
 
 
 def rows(found: Preview) -> list[dict[str, Any]]:
-    """The preview as flat rows for CSV and JSON: one for each submission, with `COLUMNS`.
+    """The preview as flat rows for CSV and JSON: one for each submission, with its `columns`.
 
     `n_renumbered` is of the edition and the same in all rows: sequences with another anno_id than before.
     """
@@ -136,8 +142,8 @@ def rows(found: Preview) -> list[dict[str, Any]]:
             "new_status": change.new_status,
             "old_rank": change.old_rank,
             "new_rank": change.new_rank,
-            **{f"old_{name}": change.old[name] for name in SCORE_NAMES},
-            **{f"new_{name}": change.new[name] for name in SCORE_NAMES},
+            **{f"old_{name}": change.old.get(name) for name in found.names},
+            **{f"new_{name}": change.new.get(name) for name in found.names},
             **{f"delta_{name}": value for name, value in change.delta.items()},
             "reason": change.problems[0]["message"] if change.problems else "",
             "n_renumbered": found.truth.n_renumbered if found.truth else None,
@@ -179,9 +185,10 @@ class _Side:
     ranks: Mapping[UUID, int | None]
 
     def values(self, submission: Submission) -> Mapping[str, float | None]:
-        """The ten values of a submission, None where it has none."""
+        """The values of a submission, None where it has none."""
         evaluation = self.evaluations.get(submission.pk)
-        return (self.scores.get(evaluation.pk) if evaluation else None) or standings.flat_scores([])
+        found = self.scores.get(evaluation.pk) if evaluation else None
+        return found or dict.fromkeys(self.edition.rules.score_names)
 
     def status(self, submission: Submission) -> str:
         """The state of a submission's evaluation."""
@@ -191,12 +198,12 @@ class _Side:
 
 def _side(edition: Edition) -> _Side:
     """An edition's evaluations and values, and the rank of each submission that stands for its method."""
-    board = standings.board(split=edition.split, edition=edition, viewer=AnonymousUser())
+    board = boards.board(split=edition.split, edition=edition, viewer=AnonymousUser())
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
     return _Side(
         edition=edition,
         evaluations={evaluation.submission_id: evaluation for evaluation in rows},
-        scores=standings.scores_in(edition),
+        scores=boards.scores_in(edition),
         ranks={entry.submission_id: entry.rank for entry in board.entries if entry.submission_id},
     )
 
@@ -215,7 +222,6 @@ def _change(submission: Submission, old: _Side, new: _Side) -> Change:
         old_rank=old.ranks.get(submission.pk),
         new_rank=new.ranks.get(submission.pk),
         problems=tuple(evaluation.problems) if evaluation else (),
-        n_problems=evaluation.n_problems if evaluation else 0,
         old_decimals=old.edition.decimals,
         new_decimals=new.edition.decimals,
     )

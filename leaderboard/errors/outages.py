@@ -1,4 +1,4 @@
-"""When something that the leaderboard stands on fails: what to tell whoever asked, on every door alike.
+"""Outages: the words for a database or file store that does not answer, the same on pages and in the API.
 
 Neither is the asker's fault, and neither is a reason for a bare 500: both pass, and asking again is safe.
 """
@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import structlog
 from django.db import InterfaceError, OperationalError
 
-from leaderboard.files import StoreAway
+from leaderboard.storage.files import StoreAway
 
 log = structlog.get_logger(__name__)
 
@@ -37,24 +37,24 @@ DATABASE_AWAY = Outage(
     status=503,
     code="database-unavailable",
     title="The leaderboard is not available",
-    sentence="The database does not answer at the moment. If you were sending a file, send it again: the "
-    "same bytes are never taken twice.",
+    sentence="The database does not answer at the moment. If you were submitting a file, submit it "
+    "again: the same file never counts twice.",
     retry_after_s=5,
 )
 STORE_AWAY = Outage(
     status=503,
     code="store-unavailable",
     title="The file store is not available",
-    sentence="The place where files are kept does not answer at the moment, so nothing was taken and nothing "
-    "was changed. That is our fault, not the file's; please try again later.",
+    sentence="The file store does not answer at the moment. Nothing was stored or changed. This is an error "
+    "on our side; please try again later.",
     retry_after_s=30,
 )
 STORAGE_FULL = Outage(
     status=507,
     code="storage-full",
-    title="There is no room left",
-    sentence="There is no room left to keep the file, so it was not taken and nothing was changed. That is "
-    "our fault, not the file's; please send it again later.",
+    title="The file store is full",
+    sentence="The file store is full, so the file was not stored. This is an error on our side; please "
+    "submit it again later.",
     retry_after_s=300,
 )
 

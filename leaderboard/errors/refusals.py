@@ -1,9 +1,11 @@
-"""What people write: taken as clean text, or refused with a reason, in the same words at every door."""
+"""The refusal of a request, and texts that people write, cleaned or refused."""
 
 import unicodedata
 
 from django.core.exceptions import ValidationError
 from django.core.validators import URLValidator
+
+from leaderboard.models import User
 
 _is_web_address = URLValidator(schemes=["http", "https"])
 MAX_URL = 500
@@ -13,12 +15,26 @@ _MOST_COMPOSED = 4
 
 
 class Refused(Exception):
-    """What was asked for cannot be done. `field` names the input at fault, `code` is stable."""
+    """What was asked for cannot be done. `field` names the input at fault, `code` is stable.
 
-    def __init__(self, code: str, message: str, *, field: str = "") -> None:
+    `advice` says at the field of a form what to enter; without it the message stands there.
+    """
+
+    def __init__(self, code: str, message: str, *, field: str = "", advice: str = "") -> None:
         super().__init__(message)
         self.code = code
         self.field = field
+        self.advice = advice
+
+
+class NotMaintainer(Exception):
+    """Only maintainers may do what was asked for."""
+
+
+def require_maintainer(actor: User | None, *, to: str) -> None:
+    """Raise `NotMaintainer` for anybody else; None is the command line. `to` ends "Only maintainers may"."""
+    if actor is not None and not actor.is_maintainer:
+        raise NotMaintainer(f"Only maintainers may {to}.")
 
 
 def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:

@@ -3,9 +3,10 @@
 from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
-from evaluator.escaping import one_line
-from evaluator.report import format_published
-from leaderboard.entries import Entry
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.scoring.report import format_published
+from evaluator.tables.escaping import one_line
+from leaderboard.boards.rows import Entry
 
 _HEIGHT_PX: Final = 20
 _MARGIN_PX: Final = 6
@@ -22,10 +23,10 @@ def words(entry: Entry | None) -> str:
         return "no entry"
     if entry.withdrawn_at is not None:
         return "withdrawn"
-    if entry.scores["mid"] is None:
+    if entry.scores[PRIMARY] is None:
         return "no MiD"
     rank = f"rank {entry.rank}, " if entry.rank is not None else ""
-    return f"{rank}MiD {format_published(entry.scores['mid'], decimals=entry.decimals)}"
+    return f"{rank}MiD {format_published(entry.scores[PRIMARY], decimals=entry.decimals)}"
 
 
 def svg(*, label: str, text: str) -> str:

@@ -3,14 +3,16 @@
 import json
 import re
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Final
 
-from evaluator import layouts
-from evaluator.escaping import latex, one_line
-from leaderboard.benchmark import PUBLISHED_DIR
-from leaderboard.entries import Entry
+from evaluator.tables import layouts
+from evaluator.tables.escaping import latex, one_line
+from leaderboard.benchmark.splits import PUBLISHED_DIR
+from leaderboard.boards.rows import Entry
+from leaderboard.models import Edition
 
 _ARXIV: Final = re.compile(
     r"https?://(?:www\.)?arxiv\.org/(?:abs|pdf)/([0-9]{4}\.[0-9]{4,5})(?:v[0-9]+)?(?:\.pdf)?"
@@ -19,16 +21,19 @@ _ARXIV: Final = re.compile(
 _IN_ADDRESSES: Final = {character: f"%{ord(character):02X}" for character in '{}\\^~"` |<>'}
 
 
-def board_bibtex(entries: Iterable[Entry]) -> str:
-    """The benchmark's paper, then one entry for each further paper that a row names.
+def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]:
+    """The benchmark's paper, the board itself, then one entry for each further paper that a row names.
 
     That of a row of one's own that others do not see as it is says so in its note, which styles print.
     """
-    found = {benchmark_key(): of_benchmark()}
+    yield of_benchmark()
+    if of_board:
+        yield of_board
+    found = {benchmark_key(): ""}
     for entry in entries:
         if entry.withdrawn_at is None and (entry.source_title or entry.paper_url):
             found.setdefault(key_of(entry), of_entry(entry))
-    return "\n".join(found.values())
+    yield from filter(None, found.values())
 
 
 @lru_cache(maxsize=1)
@@ -48,6 +53,22 @@ def of_benchmark() -> str:
     """The benchmark's paper."""
     source = _benchmark()
     return _paper(benchmark_key(), source["title"], source["authors"], str(source["year"]), source["url"])
+
+
+def of_edition(edition: Edition, *, address: str, at: datetime | None) -> str:
+    """The board of an edition as of a time, at an address where it stays."""
+    facts = [f"Protocol {edition.protocol}", f"ground truth {edition.ground_truth_id}"]
+    facts += [f"as of {at.astimezone(UTC):%Y-%m-%d}"] if at else []
+    return _entry(
+        f"tsttc-leaderboard-{_plain(edition.split_id)}-edition-{edition.number}",
+        {
+            "title": f"{{TSTTC leaderboard: {latex(edition.split_id)}, edition {edition.number}}}",
+            "author": "{TSTTC leaderboard}",
+            "year": f"{at.astimezone(UTC):%Y}" if at else "",
+            **_address(address),
+            "note": latex(", ".join(facts)),
+        },
+    )
 
 
 def key_of(entry: Entry) -> str:

@@ -7,9 +7,10 @@ from typing import Final
 from uuid import NAMESPACE_URL, UUID, uuid5
 from xml.etree import ElementTree as ET
 
-from evaluator.escaping import one_line
-from evaluator.report import format_published
-from leaderboard.entries import Entry
+from evaluator.metrics.protocol import grouped_names
+from evaluator.scoring.report import format_published
+from evaluator.tables.escaping import one_line
+from leaderboard.boards.rows import Entry
 from leaderboard.models import Split
 
 MAX_ENTRIES: Final = 50
@@ -61,13 +62,18 @@ def _entry(feed: ET.Element, item: Item) -> None:
     entry = item.entry
     element = ET.SubElement(feed, "entry")
     _text(element, "id", item.id.urn)
-    mid, rte = (format_published(entry.scores[name], decimals=entry.decimals) for name in ("mid", "rte"))
-    _text(element, "title", f"{entry.method} on {item.split.pk}: MiD {mid}")
+    texts = {
+        metric: format_published(entry.scores[name], decimals=entry.decimals)
+        for metric, (name, *_) in grouped_names(entry.scores).items()
+    }
+    primary = next(f"{metric.symbol} {text}" for metric, text in texts.items())
+    _text(element, "title", f"{entry.method} on {item.split.pk}: {primary}")
     _text(element, "updated", _moment(item.at))
     _text(ET.SubElement(element, "author"), "name", entry.team)
     ET.SubElement(element, "link", rel="alternate", type="text/html", href=item.address)
     rank = f"Rank {entry.rank}. " if entry.rank is not None else ""
-    _text(element, "summary", f"{rank}MiD {mid} ×10⁻⁴, RTE {rte} %; lower is better.")
+    values = ", ".join(f"{metric.symbol} {text} {metric.unit}".rstrip() for metric, text in texts.items())
+    _text(element, "summary", f"{rank}{values}; lower is better.")
 
 
 def _text(parent: ET.Element, name: str, text: str) -> None:

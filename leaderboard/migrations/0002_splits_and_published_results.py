@@ -5,7 +5,7 @@ from django.db import migrations
 
 def ensure_splits(apps, schema_editor):
     # The rows are made with the historical models, so that later columns do not matter here.
-    from leaderboard.benchmark import ensure_splits
+    from leaderboard.benchmark.splits import ensure_splits
 
     ensure_splits(split_model=apps.get_model("leaderboard", "Split"), result_model=apps.get_model("leaderboard", "PublishedResult"))
 

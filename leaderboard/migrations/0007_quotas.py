@@ -32,7 +32,7 @@ def rules():
 
 
 def set_quotas(apps, schema_editor):
-    from leaderboard.benchmark import SPLITS
+    from leaderboard.benchmark.splits import SPLITS
 
     for fields in SPLITS:
         quota = {name: value for name, value in fields.items() if name.startswith("quota_")}

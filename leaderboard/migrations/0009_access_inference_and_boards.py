@@ -9,7 +9,7 @@ import uuid
 from django.conf import settings
 from django.db import migrations, models
 
-from leaderboard.names import look
+from leaderboard.people.names import skeleton
 
 
 def fill(apps, schema_editor):
@@ -19,7 +19,7 @@ def fill(apps, schema_editor):
     Team = apps.get_model("leaderboard", "Team")
     taken = set()
     for team in Team.objects.order_by("created_at", "name"):
-        wanted = look(team.name)
+        wanted = skeleton(team.name)
         team.look = next(
             text for n in itertools.count(1) if (text := wanted if n == 1 else f"{wanted} {n}") not in taken
         )

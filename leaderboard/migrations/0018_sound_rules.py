@@ -11,7 +11,7 @@ MAX_SPAN = timedelta(days=3650)
 
 def mend(apps, schema_editor):
     """What the constraints below refuse becomes what the program would do instead of it."""
-    from leaderboard.benchmark import SPLITS
+    from leaderboard.benchmark.splits import SPLITS
 
     Split = apps.get_model("leaderboard", "Split")
     QuotaOverride = apps.get_model("leaderboard", "QuotaOverride")

@@ -1,4 +1,4 @@
-"""What the leaderboard remembers. Constraints live here; verbs live beside this package."""
+"""The tables. Constraints live here; the functions that change rows live in the rooms."""
 
 from leaderboard.models.audit import AuditEvent
 from leaderboard.models.benchmark import (
@@ -24,39 +24,3 @@ from leaderboard.models.submissions import (
     Submission,
 )
 from leaderboard.models.sweep import SweepBeat
-
-__all__ = [
-    "Admission",
-    "Allowance",
-    "Analysis",
-    "ApiToken",
-    "AuditEvent",
-    "BoardVersion",
-    "BoxSource",
-    "CachedValue",
-    "Cameras",
-    "Comparison",
-    "Edition",
-    "Evaluation",
-    "GroundTruth",
-    "IdempotencyKey",
-    "Invitation",
-    "Membership",
-    "Method",
-    "Publication",
-    "PublishedResult",
-    "Question",
-    "QuotaOverride",
-    "Scope",
-    "Score",
-    "SentFile",
-    "Snapshot",
-    "Split",
-    "Status",
-    "Submission",
-    "SweepBeat",
-    "Team",
-    "TruthComparison",
-    "User",
-    "Visibility",
-]

@@ -1,12 +1,15 @@
-"""Who did what to what, when: a chain in which nothing can be changed, and of which nothing can be taken."""
+"""Who did what to what, when: rows that stay as they are, sealed into a chain of hashes soon after."""
 
 import hashlib
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any, NoReturn
 
 from django.db import models
+from django.db.models import Count, Min
+from django.db.models.functions import Now
 from django.utils import timezone
 
 from leaderboard.models.people import User
@@ -32,7 +35,7 @@ def chained_hash(
     noun_id: str,
     details: Mapping[str, Any],
 ) -> str:
-    """SHA-256 of the event before and of all that this one says. Never changes: old chains must hold."""
+    """SHA-256 of the hash before and of all that this event says. Never changes: old chains must hold."""
     content = {
         "at": at.astimezone(UTC).isoformat(timespec="microseconds"),
         "actor": actor_id,
@@ -45,8 +48,21 @@ def chained_hash(
     return hashlib.sha256(f"{previous_hash}\n{text}".encode()).hexdigest()
 
 
+@dataclass(frozen=True)
+class Unsealed:
+    """Events that are in no chain yet: how many, and how long the oldest has been there."""
+
+    n_events: int
+    oldest_age_s: float
+
+
 class AuditEventQuerySet(models.QuerySet["AuditEvent"]):
     """Reads and appends. On PostgreSQL a trigger refuses the rest as well, whoever asks for it."""
+
+    def unsealed(self) -> Unsealed:
+        """What the next sweep is to seal, by the database's clock."""
+        found = self.filter(hash=None).aggregate(n=Count("pk"), age=Now() - Min("at"))
+        return Unsealed(found["n"], max(0.0, found["age"].total_seconds()) if found["age"] else 0.0)
 
     def update(self, **kwargs: Any) -> NoReturn:
         """Refused."""
@@ -66,7 +82,7 @@ class AuditEventQuerySet(models.QuerySet["AuditEvent"]):
 
 
 class AuditEvent(models.Model):
-    """One deed. Written by `leaderboard.audit.record`, never changed."""
+    """One deed. Written by `leaderboard.audit.record`, then sealed by `leaderboard.audit.seal`."""
 
     at = models.DateTimeField(default=timezone.now, db_index=True)
     actor = models.ForeignKey(User, null=True, blank=True, on_delete=models.PROTECT, related_name="+")
@@ -74,9 +90,15 @@ class AuditEvent(models.Model):
     noun = models.CharField(max_length=40)
     noun_id = models.CharField(max_length=80)
     details = models.JSONField(default=dict, blank=True)
-    # Unique, so that the chain cannot fork even if two writers did not wait for each other.
-    previous_hash = models.CharField(max_length=64, unique=True)
-    hash = models.CharField(max_length=64, unique=True)
+    # The seal: None until a worker has put the event into the chain. All three are unique, so that the chain
+    # cannot fork even if two sealed at once.
+    seal_number = models.PositiveBigIntegerField(null=True, unique=True, editable=False)
+    previous_hash = models.CharField(  # noqa: DJ001 - unique, and an empty text is one
+        max_length=64, null=True, unique=True, editable=False
+    )
+    hash = models.CharField(  # noqa: DJ001 - likewise
+        max_length=64, null=True, unique=True, editable=False
+    )
 
     objects = AuditEventQuerySet.as_manager()
 
@@ -84,7 +106,10 @@ class AuditEvent(models.Model):
         ordering = ["-id"]
         # The manager that `save()` itself uses.
         base_manager_name = "objects"
-        indexes = [models.Index(fields=["noun", "noun_id"], name="audit_by_noun")]
+        indexes = [
+            models.Index(fields=["noun", "noun_id"], name="audit_by_noun"),
+            models.Index(fields=["id"], condition=models.Q(hash=None), name="audit_unsealed"),
+        ]
 
     def __str__(self) -> str:
         return f"{self.at:%Y-%m-%d %H:%M:%S} {self.verb} {self.noun} {self.noun_id}"
@@ -93,10 +118,10 @@ class AuditEvent(models.Model):
         """Refused."""
         raise AppendOnly
 
-    def expected_hash(self) -> str:
-        """The hash that what the event says ought to have."""
+    def hash_after(self, previous_hash: str) -> str:
+        """The hash that what the event says has in a chain, after this one."""
         return chained_hash(
-            previous_hash=self.previous_hash,
+            previous_hash=previous_hash,
             at=self.at,
             actor_id=self.actor_id,
             verb=self.verb,

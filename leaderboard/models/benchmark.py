@@ -7,6 +7,7 @@ from django.db import connection, models
 from django.db.models import Q
 from django.utils import timezone
 
+from evaluator.metrics.protocol import Protocol, get_protocol
 from leaderboard.models.people import User
 from leaderboard.models.quotas import QuotaRules
 
@@ -95,7 +96,7 @@ class Split(QuotaRules):
 
     @property
     def has_ground_truth(self) -> bool:
-        """Whether there is something to score against; `leaderboard.deadlines` says when files are taken."""
+        """Whether there is something to score against; `quotas.deadlines` says when files are taken."""
         return self.published_edition_id is not None
 
 
@@ -202,6 +203,11 @@ class Edition(models.Model):
         return f"{self.split_id} edition {self.number}"
 
     @property
+    def rules(self) -> Protocol:
+        """Its protocol, which says what metrics and TTC ranges there are."""
+        return get_protocol(self.protocol)
+
+    @property
     def is_in_preparation(self) -> bool:
         """Whether it stands beside the board, neither published nor given up."""
         return self.published_at is None and self.discarded_at is None
@@ -247,14 +253,13 @@ class PublishedResultQuerySet(models.QuerySet["PublishedResult"]):
     """Questions about quoted rows."""
 
     def on_board(self, split: Split, edition: Edition | None, *, at: datetime | None = None) -> Self:
-        """The rows that stand on a board, or stood on it at a time, in their order.
+        """The rows that stand on a board, or stood on it at a time when `edition` was it, in their order.
 
         A former edition keeps the rows that stood when it last stopped being the board: what is added,
         replaced or taken away later never changes it.
         """
         rows = self.filter(split=split).order_by("pk")
-        ended_at = edition.ended_at(split) if edition is not None else None
-        as_of = min((moment for moment in (at, ended_at) if moment is not None), default=None)
+        as_of = edition.ended_at(split) if at is None and edition is not None else at
         if as_of is None:
             return rows.filter(replaced_at=None)
         return rows.filter(Q(replaced_at=None) | Q(replaced_at__gt=as_of), added_at__lte=as_of)

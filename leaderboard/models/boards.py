@@ -22,19 +22,13 @@ class BoardVersion(models.Model):
 
 
 class Snapshot(models.Model):
-    """What everybody sees of an edition, in one form, as of one version of its split's boards."""
+    """What everybody sees of an edition, as of one version of its split's boards."""
 
-    edition = models.ForeignKey(Edition, on_delete=models.CASCADE, related_name="snapshots")
-    form = models.CharField(max_length=16)
+    edition = models.OneToOneField(Edition, on_delete=models.CASCADE, related_name="snapshot")
     version = models.PositiveBigIntegerField()
     body = models.BinaryField()
     etag = models.CharField(max_length=80)
     made_at = models.DateTimeField(default=timezone.now)
 
-    class Meta:
-        constraints = [
-            models.UniqueConstraint(fields=["edition", "form"], name="one_snapshot_per_edition_and_form"),
-        ]
-
     def __str__(self) -> str:
-        return f"{self.edition} as {self.form}"
+        return str(self.edition)

@@ -6,7 +6,7 @@ A second would tell whose it is: of a team that sends an anonymous method and a 
 from datetime import UTC, datetime, time
 
 
-def told(at: datetime, *, is_masked: bool) -> datetime:
+def truncate_to_day(at: datetime, *, is_masked: bool) -> datetime:
     """The time as everybody is told it: of an anonymous method the beginning of its day.
 
     >>> told(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
@@ -15,9 +15,9 @@ def told(at: datetime, *, is_masked: bool) -> datetime:
     return datetime.combine(at.astimezone(UTC).date(), time.min, tzinfo=UTC) if is_masked else at
 
 
-def told_or_none(at: datetime | None, *, is_masked: bool) -> datetime | None:
+def truncate_to_day_or_none(at: datetime | None, *, is_masked: bool) -> datetime | None:
     """The same of what may not have happened."""
-    return None if at is None else told(at, is_masked=is_masked)
+    return None if at is None else truncate_to_day(at, is_masked=is_masked)
 
 
 def known_until(at: datetime, *, is_masked: bool) -> datetime:

@@ -39,7 +39,7 @@ class Comparison(models.Model):
 
 
 class Question(models.Model):
-    """That somebody waits for a comparison. Deleted once it is computed; see `leaderboard/questions.py`.
+    """That somebody waits for a comparison. Deleted once it is computed; see `scoring.questions`.
 
     The asker is named by a keyed hash: of their account, or of the address that they come from.
     """

@@ -4,7 +4,7 @@ from django.db import models
 
 
 class Allowance(models.Model):
-    """How far somebody has drawn on a rate: a time that one statement moves on (see leaderboard/rates.py).
+    """How far somebody has drawn on a rate: a time that one statement moves on; see `ops.rate_limits`.
 
     Worth nothing once its time is over, and lost in a crash of the server without harm.
     """

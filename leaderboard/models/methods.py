@@ -1,4 +1,4 @@
-"""What competes: a team's named approaches, what is said of them, and who may see them."""
+"""Methods: a team's named approaches, their details, and their visibility."""
 
 import uuid
 from datetime import datetime
@@ -35,13 +35,17 @@ class Cameras(models.TextChoices):
 class BoxSource(models.TextChoices):
     """Where a method has the object's box from."""
 
-    GIVEN = "GIVEN", "given boxes"
+    GIVEN = "GIVEN", "provided"
     DETECTED = "DETECTED", "own detector"
-    NONE = "NONE", "no boxes"
+    NONE = "NONE", "none"
 
 
 class MethodQuerySet(models.QuerySet["Method"]):
     """Questions about methods."""
+
+    def existing(self) -> Self:
+        """Methods that their team has not deleted."""
+        return self.filter(deleted_at=None)
 
     def shown(self, *, at: datetime | None = None) -> Self:
         """Methods that everybody sees, under their name or a pseudonym; with `at` those shown by then.
@@ -58,7 +62,7 @@ class MethodQuerySet(models.QuerySet["Method"]):
         """Methods of the person's own team."""
         if not user.is_authenticated:
             return self.none()
-        return self.filter(team__in=Membership.objects.filter(user=user).values("team"))
+        return self.existing().filter(team__in=Membership.objects.filter(user=user).values("team"))
 
     def visible_to(self, user: User | AnonymousUser) -> Self:
         """What everybody sees, and the person's own team's; maintainers see all.
@@ -70,7 +74,7 @@ class MethodQuerySet(models.QuerySet["Method"]):
         if user.is_maintainer:
             return self
         own = Membership.objects.filter(user=user).values("team")
-        return self.filter(~Q(visibility=Visibility.PRIVATE) | Q(team__in=own))
+        return self.existing().filter(~Q(visibility=Visibility.PRIVATE) | Q(team__in=own))
 
 
 class Method(models.Model):
@@ -99,12 +103,23 @@ class Method(models.Model):
     reveal_at = models.DateTimeField(null=True, blank=True, help_text="When an anonymous one turns public.")
     created_at = models.DateTimeField(default=timezone.now)
     renamed_at = models.DateTimeField(null=True, blank=True)
+    deleted_at = models.DateTimeField(
+        null=True,
+        blank=True,
+        help_text="When its team deleted it, which never had a score; its rejected files stay.",
+    )
 
     objects: ClassVar[MethodQuerySet] = MethodQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 
     class Meta:
         constraints = [
-            models.UniqueConstraint(fields=["team", "name"], name="method_name_once_per_team"),
+            models.UniqueConstraint(
+                fields=["team", "name"], condition=Q(deleted_at=None), name="method_name_once_per_team"
+            ),
+            models.CheckConstraint(
+                condition=Q(deleted_at=None) | Q(visibility=Visibility.PRIVATE),
+                name="what_was_shown_is_not_deleted",
+            ),
             models.CheckConstraint(
                 condition=Q(n_frames=None) | Q(n_frames__gte=2, n_frames__lte=6),
                 name="method_uses_2_to_6_frames",

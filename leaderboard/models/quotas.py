@@ -82,7 +82,7 @@ def _is_span(span: timedelta, *, is_none_allowed: bool) -> bool:
 
 
 class QuotaOverride(QuotaRules):
-    """The rules of one team on one split, instead of the split's own. Written by `leaderboard.quotas`."""
+    """The rules of one team on one split, instead of the split's own. Written by `quotas.quotas`."""
 
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="quota_overrides")
     split = models.ForeignKey("Split", on_delete=models.CASCADE, related_name="quota_overrides")
@@ -101,7 +101,7 @@ class QuotaOverride(QuotaRules):
 
 
 class Admission(models.Model):
-    """That a team may submit to a split by admission. Written by `leaderboard.admissions`."""
+    """That a team may submit to a split by admission. Written by `leaderboard.quotas.admissions`."""
 
     team = models.ForeignKey(Team, on_delete=models.CASCADE, related_name="admissions")
     split = models.ForeignKey("Split", on_delete=models.CASCADE, related_name="admissions")

@@ -14,6 +14,10 @@ from leaderboard.models.benchmark import Edition, Split
 from leaderboard.models.methods import FINITE, Method
 from leaderboard.models.people import User
 
+# So many failed runs end an evaluation: of those that its file may have caused, and of those that it did not.
+MAX_POISON_STRIKES = 3
+MAX_INFRASTRUCTURE_STRIKES = 10
+
 
 class SentFile(NamedTuple):
     """What a submission's values follow from: the bytes, and the manifest that gives their keys a meaning.
@@ -111,13 +115,13 @@ class IdempotencyKey(models.Model):
 
 
 class Status(models.TextChoices):
-    """The states of an evaluation; only `leaderboard.lifecycle` writes them."""
+    """The states of an evaluation; only `leaderboard.scoring.lifecycle` writes them."""
 
     QUEUED = "QUEUED", "queued"
     RUNNING = "RUNNING", "running"
     SCORED = "SCORED", "scored"
     REJECTED = "REJECTED", "rejected"
-    SYSTEM_ERROR = "SYSTEM_ERROR", "failed by our fault"
+    SYSTEM_ERROR = "SYSTEM_ERROR", "system error"
     CANCELLED = "CANCELLED", "cancelled"
 
 
@@ -227,8 +231,8 @@ class Score(models.Model):
     """One published value: evaluation × metric × interval, rounded as the protocol says."""
 
     evaluation = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="scores")
-    metric = models.CharField(max_length=8)
-    interval = models.CharField(max_length=12)
+    metric = models.CharField(max_length=32)
+    interval = models.CharField(max_length=32)
     value = models.FloatField()
     low = models.FloatField(null=True, blank=True)
     high = models.FloatField(null=True, blank=True)

@@ -10,12 +10,16 @@ class SweepBeat(models.Model):
     THE_ONE = 1
 
     id = models.PositiveSmallIntegerField(primary_key=True, default=THE_ONE, editable=False)
-    swept_at = models.DateTimeField()
+    swept_at = models.DateTimeField(null=True, blank=True)
     n_out_of_reach = models.PositiveIntegerField(
         default=0, help_text="What waited for a ground truth that the sweeping worker cannot read."
     )
 
-    # What was removed because no submission named it (see leaderboard/upkeep.py), since the beginning.
+    # When a worker last began to sweep, and to clean; see `workers.queue`.
+    sweep_begun_at = models.DateTimeField(null=True, blank=True)
+    clean_begun_at = models.DateTimeField(null=True, blank=True)
+
+    # What was removed because no submission named it, since the beginning; see `workers.upkeep`.
     cleaned_at = models.DateTimeField(null=True, blank=True)
     n_files_removed = models.PositiveBigIntegerField(default=0)
     n_bytes_removed = models.PositiveBigIntegerField(default=0)
@@ -24,4 +28,4 @@ class SweepBeat(models.Model):
         constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]
 
     def __str__(self) -> str:
-        return f"last sweep {self.swept_at:%Y-%m-%d %H:%M:%S}"
+        return f"last sweep {self.swept_at:%Y-%m-%d %H:%M:%S}" if self.swept_at else "no sweep yet"

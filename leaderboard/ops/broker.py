@@ -1,19 +1,19 @@
 """The broker: makes things fast, and may be absent. A message is only the news that something waits."""
 
 import time
-import uuid
 from functools import lru_cache
 from typing import Any
 
 import structlog
 from celery import current_app
+from django.conf import settings
 from kombu import Connection
 from kombu.exceptions import KombuError
 
 log = structlog.get_logger(__name__)
 
 # Somebody waits for an answer while a nudge is sent, and a lost one costs seconds at most.
-IMPATIENT = {
+FAIL_FAST = {
     "socket_timeout": 1.0,
     "socket_connect_timeout": 1.0,
     "retry_on_timeout": False,
@@ -23,7 +23,7 @@ MAX_CONNECTIONS = 16
 REST_S = 5.0
 
 
-class Rest:
+class CircuitBreaker:
     """After a failure the broker is left alone for a while, or everybody would wait for it in turn."""
 
     def __init__(self, *, rest_s: float) -> None:
@@ -39,54 +39,47 @@ class Rest:
         return time.monotonic() < self._until_s
 
 
-_rest = Rest(rest_s=REST_S)
+_rest = CircuitBreaker(rest_s=REST_S)
 
 
-def nudge(evaluation_id: uuid.UUID) -> bool:
-    """Tell the workers that something waits; False if the broker did not take it.
+def nudge() -> bool:
+    """Tell the workers that a submission waits; False if the broker did not take it.
 
     A lost nudge costs seconds: workers also look by themselves. It takes about two seconds at most, and none
     right after one was lost.
     """
-    return _sent("nudge", str(evaluation_id), lost="nudge_not_sent", evaluation_id=str(evaluation_id))
+    return _sent("nudge")
 
 
-def redraw(split_id: str) -> bool:
-    """Tell the workers that a split's board has changed; False if the broker did not take it.
+def work_off() -> bool:
+    """Tell the workers that something waits behind submissions; False if the broker did not take it.
 
-    Lost, it costs the next reader the drawing.
+    Lost, it costs seconds, and the next reader of a board the drawing.
     """
-    return _sent("redraw", split_id, lost="redraw_not_sent", split=split_id)
+    return _sent("work_off")
 
 
-def infer(about: int | str) -> bool:
-    """Tell the workers that an edition or split has something to infer; False if it was not taken.
-
-    A lost message costs seconds: workers also look by themselves.
-    """
-    return _sent("infer", str(about), lost="infer_not_sent", about=str(about))
-
-
-def _sent(task: str, argument: str, *, lost: str, **facts: str) -> bool:
-    if _rest:
+def _sent(task: str) -> bool:
+    connections = _connections()
+    if _rest or connections is None:
         return False
     try:
-        with _connections().acquire(block=True, timeout=IMPATIENT["socket_timeout"]) as connection:
-            current_app.send_task(
-                f"leaderboard.tasks.{task}",
-                args=[argument],
-                ignore_result=True,
-                connection=connection,
-            )
+        with connections.acquire(block=True, timeout=FAIL_FAST["socket_timeout"]) as connection:
+            current_app.send_task(f"leaderboard.tasks.{task}", ignore_result=True, connection=connection)
     except (KombuError, OSError) as fault:
         _rest.begin()
-        log.warning(lost, reason=str(fault)[:200], **facts)
+        log.warning("message_not_sent", task=task, reason=str(fault)[:200])
         return False
     return True
 
 
 @lru_cache(maxsize=1)
 def _connections() -> Any:
-    """This process's connections to the broker: not Celery's own, which wait much longer."""
-    connection: Connection = current_app.connection_for_write(transport_options=IMPATIENT)
+    """This process's connections to the broker: not Celery's own, which wait much longer.
+
+    None where there is no broker (`memory://`): no other process would hear a message.
+    """
+    if settings.CELERY_BROKER_URL == "memory://":
+        return None
+    connection: Connection = current_app.connection_for_write(transport_options=FAIL_FAST)
     return connection.Pool(MAX_CONNECTIONS)

@@ -22,7 +22,7 @@ if PROFILE not in {"embedded", "production"}:
 PRODUCTION = PROFILE == "production"
 
 # Which process this is, so that none has to be given a secret that it has no use for.
-PROCESSES = ("web", "worker", "beat", "migrate", "maintainer")
+PROCESSES = ("web", "worker", "migrate", "maintainer")
 PROCESS: str = env.str("TSTTC_PROCESS", default="web")
 if PROCESS not in PROCESSES:
     raise ImproperlyConfigured(f"TSTTC_PROCESS is {PROCESS!r}; expected one of {', '.join(PROCESSES)}.")

@@ -3,34 +3,32 @@
 The checks are for a probe that asks every few seconds: each is bounded in time, and none raises.
 """
 
-import errno
-import os
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
-from pathlib import Path
 from typing import Any
 
 import structlog
 from django.conf import settings
 from django.db import Error as DatabaseProblem
 from django.db import connections
-from django.db.models import DurationField, ExpressionWrapper, F
+from django.db.models import F
 from django.db.models.functions import Now
 from django.db.utils import load_backend
 from kombu import Connection
 from kombu.exceptions import KombuError
 
-from leaderboard.models import SweepBeat
+from leaderboard.models import AuditEvent, SweepBeat
 
 log = structlog.get_logger(__name__)
 
 CHECK_TIMEOUT_S = 2
 """How long one check may take. PostgreSQL's client knows no shorter time for connecting."""
 MAX_SWEEP_AGE_S = 60.0
+MAX_UNSEALED_AGE_S = 120.0
 PROBE = "probe"
 
 
@@ -41,6 +39,7 @@ class Check:
     name: str
     is_ok: bool
     detail: str
+    is_vital: bool = True  # without it the site cannot do its work
 
 
 def record_sweep(*, n_out_of_reach: int = 0) -> None:
@@ -57,7 +56,7 @@ def sweep_age_s(*, using: str = "default") -> float | None:
     """Seconds since the last sweep, by the database's clock; None if there was none."""
     age: timedelta | None = (
         SweepBeat.objects.using(using)
-        .annotate(age=ExpressionWrapper(Now() - F("swept_at"), output_field=DurationField()))
+        .annotate(age=Now() - F("swept_at"))
         .values_list("age", flat=True)
         .first()
     )
@@ -81,17 +80,21 @@ def _database() -> tuple[Check, ...]:
         with _own_connection() as alias:
             age_s = sweep_age_s(using=alias)
             n_without = n_out_of_reach(using=alias)
+            unsealed = AuditEvent.objects.using(alias).unsealed()
     except DatabaseProblem as fault:
         log.warning("database_not_ready", reason=str(fault)[:200])
         return (
             Check("database", is_ok=False, detail="does not answer"),
-            Check("sweep", is_ok=False, detail="unknown: the database does not answer"),
-            Check("ground truth", is_ok=False, detail="unknown: the database does not answer"),
+            *(
+                Check(name, is_ok=False, detail="unknown: the database does not answer")
+                for name in ("sweep", "ground truth", "audit trail")
+            ),
         )
     return (
         Check("database", is_ok=True, detail=_answered(started_s)),
         _sweep(age_s),
         _ground_truth(n_without),
+        _audit(unsealed.oldest_age_s),
     )
 
 
@@ -99,6 +102,14 @@ def _ground_truth(n_without: int) -> Check:
     """Whether the workers can read what they score against; how much waits is nobody's business."""
     detail = "a worker cannot read that of what waits" if n_without else "the workers read that of what waits"
     return Check("ground truth", is_ok=not n_without, detail=detail)
+
+
+def _audit(age_s: float) -> Check:
+    """Whether sweeps seal the audit trail; an event that was committed late is older than it looks."""
+    if not age_s:
+        return Check("audit trail", is_ok=True, detail="sealed", is_vital=False)
+    detail = f"an event waits to be sealed for {age_s:.0f} s, expected less than {MAX_UNSEALED_AGE_S:.0f} s"
+    return Check("audit trail", is_ok=age_s < MAX_UNSEALED_AGE_S, detail=detail, is_vital=False)
 
 
 def _sweep(age_s: float | None) -> Check:
@@ -109,7 +120,7 @@ def _sweep(age_s: float | None) -> Check:
 
 
 def _broker() -> Check:
-    """A new connection to the broker; for a broker made of files, whether its folder can be written."""
+    """A new connection to the broker."""
     started_s = time.monotonic()
     options: dict[str, Any] = {
         **settings.CELERY_BROKER_TRANSPORT_OPTIONS,
@@ -119,23 +130,14 @@ def _broker() -> Check:
         "max_retries": 0,
     }
     try:
-        if settings.CELERY_BROKER_URL.startswith("filesystem"):
-            _check_folder(Path(options["data_folder_out"]))
-        else:
-            with Connection(
-                settings.CELERY_BROKER_URL, connect_timeout=CHECK_TIMEOUT_S, transport_options=options
-            ) as connection:
-                connection.default_channel  # noqa: B018 - asking for it makes kombu speak to the server
+        with Connection(
+            settings.CELERY_BROKER_URL, connect_timeout=CHECK_TIMEOUT_S, transport_options=options
+        ) as connection:
+            connection.default_channel  # noqa: B018 - asking for it makes kombu speak to the server
     except (KombuError, OSError) as fault:
         log.warning("broker_not_ready", reason=str(fault)[:200])
         return Check("broker", is_ok=False, detail="does not answer")
     return Check("broker", is_ok=True, detail=_answered(started_s))
-
-
-def _check_folder(folder: Path) -> None:
-    """Raise `OSError` unless files can be made in the folder."""
-    if not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
-        raise PermissionError(errno.EACCES, "the folder of messages cannot be written")
 
 
 def _answered(started_s: float) -> str:

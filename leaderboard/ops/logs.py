@@ -1,4 +1,4 @@
-"""What is written down while it runs: one line an event, readable in a terminal, JSON for machines.
+"""Logging: one line an event, readable in a terminal, JSON for machines.
 
 Lines about a submission carry `submission_id` and `evaluation_id`, those of one request `request_id`, those
 of one task `task_id`. What nobody may read in a log (tokens, passwords in addresses, e-mail addresses, the
@@ -102,7 +102,7 @@ def logging_settings(*, as_json: bool, level: str) -> dict[str, Any]:
     return {
         "version": 1,
         "disable_existing_loggers": False,
-        "formatters": {"line": {"()": "leaderboard.logs.formatter", "as_json": as_json}},
+        "formatters": {"line": {"()": "leaderboard.ops.logs.formatter", "as_json": as_json}},
         "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "line"}},
         "root": {"handlers": ["stderr"], "level": level},
         "loggers": {

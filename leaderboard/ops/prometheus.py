@@ -1,33 +1,23 @@
 """Figures for Prometheus, read from the database when they are asked for.
 
-So they are the same from every process on every machine, and a restart loses nothing. Four statements a
+So they are the same from every process on every machine, and a restart loses nothing. Five statements a
 scrape; the counters are counts of rows that never change again.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import timedelta
+from functools import partial
 from itertools import accumulate
 from typing import Any, Final
 
-from django.db.models import (
-    Case,
-    Count,
-    DurationField,
-    ExpressionWrapper,
-    F,
-    IntegerField,
-    Min,
-    Sum,
-    Value,
-    When,
-)
+from django.db.models import Case, Count, F, IntegerField, Min, Sum, Value, When
 from django.db.models.functions import Now
 from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from leaderboard import health
-from leaderboard.models import Evaluation, Status, SweepBeat
+from leaderboard.models import AuditEvent, Evaluation, Status, SweepBeat
+from leaderboard.ops import health
 
 PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
 BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
@@ -48,7 +38,7 @@ class DatabaseCollector(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Every figure, from four statements."""
+        """Every figure, from five statements."""
         yield from _queue(list(_by_status()))
         yield from _durations(list(_by_bucket()))
         yield _gauge(
@@ -57,6 +47,7 @@ class DatabaseCollector(Collector):
             {(): _or_nan(health.sweep_age_s())},
         )
         yield from _cleaning()
+        yield from _sealing()
 
 
 # --- the queue and the states ---------------------------------------------------------------------------
@@ -71,7 +62,7 @@ def _by_status() -> Iterable[Mapping[str, Any]]:
             n_attempts=Sum("attempt"),
             n_poison=Sum("n_poison_strikes"),
             n_infrastructure=Sum("n_infrastructure_strikes"),
-            oldest_age=ExpressionWrapper(Now() - Min("queued_at"), output_field=DurationField()),
+            oldest_age=Now() - Min("queued_at"),
         )
     )
 
@@ -96,7 +87,7 @@ def _queue(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
     yield _gauge("tsttc_running", "Evaluations that a worker holds.", {(): n_by_status[Status.RUNNING]})
     yield _gauge(
         "tsttc_evaluations",
-        "Evaluations by state; SYSTEM_ERROR is what failed by our fault and waits for a maintainer.",
+        "Evaluations by state; SYSTEM_ERROR waits for a retry by a maintainer.",
         {(status,): n for status, n in n_by_status.items()},
         labels=["status"],
     )
@@ -119,9 +110,7 @@ def _queue(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
 
 
 def _cleaning() -> Iterator[Metric]:
-    beat = SweepBeat.objects.annotate(
-        age=ExpressionWrapper(Now() - F("cleaned_at"), output_field=DurationField())
-    ).first()
+    beat = SweepBeat.objects.annotate(age=Now() - F("cleaned_at")).first()
     age = beat.age if beat else None
     yield _gauge(
         "tsttc_last_clean_age_seconds",
@@ -133,6 +122,16 @@ def _cleaning() -> Iterator[Metric]:
         yield _counter(
             f"tsttc_unnamed_{what}_removed", f"Of such files, the {what} that were removed.", {(): n}
         )
+
+
+def _sealing() -> Iterator[Metric]:
+    unsealed = AuditEvent.objects.unsealed()
+    yield _gauge("tsttc_audit_unsealed", "Audit events that are in no chain yet.", {(): unsealed.n_events})
+    yield _gauge(
+        "tsttc_audit_unsealed_age_seconds",
+        "How long the oldest of them is there; 0 if there is none.",
+        {(): unsealed.oldest_age_s},
+    )
 
 
 # --- how long it takes ----------------------------------------------------------------------------------
@@ -155,10 +154,7 @@ def _by_bucket() -> Iterable[Mapping[str, Any]]:
     return (
         Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED], started_at__isnull=False)
         .order_by()
-        .annotate(
-            run=ExpressionWrapper(F("finished_at") - F("started_at"), output_field=DurationField()),
-            turnaround=ExpressionWrapper(F("finished_at") - F("queued_at"), output_field=DurationField()),
-        )
+        .annotate(run=F("finished_at") - F("started_at"), turnaround=F("finished_at") - F("queued_at"))
         .annotate(run_bucket=_bucket("run"), turnaround_bucket=_bucket("turnaround"))
         .values("run_bucket", "turnaround_bucket")
         .annotate(n=Count("pk"), run_sum=Sum("run"), turnaround_sum=Sum("turnaround"))
@@ -186,22 +182,21 @@ def _durations(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
 # --- Prometheus' words ----------------------------------------------------------------------------------
 
 
-def _gauge(
-    name: str, documentation: str, values: dict[tuple[str, ...], float], *, labels: Iterable[str] = ()
+def _family(
+    kind: type[GaugeMetricFamily] | type[CounterMetricFamily],
+    name: str,
+    documentation: str,
+    values: dict[tuple[str, ...], float],
+    *,
+    labels: Iterable[str] = (),
 ) -> Metric:
-    return _family(GaugeMetricFamily(name, documentation, labels=list(labels)), values)
-
-
-def _counter(
-    name: str, documentation: str, values: dict[tuple[str, ...], float], *, labels: Iterable[str] = ()
-) -> Metric:
-    return _family(CounterMetricFamily(name, documentation, labels=list(labels)), values)
-
-
-def _family(family: GaugeMetricFamily | CounterMetricFamily, values: dict[tuple[str, ...], float]) -> Metric:
-    for labels, value in values.items():
-        family.add_metric(list(labels), value)
+    family = kind(name, documentation, labels=list(labels))
+    for given, value in values.items():
+        family.add_metric(list(given), value)
     return family
+
+
+_gauge, _counter = partial(_family, GaugeMetricFamily), partial(_family, CounterMetricFamily)
 
 
 def _or_nan(value: float | None) -> float:

@@ -1,4 +1,4 @@
-"""How often somebody may ask: counted for all web processes together, in one statement of the database.
+"""Rate limits: counted for all web processes together, in one statement of the database.
 
 A rate of `n` in a period lets `n` requests through at once, and after that one for each `period / n` seconds
 (the generic cell rate algorithm). What is kept is a single time, at which the one who asked is as good as
@@ -76,7 +76,7 @@ def refusal(wait_s: float) -> str:
 
 
 @dataclass(frozen=True)
-class Answer:
+class Decision:
     """Whether a request is let through, how many more would be at once, and when the next one is if none."""
 
     is_allowed: bool
@@ -84,14 +84,14 @@ class Answer:
     wait_s: float
 
 
-def _answer(rate: Rate, *, free_at_s: float, now_s: float, is_allowed: bool) -> Answer:
+def _answer(rate: Rate, *, free_at_s: float, now_s: float, is_allowed: bool) -> Decision:
     ahead_s = max(0.0, free_at_s - now_s)
     n_left = int((rate.period_s - ahead_s + _TOLERANCE_S) / rate.step_s)
     wait_s = max(0.0, ahead_s + rate.step_s - rate.period_s)
-    return Answer(is_allowed=is_allowed, n_left=max(0, n_left), wait_s=wait_s)
+    return Decision(is_allowed=is_allowed, n_left=max(0, n_left), wait_s=wait_s)
 
 
-def take(*, who: str, rate: Rate, now_s: float) -> Answer:
+def take(*, who: str, rate: Rate, now_s: float) -> Decision:
     """Count one request of `who`, a name with the rate's in it, for every process on this database."""
     key = hashlib.sha256(who.encode()).hexdigest()
     values: dict[str, str | float] = {
@@ -109,7 +109,7 @@ def take(*, who: str, rate: Rate, now_s: float) -> Answer:
     return _answer(rate, free_at_s=free_at_s, now_s=now_s, is_allowed=False)
 
 
-def forget_the_past(*, now_s: float) -> int:
+def purge_expired(*, now_s: float) -> int:
     """Remove what counts for nothing any more, of allowances and of the cache. Returns how many rows."""
     n_allowances, _ = Allowance.objects.filter(free_at_s__lt=now_s).delete()
     n_values, _ = CachedValue.objects.filter(expires__lt=datetime.fromtimestamp(now_s, tz=UTC)).delete()
@@ -123,7 +123,7 @@ class InMemory:
         self._lock = threading.Lock()
         self._free_at_s: dict[str, float] = {}
 
-    def take(self, *, who: str, rate: Rate, now_s: float) -> Answer:
+    def take(self, *, who: str, rate: Rate, now_s: float) -> Decision:
         """Count one request."""
         with self._lock:
             free_at_s = max(self._free_at_s.get(who, now_s), now_s)

@@ -15,17 +15,18 @@ from django.db import IntegrityError, transaction
 from django.db.models import QuerySet
 from django.urls import reverse
 
-from leaderboard import audit, boards, teams
+from leaderboard import audit, versions
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, Team, User, Visibility
-from leaderboard.names import MAX_NAME, like
-from leaderboard.texts import Refused
+from leaderboard.people import teams
+from leaderboard.people.names import MAX_NAME, confusable_with
 
 LIFETIME = timedelta(days=7)
 MAX_STANDING = 20
 _SECRET = re.compile(r"[A-Za-z0-9_-]{43}")
 
 
-class Unusable(Refused):
+class UnusableInvitation(Refused):
     """The link let somebody in once, or would have, and does not any more."""
 
 
@@ -52,11 +53,11 @@ def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
     with transaction.atomic():
         row = teams.locked(team)[0]
         teams.require_owner(row, actor, doing="invites")
-        n_standing = standing(team=row, now=now).count()
+        n_standing = open_invitations(team=row, now=now).count()
         if n_standing >= MAX_STANDING:
             raise Refused(
                 "too-many-invitations",
-                f"There are {n_standing} invitations that nobody used, the most there may be; revoke one.",
+                f"The team has {n_standing} unused invitations, the maximum; revoke one.",
             )
         invitation = Invitation.objects.create(
             team=row,
@@ -74,7 +75,7 @@ def link(secret: str) -> str:
     return settings.SITE_URL + reverse("join_team", args=[secret])
 
 
-def standing(*, team: Team, now: datetime) -> "QuerySet[Invitation]":
+def open_invitations(*, team: Team, now: datetime) -> "QuerySet[Invitation]":
     """The team's invitations that somebody may still use."""
     return Invitation.objects.filter(team=team, accepted_at=None, revoked_at=None, expires_at__gt=now)
 
@@ -103,12 +104,12 @@ def revoke(*, invitation: Invitation, actor: User, now: datetime) -> bool:
 
 
 def find(*, secret: str, now: datetime) -> Invitation | None:
-    """The invitation of this link; None if there is none. Raises `Unusable` if it opens nothing any more."""
+    """The invitation of this link; None if there is none. Raises `UnusableInvitation` if it has ended."""
     if not _SECRET.fullmatch(secret):
         return None
-    found = Invitation.objects.select_related("team").filter(secret_hash=_hash(secret)).first()
+    found = Invitation.objects.select_related("team", "created_by").filter(secret_hash=_hash(secret)).first()
     if found is not None:
-        _require_standing(found, now=now)
+        _require_open(found, now=now)
     return found
 
 
@@ -117,8 +118,9 @@ def meaning(*, invitation: Invitation, user: User) -> Meaning:
     membership = Membership.objects.filter(user=user).select_related("team").first()
     left = membership.team if membership else None
     comes_along = left is not None and not left.memberships.exclude(user=user).exists()
-    methods = list(Method.objects.filter(team=left).order_by("name")) if left and comes_along else []
-    there = Method.objects.filter(team=invitation.team).values_list("name", flat=True)
+    existing = Method.objects.existing()
+    methods = list(existing.filter(team=left).order_by("name")) if left and comes_along else []
+    there = existing.filter(team=invitation.team).values_list("name", flat=True)
     names = _names_there([method.name for method in methods], there)
     refusal = ""
     if membership is not None:
@@ -143,11 +145,11 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
     if seen is None:
         raise _nothing()
     with transaction.atomic():
-        membership = teams.present_membership(user, seen.team)
+        membership = teams.current_membership(user, seen.team)
         invitation = Invitation.objects.select_for_update(no_key=True).filter(pk=seen.pk).first()
         if invitation is None:
             raise _nothing()  # its team has ended meanwhile
-        _require_standing(invitation, now=now)
+        _require_open(invitation, now=now)
         team, moved = seen.team, {}
         former = membership.team if membership else None
         if membership is None or former is None:
@@ -173,7 +175,7 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
             actor=user,
             details={**_named(invitation), "left": str(former.pk) if former else None, "brought": moved},
         )
-        boards.changed_by_methods(
+        versions.changed_by_methods(
             Method.objects.shown().filter(pk__in=list(moved)).values_list("pk", flat=True)
         )
     return team
@@ -182,8 +184,8 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
 # --- what several of these need --------------------------------------------------------------------------
 
 
-def _nothing() -> Unusable:
-    return Unusable("no-invitation", "There is no such invitation; ask for a new link.")
+def _nothing() -> UnusableInvitation:
+    return UnusableInvitation("no-invitation", "There is no such invitation; ask for a new link.")
 
 
 def _hash(secret: str) -> str:
@@ -194,15 +196,15 @@ def _named(invitation: Invitation) -> dict[str, str]:
     return {"invitation": str(invitation.pk)}
 
 
-def _require_standing(invitation: Invitation, *, now: datetime) -> None:
+def _require_open(invitation: Invitation, *, now: datetime) -> None:
     state = state_of(invitation, now=now)
     sentence = {
-        "used": "This invitation has let somebody in already; each is for one person.",
+        "used": "This invitation was already used; each works once.",
         "revoked": "This invitation was revoked by the team.",
-        "expired": f"This invitation ended at {invitation.expires_at:%Y-%m-%d %H:%M} UTC.",
+        "expired": f"This invitation expired at {invitation.expires_at:%Y-%m-%d %H:%M} UTC.",
     }.get(state)
     if sentence:
-        raise Unusable(f"invitation-{state}", f"{sentence} Ask the team for a new link.")
+        raise UnusableInvitation(f"invitation-{state}", f"{sentence} Ask the team for a new link.")
 
 
 def _refusal(membership: Membership, team: Team, *, is_alone: bool) -> str:
@@ -210,8 +212,8 @@ def _refusal(membership: Membership, team: Team, *, is_alone: bool) -> str:
         return f"You are in the team {team.name!r} already."
     if membership.is_owner and not is_alone:
         return (
-            f"You own the team {membership.team.name!r}, and others are in it; "
-            "hand it over to one of them before you join another."
+            f"You own the team {membership.team.name!r}, which has other members; "
+            "make one of them its owner before you join another team."
         )
     return ""
 
@@ -221,17 +223,21 @@ def _enter(team: Team, user: User, *, now: datetime) -> None:
         with transaction.atomic():
             Membership.objects.create(team=team, user=user, joined_at=now)
     except IntegrityError:
-        raise Refused("changed-meanwhile", "Your team has just changed; look again, and try again.") from None
+        raise Refused(
+            "changed-meanwhile", "Your team has just changed; reload the page and try again."
+        ) from None
 
 
 def _bring_methods(former: Team, team: Team) -> dict[str, str]:
     """Move every method of one team into the other. Returns their names there, by id."""
     methods = list(Method.objects.select_for_update(no_key=True).filter(team=former).order_by("name"))
-    there = Method.objects.filter(team=team).values_list("name", flat=True)
-    names = _names_there([method.name for method in methods], there)
-    for method in methods:
-        Method.objects.filter(pk=method.pk).update(team=team, name=names[method.name])
-    return {str(method.pk): names[method.name] for method in methods}
+    there = Method.objects.existing().filter(team=team).values_list("name", flat=True)
+    names = _names_there([method.name for method in methods if method.deleted_at is None], there)
+    # A deleted one comes along with its files, and takes no name.
+    moved = {method: method.name if method.deleted_at else names[method.name] for method in methods}
+    for method, name in moved.items():
+        Method.objects.filter(pk=method.pk).update(team=team, name=name)
+    return {str(method.pk): name for method, name in moved.items()}
 
 
 def _names_there(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
@@ -240,7 +246,7 @@ def _names_there(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
     others = list(taken)
     for name in names:
         new, number = name, 1
-        while like(new, others):
+        while confusable_with(new, others):
             number += 1
             ending = f" {number}"
             new = f"{name[: MAX_NAME - len(ending)]}{ending}"

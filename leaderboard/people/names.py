@@ -1,4 +1,4 @@
-"""Names of people's making: which are taken, and what they look like, whatever characters they are made of.
+"""Names that people choose: which are taken, and which look alike (UTS 39).
 
 What looks alike is Unicode's list of confusable characters (UTS 39, through `confusable-homoglyphs`), each
 folded to what it is taken for. The list says nothing of case, and has a few gaps that this fills.
@@ -13,7 +13,7 @@ from typing import Any
 from confusable_homoglyphs.confusables import confusables_data
 from django.conf import settings
 
-from leaderboard.texts import Refused, clean_text
+from leaderboard.errors.refusals import Refused, clean_text
 
 MAX_NAME = 80
 MAX_LOOK = 320
@@ -33,7 +33,7 @@ _WITHOUT_INK = frozenset(
 _MAX_MARKS = 2
 
 
-def look(name: str) -> str:
+def skeleton(name: str) -> str:
     """What a name looks like, as a key: names with the same one are taken for each other.
 
     >>> look("Foo  Lab") == look("ｆｏｏ lab") == look("Fоο Lаb")
@@ -63,14 +63,14 @@ def clean_name(field: str, text: str) -> str:
         raise Refused(
             "bad-name", f"The name in '{field}' is {text!r}; expected a letter or a digit in it.", field=field
         )
-    found = look(text)
+    found = skeleton(text)
     if len(found) > MAX_LOOK:
         raise Refused(
             "text-too-long",
             f"The name in '{field}' is shown with {len(found)} characters; expected at most {MAX_LOOK}.",
             field=field,
         )
-    if found.startswith(look(RESERVED)):
+    if found.startswith(skeleton(RESERVED)):
         raise Refused(
             "reserved-name",
             f"The name in '{field}' reads as {RESERVED!r}, which is what methods without a name are called; "
@@ -95,10 +95,10 @@ def require_rename_possible(*, renamed_at: datetime | None, now: datetime) -> No
     )
 
 
-def like(name: str, others: Iterable[str]) -> str | None:
+def confusable_with(name: str, others: Iterable[str]) -> str | None:
     """The first of the other names that this one would be taken for."""
-    wanted = look(name)
-    return next((other for other in others if look(other) == wanted), None)
+    wanted = skeleton(name)
+    return next((other for other in others if skeleton(other) == wanted), None)
 
 
 def _with_plain_spaces(text: str) -> str:

@@ -10,22 +10,22 @@ from datetime import datetime
 from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
 
-from leaderboard import audit, boards
+from leaderboard import audit, versions
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, QuotaOverride, Team, User
-from leaderboard.names import MAX_NAME, clean_name, look, require_rename_possible
-from leaderboard.texts import Refused
+from leaderboard.people.names import MAX_NAME, clean_name, require_rename_possible, skeleton
 
 _ROOM_FOR_A_NUMBER = 10
 
 
-def present_team_of(*, user: User) -> Team | None:
+def current_team_of(*, user: User) -> Team | None:
     """The person's team, if there is one yet."""
     return Team.objects.filter(memberships__user=user).first()
 
 
 def team_of(*, user: User) -> Team:
     """The person's team; somebody without one becomes a team of one."""
-    present = present_team_of(user=user)
+    present = current_team_of(user=user)
     if present is not None:
         return present
     try:
@@ -33,17 +33,18 @@ def team_of(*, user: User) -> Team:
         wanted = clean_name("name", user.name)
     except Refused:
         wanted = f"Team {secrets.token_hex(3)}"
-    return _founded(_named(wanted), user)
+    name = _numbered(wanted[: MAX_NAME - _ROOM_FOR_A_NUMBER])
+    return _created(Team.objects.create(name=name, look=skeleton(name)), user)
 
 
 def create(*, user: User, name: str, now: datetime) -> Team:
     """Found a team under a name of one's choice. Raises `Refused`."""
     name = clean_name("name", name)
-    if present_team_of(user=user) is not None:
+    if current_team_of(user=user) is not None:
         raise Refused("in-a-team", "You are in a team already; expected somebody who is in none.")
     with transaction.atomic():
         _require_free(name)
-        return _founded(Team.objects.create(name=name, look=look(name), created_at=now), user)
+        return _created(Team.objects.create(name=name, look=skeleton(name), created_at=now), user)
 
 
 def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
@@ -56,7 +57,7 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
             return row
         require_rename_possible(renamed_at=row.renamed_at, now=now)
         _require_free(name, but=row)
-        before, row.name, row.look, row.renamed_at = row.name, name, look(name), now
+        before, row.name, row.look, row.renamed_at = row.name, name, skeleton(name), now
         try:
             with transaction.atomic():
                 row.save(update_fields=["name", "look", "renamed_at"])
@@ -65,7 +66,7 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
         audit.record(
             verb="renamed", noun="Team", noun_id=row.pk, actor=actor, details={"from": before, "to": name}
         )
-        boards.changed_by_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
+        versions.changed_by_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
     return row
 
 
@@ -86,24 +87,19 @@ def show_name(team: Team) -> None:
 
 def show_name_in_any_case(team: Team) -> None:
     """The same where nobody is there to choose another name: a number is added to a name that is taken."""
-    number = 1
-    name = team.name
-    while _shown_twin(name, but=team):
-        number += 1
-        name = f"{team.name[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
+    name = _numbered(team.name, but=team)
     if name != team.name:
-        Team.objects.filter(pk=team.pk).update(name=name, look=look(name))
+        Team.objects.filter(pk=team.pk).update(name=name, look=skeleton(name))
     before, team.name = team.name, name
-    # Before the audit trail: this waits for whoever shows another team under a name like it.
     show_name(team)
     if name != before:
-        details = {"from": before, "to": name, "reason": "another team was shown under this name first"}
+        details = {"from": before, "to": name, "reason": "another team used this name on the boards first"}
         audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details)
 
 
 def require_showable(team: Team) -> None:
     """Raise `Refused` where everybody would take the team's name for that of another team."""
-    if not team.is_shown and _shown_twin(team.name, but=team):
+    if not team.is_shown and _public_twin(team.name, but=team):
         raise _taken_first(team.name)
 
 
@@ -113,7 +109,7 @@ def leave(*, user: User) -> Team:
     An owner hands over first, unless nobody else is there. Raises `Refused`.
     """
     with transaction.atomic():
-        membership = present_membership(user)
+        membership = current_membership(user)
         if membership is None:
             raise Refused("in-no-team", "You are in no team; expected a member of one.")
         team = membership.team
@@ -121,7 +117,7 @@ def leave(*, user: User) -> Team:
         if membership.is_owner and others.exists():
             raise Refused(
                 "hand-over-first",
-                f"You own the team {team.name!r}, and others are in it; hand it over to one of them first.",
+                f"You own the team {team.name!r}, which has other members; make one of them its owner first.",
             )
         membership.delete()
         end_invitations(team, of=user)
@@ -136,7 +132,7 @@ def remove(*, team: Team, member: User, actor: User) -> None:
         row = locked(team)[0]
         require_owner(row, actor, doing="removes members")
         if member == actor:
-            raise Refused("not-yourself", "You would remove yourself; expected somebody else of your team.")
+            raise Refused("not-yourself", "You cannot remove yourself; expected another member of your team.")
         _membership_in(row, member).delete()
         end_invitations(row, of=member)
         audit.record(
@@ -150,7 +146,7 @@ def hand_over(*, team: Team, to: User, actor: User) -> None:
         row = locked(team)[0]
         require_owner(row, actor, doing="hands it over")
         if to == actor:
-            raise Refused("not-yourself", "You own the team already; expected somebody else of it.")
+            raise Refused("not-yourself", "You own the team already; expected another member.")
         heir = _membership_in(row, to)
         Membership.objects.filter(team=row, user=actor).update(is_owner=False)
         Membership.objects.filter(pk=heir.pk).update(is_owner=True)
@@ -190,14 +186,14 @@ def locked(*teams: Team | None) -> list[Team]:
     return list(Team.objects.select_for_update(no_key=True).filter(pk__in=ids).order_by("pk"))
 
 
-def present_membership(user: User, *also: Team) -> Membership | None:
+def current_membership(user: User, *also: Team) -> Membership | None:
     """Where the person is, with that team and these others locked. Raises `Refused` if that changed."""
     User.objects.select_for_update(no_key=True).get(pk=user.pk)
     seen = Membership.objects.filter(user=user).select_related("team").first()
     locked(*also, seen.team if seen else None)
     found = Membership.objects.filter(user=user).select_related("team").first()
     if (found and found.team_id) != (seen and seen.team_id):
-        raise Refused("changed-meanwhile", "Your team has just changed; look again, and try again.")
+        raise Refused("changed-meanwhile", "Your team has just changed; reload the page and try again.")
     return found
 
 
@@ -238,34 +234,33 @@ def _taken(name: str) -> Refused:
 def _taken_first(name: str) -> Refused:
     return Refused(
         "name-taken",
-        f"There is a team on the boards whose name looks like {name!r}, which was shown first; expected your "
-        "team to be renamed before everybody sees its name.",
+        f"There is a team on the boards whose name looks like {name!r}, which was public first; rename "
+        "your team before you publish.",
         field="visibility",
     )
 
 
-def _shown_twin(name: str, *, but: Team | None = None) -> bool:
+def _public_twin(name: str, *, but: Team | None = None) -> bool:
     """Whether a team that everybody sees has a name like it. Other teams take no name."""
-    shown = Team.objects.filter(look=look(name), is_shown=True)
+    shown = Team.objects.filter(look=skeleton(name), is_shown=True)
     return (shown.exclude(pk=but.pk) if but is not None else shown).exists()
 
 
 def _require_free(name: str, *, but: Team | None = None) -> None:
-    if _shown_twin(name, but=but):
+    if _public_twin(name, but=but):
         raise _taken(name)
 
 
-def _named(wanted: str) -> Team:
-    """A new team of that name, numbered if a team that everybody sees has it."""
-    wanted = wanted[: MAX_NAME - _ROOM_FOR_A_NUMBER]
+def _numbered(wanted: str, *, but: Team | None = None) -> str:
+    """The name, with a number if a team that everybody sees has it."""
     name, number = wanted, 1
-    while _shown_twin(name):
+    while _public_twin(name, but=but):
         number += 1
-        name = f"{wanted} {number}"
-    return Team.objects.create(name=name, look=look(name))
+        name = f"{wanted[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
+    return name
 
 
-def _founded(team: Team, user: User) -> Team:
+def _created(team: Team, user: User) -> Team:
     """The new team with its first member; or the one that another request of the same person made first."""
     try:
         with transaction.atomic():

@@ -1,4 +1,4 @@
-"""Tokens for CI jobs: hashed at rest, shown once, good for what they were made for and for so long."""
+"""API tokens: hashed at rest, shown once, limited in scope and time."""
 
 import re
 from collections.abc import Collection
@@ -12,6 +12,7 @@ from knox.models import get_digest_token
 from knox.settings import CONSTANTS
 
 from leaderboard import audit
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import ApiToken, Scope, Split, User
 
 DAYS = 90
@@ -23,16 +24,7 @@ PATTERN = re.compile(r"tsttc_[0-9a-f]{64}")
 USED_EVERY = timedelta(minutes=1)
 
 
-class Refused(Exception):
-    """The token cannot be made like that. `field` names the input at fault, `code` is stable."""
-
-    def __init__(self, code: str, message: str, *, field: str = "") -> None:
-        super().__init__(message)
-        self.code = code
-        self.field = field
-
-
-class Unusable(Exception):
+class UnusableToken(Exception):
     """The token opens nothing (any more); the text says why, `code` is stable."""
 
     def __init__(self, code: str, message: str) -> None:
@@ -63,7 +55,7 @@ def create(
         n_standing = ApiToken.objects.filter(user=user, revoked_at=None, expiry__gt=now).count()
         if n_standing >= MAX_STANDING:
             raise Refused(
-                "too-many-tokens", f"There are {n_standing} tokens in use, the most there may be; revoke one."
+                "too-many-tokens", f"There are {n_standing} tokens in use, the maximum; revoke one."
             )
         digest, secret = get_digest_token()
         row = ApiToken(
@@ -109,7 +101,7 @@ def _check(*, scopes: Collection[str], days: int) -> None:
         raise Refused("bad-scope", f"The token has {found}; expected read, submit, or both.", field="scopes")
     if not 1 <= days <= MAX_DAYS:
         raise Refused(
-            "bad-days", f"The token ends after {days} days; expected 1 to {MAX_DAYS}.", field="days"
+            "bad-days", f"The token expires after {days} days; expected 1 to {MAX_DAYS}.", field="days"
         )
 
 
@@ -131,35 +123,37 @@ def _split(name: str) -> Split | None:
 def use(*, secret: str, now: datetime) -> ApiToken:
     """The token of this secret, with its owner. When it was last used is noted to the minute.
 
-    Raises `Unusable`. What does not look like a token never reaches the database.
+    Raises `UnusableToken`. What does not look like a token never reaches the database.
     """
     if not PATTERN.fullmatch(secret):
-        raise Unusable(
+        raise UnusableToken(
             "token-malformed", "The bearer token is malformed; expected tsttc_ and 64 hexadecimal digits."
         )
     row = ApiToken.objects.select_related("user").filter(pk=hash_token(secret)).first()
     if row is None:
-        raise Unusable("token-unknown", "The bearer token is none of this leaderboard's.")
-    _require_standing(row, now=now)
+        raise UnusableToken("token-unknown", "The bearer token is none of this leaderboard's.")
+    _require_active(row, now=now)
     if row.last_used_at is None or now - row.last_used_at >= USED_EVERY:
         stale = Q(last_used_at=None) | Q(last_used_at__lte=now - USED_EVERY)
         ApiToken.objects.filter(stale, pk=row.pk).update(last_used_at=now)
     return row
 
 
-def _require_standing(row: ApiToken, *, now: datetime) -> None:
-    another = f"make another one at {settings.SITE_URL}/tokens/"
+def _require_active(row: ApiToken, *, now: datetime) -> None:
+    another = f"create another one at {settings.SITE_URL}/tokens/"
     if row.revoked_at is not None:
-        raise Unusable(
+        raise UnusableToken(
             "token-revoked", f"The token was revoked on {row.revoked_at:%Y-%m-%d %H:%M} UTC; {another}."
         )
     if row.expiry is not None and row.expiry <= now:
-        raise Unusable("token-expired", f"The token expired on {row.expiry:%Y-%m-%d %H:%M} UTC; {another}.")
+        raise UnusableToken(
+            "token-expired", f"The token expired on {row.expiry:%Y-%m-%d %H:%M} UTC; {another}."
+        )
     if not row.user.is_active:
-        raise Unusable("account-closed", "The account that this token belongs to is closed.")
+        raise UnusableToken("account-closed", "The account that this token belongs to is closed.")
 
 
-def is_standing(row: ApiToken, *, now: datetime) -> bool:
+def is_active(row: ApiToken, *, now: datetime) -> bool:
     """Whether it still opens something."""
     return row.revoked_at is None and (row.expiry is None or row.expiry > now)
 
@@ -168,7 +162,7 @@ def state_of(row: ApiToken, *, now: datetime) -> str:
     """In one word: in use, expired or revoked."""
     if row.revoked_at is not None:
         return "revoked"
-    return "in use" if is_standing(row, now=now) else "expired"
+    return "in use" if is_active(row, now=now) else "expired"
 
 
 def revoke(*, token: ApiToken, now: datetime, actor: User | None, how: str = "") -> bool:

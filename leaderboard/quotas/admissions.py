@@ -4,9 +4,10 @@ from datetime import datetime
 
 from django.db import transaction
 
-from leaderboard import audit, quotas
+from leaderboard import audit
+from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Admission, Split, Team, User
-from leaderboard.texts import Refused
+from leaderboard.quotas import quotas
 
 
 class NotAdmitted(Refused):
@@ -19,10 +20,10 @@ def refusal_of(*, team: Team | None, split: Split) -> NotAdmitted | None:
         return None
     if team is not None and Admission.objects.filter(team=team, split=split).exists():
         return None
-    ask = split.how_to_be_admitted.rstrip(". ") or "ask the maintainers of this site to admit it"
+    ask = split.how_to_be_admitted.rstrip(". ") or "ask the maintainers of this site for access"
     return NotAdmitted(
         "not-admitted",
-        f"Only admitted teams submit to {split.pk}, and your team is not one of them; {ask}.",
+        f"Only admitted teams can submit to {split.pk}, and your team is not one of them; {ask}.",
         field="split",
     )
 
@@ -37,12 +38,12 @@ def require(*, team: Team | None, split: Split) -> None:
 def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: datetime) -> Admission:
     """Let a team submit to a split; once more gives another reason. `actor` None is the command line.
 
-    Raises `quotas.NotMaintainer`, and `Team.DoesNotExist` if the team has just ended.
+    Raises `NotMaintainer`, and `Team.DoesNotExist` if the team has just ended.
     """
-    quotas.require_maintainer(actor)
+    require_maintainer(actor, to="admit teams")
     with transaction.atomic():
-        # Before the row that names it: whoever ends the team holds it, and waits for the audit trail.
-        if not quotas.hold(team=team):
+        # Before the row that names it: whoever ends the team holds it.
+        if not quotas.lock(team=team):
             raise Team.DoesNotExist(f"The team {team.name!r} has just ended; expected one that is there.")
         row, _ = Admission.objects.update_or_create(
             team=team, split=split, defaults={"reason": reason, "admitted_by": actor, "admitted_at": now}
@@ -53,8 +54,8 @@ def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: dat
 
 
 def end(*, row: Admission, actor: User | None) -> None:
-    """Take the admission back; what was sent stays. Raises `quotas.NotMaintainer`."""
-    quotas.require_maintainer(actor)
+    """Take the admission back; what was sent stays. Raises `NotMaintainer`."""
+    require_maintainer(actor, to="admit teams")
     with transaction.atomic():
         row.delete()
         details = {"split": row.split_id}

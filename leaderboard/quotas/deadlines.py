@@ -1,11 +1,11 @@
-"""When a split takes submissions, in the words that every door says it in."""
+"""When a split takes submissions, in the words of pages, API and command line."""
 
 from dataclasses import replace
 from datetime import datetime
 
-from leaderboard import admissions, quotas
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Split, Team, User
-from leaderboard.texts import Refused
+from leaderboard.quotas import admissions, quotas
 
 
 def refusal_of(split: Split, *, now: datetime) -> Refused | None:
@@ -28,11 +28,13 @@ def is_open(split: Split, *, now: datetime) -> bool:
 
 def sentence_of(split: Split, *, now: datetime) -> str:
     """Since when, until when or why not the split takes submissions; empty where nothing limits it."""
-    refusal = refusal_of(split, now=now)
+    return str(refusal_of(split, now=now) or closing_of(split))
+
+
+def closing_of(split: Split) -> str:
+    """Until when a split that takes submissions does so; empty where nothing limits it."""
     closes_at = split.times[1]
-    if refusal is None and closes_at:
-        return f"Submissions to {split.pk} close at {closes_at:%Y-%m-%d %H:%M} UTC."
-    return str(refusal or "")
+    return f"Submissions to {split.pk} close at {closes_at:%Y-%m-%d %H:%M} UTC." if closes_at else ""
 
 
 def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quotas.Quota:

@@ -21,10 +21,11 @@ from django.conf import settings
 from django.db import transaction
 from django.db.models import Exists, OuterRef, Q, QuerySet
 
-from leaderboard import audit, lifecycle
+from leaderboard import audit
+from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
-from leaderboard.quota_rules import UNLIMITED, Rules, rules_of
-from leaderboard.texts import Refused
+from leaderboard.models.submissions import MAX_POISON_STRIKES
+from leaderboard.quotas.rules import UNLIMITED, Rules, rules_of
 
 __all__ = ["UNLIMITED", "Quota", "QuotaExceeded", "Rules", "override", "require", "rules_of", "span", "state"]
 
@@ -41,10 +42,6 @@ class QuotaExceeded(Exception):
     def __init__(self, quota: "Quota") -> None:
         super().__init__(quota.sentence)
         self.quota = quota
-
-
-class NotMaintainer(Exception):
-    """Only maintainers give a team other rules."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,7 @@ def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quot
     return _state(team=team, user=user, split=split, rules=rules, now=now)
 
 
-def hold(*, team: Team) -> bool:
+def lock(*, team: Team) -> bool:
     """Let what else the team does wait until this transaction ends, so that two cannot take one slot.
 
     To be called before anything is looked up that `require` or an answer depends on. Returns whether the team
@@ -98,28 +95,20 @@ def hold(*, team: Team) -> bool:
     return team.pk in {row.pk for row in rows.order_by("pk")}
 
 
-def hold_before_founding(*, user: User) -> None:
-    """The same with the teams of the person's other accounts, for somebody who is about to found a team.
+def hold_accounts(*, user: User) -> None:
+    """Of somebody in no team, let no account of the same mailbox enter one until the transaction ends.
 
-    Who founds a team has the audit trail from then on, for which others wait who have their teams' rows. The
-    accounts are held as well, so that none of them enters another team meanwhile. Nothing is done for
-    somebody who has a team.
+    Else two of them could each get a team, and both a slot of the quota that they have in common.
     """
-    mine = Membership.objects.filter(user=user)
-    if mine.exists():
-        return
-    mailbox = User.objects.filter(pk=user.pk).values("mailbox")
-    accounts = User.objects.select_for_update(no_key=True).filter(mailbox__in=mailbox).order_by("pk")
-    ids = [account.pk for account in accounts]
-    if not mine.exists():
-        others = Membership.objects.filter(user__in=ids).values("team")
-        list(Team.objects.select_for_update(no_key=True).filter(pk__in=others).order_by("pk"))
+    if not Membership.objects.filter(user=user).exists():
+        mailbox = User.objects.filter(pk=user.pk).values("mailbox")
+        list(User.objects.select_for_update(no_key=True).filter(mailbox__in=mailbox).order_by("pk"))
 
 
 def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now: datetime) -> None:
     """Raise `QuotaExceeded` unless a slot is open for a file of this size.
 
-    What it says is certain for whoever has called `hold`.
+    What it says is certain for whoever has called `lock`.
     """
     if not settings.QUOTAS:
         return
@@ -153,7 +142,7 @@ def _spent(
             is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),
             is_rejected=Exists(live.filter(status=Status.REJECTED)),
             is_poison=Exists(
-                live.filter(status=Status.SYSTEM_ERROR, n_poison_strikes__gte=lifecycle.MAX_POISON_STRIKES)
+                live.filter(status=Status.SYSTEM_ERROR, n_poison_strikes__gte=MAX_POISON_STRIKES)
             ),
             # By its team: those of an edition that was given up are cancelled as well.
             is_cancelled=Exists(live.filter(status=Status.CANCELLED, submission__withdrawn_at__isnull=False)),
@@ -238,11 +227,11 @@ def weigh(
         sentence = _left(rules, n_used=len(in_window))
     else:
         said = {
-            full_until: f"Your team has spent the {_n(rules.limit)} to {split.pk} that it has in "
+            full_until: f"Your team has used {_n(rules.limit)} to {split.pk}, its quota for "
             f"{span(rules.window)}",
-            gap_until: f"Submissions of a team to {split.pk} are at least {span(rules.min_gap)} apart",
-            rejected_until: f"{len(rejected)} files that your team sent to {split.pk} within 24 hours were "
-            f"rejected or cancelled, or stopped the process that read them, and no more are taken",
+            gap_until: f"Submissions of a team to {split.pk} must be at least {span(rules.min_gap)} apart",
+            rejected_until: f"Your team has used its limit of {len(rejected)} files to {split.pk} within 24 "
+            "hours that were rejected or cancelled, or stopped the process that read them",
         }
         sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
     return Quota(
@@ -265,7 +254,7 @@ def _until(times: Sequence[datetime], *, limit: int | None, window: timedelta) -
 
 def _left(rules: Rules, *, n_used: int) -> str:
     if rules.limit is None:
-        said = "As many as you like"
+        said = "No limit"
     else:
         n_left = max(0, rules.limit - n_used)
         said = f"{n_left} of {_n(rules.limit)} left within {span(rules.window)}"
@@ -320,7 +309,7 @@ def override(
     Raises `NotMaintainer`, `Refused` for rules that make no sense, and `Team.DoesNotExist` if the team has
     just ended.
     """
-    require_maintainer(actor)
+    require_maintainer(actor, to="change the quotas of a team")
     rules = {
         "quota_limit": limit,
         "quota_window": window,
@@ -330,8 +319,8 @@ def override(
     for name, fault in QuotaOverride(**rules).faults().items():
         raise Refused("bad-value", fault, field=name)
     with transaction.atomic():
-        # Before the row that names it: whoever ends the team holds it, and waits for the audit trail.
-        if not hold(team=team):
+        # Before the row that names it: whoever ends the team holds it.
+        if not lock(team=team):
             raise Team.DoesNotExist(f"The team {team.name!r} has just ended; expected one that is there.")
         row, _ = QuotaOverride.objects.update_or_create(
             team=team, split=split, defaults={**rules, "reason": reason, "set_by": actor, "set_at": now}
@@ -349,7 +338,7 @@ def override(
 
 def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") -> None:
     """Let the split's rules hold for the team again. Raises `NotMaintainer`."""
-    require_maintainer(actor)
+    require_maintainer(actor, to="change the quotas of a team")
     with transaction.atomic():
         row.delete()
         audit.record(
@@ -359,9 +348,3 @@ def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") ->
             actor=actor,
             details={"split": row.split_id, "reason": reason},
         )
-
-
-def require_maintainer(actor: User | None) -> None:
-    """Raise `NotMaintainer` for anybody else; None is the command line."""
-    if actor is not None and not actor.is_maintainer:
-        raise NotMaintainer("Only maintainers give a team other quotas, or admit it.")

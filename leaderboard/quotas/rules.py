@@ -13,7 +13,7 @@ from typing import Any
 import structlog
 from django.conf import settings
 
-from leaderboard import benchmark
+from leaderboard.benchmark import splits
 from leaderboard.models import QuotaOverride, Split, Team
 from leaderboard.models.quotas import QuotaRules
 
@@ -58,13 +58,7 @@ def rules_of(*, team: Team | None, split: Split) -> Rules:
         return UNLIMITED
     own = QuotaOverride.objects.filter(team=team, split=split).first() if team else None
     rows: list[QuotaRules] = [row for row in (own, split, _shipped(split)) if row is not None]
-    found = {name: _first_sound(rows, name) for name in _NAMES}
-    return Rules(
-        limit=found["quota_limit"],
-        window=found["quota_window"],
-        min_gap=found["quota_min_gap"],
-        rejected_limit=found["quota_rejected_limit"],
-    )
+    return Rules(**{name.removeprefix("quota_"): _first_sound(rows, name) for name in _NAMES})
 
 
 _NAMES = ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")
@@ -82,7 +76,7 @@ def _first_sound(rows: list[QuotaRules], name: str) -> Any:
 
 def _shipped(split: Split) -> QuotaRules:
     """The rules that the split had from the start; of another split those of a new one."""
-    fields = next((fields for fields in benchmark.SPLITS if fields["name"] == split.pk), {})
+    fields = next((fields for fields in splits.SPLITS if fields["name"] == split.pk), {})
     return Split(**{name: fields[name] for name in _NAMES if name in fields})
 
 

@@ -1,4 +1,4 @@
-"""A submission's values in the order of an edition's ground truth, kept from before or read from the file.
+"""A submission's values in the order of an edition's ground truth: saved before, or read from the file.
 
 A file is read with its own manifest, the one that was public when it came. From there its values go sequence
 by sequence, by natural keys, to the manifest of the edition. So a correction that numbers the sequences anew
@@ -14,21 +14,22 @@ from django.conf import settings
 from numpy.typing import NDArray
 
 from evaluator import Predictions
-from evaluator.revisions import Rows, absent, realigned, rows_in
-from leaderboard import files, ground_truth, manifests, quarantine
+from evaluator.predictions.revisions import Rows, absent, realigned, rows_in
 from leaderboard.models import Edition, SentFile
+from leaderboard.scoring import sandbox
+from leaderboard.storage import files, manifests, truth_values
 
 log = structlog.get_logger(__name__)
 
 
-def kept(file: SentFile, edition: Edition) -> Predictions | None:
+def saved(file: SentFile, edition: Edition) -> Predictions | None:
     """The values that were kept when the file was first read; None if they are not all there.
 
     Neither the file's bytes nor its own manifest are read, but once for each pair of manifests. Raises
     `evaluator.Rejected` if the edition has sequences that the file's manifest did not have, and `OSError` if
     the private directory or the store does not answer.
     """
-    manifest = ground_truth.load(edition.ground_truth_id).manifest
+    manifest = truth_values.load(edition.ground_truth_id).manifest
     n_sent, places = _places(file.manifest_digest, edition.ground_truth_id)
     if len(missing := np.flatnonzero(places < 0)):
         raise absent(missing, manifest=manifest)
@@ -44,7 +45,7 @@ def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows]:
 
     (n,) in the order of the ground truth; -1 for what the file's manifest does not have.
     """
-    manifest = ground_truth.load(truth_digest).manifest
+    manifest = truth_values.load(truth_digest).manifest
     own = manifest if manifest.digest == own_digest else manifests.load(own_digest)
     rows = rows_in(own, manifest)
     place_of_row: NDArray[np.intp] = np.empty(own.n_sequences, dtype=np.intp)
@@ -56,17 +57,17 @@ def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = la
     """The values from the bytes of the file, which are kept for the next time.
 
     Raises `evaluator.Rejected` if the file is at fault or lacks sequences of the edition, `OSError` if the
-    store, the disk or the private directory does not answer, and what `quarantine.read_predictions` raises.
+    store, the disk or the private directory does not answer, and what `sandbox.read_predictions` raises.
     """
-    manifest = ground_truth.load(edition.ground_truth_id).manifest
+    manifest = truth_values.load(edition.ground_truth_id).manifest
     is_own = manifest.digest == file.manifest_digest
     own = manifest if is_own else manifests.load(file.manifest_digest)
     with files.opened_predictions(file.digest) as source:
-        predictions = quarantine.read_predictions(
+        predictions = sandbox.read_predictions(
             source,
             manifest=own,
             manifest_path=(
-                ground_truth.manifest_path(edition.ground_truth_id)
+                truth_values.manifest_path(edition.ground_truth_id)
                 if is_own
                 else manifests.path(file.manifest_digest)
             ),
@@ -74,7 +75,7 @@ def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = la
             heartbeat_s=settings.HEARTBEAT_S,
         )
     try:
-        files.keep_aligned(predictions)
+        files.save_aligned(predictions)
     except OSError as fault:
         # They only make re-scoring quicker; without them it reads the file again.
         log.warning("values_not_kept", digest=file.digest, reason=f"{type(fault).__name__}: {fault}")
@@ -83,4 +84,4 @@ def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = la
 
 def of(file: SentFile, edition: Edition) -> Predictions:
     """The values as they were kept, or from the file itself. Raises as `read` does."""
-    return kept(file, edition) or read(file, edition)
+    return saved(file, edition) or read(file, edition)

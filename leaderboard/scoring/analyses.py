@@ -1,8 +1,7 @@
-"""Analyses: what the owner of an entry on an open split may look at more closely. Never of a hidden one."""
+"""Error analysis of an entry on an open split, for its team. Never of a hidden split."""
 
 import itertools
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
@@ -13,11 +12,14 @@ from django.db.models import QuerySet
 from numpy.typing import NDArray
 
 import evaluator
-from evaluator.protocol import get_protocol
-from leaderboard import aligned, ground_truth
+from evaluator.metrics.protocol import PRIMARY, Protocol
+from evaluator.scoring import uncertainty
 from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
+from leaderboard.scoring import aligned
+from leaderboard.storage import truth_values
 
 Floats = NDArray[np.float64]
+Errors = Mapping[str, Floats]  # of every sequence, by metric
 
 # Edges of the true time to contact in seconds: finer where it matters, the intervals' own ends among them.
 CURVE_EDGES_S = (-20, -15, -10, -8, -6, -4, -3, -2, -1, 0, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 15, 20)
@@ -27,28 +29,7 @@ MAX_POINTS = 500
 MAX_RECORDINGS = 20
 
 
-@dataclass(frozen=True)
-class Closer:
-    """A closer look at one submission, in the edition that is its split's board. `content` has
-
-    - `curve`: the mean error by true time to contact, a list of `{"low_s", "high_s", "n", "mid", "rte"}` in
-      ascending order, one for each bin [low_s, high_s) that has sequences;
-    - `distribution`: `{"mid": […], "rte": […]}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
-    - `histogram`: a list of `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the
-      last has `"high": None` and holds all that is larger;
-    - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 sequences drawn at random, the
-      predictions as the protocol truncates them;
-    - `worst`: at most 20 recordings by their mean MiD, the worst first: `{"recording", "n", "mid", "rte"}`;
-    - `n_sequences` and `n_recordings`.
-
-    Errors are rounded as published values are, times to a thousandth of a second.
-    """
-
-    content: Mapping[str, Any]
-    made_at: datetime
-
-
-def of(*, submission: Submission, viewer: User | AnonymousUser) -> Closer | None:
+def of(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | None:
     """The analysis of a submission for its own team (and maintainers).
 
     None for everybody else, on a hidden split, and until a worker has made it.
@@ -56,10 +37,9 @@ def of(*, submission: Submission, viewer: User | AnonymousUser) -> Closer | None
     split = submission.split
     if split.is_hidden or not Submission.objects.visible_to(viewer).filter(pk=submission.pk).exists():
         return None
-    found = Analysis.objects.filter(
+    return Analysis.objects.filter(
         evaluation__submission=submission, evaluation__edition=split.published_edition_id
     ).first()
-    return Closer(found.content, found.made_at) if found else None
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
@@ -67,7 +47,7 @@ def of(*, submission: Submission, viewer: User | AnonymousUser) -> Closer | None
 
 def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
     """What stands on the board of an open split and has no analysis, the newest first."""
-    opened = [digest for digest in held if not ground_truth.is_marked_hidden(digest)]
+    opened = [digest for digest in held if not truth_values.is_marked_hidden(digest)]
     boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=opened)
     return (
         Evaluation.objects.filter(
@@ -87,30 +67,44 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
     Nor if its ground truth was imported as a hidden one: then it is a mistake, or worse, to call it open.
     Raises `OSError` if the store or the private directory does not answer.
     """
-    if ground_truth.is_marked_hidden(evaluation.edition.ground_truth_id):
+    if truth_values.is_marked_hidden(evaluation.edition.ground_truth_id):
         return
-    truth = ground_truth.load(evaluation.edition.ground_truth_id)
+    truth = truth_values.load(evaluation.edition.ground_truth_id)
     predictions = aligned.of(evaluation.submission.sent_file, evaluation.edition)
-    content = content_of(predictions, truth, protocol=evaluation.edition.protocol)
+    content = content_of(predictions, truth, rules=evaluation.edition.rules)
     with transaction.atomic():
         if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:
             return
         Analysis.objects.get_or_create(evaluation=evaluation, defaults={"content": content, "made_at": now})
 
 
-def forget_hidden() -> None:
+def delete_hidden() -> None:
     """Remove the analyses of splits that were open once and are hidden now."""
     Analysis.objects.filter(evaluation__edition__split__is_hidden=True).delete()
 
 
 def content_of(
-    predictions: evaluator.Predictions, truth: evaluator.GroundTruth, *, protocol: str
+    predictions: evaluator.Predictions, truth: evaluator.GroundTruth, *, rules: Protocol
 ) -> dict[str, Any]:
-    """The closer look itself, as `Closer` describes it. The points drawn are the same for all submissions."""
-    rules = get_protocol(protocol)
+    """The error analysis of one submission. The points drawn are the same for all submissions. It has
+
+    - `curve`: the mean errors by true time to contact, a list of `{"low_s", "high_s", "n", "mid", …,
+      "intervals"}` in ascending order, one for each bin [low_s, high_s) that has sequences; `intervals` are
+      the 95 % confidence intervals `{"mid": [low, high], …}` of those means that have enough recordings;
+    - `distribution`: `{"mid": […], …}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
+    - `histogram`: a list of `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the
+      last has `"high": None` and holds all that is larger;
+    - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 sequences drawn at random, the
+      predictions as the protocol truncates them;
+    - `worst`: at most 20 recordings by their mean MiD, the worst first: `{"recording", "n", "mid", …}`;
+    - `n_sequences` and `n_recordings`.
+
+    Errors stand under the names of the protocol's metrics. They are rounded as published values are, times to
+    a thousandth of a second.
+    """
     report = evaluator.evaluate(predictions, truth, protocol=rules, keep_sequences=True)
     assert report.sequences is not None  # noqa: S101 - they were asked for
-    mid, rte = report.sequences.mid, report.sequences.rte
+    errors, decimals = report.sequences, rules.decimals
     rng = np.random.default_rng(0)
     drawn = np.sort(rng.permutation(truth.n_sequences)[:MAX_POINTS])
     predicted_s = np.clip(predictions.ttc_s[drawn], -rules.limit_s, rules.limit_s)
@@ -122,33 +116,49 @@ def content_of(
     return {
         "n_sequences": truth.n_sequences,
         "n_recordings": truth.manifest.n_recordings,
-        "curve": _curve(truth.ttc_s, mid, rte, rules.decimals),
+        "curve": _curve(truth, errors, decimals),
         "distribution": {
             name: [
-                {"quantile": share, "value": round(float(value), rules.decimals)}
-                for share, value in zip(QUANTILES, np.quantile(errors, QUANTILES), strict=True)
+                {"quantile": share, "value": round(float(value), decimals)}
+                for share, value in zip(QUANTILES, np.quantile(values, QUANTILES), strict=True)
             ]
-            for name, errors in (("mid", mid), ("rte", rte))
+            for name, values in errors.items()
         },
-        "histogram": _histogram(mid, rules.decimals),
+        "histogram": _histogram(errors[PRIMARY], decimals),
         "scatter": {
             "true_s": np.round(truth.ttc_s[drawn], 3).tolist(),
             "predicted_s": np.round(predicted_s, 3).tolist(),
         },
-        "worst": _worst(truth, mid, rte, rules.decimals),
+        "worst": _worst(truth, errors, decimals),
     }
 
 
-def _curve(ttc_s: Floats, mid: Floats, rte: Floats, decimals: int) -> list[dict[str, float | int]]:
-    bins = np.digitize(ttc_s, CURVE_EDGES_S)
-    rows = []
-    for i, (low_s, high_s) in enumerate(itertools.pairwise(CURVE_EDGES_S), 1):
-        inside = bins == i
-        if inside.any():
-            means = {"mid": float(mid[inside].mean()), "rte": float(rte[inside].mean())}
-            rounded = {name: round(mean, decimals) for name, mean in means.items()}
-            rows.append({"low_s": low_s, "high_s": high_s, "n": int(inside.sum()), **rounded})
-    return rows
+def _curve(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[dict[str, Any]]:
+    bins = np.digitize(truth.ttc_s, CURVE_EDGES_S)
+    n_bins = len(CURVE_EDGES_S) + 1
+    shape = (truth.manifest.n_recordings, n_bins)
+    cells = truth.manifest.recording_index * n_bins + bins
+    counts = np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape).astype(float)
+    per_metric = [np.bincount(cells, weights=each, minlength=counts.size) for each in errors.values()]
+    sums: Floats = np.stack([each.reshape(shape) for each in per_metric]).astype(float)
+    # The weights of an open split are no secret: these are those of `tsttc score`.
+    low, high = uncertainty.bootstrap_of(truth.digest, counts).intervals(sums)
+    totals, n = sums.sum(axis=1), counts.sum(axis=0)
+    return [
+        {
+            "low_s": low_s,
+            "high_s": high_s,
+            "n": int(n[i]),
+            **{name: round(float(totals[k, i] / n[i]), decimals) for k, name in enumerate(errors)},
+            "intervals": {
+                name: [round(float(low[k, i]), decimals), round(float(high[k, i]), decimals)]
+                for k, name in enumerate(errors)
+                if np.isfinite(low[k, i])
+            },
+        }
+        for i, (low_s, high_s) in enumerate(itertools.pairwise(CURVE_EDGES_S), 1)
+        if n[i]
+    ]
 
 
 def _histogram(mid: Floats, decimals: int) -> list[dict[str, float | int | None]]:
@@ -162,14 +172,11 @@ def _histogram(mid: Floats, decimals: int) -> list[dict[str, float | int | None]
     return [*rows, {"low": round(end, decimals), "high": None, "n": int((mid >= end).sum())}]
 
 
-def _worst(
-    truth: evaluator.GroundTruth, mid: Floats, rte: Floats, decimals: int
-) -> list[dict[str, float | int | str]]:
+def _worst(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[dict[str, float | int | str]]:
     index, n_bags = truth.manifest.recording_index, truth.manifest.n_recordings
     counts = np.bincount(index, minlength=n_bags)
     means = {
-        name: np.bincount(index, weights=errors, minlength=n_bags) / counts
-        for name, errors in (("mid", mid), ("rte", rte))
+        name: np.bincount(index, weights=values, minlength=n_bags) / counts for name, values in errors.items()
     }
     return [
         {
@@ -177,5 +184,5 @@ def _worst(
             "n": int(counts[row]),
             **{name: round(float(values[row]), decimals) for name, values in means.items()},
         }
-        for row in np.argsort(-means["mid"], kind="stable")[:MAX_RECORDINGS].tolist()
+        for row in np.argsort(-means[PRIMARY], kind="stable")[:MAX_RECORDINGS].tolist()
     ]

@@ -14,13 +14,17 @@ from uuid import UUID
 from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
 
-from evaluator import Difference, differences, sentences
-from evaluator.protocol import SCORE_NAMES
-from leaderboard import bags, disclosure, entries, inference, questions, snapshots, standings
+from evaluator import Difference
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.scoring import differences
+from evaluator.tables import sentences
+from leaderboard.boards import boards, rows, snapshots
+from leaderboard.boards.boards import Entry
 from leaderboard.models import Comparison, Edition, Method, Split, User
-from leaderboard.standings import Entry
+from leaderboard.scoring import confidence, disclosure, questions, recording_sums, verdicts
 
 MIN_METHODS, MAX_METHODS = 2, 5
+N_FIRST = 20
 
 
 class BadComparison(Exception):
@@ -36,6 +40,16 @@ class UnknownMethod(BadComparison):
     """A method that there is not, or that this reader may not see: the two are not told apart."""
 
     code = "unknown-method"
+
+
+def method_id(text: str) -> UUID:
+    """The method that an address names. Raises `UnknownMethod`."""
+    try:
+        return UUID(text)
+    except ValueError:
+        raise UnknownMethod(
+            f"There is no method {text[:60]!r}; expected an identifier as in the address of a method's page."
+        ) from None
 
 
 class NotOnTheBoard(BadComparison):
@@ -57,7 +71,7 @@ class Pair:
     differences: Mapping[str, Difference] | None
     withheld: str = ""
 
-    def sentence(self, name: str = "mid") -> str:
+    def sentence(self, name: str = PRIMARY) -> str:
         """What the difference in one column means, in words; empty while it is not known."""
         if self.differences is None or name not in self.differences:
             return ""
@@ -71,11 +85,9 @@ class Pair:
             withheld=self.withheld,
         )
 
-    def others(self) -> tuple[str, tuple[str, ...]]:
-        """Of the columns beside overall MiD: how many differ significantly, and a sentence for each."""
-        return sentences.others(
-            self.first.method, self.second.method, self.differences or {}, decimals=self.first.decimals
-        )
+    def others(self) -> str:
+        """How many columns besides overall MiD differ significantly."""
+        return sentences.others(self.differences or {})
 
 
 @dataclass(frozen=True)
@@ -137,25 +149,48 @@ def of(
         entries=tuple(chosen),
         pairs=pairs,
         is_complete=all(pair.differences is not None for pair in pairs),
-        reason=inference.why_no_interval(board.edition),
+        reason=verdicts.why_no_interval(board.edition),
     )
 
 
-def _chosen(board: standings.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
+def of_first(*, board: boards.Board, now: datetime) -> tuple[Pair, ...]:
+    """All pairs of the first rows of a board that everybody sees, each with the better rank first.
+
+    What is not known yet is noted, for workers to compute after all that somebody waits for. Empty for a
+    board of another time, and where there are too few recordings to compare anything.
+    """
+    if board.edition is None or board.at is not None or verdicts.why_no_interval(board.edition):
+        return ()
+    board.edition.split = board.split  # as above
+    ranked = [
+        entry for entry in board.entries if entry.is_visible_to_all and entry.evaluation_id and entry.rank
+    ]
+    first = sorted(ranked, key=lambda entry: entry.rank or 0)[:N_FIRST]
+    pairs = list(itertools.combinations(first, 2))
+    withheld, known = _withheld(board.edition, pairs), _known(board.edition, first)
+    new = [key for key in map(_key, pairs) if key not in withheld and key not in known]
+    questions.note(edition=board.edition, pairs=new, now=now)
+    return tuple(
+        _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
+        for pair in pairs
+    )
+
+
+def _chosen(board: boards.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
     """The methods' rows, in the order that was asked for."""
     if not MIN_METHODS <= len(methods) <= MAX_METHODS:
         raise BadComparison(
-            f"{_n_methods(len(methods))} named; expected {MIN_METHODS} to {MAX_METHODS} to compare."
+            f"A comparison needs {MIN_METHODS} to {MAX_METHODS} methods; found {len(methods)}."
         )
     if len(set(methods)) < len(methods):
-        raise BadComparison("A method was named twice; expected different ones to compare.")
-    rows = {entry.method_id: entry for entry in board.entries if entry.scores["mid"] is not None}
+        raise BadComparison("One method is given twice; expected different methods to compare.")
+    entry_of = {entry.method_id: entry for entry in board.entries if entry.scores[PRIMARY] is not None}
     for pk in methods:
-        if pk not in rows:
+        if pk not in entry_of:
             if Method.objects.visible_to(viewer).filter(pk=pk).exists():
                 raise NotOnTheBoard(f"The method {pk} has no scored submission on {board.split.pk}.")
             raise UnknownMethod(f"There is no method {pk} that you may see; expected one of the board.")
-    return [rows[pk] for pk in methods]
+    return [entry_of[pk] for pk in methods]
 
 
 def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[tuple[UUID, UUID], str]:
@@ -166,7 +201,7 @@ def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[tu
 
 def _plain(first: Entry, second: Entry, why: str) -> Pair:
     """The differences of the published values, which everybody can take from the board."""
-    values = ((name, first.scores[name], second.scores[name]) for name in SCORE_NAMES)
+    values = ((name, one, second.scores[name]) for name, one in first.scores.items())
     shown = {
         name: Difference(round(one - other, first.decimals) + 0.0, None, None, None)
         for name, one, other in values
@@ -189,8 +224,8 @@ def _evaluation_id(entry: Entry) -> UUID:
 def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[tuple[UUID, UUID], Comparison]:
     """What was asked for before, computed or not."""
     ids = [_evaluation_id(entry) for entry in chosen]
-    rows = Comparison.objects.filter(edition=edition, first__in=ids, second__in=ids)
-    return {(row.first_id, row.second_id): row for row in rows}
+    asked = Comparison.objects.filter(edition=edition, first__in=ids, second__in=ids)
+    return {(row.first_id, row.second_id): row for row in asked}
 
 
 def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
@@ -199,15 +234,11 @@ def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
     is_turned = row.first_id != first.evaluation_id
     shown = {
         name: found.turned() if is_turned else found
-        for name in SCORE_NAMES
+        for name in first.scores
         if name in row.differences
         for found in [Difference(**row.differences[name])]
     }
     return Pair(first, second, shown)
-
-
-def _n_methods(n: int) -> str:
-    return "1 method was" if n == 1 else f"{n} methods were"
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
@@ -221,11 +252,15 @@ def compute(row: Comparison, *, now: datetime) -> None:
     questions.begin(row, now=now)
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
-    first, second = (bags.sums_of(edition, file=file) for file in sent)
+    first, second = (recording_sums.sums_of(edition, file=file) for file in sent)
     found = differences.difference(
-        first, second, bags.counts_of(edition), signs=inference.generator_of(edition, purpose="signs")
+        first,
+        second,
+        recording_sums.counts_of(edition),
+        names=edition.rules.score_names,
+        signs=confidence.generator_of(edition, purpose="signs"),
     )
-    values = [entries.flat_scores(each.scores.all()) for each in (row.first, row.second)]
+    values = [rows.flat_scores(each) for each in (row.first, row.second)]
     shown = {
         name: disclosure.published_difference(
             gap,

@@ -21,13 +21,17 @@ from django.db import connection, transaction
 from django.db.models import Exists, OuterRef
 from numpy.typing import NDArray
 
-from evaluator import published, uncertainty
-from evaluator.protocol import SCORE_NAMES
-from evaluator.ranges import Quoted, rank_ranges
-from evaluator.significance import MIN_DEGREES, cut_off, too_few_recordings
-from leaderboard import bags, boards, bulk, disclosure, seeds
-from leaderboard.entries import printed_decimals
+from evaluator import published
+from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
+from evaluator.scoring import uncertainty
+from evaluator.scoring.ranges import Quoted, rank_ranges
+from evaluator.scoring.significance import cut_off
+from leaderboard import versions
+from leaderboard.boards.rows import printed_decimals
+from leaderboard.db import bulk
 from leaderboard.models import Edition, Evaluation, PublishedResult, Score, SentFile, Status, Visibility
+from leaderboard.scoring import disclosure, recording_sums
+from leaderboard.storage.seeds import seed_of
 
 log = structlog.get_logger(__name__)
 
@@ -41,11 +45,10 @@ REST_PER_PAIR = timedelta(microseconds=60)
 LOCKS = 0x7753
 COLUMNS = ("low", "high", "rank_low", "rank_high", "is_with_best")
 Values = tuple[float | None, float | None, int | None, int | None, bool | None]
-NOTHING: Values = (None, None, None, None, None)
 
 
 @dataclass(frozen=True)
-class Standing:
+class ScoredEntry:
     """A scored submission in an edition that its team has not withdrawn."""
 
     evaluation_id: UUID
@@ -56,43 +59,25 @@ class Standing:
     submitted_at: datetime
 
 
-def why_no_interval(edition: Edition) -> str:
-    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
-
-    A worker finds out how many recordings an edition effectively has, and writes it beside the edition; until
-    then only an edition with too few recordings in all is known to have none.
-    """
-    known = [edition.n_effective.get(name, 0.0) for name in SCORE_NAMES] if edition.n_effective else []
-    most = max(known, default=float(edition.ground_truth.n_recordings))
-    if most >= MIN_DEGREES:
-        return ""
-    return f"There are no intervals: they would be made of {too_few_recordings(most)}."
-
-
 def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
-    """The random numbers of an edition: everything that is drawn for it comes from here."""
-    return uncertainty.generator_of(seed_of(edition), purpose=purpose)
-
-
-def seed_of(edition: Edition) -> str:
-    """What the random numbers of an edition are made of; each purpose then has its own.
+    """The random numbers of an edition for one purpose: everything that is drawn for it comes from here.
 
     Raises `OSError` of a hidden split without its secret.
     """
-    return seeds.seed_of(edition)
+    return uncertainty.generator_of(seed_of(edition), purpose=purpose)
 
 
 # --- which entries ---------------------------------------------------------------------------------------
 
 
-def standing(edition: Edition) -> list[Standing]:
+def active_entries(edition: Edition) -> list[ScoredEntry]:
     """Everything that stands in an edition, private methods included: one query."""
     rows = Score.objects.filter(
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
-        metric="mid",
-        interval="overall",
+        metric=PRIMARY,
+        interval=OVERALL,
     ).values_list(
         "evaluation_id",
         "evaluation__submission__digest",
@@ -103,21 +88,21 @@ def standing(edition: Edition) -> list[Standing]:
         "evaluation__submission__submitted_at",
     )
     return [
-        Standing(pk, SentFile(digest, manifest), method, visibility != Visibility.PRIVATE, value, at)
+        ScoredEntry(pk, SentFile(digest, manifest), method, visibility != Visibility.PRIVATE, value, at)
         for pk, digest, manifest, method, visibility, value, at in rows
     ]
 
 
-def ranked(rows: Sequence[Standing]) -> list[Standing]:
+def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
     """What everybody sees ranked: of each shown method its best, the earlier one of two that are as good."""
-    best: dict[UUID, Standing] = {}
+    best: dict[UUID, ScoredEntry] = {}
     for row in sorted(rows, key=lambda row: (row.value, row.submitted_at)):
         if row.is_shown:
             best.setdefault(row.method_id, row)
     return list(best.values())
 
 
-def digest_of(edition: Edition, rows: Sequence[Standing]) -> str:
+def digest_of(edition: Edition, rows: Sequence[ScoredEntry]) -> str:
     """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
     rivals = {row.evaluation_id for row in ranked(rows)}
     lines = sorted(f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in rows)
@@ -127,60 +112,76 @@ def digest_of(edition: Edition, rows: Sequence[Standing]) -> str:
 
 
 def _printed(edition: Edition) -> list[tuple[float, ...]]:
-    """The ten numbers of each row on its board that is quoted from a paper; NaN where it has none."""
+    """The numbers of each row on its board that is quoted from a paper; NaN where it has none."""
     rows = PublishedResult.objects.on_board(edition.split, edition).values_list("scores", flat=True)
-    return [tuple(float(scores.get(name) or "nan") for name in SCORE_NAMES) for scores in rows]
+    names = edition.rules.score_names
+    return [tuple(float(scores.get(name) or "nan") for name in names) for scores in rows]
 
 
-def stale(*, now: datetime, held: Collection[str] | None) -> list[Edition]:
-    """Editions whose entries are not those that their ranges were made of.
+@dataclass(frozen=True)
+class Entries:
+    """What stands in an edition, read once for all that a worker does with it."""
 
-    With `held` only those whose ground truth is among these digests: what this worker can do. An edition in
+    edition: Edition
+    rows: tuple[ScoredEntry, ...]
+    digest: str
+
+    @classmethod
+    def of(cls, edition: Edition) -> "Entries":
+        """As they are now."""
+        rows = active_entries(edition)
+        return cls(edition, tuple(rows), digest_of(edition, rows))
+
+    @property
+    def have_ranges(self) -> bool:
+        """Whether all that workers make of an edition beside its scores is there, and of these entries."""
+        return self.edition.floor is not None and self.edition.inference_digest == self.digest
+
+
+def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
+    """The entries of editions whose ranges were made of others, each read when it is asked for.
+
+    Only those whose ground truth is `held`, among these digests: what this worker can do. An edition in
     which something is still to be scored has patience, and so has a large one whose ranges are quite new.
     """
     undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
     found = (
-        Edition.objects.filter(discarded_at=None)
+        Edition.objects.filter(discarded_at=None, ground_truth__in=held)
         .select_related("ground_truth", "split")
         .annotate(is_busy=Exists(undecided))
         .order_by("pk")
     )
-    if held is not None:
-        found = found.filter(ground_truth__in=held)
-    return [edition for edition in found if _is_stale(edition, now=now)]
+    for edition in found:
+        if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:
+            continue
+        entries = Entries.of(edition)
+        if not (entries.have_ranges or _rests(entries, now=now)):
+            yield entries
 
 
-def _is_stale(edition: Edition, *, now: datetime) -> bool:
-    if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:  # type: ignore[attr-defined]  # annotated above
-        return False
-    rows = standing(edition)
-    rest = min(PATIENCE, len(rows) ** 2 * REST_PER_PAIR)
-    is_new = edition.inferred_at is not None and now - edition.inferred_at < rest
-    return not is_new and not _holds(edition, digest=digest_of(edition, rows))
-
-
-def _holds(edition: Edition, *, digest: str) -> bool:
-    """Whether all that workers make of an edition beside its scores is there, and of these entries."""
-    return edition.floor is not None and edition.inference_digest == digest
+def _rests(entries: Entries, *, now: datetime) -> bool:
+    rest = min(PATIENCE, len(entries.rows) ** 2 * REST_PER_PAIR)
+    inferred_at = entries.edition.inferred_at
+    return inferred_at is not None and now - inferred_at < rest
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
 
 
-def infer(*, edition: Edition, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
+def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
     """Make what is missing of an edition's intervals, and its rank ranges anew. Whether it wrote them.
 
-    False: they hold already, another worker is at it, or the entries changed meanwhile, and whoever looks
-    next does it. `between` is called every fraction of a second. Raises what `bags.sums_of` raises.
+    False: they hold already, another worker is at it, or the entries have changed since they were read, and
+    whoever looks next does it. `between` is called every fraction of a second. Raises what
+    `recording_sums.sums_of` raises.
     """
-    with _alone(edition) as is_alone:
-        rows = standing(edition)
-        digest = digest_of(edition, rows)
-        if not is_alone or _holds(edition, digest=digest):
+    with _alone(entries.edition) as is_alone:
+        if not is_alone or entries.have_ranges:
             return False
-        inferred = _inferred(edition, rows, between=between)
-        is_written = _write(edition, digest=digest, inferred=inferred, rows=rows, now=now)
-    log.info("inferred", edition=str(edition), n_entries=len(rows), is_written=is_written)
+        table = _Table(entries.edition)
+        inferred = _inferred(entries, table, between=between)
+        is_written = _write(entries, table, inferred=inferred, now=now)
+    log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
     return is_written
 
 
@@ -200,12 +201,10 @@ def _alone(edition: Edition) -> Iterator[bool]:
                 cursor.execute("SELECT pg_advisory_unlock(%s, %s)", [LOCKS, edition.pk])
 
 
-def _inferred(
-    edition: Edition, rows: Sequence[Standing], *, between: Callable[[], None]
-) -> Mapping[int, Values]:
+def _inferred(entries: Entries, table: "_Table", *, between: Callable[[], None]) -> Mapping[int, Values]:
     """What is to stand beside each score of the edition, by the score's id."""
-    table = _Table(edition)
-    counts = bags.counts_of(edition)
+    edition, rows = entries.edition, entries.rows
+    counts = recording_sums.counts_of(edition)
     usable = uncertainty.usable_columns(counts)
     low, high = table.low, table.high
     if not edition.inference_digest.startswith(f"{METHOD} "):
@@ -220,7 +219,7 @@ def _inferred(
     for start in range(0, len(missing), uncertainty.BATCH):
         between()
         some = missing[start : start + uncertainty.BATCH]
-        sums = np.stack([bags.sums_of(edition, file=row.file) for row in some])
+        sums = np.stack([recording_sums.sums_of(edition, file=row.file) for row in some])
         places = [table.row_of[row.evaluation_id] for row in some]
         ends = bootstrap_of(edition).intervals(sums)
         # As they are kept: ranges must not depend on which of them were made before.
@@ -230,7 +229,7 @@ def _inferred(
     rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)
     if rivals:
         ranges = rank_ranges(
-            np.stack([bags.sums_of(edition, file=row.file) for row in rivals]),
+            np.stack([recording_sums.sums_of(edition, file=row.file) for row in rivals]),
             published=table.value[places],
             usable=usable,
             rng=generator_of(edition, purpose="signs"),
@@ -262,13 +261,12 @@ class _Table:
         )
         ids = sorted({score[1] for score in scores})
         self.row_of = {pk: i for i, pk in enumerate(ids)}
-        column_of = {name: j for j, name in enumerate(SCORE_NAMES)}
-        self.value, self.low, self.high = (np.full((len(ids), len(SCORE_NAMES)), np.nan) for _ in range(3))
+        column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
+        self.value, self.low, self.high = (np.full((len(ids), len(column_of)), np.nan) for _ in range(3))
         self.cells: dict[int, tuple[int, int]] = {}
         self.before: dict[int, Values] = {}
         for pk, evaluation_id, metric, interval, value, *inferred in scores:
-            name = metric if interval == "overall" else f"{metric}_{interval}"
-            cell = self.row_of[evaluation_id], column_of[name]
+            cell = self.row_of[evaluation_id], column_of[score_name(metric, interval)]
             self.cells[pk] = cell
             self.before[pk] = (inferred[0], inferred[1], inferred[2], inferred[3], inferred[4])
             self.value[cell] = value
@@ -279,13 +277,13 @@ class _Table:
 
 def _n_effective(edition: Edition) -> dict[str, float]:
     """The effective number of recordings of each column, as it is published."""
-    degrees = uncertainty.degrees_of(bags.counts_of(edition))
-    return {name: cut_off(n) for name, n in zip(SCORE_NAMES, degrees.tolist(), strict=True)}
+    degrees = uncertainty.degrees_of(recording_sums.counts_of(edition))
+    return {name: cut_off(n) for name, n in zip(edition.rules.score_names, degrees.tolist(), strict=True)}
 
 
 def _quoted(edition: Edition, counts: Floats) -> Quoted | None:
     """The rows quoted from papers, each value as exact as it was printed: 14.8 is 14.75 to 14.85."""
-    values = np.array(_printed(edition)).reshape(-1, len(SCORE_NAMES))
+    values = np.array(_printed(edition)).reshape(-1, len(edition.rules.score_names))
     if not len(values):
         return None
     decimals = [printed_decimals(v for v in row if not np.isnan(v)) for row in values.tolist()]
@@ -299,41 +297,39 @@ def _published(value: float, decimals: int) -> float | None:
 
 def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
     """The weights of the edition's ground truth. Raises `OSError` without access to its values."""
-    return _bootstrap(seed_of(edition), bags.counts_of(edition).tobytes())
+    counts = recording_sums.counts_of(edition)
+    return _bootstrap(seed_of(edition), counts.tobytes(), counts.shape)
 
 
 @lru_cache(maxsize=1)
-def _bootstrap(seed: str, counts: bytes) -> uncertainty.Bootstrap:
-    table = np.frombuffer(counts).reshape(-1, len(SCORE_NAMES))
-    return uncertainty.bootstrap_of(seed, table)
+def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.Bootstrap:
+    return uncertainty.bootstrap_of(seed, np.frombuffer(counts).reshape(shape))
 
 
-def _write(
-    edition: Edition,
-    *,
-    digest: str,
-    inferred: Mapping[int, Values],
-    rows: Sequence[Standing],
-    now: datetime,
-) -> bool:
-    """Write what was made, all or nothing, if the entries are still the same."""
-    shown = {row.evaluation_id for row in rows if row.is_shown}
-    floor, n_effective = bags.floor_of(edition), _n_effective(edition)
+def _write(entries: Entries, table: _Table, *, inferred: Mapping[int, Values], now: datetime) -> bool:
+    """Write what was made, all or nothing, if the entries are still the same.
+
+    They are read for the second time here, with the edition locked: the comparison of compare-and-set. The
+    table need not be: a score does not change, and only who has the edition locked writes beside it.
+    """
+    edition = entries.edition
+    shown = {row.evaluation_id for row in entries.rows if row.is_shown}
+    floor, n_effective = recording_sums.floor_of(edition), _n_effective(edition)
     with transaction.atomic():
         present = (
             Edition.objects.select_for_update(of=("self",), no_key=True)
-            .select_related("ground_truth")
+            .select_related("ground_truth", "split")
             .get(pk=edition.pk)
         )
-        if present.inference_digest != edition.inference_digest or digest != digest_of(
-            present, standing(present)
+        if (
+            present.inference_digest != edition.inference_digest
+            or Entries.of(present).digest != entries.digest
         ):
             return False
-        table = _Table(present)
-        changed = [(*values, pk) for pk, values in inferred.items() if table.before.get(pk, values) != values]
+        changed = [(*values, pk) for pk, values in inferred.items() if table.before[pk] != values]
         bulk.update(Score, COLUMNS, changed)
         Edition.objects.filter(pk=edition.pk).update(
-            inferred_at=now, inference_digest=digest, floor=floor, n_effective=n_effective
+            inferred_at=now, inference_digest=entries.digest, floor=floor, n_effective=n_effective
         )
         ids = {i: pk for pk, i in table.row_of.items()}
         # Whose rows only their own team sees, changes nothing that anybody else is shown.
@@ -341,5 +337,5 @@ def _write(
             ids[table.cells[row[-1]][0]] in shown for row in changed
         )
         if is_seen and present.published_at is not None:
-            boards.changed(present.split_id)
+            versions.changed(present.split_id)
     return True

@@ -1,4 +1,4 @@
-"""What is told of hidden values beyond the means: how fine an interval and a p are, and of which pairs.
+"""Disclosure: how finely intervals and p-values of hidden splits are published, and of which pairs.
 
 Each number that follows from hidden labels tells of them, and a file can be made to be read through such
 numbers. Of a hidden split the ends of intervals are therefore rounded to about a tenth of their width, p is
@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator import Difference
-from leaderboard.entries import Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.models import Edition, Visibility
 
 Floats = NDArray[np.float64]
@@ -100,21 +100,21 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
     for entry in (first, second):
         if entry.visibility == Visibility.ANONYMOUS and not entry.is_mine:
             return (
-                f"No confidence interval and no p: {entry.method} is anonymous, and they would tell whose it "
-                "may be. They follow once it is public."
+                f"No confidence interval and no p-value: {entry.method} is anonymous, and "
+                "these numbers could reveal its team. They appear once the method is public."
             )
     if not edition.split.is_hidden:
         return ""
     for entry in (first, second):
         if entry.visibility != Visibility.PUBLIC:
             return (
-                f"No confidence interval and no p: {entry.method} is not public, and the ground truth of "
-                f"{edition.split_id} is hidden. {_POSSIBLE}"
+                f"No confidence interval and no p-value: {entry.method} is not public, and the ground "
+                f"truth of {edition.split_id} is hidden. {_POSSIBLE}"
             )
     # Teams that show a method have different names, by a constraint of the database.
     if first.team == second.team:
         return (
-            "No confidence interval and no p: both methods are of one team, and the ground truth of "
+            "No confidence interval and no p-value: both methods are of one team, and the ground truth of "
             f"{edition.split_id} is hidden. {_POSSIBLE}"
         )
     return ""

@@ -20,7 +20,6 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
-from functools import partial
 from typing import Any
 
 import structlog
@@ -29,14 +28,15 @@ from django.db import transaction
 from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
-from leaderboard import audit, boards, broker, bulk
-from leaderboard.clock import after, database_now, just_before
+from leaderboard import audit, versions
+from leaderboard.db import bulk
+from leaderboard.db.clock import after, database_now, just_before
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
+from leaderboard.models.submissions import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
+from leaderboard.ops import broker
 
 log = structlog.get_logger(__name__)
 
-MAX_POISON_STRIKES = 3
-MAX_INFRASTRUCTURE_STRIKES = 10
 MAX_BACKOFF_S = 60.0
 # Large enough that a batch's round trips and COMMITs are nothing beside its arithmetic; small enough that the
 # workers of an edition end together, and that a live submission waits for a fraction of a second.
@@ -105,7 +105,7 @@ def _announce(evaluation: Evaluation) -> None:
         submission_id=str(evaluation.submission_id), evaluation_id=str(evaluation.pk)
     ):
         log.info("evaluation_queued")
-        broker.nudge(evaluation.pk)
+        broker.nudge()
 
 
 def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> None:
@@ -120,17 +120,11 @@ def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> No
         [(pk, edition.pk, Evaluation.PRIORITY_RESCORE, now, just_before(now)) for pk in submission_ids],
         ignore_conflicts=True,
     )
-    transaction.on_commit(partial(_announce_many, len(submission_ids)), robust=True)
+    for _ in range(0, len(submission_ids), RESCORE_BATCH):
+        transaction.on_commit(broker.nudge, robust=True)
 
 
-def _announce_many(n: int) -> None:
-    """Nudge once for each batch, or until the broker does not take it."""
-    for pk in waiting_ids(limit=-(-n // RESCORE_BATCH)):
-        if not broker.nudge(pk):
-            return
-
-
-# --- a worker's verbs ------------------------------------------------------------------------------------
+# --- workers ---------------------------------------------------------------------------------------------
 
 
 def claim(
@@ -240,7 +234,6 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
                 for (metric, interval), value in outcome.scores.items()
             ],
         )
-        boards.changed_by_evaluations(lease.evaluation_id for lease, _ in decided)
         audit.record_many(
             (
                 *(outcome.status.lower(), "Evaluation", lease.evaluation_id),
@@ -248,6 +241,7 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
             )
             for lease, outcome in decided
         )
+        versions.changed_by_evaluations(lease.evaluation_id for lease, _ in decided)
     return {lease.evaluation_id for lease, _ in decided}
 
 
@@ -266,7 +260,7 @@ def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
     return {row[0]: row[3] for row in rows if row[:3] in valid}
 
 
-def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> Status:
+def fail_attempt(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> Status:
     """End a run that came to nothing, with a strike. Returns the state it left: QUEUED or SYSTEM_ERROR.
 
     Raises `LostRace` if the lease is no longer valid.
@@ -278,7 +272,7 @@ def give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) 
         return _strike(evaluation, strike=strike, reason=reason, rng=rng)
 
 
-def hand_back(leases: Sequence[Lease]) -> int:
+def release(leases: Sequence[Lease]) -> int:
     """Queue again what was claimed and never begun, without a strike. Returns how many that were.
 
     Leases that are no longer valid are left alone.
@@ -289,7 +283,7 @@ def hand_back(leases: Sequence[Lease]) -> int:
         return rows.update(status=Status.QUEUED, leased_until=None)
 
 
-# --- the sweeper's verbs ---------------------------------------------------------------------------------
+# --- the sweep -------------------------------------------------------------------------------------------
 
 
 def release_expired(*, rng: random.Random) -> int:
@@ -298,11 +292,15 @@ def release_expired(*, rng: random.Random) -> int:
     A worker that renewed its lease up to the deadline overran on this file: poison. One whose lease ran out
     earlier vanished: infrastructure. What the clock says now is no evidence, since a sweep may come late.
     """
+    rows = Evaluation.objects.filter(status=Status.RUNNING, leased_until__lt=Now())
+    # Asked first: every worker looks every few seconds, and there is hardly ever one.
+    if not rows.exists():
+        return 0
     with transaction.atomic():
         expired = list(
-            Evaluation.objects.select_for_update(skip_locked=True, no_key=True)
-            .filter(status=Status.RUNNING, leased_until__lt=Now())
-            .annotate(overran=Q(leased_until__gte=F("deadline_at")))
+            rows.select_for_update(skip_locked=True, no_key=True).annotate(
+                overran=Q(leased_until__gte=F("deadline_at"))
+            )
         )
         for evaluation in expired:
             overran: bool = evaluation.overran
@@ -313,11 +311,6 @@ def release_expired(*, rng: random.Random) -> int:
                 rng=rng,
             )
     return len(expired)
-
-
-def waiting_ids(*, limit: int) -> list[uuid.UUID]:
-    """Evaluations that are queued and due, most urgent first: what a sweep nudges again."""
-    return list(Evaluation.objects.due().values_list("pk", flat=True)[:limit])
 
 
 def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.Random) -> Status:
@@ -357,7 +350,7 @@ def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.
     return status
 
 
-# --- people's verbs --------------------------------------------------------------------------------------
+# --- people ----------------------------------------------------------------------------------------------
 
 
 def cancel_edition(*, edition: Edition) -> int:

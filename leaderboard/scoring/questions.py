@@ -1,4 +1,4 @@
-"""Who waits for which comparison, and whose turn it is: nobody's questions keep all the others' waiting.
+"""The queue of comparisons: askers take turns, and nobody's questions delay all others.
 
 Each asker has a number of places. Askers take turns: whoever was served lets everybody go first who asks
 within the next minute, however many questions they have left; within an asker's own the oldest is first.
@@ -8,7 +8,6 @@ Those who are signed in begin a minute ahead of visitors, who cannot take their 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from functools import partial
 from typing import Final
 from uuid import UUID
 
@@ -17,9 +16,9 @@ from django.db import transaction
 from django.db.models import F, Min, QuerySet
 from django.utils.crypto import salted_hmac
 
-from leaderboard import broker
-from leaderboard.clock import after
+from leaderboard.db.clock import after
 from leaderboard.models import Comparison, Edition, Question, User
+from leaderboard.ops import broker
 
 MAX_PLACES: Final = 20
 # Of all visitors together, and of all who are signed in together.
@@ -49,7 +48,7 @@ class Asker:
 def asker_of(*, user: User | AnonymousUser, address: str) -> Asker:
     """The account, whatever address it comes from; else the address."""
     who = f"user {user.pk}" if user.is_authenticated else f"address {address}"
-    name = salted_hmac("leaderboard.questions", who, algorithm="sha256").hexdigest()
+    name = salted_hmac("leaderboard.scoring.questions", who, algorithm="sha256").hexdigest()
     return Asker(name=name, is_signed_in=user.is_authenticated)
 
 
@@ -89,7 +88,19 @@ def ask(*, edition: Edition, pairs: Sequence[Key], asker: Asker, now: datetime) 
             ],
             ignore_conflicts=True,
         )
-        transaction.on_commit(partial(broker.infer, edition.pk), robust=True)
+        transaction.on_commit(broker.work_off, robust=True)
+
+
+def note(*, edition: Edition, pairs: Sequence[Key], now: datetime) -> None:
+    """Have these pairs of evaluations compared when nothing waits that somebody asked for."""
+    if not pairs:
+        return
+    rows = [
+        Comparison(edition=edition, first_id=one, second_id=two, asked_at=now) for one, two in sorted(pairs)
+    ]
+    with transaction.atomic():
+        Comparison.objects.bulk_create(rows, ignore_conflicts=True)
+        transaction.on_commit(broker.work_off, robust=True)
 
 
 def _require_places(n_taken: int, n_wanted: int, *, is_signed_in: bool) -> None:
@@ -107,11 +118,11 @@ def _require_places(n_taken: int, n_wanted: int, *, is_signed_in: bool) -> None:
         )
 
 
-def waiting(*, held: Collection[str] | None = None) -> QuerySet[Comparison]:
-    """What is not computed, in the order in which it is to be; with `held` what this worker can compute."""
-    rows = Comparison.objects.filter(computed_at=None).annotate(turn_at=Min("questions__turn_at"))
-    rows = rows.order_by(F("turn_at").asc(nulls_last=True), "asked_at", "pk")
-    return rows if held is None else rows.filter(edition__ground_truth__in=held)
+def waiting(*, held: Collection[str]) -> QuerySet[Comparison]:
+    """What is not computed, in the order in which it is to be, against ground truth of `held`."""
+    rows = Comparison.objects.filter(computed_at=None, edition__ground_truth__in=held)
+    rows = rows.annotate(turn_at=Min("questions__turn_at"))
+    return rows.order_by(F("turn_at").asc(nulls_last=True), "asked_at", "pk")
 
 
 def begin(row: Comparison, *, now: datetime) -> None:
@@ -132,7 +143,7 @@ def end(row: Comparison) -> None:
         _locked(Question.objects.filter(comparison=row)).delete()
 
 
-def forget(*, now: datetime) -> int:
+def delete_expired(*, now: datetime) -> int:
     """Forget who asked for what no worker could compute for a day. Returns how many questions that were."""
     with transaction.atomic():
         n_forgotten, _ = _locked(Question.objects.filter(asked_at__lt=now - KEPT)).delete()

@@ -1,10 +1,11 @@
-"""Sums per recording, kept where only workers look: in the private directory, beside the ground truth.
+"""Sums per recording, saved in the private directory of workers, beside the ground truth.
 
 They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. Each file
 is named by what it was made of, so it never changes; whatever is missing, as on another worker, is made anew
 from the submission's values.
 """
 
+import math
 import os
 import tempfile
 from functools import lru_cache
@@ -15,12 +16,14 @@ import structlog
 from django.conf import settings
 from numpy.typing import NDArray
 
-from evaluator import GroundTruth, floors, published
-from evaluator.protocol import SCORE_NAMES, get_protocol
-from evaluator.report import BagSums
-from evaluator.scoring import Scorer
-from leaderboard import aligned, ground_truth
+from evaluator import GroundTruth, published
+from evaluator.metrics.protocol import get_protocol
+from evaluator.scoring import floors
+from evaluator.scoring.report import RecordingSums
+from evaluator.scoring.scoring import Scorer
 from leaderboard.models import Edition, SentFile
+from leaderboard.scoring import aligned
+from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
 
@@ -35,7 +38,7 @@ def path(edition: Edition, *, file: SentFile) -> Path:
     return kept / f"{truth[:32]}-{edition.protocol}" / f"{digest}-{manifest[:32]}.f8"
 
 
-def keep(edition: Edition, *, file: SentFile, bags: BagSums | None) -> None:
+def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> None:
     """Keep a file's sums, little-endian float64. A disk that does not take them costs only time later."""
     if bags is None:
         return
@@ -52,18 +55,18 @@ def keep(edition: Edition, *, file: SentFile, bags: BagSums | None) -> None:
 
 def load(edition: Edition, *, file: SentFile) -> Floats | None:
     """The sums that were kept, (G, 10); None if they are not all there."""
-    n_bags = edition.ground_truth.n_recordings
+    shape = edition.ground_truth.n_recordings, len(edition.rules.score_names)
     try:
         data = path(edition, file=file).read_bytes()
     except OSError:
         return None
-    if len(data) != n_bags * len(SCORE_NAMES) * 8:
+    if len(data) != math.prod(shape) * 8:
         return None
-    return np.frombuffer(data, dtype="<f8").reshape(n_bags, len(SCORE_NAMES)).astype(np.float64)
+    return np.frombuffer(data, dtype="<f8").reshape(shape).astype(np.float64)
 
 
 def sums_of(edition: Edition, *, file: SentFile) -> Floats:
-    """The sums of a scored file, kept or made anew, (G, 10).
+    """The sums of a scored file, kept or made anew, (G, columns).
 
     Raises what `aligned.read` raises.
     """
@@ -73,22 +76,22 @@ def sums_of(edition: Edition, *, file: SentFile) -> Floats:
     predictions = aligned.of(file, edition)
     bags = _scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for
-    keep(edition, file=file, bags=bags)
+    save(edition, file=file, bags=bags)
     return bags.sums
 
 
 def counts_of(edition: Edition) -> Floats:
-    """Sequences per recording in every column, (G, 10). Raises `OSError` without access to the values."""
-    return _scorer(edition.ground_truth_id, edition.protocol).bag_counts
+    """Sequences per recording in every column, (G, columns). Raises `OSError` without the values."""
+    return _scorer(edition.ground_truth_id, edition.protocol).recording_counts
 
 
 def floor_of(edition: Edition) -> dict[str, float | None]:
     """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
-    floor = floors.floor_of(ground_truth.load(edition.ground_truth_id), protocol=edition.protocol)
+    floor = floors.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
     return {name: published(value, decimals=edition.decimals) for name, value in floor.items()}
 
 
 @lru_cache(maxsize=2)
 def _scorer(truth_digest: str, protocol: str) -> Scorer:
-    truth: GroundTruth = ground_truth.load(truth_digest)
+    truth: GroundTruth = truth_values.load(truth_digest)
     return Scorer(truth, get_protocol(protocol))

@@ -5,7 +5,6 @@ the file, that is known at once, and known to be the file's doing: the worker it
 """
 
 import json
-import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -17,6 +16,8 @@ from django.conf import settings
 
 from evaluator import Manifest, Predictions, Problem, Rejected
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY
+from leaderboard.scoring import fork_server
+from leaderboard.scoring.fork_server import Answer
 
 
 class ChildDied(Exception):
@@ -24,7 +25,7 @@ class ChildDied(Exception):
 
 
 class ChildNotReady(Exception):
-    """The child ended before it had read anything of the file: the machine's doing, or the installation's."""
+    """The child could not begin, or lost the process that had started it: not the file's doing."""
 
 
 class LeaseLost(Exception):
@@ -45,29 +46,58 @@ def read_predictions(
     ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied`, `ChildNotReady`, or `LeaseLost`;
     `OSError` if no child could be started.
     """
-    command = [
-        sys.executable,
-        "-m",
-        "evaluator.quarantine",
-        str(manifest_path),
-        str(settings.CHILD_MEMORY_BYTES),
-        str(settings.CHILD_CPU_S),
-    ]
-    environment = {
-        "PATH": os.defpath,
-        "PYTHONPATH": str(settings.BASE_DIR),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "OPENBLAS_NUM_THREADS": "1",
+    request = {
+        "manifest": str(manifest_path),
+        "memory_bytes": settings.CHILD_MEMORY_BYTES,
+        "cpu_s": settings.CHILD_CPU_S,
     }
+    read = _forked if fork_server.AVAILABLE else _spawned
+    found = read(source, request, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+    if not found.output.startswith(READY):
+        raise ChildNotReady(f"the reading process did not start: {_cause(found.returncode, found.complaint)}")
+    if found.returncode != 0:
+        raise ChildDied(f"reading the file {_cause(found.returncode, found.complaint)}")
+    return _decoded(found.output[len(READY) :], manifest=manifest)
+
+
+def _forked(
+    source: IO[bytes], request: dict[str, object], *, heartbeat: Callable[[], bool], heartbeat_s: float
+) -> Answer:
+    """What a child says that is forked for the file.
+
+    A server that has ended since the last file is replaced, once; one that ends while a child reads takes the
+    child with it, and the file is not to blame.
+    """
+    for _ in range(2):
+        server = fork_server.server_of_this_thread(python_path=settings.BASE_DIR)
+        is_new = not server.has_served
+        try:
+            return server.read(source, request=request, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+        except fork_server.Interrupted:
+            raise LeaseLost("the run reached its time limit or was taken away") from None
+        except fork_server.NotStarted as fault:
+            raise ChildNotReady(f"the reading process did not start: {fault}") from fault
+        except fork_server.ServerEnded as fault:
+            if is_new or fault.began:
+                break
+    raise ChildNotReady("the process that starts reading processes ended")
+
+
+def _spawned(
+    source: IO[bytes], request: dict[str, object], *, heartbeat: Callable[[], bool], heartbeat_s: float
+) -> Answer:
+    """What a child says that is started for the file, where there is no `fork` to be trusted."""
+    command = [sys.executable, "-m", "evaluator.predictions.sandbox", *map(str, request.values())]
     child = subprocess.Popen(  # noqa: S603 - our own interpreter and module, nothing of the file
-        command, stdin=source, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment, close_fds=True
+        command,
+        stdin=source,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=fork_server.environment(python_path=settings.BASE_DIR),
+        close_fds=True,
     )
-    answer, complaint = _answer(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
-    if not answer.startswith(READY):
-        raise ChildNotReady(f"the reading process did not start: {_cause(child.returncode, complaint)}")
-    if child.returncode != 0:
-        raise ChildDied(f"reading the file {_cause(child.returncode, complaint)}")
-    return _decoded(answer[len(READY) :], manifest=manifest)
+    output, complaint = _answer(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+    return Answer(child.returncode, output, complaint)
 
 
 def _answer(

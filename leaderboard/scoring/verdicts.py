@@ -1,7 +1,8 @@
-"""What a submission's team is told of how its scoring ended, in a sentence."""
+"""Sentences about the end of scoring; pages ask for them, so this module computes nothing."""
 
-from leaderboard import lifecycle
-from leaderboard.models import Evaluation, Status
+from evaluator.scoring.significance import MIN_DEGREES, too_few_recordings
+from leaderboard.models import Edition, Evaluation, Status
+from leaderboard.scoring import lifecycle
 
 
 def sentence_of(evaluation: Evaluation) -> str:
@@ -11,25 +12,35 @@ def sentence_of(evaluation: Evaluation) -> str:
         case Status.REJECTED if evaluation.kept_in is not None:
             return (
                 f"Edition {evaluation.edition.number} cannot score this file. It keeps its result in edition "
-                f"{evaluation.kept_in}, and its slot of the quota is given back."
+                f"{evaluation.kept_in}, and your quota is refunded."
             )
         case Status.REJECTED:
             n = evaluation.n_problems
             found = f"it has {n:,} problems" if n != 1 else "it has a problem"
-            return f"The file is at fault: {found}, so nothing of it was scored."
+            return f"The file is at fault: {found}, so it was not scored."
         case Status.SYSTEM_ERROR:
             tries = f"{n_failed} times" if n_failed != 1 else "once"
             is_poison = evaluation.n_poison_strikes >= lifecycle.MAX_POISON_STRIKES
-            counts = " Until then it counts among the files rejected within 24 hours." if is_poison else ""
+            counts = " Until then it counts as a rejected file for 24 hours." if is_poison else ""
             return (
-                f"The fault is ours, not the file's: scoring it failed {tries}. The file is kept; the "
-                f"maintainers see it and can have it scored again.{counts}"
+                f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
+                f"the file, and a maintainer can retry it.{counts}"
             )
         case Status.CANCELLED:
-            return "Its team cancelled it before it was scored."
+            return "The team cancelled the submission before it was scored."
         case Status.QUEUED | Status.RUNNING if n_failed:
             tries = f"{n_failed} tries" if n_failed != 1 else "One try"
-            return (
-                f"{tries} ended without a result. That says nothing of the file; it is tried again by itself."
-            )
+            return f"{tries} ended without a result; the file may be fine. We retry automatically."
     return ""
+
+
+def why_no_interval(edition: Edition) -> str:
+    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
+
+    A worker finds out how many recordings an edition effectively has, and writes it beside the edition; until
+    then only an edition with too few recordings in all is known to have none.
+    """
+    most = max(edition.n_effective.values(), default=float(edition.ground_truth.n_recordings))
+    if most >= MIN_DEGREES:
+        return ""
+    return f"There are no confidence intervals: {too_few_recordings(most)}."

@@ -1,4 +1,4 @@
-"""A worker's work: claim an evaluation, parse its file in quarantine, score it, write the outcome."""
+"""The worker: claim an evaluation, read its file in the sandbox, score it, write the outcome."""
 
 import hashlib
 import random
@@ -7,22 +7,21 @@ import uuid
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import asdict
-from functools import partial
 from typing import TypeVar
 
 import structlog
 from django.conf import settings
-from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection, transaction
+from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection
 
 import evaluator
 from evaluator import GroundTruth, Rejected, Report, published
-from evaluator.plausibility import warnings_of
+from evaluator.predictions.plausibility import warnings_of
 from evaluator.problems import FileWarning
-from evaluator.protocol import get_protocol
-from evaluator.scoring import Scorer
-from leaderboard import aligned, bags, broker, ground_truth, lifecycle, quarantine
-from leaderboard.lifecycle import Lease, LostRace, Outcome, Strike
+from evaluator.scoring.scoring import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
+from leaderboard.scoring import aligned, lifecycle, recording_sums, sandbox
+from leaderboard.scoring.lifecycle import Lease, LostRace, Outcome, Strike
+from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
 
@@ -34,12 +33,12 @@ class TruthDamaged(Exception):
 
 
 # The store, the disk, the private directory or the child's start failed: another try may well succeed.
-OUR_FAULTS = (OSError, quarantine.ChildNotReady, TruthDamaged)
+OUR_FAULTS = (OSError, sandbox.ChildNotReady, TruthDamaged)
 # The child died of the file, or our own code failed on it, or the database refused what came of it. Tried
 # again in case the machine was to blame, but not often: it would end the same way.
 FAULTS_OF_THE_FILE = (
-    quarantine.ChildDied,
-    quarantine.LeaseLost,
+    sandbox.ChildDied,
+    sandbox.LeaseLost,
     ArithmeticError,
     AssertionError,
     AttributeError,
@@ -64,14 +63,14 @@ def run_next(*, rng: random.Random) -> bool:
     leases = _claimed()
     if not leases:
         return False
-    first = _insist(lambda: _evaluations(leases[:1]))[0]
+    first = _retry_on_disconnect(lambda: _evaluations(leases[:1]))[0]
     if first.priority == Evaluation.PRIORITY_RESCORE:
         leases = rescore(leases, edition=first.edition)
     waiting = deque(leases)
     while waiting:
         run(waiting.popleft(), rng=rng, waiting=waiting)
         if time.monotonic() - claimed_s > settings.LEASE_S / 2:
-            _hand_back(waiting)
+            _release(waiting)
     return True
 
 
@@ -79,18 +78,21 @@ def _claimed() -> list[Lease]:
     """What this worker gets to decide. Raises the database's error if it stays away."""
     token = uuid.uuid4()
     try:
+        # Asked first, because a claim is a write, for which SQLite lets nobody else write.
+        if not Evaluation.objects.due().exists():
+            return []
         return lifecycle.claim(
             lease_s=settings.LEASE_S,
             wall_s=settings.WALL_S,
             batch=lifecycle.RESCORE_BATCH,
             token=token,
-            held=ground_truth.held(),
+            held=truth_values.readable_digests(),
         )
     except (OperationalError, InterfaceError) as fault:
         # It may have been committed and only the answer lost; nobody else would look at it for a whole lease.
         log.warning("claim_not_answered", reason=str(fault)[:200])
         connection.close()
-        return _insist(lambda: _leases_of(token))
+        return _retry_on_disconnect(lambda: _leases_of(token))
 
 
 def _leases_of(token: uuid.UUID) -> list[Lease]:
@@ -100,10 +102,10 @@ def _leases_of(token: uuid.UUID) -> list[Lease]:
     return [Lease(pk, attempt, token) for pk, attempt in rows.values_list("pk", "attempt")]
 
 
-def _hand_back(waiting: deque[Lease]) -> None:
+def _release(waiting: deque[Lease]) -> None:
     """Give others what was claimed with a batch and would run out of its lease before it is begun."""
     if waiting:
-        lifecycle.hand_back(tuple(waiting))
+        lifecycle.release(tuple(waiting))
         waiting.clear()
 
 
@@ -124,18 +126,18 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     rows = Evaluation.objects.filter(pk__in=ids).values_list(
         "pk", "submission__digest", "submission__manifest_digest"
     )
-    sent = _insist(lambda: {pk: SentFile(*digests) for pk, *digests in rows})
+    sent = _retry_on_disconnect(lambda: {pk: SentFile(*digests) for pk, *digests in rows})
     try:
         truth = _truth(edition)
     except (OSError, TruthDamaged):
         return list(leases)
-    scorer = Scorer(truth, get_protocol(edition.protocol))
+    scorer = Scorer(truth, edition.rules)
     outcomes: list[tuple[Lease, Outcome]] = []
     rest: list[Lease] = []
     for lease in leases:
         file = sent[lease.evaluation_id]
         try:
-            predictions = aligned.kept(file, edition)
+            predictions = aligned.saved(file, edition)
         except Rejected as rejected:
             # For want of sequences that the file cannot have, which needs no word of the file.
             outcomes.append((lease, rejection(rejected)))
@@ -145,7 +147,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         try:
             if predictions is not None:
                 report = scorer.report(predictions, keep_bags=True)
-                bags.keep(edition, file=file, bags=report.bags)
+                recording_sums.save(edition, file=file, bags=report.bags)
                 warnings = warnings_of(predictions)
                 outcomes.append((lease, scored(report, decimals=edition.decimals, warnings=warnings)))
                 continue
@@ -154,8 +156,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
             log.info("not_rescored_in_the_batch", evaluation_id=str(lease.evaluation_id), reason=str(fault))
         rest.append(lease)
     if outcomes:
-        _insist(lambda: lifecycle.finalise_many(outcomes))
-        _announce(edition)
+        _retry_on_disconnect(lambda: lifecycle.finalise_many(outcomes))
     log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
     return rest
 
@@ -167,7 +168,7 @@ def run(lease: Lease, *, rng: random.Random, waiting: deque[Lease] | None = None
     the loss of the database is raised; the lease then runs out by itself.
     """
     waiting = deque() if waiting is None else waiting
-    evaluation = _insist(lambda: _evaluations([lease]))[0]
+    evaluation = _retry_on_disconnect(lambda: _evaluations([lease]))[0]
     # Every line from here on says what it is about, also those of modules that know of no submission.
     with structlog.contextvars.bound_contextvars(
         submission_id=str(evaluation.submission_id),
@@ -184,15 +185,14 @@ def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: ra
             evaluation,
             heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
         )
-        _insist(lambda: lifecycle.finalise(lease, outcome))
-        _announce(evaluation.edition)
+        _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
     except LostRace as race:
         log.warning("evaluation_lost", reason=str(race))
     except OUR_FAULTS as fault:
-        _give_back(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
+        _fail_attempt(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
     except FAULTS_OF_THE_FILE as fault:
         log.warning("evaluation_failed", exc_info=fault)
-        _give_back(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng)
+        _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng)
     else:
         log.info(
             "evaluation_finished",
@@ -219,7 +219,7 @@ class Pulse:
         if time.monotonic() >= self._ends_s:
             return False
         try:
-            _hand_back(self._waiting)
+            _release(self._waiting)
             return lifecycle.heartbeat(self._lease, lease_s=self._lease_s)
         except (OperationalError, InterfaceError) as fault:
             log.warning("heartbeat_not_sent", reason=str(fault)[:200])
@@ -236,26 +236,21 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
         report = evaluator.evaluate(predictions, truth, protocol=edition.protocol, keep_bags=True)
     except Rejected as rejected:
         return rejection(rejected)
-    bags.keep(edition, file=file, bags=report.bags)
+    recording_sums.save(edition, file=file, bags=report.bags)
     return scored(report, decimals=edition.decimals, warnings=warnings_of(predictions))
-
-
-def _announce(edition: Edition) -> None:
-    """Tell the workers that the entries of an edition have changed: its intervals and ranges have not."""
-    transaction.on_commit(partial(broker.infer, edition.pk), robust=True)
 
 
 def _truth(edition: Edition) -> GroundTruth:
     """The edition's values. Raises `OSError` or `TruthDamaged`: a submission is never to blame for them."""
     try:
-        return ground_truth.load(edition.ground_truth_id)
+        return truth_values.load(edition.ground_truth_id)
     except Rejected as fault:
         raise TruthDamaged(f"the ground truth {edition.ground_truth_id} cannot be used: {fault}") from fault
 
 
 def _in_words(fault: Exception) -> str:
     """What happened, for maintainers. Ours are sentences already; a library's needs its name."""
-    ours = (quarantine.ChildDied, quarantine.ChildNotReady, quarantine.LeaseLost, TruthDamaged)
+    ours = (sandbox.ChildDied, sandbox.ChildNotReady, sandbox.LeaseLost, TruthDamaged)
     return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
@@ -266,7 +261,7 @@ def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = (
     """
     values = {}
     for interval, scores in report.scores.items():
-        for metric, value in (("mid", scores.mid), ("rte", scores.rte)):
+        for metric, value in scores.means.items():
             rounded = published(value, decimals=decimals)
             if rounded is not None:
                 values[metric, interval] = rounded
@@ -294,14 +289,14 @@ def rejection(rejected: Rejected) -> Outcome:
     return Outcome(status=Status.REJECTED, scores={}, problems=problems, n_problems=rejected.n_problems)
 
 
-def _give_back(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> None:
+def _fail_attempt(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> None:
     try:
-        _insist(lambda: lifecycle.give_back(lease, strike=strike, reason=reason, rng=rng))
+        _retry_on_disconnect(lambda: lifecycle.fail_attempt(lease, strike=strike, reason=reason, rng=rng))
     except LostRace as race:
         log.warning("evaluation_lost", evaluation_id=str(lease.evaluation_id), reason=str(race))
 
 
-def _insist(ask: Callable[[], T]) -> T:
+def _retry_on_disconnect(ask: Callable[[], T]) -> T:
     """Ask the database, again after a lost connection: questions and compare-and-set may be repeated.
 
     Raises what the question raises, or the database's error when it stays away; the lease then runs out and

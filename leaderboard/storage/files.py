@@ -27,7 +27,7 @@ _DIGEST_BYTES = 32
 INCOMING = ".incoming"
 LEFTOVER_S = 3600.0
 FRESH = timedelta(hours=12)
-"""Younger files are nobody's to clean up; see `leaderboard/cleaning.py`, which waits for twice as long."""
+"""Younger files are nobody's to clean up; see `storage.orphans`, which waits for twice as long."""
 
 
 class StoreAway(OSError):
@@ -119,6 +119,19 @@ class StoredFile:
     size_bytes: int
 
 
+@contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """A file beside `target` to be written, for its owner only; it takes its place once it is on the disk."""
+    target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+    handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=target.suffix)
+    os.close(handle)
+    yield Path(temporary)
+    # Else a power cut could leave a file that is never made anew, because it is there.
+    with Path(temporary).open("rb") as written:
+        os.fsync(written.fileno())
+    Path(temporary).replace(target)
+
+
 def store() -> Storage:
     """The configured file store."""
     return storages["files"]
@@ -145,15 +158,19 @@ def measure(upload: "File[bytes]") -> StoredFile:
     return StoredFile(digest=f"sha256:{digest.hexdigest()}", size_bytes=size_bytes)
 
 
-def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
+def save_predictions(
+    upload: "File[bytes]", *, now: datetime, measured: StoredFile | None = None
+) -> StoredFile:
     """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
+
+    `measured` is what `measure` has found, where somebody has asked already.
 
     Bytes that have been there for long are written again all the same: whoever cleans up looks for old files
     that no row names, and this one's row is only about to be written.
 
     Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
     """
-    kept = measure(upload)
+    kept = measured or measure(upload)
     name = predictions_name(kept.digest)
     if not _is_fresh(name, now=now):
         upload.seek(0)
@@ -161,7 +178,7 @@ def keep_predictions(upload: "File[bytes]", *, now: datetime) -> StoredFile:
     return kept
 
 
-def keep_still(upload: "File[bytes]", *, digest: str) -> None:
+def require_unchanged(upload: "File[bytes]", *, digest: str) -> None:
     """Keep an uploaded file again if it was removed meanwhile; for whoever has `cleaning.hold`."""
     name = predictions_name(digest)
     if not store().exists(name):
@@ -183,7 +200,7 @@ def aligned_name(*, manifest_digest: str, digest: str) -> str:
     return f"aligned/{manifest[:16]}/{digest.removeprefix('sha256:')}.f8"
 
 
-def keep_aligned(predictions: Predictions) -> None:
+def save_aligned(predictions: Predictions) -> None:
     """Keep a file's values in seconds as little-endian float64, in ascending anno_id of the file's manifest.
 
     Before them stands their SHA-256, so that values that were changed or cut off are never scored.
@@ -226,7 +243,7 @@ def _checked(data: bytes) -> bytes:
     return values if hashlib.sha256(values).digest() == digest else b""
 
 
-def keep_manifest(*, digest: str, csv: bytes) -> None:
+def save_manifest(*, digest: str, csv: bytes) -> None:
     """Keep a public manifest."""
     if not store().exists(manifest_name(digest)):
         store().save(manifest_name(digest), ContentFile(csv))

@@ -4,7 +4,6 @@ The file store has every public manifest under its digest. Workers keep them bes
 that the reading process takes; what is missing there is made anew.
 """
 
-import os
 import tempfile
 from functools import lru_cache
 from pathlib import Path
@@ -12,7 +11,7 @@ from pathlib import Path
 from django.conf import settings
 
 from evaluator import Manifest, Rejected, read_manifest
-from leaderboard import files
+from leaderboard.storage import files
 
 
 def path(digest: str) -> Path:
@@ -24,14 +23,8 @@ def path(digest: str) -> Path:
     target = kept / f"{digest.removeprefix('sha256:')}.npz"
     if not target.exists():
         manifest = _stored(digest)
-        target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        handle, temporary = tempfile.mkstemp(dir=kept, suffix=".npz")
-        os.close(handle)
-        manifest.save(Path(temporary))
-        # Else a power cut could leave a file that is never made anew, because it is there.
-        with Path(temporary).open("rb") as written:
-            os.fsync(written.fileno())
-        Path(temporary).replace(target)
+        with files.replacing(target) as path_there:
+            manifest.save(path_there)
     return target
 
 

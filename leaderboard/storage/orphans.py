@@ -20,8 +20,9 @@ from typing import Final
 import structlog
 from django.db import connection, transaction
 
-from leaderboard import audit, files
+from leaderboard import audit
 from leaderboard.models import Submission
+from leaderboard.storage import files
 
 log = structlog.get_logger(__name__)
 
@@ -62,7 +63,7 @@ def orphans(*, now: datetime) -> Iterator[Orphan]:
 def remove(orphan: Orphan, *, now: datetime) -> bool:
     """Remove an orphan, unless it has become a submission's meanwhile. Returns whether it was removed."""
     with transaction.atomic():
-        if not _held_alone(orphan.digest) or Submission.objects.filter(digest=orphan.digest).exists():
+        if not _locked_alone(orphan.digest) or Submission.objects.filter(digest=orphan.digest).exists():
             return False
         # Written first, so that nothing is ever removed without a trace; undone if nothing was.
         audit.record(
@@ -99,13 +100,13 @@ def unless_refused(*refusals: type[Exception], digest: str) -> Iterator[None]:
 
 def _remove_unnamed(digest: str) -> bool:
     with transaction.atomic():
-        if not _held_alone(digest) or Submission.objects.filter(digest=digest).exists():
+        if not _locked_alone(digest) or Submission.objects.filter(digest=digest).exists():
             return False
         files.store().delete(files.predictions_name(digest))
     return True
 
 
-def hold(digest: str) -> None:
+def lock(digest: str) -> None:
     """Let nobody remove a file of this digest until the transaction ends; others may hold it as well.
 
     It is the first lock of its transaction, so whoever removes one keeps nobody waiting who has another.
@@ -113,7 +114,7 @@ def hold(digest: str) -> None:
     _lock("pg_advisory_xact_lock_shared", digest)
 
 
-def _held_alone(digest: str) -> bool:
+def _locked_alone(digest: str) -> bool:
     """Whether nobody else holds the file, which stays so until the transaction ends."""
     return _lock("pg_try_advisory_xact_lock", digest)
 

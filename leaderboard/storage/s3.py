@@ -21,7 +21,7 @@ from django.core.files.base import File
 from storages.backends.s3 import S3Storage
 from storages.utils import clean_name
 
-from leaderboard.files import StoreAway
+from leaderboard.storage.files import StoreAway
 
 CONNECT_TIMEOUT_S = 3
 READ_TIMEOUT_S = 15
@@ -157,7 +157,7 @@ class S3FileStore(S3Storage):
         """Remove a file unless it was written after `than`; whether it was removed.
 
         S3 has no rename, so a file that is written again between the question and the removal is removed too.
-        Whoever wrote it looks again before a row names it (`leaderboard/cleaning.py`).
+        Whoever wrote it looks again before a row names it (`leaderboard/storage/orphans.py`).
         """
         if self.get_modified_time(name) >= than:
             return False

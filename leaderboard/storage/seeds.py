@@ -1,4 +1,4 @@
-"""What the random numbers of an edition are made of: known to everybody, or known to workers only.
+"""Seeds of an edition's random numbers: public on open splits, known to workers alone on hidden ones.
 
 Intervals, p-values and rank ranges come from random weights and signs. Of an open split they follow from the
 digest of its ground truth, so that everybody gets the board's numbers offline. Of a hidden split the digest

@@ -1,32 +1,38 @@
-"""How long a submission still has to wait, told from what the last runs show; None where nothing shows it.
+"""Estimates of the wait in the queue, from the last runs; None where nothing shows it.
 
-What is counted on is seen, never configured: how long runs took, how many went on at the same time, how long
-an evaluation waited for its claim although a worker was free. A worker that has died stops being counted as
-soon as the runs without it are the recent ones.
+What is counted on is seen, never configured: how long runs took, and how many went on at the same time. A
+free worker is taken to claim at once; without a broker that is seconds off. A worker that has died stops
+being counted as soon as the runs without it are the recent ones.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from statistics import fmean, median
+from statistics import fmean
 
 from django.db.models import Count, Q
 from django.db.models.functions import Now
 
-from leaderboard import clock, health
+from leaderboard.db import clock
 from leaderboard.models import Evaluation, Status
+from leaderboard.ops import health
 
 N_RUNS = 50
 """As many of the last runs are looked at."""
 ALIVE_S = health.MAX_SWEEP_AGE_S
 """A sweep or a claim this recent shows that somebody works."""
+LATE_TIMES = 3
+"""What takes more than so many times what was to be expected takes longer than usual."""
+LEAST_USUAL_S = 5.0
+"""An expected wait is taken to be at least this long: nobody wonders about a second or two."""
+UNKNOWN_RUN_S = 10.0
+"""A run is taken to be this long where none was seen."""
 
 
 @dataclass(frozen=True)
-class Run:
-    """An evaluation that was decided: when it was queued, last claimed, and finished."""
+class RecentRun:
+    """An evaluation that was decided: when it was last claimed, and finished."""
 
-    queued_at: datetime
     started_at: datetime
     finished_at: datetime
 
@@ -39,42 +45,44 @@ class Run:
         """Whether a worker held it then."""
         return self.started_at <= at < self.finished_at
 
-    def is_waiting_at(self, at: datetime) -> bool:
-        """Whether it was in the queue then."""
-        return self.queued_at <= at < self.started_at
-
 
 @dataclass(frozen=True)
 class Evidence:
     """What the database shows of the workers. `n_running` counts the claims that are held now."""
 
     now: datetime
-    runs: Sequence[Run]
+    runs: Sequence[RecentRun]
     n_running: int
     is_alive: bool
 
 
 @dataclass(frozen=True)
-class Place:
-    """Where an evaluation stands: how many go first, and the seconds to its result, if anything tells."""
+class QueuePlace:
+    """Where an evaluation stands: how many go first, and the seconds to its result, if anything tells.
+
+    `is_late`: it has waited much longer than was to be expected when it was queued.
+    """
 
     n_ahead: int
     estimate_s: float | None
+    is_late: bool = False
 
 
-def place_of(evaluation: Evaluation) -> Place | None:
+def place_of(evaluation: Evaluation) -> QueuePlace | None:
     """Where an evaluation stands; None once it is decided."""
     if evaluation.is_final:
         return None
     if evaluation.priority != Evaluation.PRIORITY_LIVE:
         # Re-scoring goes in batches behind everything else: single runs say nothing about it.
-        return Place(n_ahead=_n_ahead(evaluation), estimate_s=None)
+        return QueuePlace(n_ahead=_n_ahead(evaluation), estimate_s=None)
     evidence = _evidence()
+    late = _is_late(evaluation, evidence)
     if evaluation.status == Status.RUNNING and evaluation.started_at is not None:
-        return Place(0, left_s(evidence, elapsed_s=(evidence.now - evaluation.started_at).total_seconds()))
+        elapsed_s = (evidence.now - evaluation.started_at).total_seconds()
+        return QueuePlace(0, left_s(evidence, elapsed_s=elapsed_s), is_late=late)
     n_ahead = _n_ahead(evaluation)
     due_in_s = (evaluation.due_at - evidence.now).total_seconds()
-    return Place(n_ahead, wait_s(evidence, n_ahead=n_ahead, due_in_s=due_in_s))
+    return QueuePlace(n_ahead, wait_s(evidence, n_ahead=n_ahead, due_in_s=due_in_s), is_late=late)
 
 
 # --- from evidence to seconds ---------------------------------------------------------------------------
@@ -91,8 +99,14 @@ def wait_s(evidence: Evidence, *, n_ahead: int, due_in_s: float = 0.0) -> float 
     run_s = fmean(run.took_s for run in evidence.runs)
     n_workers = seen_workers(evidence)
     n_ends = evidence.n_running + n_ahead - n_workers + 1
-    begins_in_s = claim_s(evidence.runs, n_workers=n_workers) if n_ends <= 0 else n_ends * run_s / n_workers
-    return max(begins_in_s, due_in_s) + run_s
+    return max(n_ends * run_s / n_workers, due_in_s, 0.0) + run_s
+
+
+def usual_s(evidence: Evidence, *, n_before: int) -> float:
+    """Seconds that were to be expected with `n_before` others queued or running, and workers as were seen."""
+    seen = replace(evidence, n_running=0, is_alive=True)
+    expected_s = wait_s(seen, n_ahead=n_before)
+    return max(LEAST_USUAL_S, (n_before + 1) * UNKNOWN_RUN_S if expected_s is None else expected_s)
 
 
 def left_s(evidence: Evidence, *, elapsed_s: float) -> float | None:
@@ -110,21 +124,6 @@ def seen_workers(evidence: Evidence) -> int:
     return max(1, evidence.n_running, *at_once)
 
 
-def claim_s(runs: Sequence[Run], *, n_workers: int) -> float:
-    """How long an evaluation waits for its claim although a worker is free: the middle of such cases."""
-    waits_s = [
-        (run.started_at - run.queued_at).total_seconds()
-        for run in runs
-        if _n_busy(runs, but=run, at=run.queued_at) < n_workers
-    ]
-    return median(waits_s) if waits_s else 0.0
-
-
-def _n_busy(runs: Sequence[Run], *, but: Run, at: datetime) -> int:
-    """How many other evaluations ran or waited then."""
-    return sum((run.is_running_at(at) or run.is_waiting_at(at)) for run in runs if run is not but)
-
-
 # --- from the database to evidence ----------------------------------------------------------------------
 
 
@@ -134,8 +133,8 @@ def _evidence() -> Evidence:
         priority=Evaluation.PRIORITY_LIVE,
         started_at__isnull=False,
     )
-    rows = decided.order_by("-finished_at").values_list("queued_at", "started_at", "finished_at")[:N_RUNS]
-    runs = [Run(queued, started, finished) for queued, started, finished in rows if started and finished]
+    rows = decided.order_by("-finished_at").values_list("started_at", "finished_at")[:N_RUNS]
+    runs = [RecentRun(started, finished) for started, finished in rows if started and finished]
     # A batch of re-scoring is held by one worker: its claims share their tokens.
     held = Evaluation.objects.filter(status=Status.RUNNING, leased_until__gt=Now())
     n_running: int = held.aggregate(n=Count("lease_token", distinct=True))["n"]
@@ -147,6 +146,17 @@ def _evidence() -> Evidence:
         or any(now - run.started_at < timedelta(seconds=ALIVE_S) for run in runs)
     )
     return Evidence(now=now, runs=runs, n_running=n_running, is_alive=is_alive)
+
+
+def _is_late(evaluation: Evaluation, evidence: Evidence) -> bool:
+    """Whether it waits longer than usual; asked of the database only once that can be."""
+    waited_s = (evidence.now - evaluation.queued_at).total_seconds()
+    if waited_s <= LATE_TIMES * LEAST_USUAL_S:
+        return False
+    at = evaluation.queued_at
+    unfinished_then = Q(finished_at=None) | Q(finished_at__gt=at)
+    before = Evaluation.objects.filter(unfinished_then, queued_at__lt=at, priority=Evaluation.PRIORITY_LIVE)
+    return waited_s > LATE_TIMES * usual_s(evidence, n_before=before.count())
 
 
 def _n_ahead(evaluation: Evaluation) -> int:

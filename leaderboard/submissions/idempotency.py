@@ -9,13 +9,12 @@ import hashlib
 import json
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 
 from django.db import IntegrityError, transaction
 
-from leaderboard import submissions
 from leaderboard.models import IdempotencyKey, User
+from leaderboard.submissions import submissions
 
 MAX_CHARACTERS = 255
 KEPT = timedelta(days=7)
@@ -29,14 +28,6 @@ class BadKey(Exception):
 
 class KeyReused(Exception):
     """The key came before with something else."""
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What came of a request; `is_replayed` is True where an earlier one had made the submission."""
-
-    submitted: submissions.Submitted
-    is_replayed: bool
 
 
 def parse(header: str) -> str:
@@ -64,7 +55,7 @@ def request_digest(*, fields: Mapping[str, object], file_digest: str) -> str:
 
 def once(
     *, user: User, key: str, digest: str, submit: Callable[[], submissions.Submitted], now: datetime
-) -> Answer:
+) -> submissions.Submitted:
     """Submit, unless the person's key has come before with this request: then its submission is the answer.
 
     Raises `KeyReused` if it came with another one, and whatever `submit` does; nothing is kept then.
@@ -84,10 +75,10 @@ def once(
         if earlier is None:
             raise
         return earlier
-    return Answer(submitted=submitted, is_replayed=False)
+    return submitted
 
 
-def _earlier(*, user: User, key: str, digest: str) -> Answer | None:
+def _earlier(*, user: User, key: str, digest: str) -> submissions.Submitted | None:
     row = (
         IdempotencyKey.objects.filter(user=user, key=key)
         .select_related("submission__method__team", "submission__split")
@@ -102,10 +93,10 @@ def _earlier(*, user: User, key: str, digest: str) -> Answer | None:
             f"The Idempotency-Key {key[:60]!r} came on {row.created_at:%Y-%m-%d %H:%M} UTC with another file "
             "or other fields; expected a new key for a new request."
         )
-    return Answer(submitted=submissions.Submitted(row.submission, is_new=False), is_replayed=True)
+    return submissions.Submitted(row.submission, is_new=False, is_replayed=True)
 
 
-def forget(*, now: datetime) -> int:
+def purge(*, now: datetime) -> int:
     """Remove keys that are older than `KEPT`. Returns how many."""
     n_removed, _ = IdempotencyKey.objects.filter(created_at__lt=now - KEPT).delete()
     return n_removed

@@ -1,4 +1,4 @@
-"""Waiting for a submission without asking again and again, and without taking the server's threads.
+"""Long polling: wait for a submission's change without holding the server's threads.
 
 A process has so many places (`settings.WAITERS`); gunicorn gives it as many threads beside those that serve
 everybody else, so waiters starve nobody. Whoever finds no place is told at once when to ask again. All
@@ -19,8 +19,8 @@ from django.conf import settings
 from django.db import Error, connection, connections
 from django.db.models import Prefetch
 
-from leaderboard import submissions
 from leaderboard.models import Evaluation, Submission
+from leaderboard.submissions import submissions
 
 log = structlog.get_logger(__name__)
 
@@ -158,7 +158,7 @@ class Watcher:
 THE_WATCHER = Watcher(look=final_among, n_places=lambda: settings.WAITERS, every_s=LOOK_EVERY_S)
 
 
-def hold(submission_id: UUID, *, wait_s: float, is_gone: Callable[[], bool]) -> bool:
+def wait(submission_id: UUID, *, wait_s: float, is_gone: Callable[[], bool]) -> bool:
     """`Watcher.hold` at a place of this process, with the thread's database connection closed."""
     if not connection.in_atomic_block:
         connection.close()

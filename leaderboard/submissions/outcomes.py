@@ -1,4 +1,4 @@
-"""What came of submissions, for whoever may see them: progress, place on the present board, what is beside.
+"""The outcome of a submission for a reader: progress, rank on the current board, comparison with others.
 
 A place is read from what is kept of the boards, so it is the one that everybody sees at that moment. A
 private method takes nobody's place; its own people are told the rank that it would have.
@@ -6,26 +6,29 @@ private method takes nobody's place; its own people are told the rank that it wo
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from uuid import UUID
 
 from django.db.models import QuerySet
 
-from evaluator import ranking
-from leaderboard import inference, snapshots, submissions
-from leaderboard.entries import Entry, Interval, profile_of, scored_of, submitted_entry
+from evaluator.metrics import ranking
+from evaluator.metrics.protocol import OVERALL
+from leaderboard.boards import snapshots
+from leaderboard.boards.boards import PRIMARY
+from leaderboard.boards.current import CurrentBoard
+from leaderboard.boards.rows import Entry, Interval, profile_of, scored_of, submitted_entry
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
-from leaderboard.present import Drawn
-from leaderboard.standings import PRIMARY
-from leaderboard.submissions import Progress
+from leaderboard.scoring import verdicts
+from leaderboard.submissions import submissions
+from leaderboard.submissions.submissions import Progress
 
 # For so long somebody is told to wait for intervals. They take a second or two where no submission waits, and
 # a minute more while a board is re-scored; what lasts longer is not worth watching.
-AWAITED_FOR = 5 * inference.PATIENCE
+AWAITED_FOR = timedelta(minutes=5)
 
 
 @dataclass(frozen=True)
-class Place:
+class BoardPlace:
     """Where a standing, scored submission is on the present board.
 
     `rank` is None where another submission of its method stands there. `is_supposed`: the method is private,
@@ -43,29 +46,29 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SubmissionResult:
     """A submission, how far it is, and where it stands, if it does."""
 
     submission: Submission
     progress: Progress
-    place: Place | None
+    place: BoardPlace | None
     awaits_intervals: bool  # scored a moment ago, and they are about to come
 
     @property
     def intervals(self) -> Mapping[str, Interval]:
         """The confidence intervals and rank ranges of its values."""
-        return shown_intervals(self.progress, self.place)
+        return published_intervals(self.progress, self.place)
 
 
-def of(rows: Iterable[Submission], *, now: datetime) -> tuple[Outcome, ...]:
+def of(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionResult, ...]:
     """What came of each of these submissions. Boards are read once for all of them, and only if one needs it.
 
     Their evaluations with editions and scores are best fetched with them.
     """
     told = [(submission, submissions.progress(submission)) for submission in rows]
-    places = _places([each for each in told if _stands(*each)])
+    places = _places([each for each in told if _is_on_board(*each)])
     return tuple(
-        Outcome(
+        SubmissionResult(
             submission=submission,
             progress=progress,
             place=places.get(submission.pk),
@@ -75,9 +78,17 @@ def of(rows: Iterable[Submission], *, now: datetime) -> tuple[Outcome, ...]:
     )
 
 
-def place_of(submission: Submission, progress: Progress) -> Place | None:
+def place_of(submission: Submission, progress: Progress) -> BoardPlace | None:
     """Where one submission is; None unless it stands in the published edition."""
-    return _places([(submission, progress)]).get(submission.pk) if _stands(submission, progress) else None
+    return (
+        _places([(submission, progress)]).get(submission.pk) if _is_on_board(submission, progress) else None
+    )
+
+
+def can_be_withdrawn(submission: Submission) -> bool:
+    """Whether withdrawing it changes anything: it has values to take from boards, or may get some."""
+    ends = {each.status for each in submission.evaluations.all()}
+    return submission.withdrawn_at is None and not ends <= {Status.REJECTED, Status.CANCELLED}
 
 
 # --- intervals -------------------------------------------------------------------------------------------
@@ -90,26 +101,26 @@ def has_intervals(progress: Progress) -> bool:
 
 def awaits_intervals(submission: Submission, progress: Progress, *, now: datetime) -> bool:
     """Whether the intervals of a scored submission are about to come. Always False `AWAITED_FOR` later."""
-    if not _stands(submission, progress) or has_intervals(progress) or progress.finished_at is None:
+    if not _is_on_board(submission, progress) or has_intervals(progress) or progress.finished_at is None:
         return False
     if now - progress.finished_at >= AWAITED_FOR:
         return False
     edition = submissions.evaluation_of(submission).edition
-    return edition.discarded_at is None and not inference.why_no_interval(edition)
+    return edition.discarded_at is None and not verdicts.why_no_interval(edition)
 
 
 def why_no_intervals(submission: Submission, progress: Progress, *, now: datetime) -> str:
     """Why a scored submission's values stand without intervals, in a sentence; empty where they do not."""
-    if not _stands(submission, progress) or has_intervals(progress):
+    if not _is_on_board(submission, progress) or has_intervals(progress):
         return ""
     if awaits_intervals(submission, progress, now=now):
-        return "Intervals are being computed."
-    return inference.why_no_interval(submissions.evaluation_of(submission).edition) or (
-        "There are no intervals yet: workers make them when no submission waits. Look again later."
+        return "The confidence intervals are being computed."
+    return verdicts.why_no_interval(submissions.evaluation_of(submission).edition) or (
+        "There are no confidence intervals yet. They are computed when no submission is waiting."
     )
 
 
-def shown_intervals(progress: Progress, place: Place | None) -> Mapping[str, Interval]:
+def published_intervals(progress: Progress, place: BoardPlace | None) -> Mapping[str, Interval]:
     """The confidence intervals of the values, and rank ranges if it is a row of the present board."""
     return place.intervals if place else _without_ranges(progress.intervals)
 
@@ -125,11 +136,11 @@ def _without_ranges(intervals: Mapping[str, Interval]) -> dict[str, Interval]:
 # --- places ----------------------------------------------------------------------------------------------
 
 
-def _stands(submission: Submission, progress: Progress) -> bool:
+def _is_on_board(submission: Submission, progress: Progress) -> bool:
     return progress.state == Status.SCORED and submission.withdrawn_at is None
 
 
-def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, Place]:
+def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPlace]:
     """The places of standing, scored submissions, by their ids."""
     if not told:
         return {}
@@ -154,12 +165,12 @@ def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, Place]:
 
 
 def _place(
-    submission: Submission, progress: Progress, edition: Edition, drawn: Drawn, *, best: set[UUID]
-) -> Place:
+    submission: Submission, progress: Progress, edition: Edition, drawn: CurrentBoard, *, best: set[UUID]
+) -> BoardPlace:
     n_ranked = sum(row.rank is not None for row in drawn.entries)
     row = next((row for row in drawn.entries if row.submission_id == submission.pk), None)
     if row is not None:
-        return Place(
+        return BoardPlace(
             edition=edition,
             rows=drawn.entries,
             rank=row.rank,
@@ -168,7 +179,7 @@ def _place(
             best=row.best,
             second=row.second,
         )
-    place = Place(
+    place = BoardPlace(
         edition=edition, rows=drawn.entries, n_ranked=n_ranked, intervals=_without_ranges(progress.intervals)
     )
     if submission.pk not in best:
@@ -181,7 +192,7 @@ def _place(
 def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
     """The submission that stands for each of these methods in each of these editions: one query."""
     best: dict[tuple[int, UUID], UUID] = {}
-    rows = _standing_in(editions).filter(evaluation__submission__method__in=methods)
+    rows = _entry_in(editions).filter(evaluation__submission__method__in=methods)
     for edition, method, submission in rows.values_list(
         "evaluation__edition", "evaluation__submission__method", "evaluation__submission"
     ):
@@ -189,40 +200,40 @@ def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
     return set(best.values())
 
 
-def _standing_in(editions: Iterable[Edition]) -> QuerySet[Score]:
+def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
     """The MiD of everything that stands in these editions, the best first, of two alike the earlier."""
     return Score.objects.filter(
         evaluation__edition__in=list(editions),
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
         metric=PRIMARY,
-        interval="overall",
+        interval=OVERALL,
     ).order_by("value", "evaluation__submission__submitted_at")
 
 
 # --- what is beside it -----------------------------------------------------------------------------------
 
 
-def teams_best_other(submission: Submission, place: Place) -> Entry | None:
+def teams_best_other(submission: Submission, place: BoardPlace) -> Entry | None:
     """The best that the same team has on the same board besides, private or not, as the team reads it."""
-    others = _standing_in([place.edition]).filter(
-        evaluation__submission__method__team=submission.method.team_id
-    )
+    others = _entry_in([place.edition]).filter(evaluation__submission__method__team=submission.method.team_id)
     found = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
     if found is None:
         return None
     evaluation = (
-        Evaluation.objects.select_related("submission__method__team").prefetch_related("scores").get(pk=found)
+        Evaluation.objects.select_related("submission__method__team", "edition")
+        .prefetch_related("scores")
+        .get(pk=found)
     )
     return submitted_entry(
         evaluation,
-        scored_of(evaluation.scores.all()),
+        scored_of(evaluation),
         profile=profile_of(evaluation.submission.method),
         decimals=place.edition.decimals,
     )
 
 
-def nearest_published(progress: Progress, place: Place) -> Entry | None:
+def nearest_published(progress: Progress, place: BoardPlace) -> Entry | None:
     """The row printed in a paper whose MiD is nearest; of two as near the better one."""
     mid = (progress.scores or {}).get(PRIMARY)
     near = [

@@ -13,9 +13,9 @@ from django.core.checks import CheckMessage, Error
 from django.core.exceptions import ImproperlyConfigured
 
 from evaluator import receipts
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
-from leaderboard import standings, submissions
+from leaderboard.boards import boards
 from leaderboard.models import Evaluation, Status, Submission
+from leaderboard.submissions import submissions
 
 
 class NoReceipt(Exception):
@@ -32,8 +32,8 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> dic
     The same every time, unless its method was renamed. Raises `NoReceipt`.
     """
     evaluation = _scored(submission, edition_number)
-    edition = evaluation.edition
-    scores = standings.flat_scores(evaluation.scores.all())
+    edition, rules = evaluation.edition, evaluation.edition.rules
+    scores = boards.flat_scores(evaluation)
     counts = (evaluation.report or {})["counts"]
     assert evaluation.finished_at is not None  # noqa: S101 - for the type checker: what is scored is finished
     document = {
@@ -45,8 +45,10 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> dic
         "ground_truth": edition.ground_truth_id,
         "file": submission.digest,
         "method": {"id": str(submission.method_id), "name": submission.method.name},
-        "scores": {name: receipts.decimal(scores[name], decimals=edition.decimals) for name in SCORE_NAMES},
-        "counts": {name: counts[name] for name in INTERVAL_NAMES},
+        "scores": {
+            name: receipts.decimal(scores[name], decimals=edition.decimals) for name in rules.score_names
+        },
+        "counts": {name: counts[name] for name in rules.interval_names},
         "scored_at": f"{evaluation.finished_at:%Y-%m-%dT%H:%M:%SZ}",
     }
     return receipts.sign(document, private_key=private_key())
@@ -54,7 +56,7 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> dic
 
 def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
     if submission.withdrawn_at:
-        raise NoReceipt("withdrawn", "The submission is withdrawn; expected one that stands.")
+        raise NoReceipt("withdrawn", "The submission is withdrawn; expected one that is not.")
     if edition_number is None:
         evaluation = submissions.evaluation_of(submission)
     else:

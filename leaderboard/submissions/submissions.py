@@ -3,31 +3,25 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
+from typing import Any
 
 import structlog
 from django.conf import settings
 from django.core.files.base import File
-from django.db import IntegrityError, transaction
+from django.db import transaction
 from django.db.models import Q
 
-from leaderboard import (
-    admissions,
-    audit,
-    boards,
-    cleaning,
-    deadlines,
-    estimates,
-    files,
-    lifecycle,
-    methods,
-    quotas,
-    teams,
-    verdicts,
-)
-from leaderboard.entries import Interval, scored_of
+from leaderboard import audit, versions
+from leaderboard.boards.rows import Interval, scored_of
+from leaderboard.errors.refusals import Refused, clean_text
+from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
-from leaderboard.names import clean_name
-from leaderboard.texts import Refused, clean_text, clean_url
+from leaderboard.people import teams
+from leaderboard.people.names import clean_name
+from leaderboard.quotas import admissions, deadlines, quotas
+from leaderboard.scoring import lifecycle, verdicts
+from leaderboard.storage import files, orphans
+from leaderboard.submissions import estimates
 
 log = structlog.get_logger(__name__)
 
@@ -42,10 +36,14 @@ class TokenSplit(Refused):
 
 @dataclass(frozen=True)
 class Submitted:
-    """The answer to a submission; `is_new` is False when the same bytes had come before."""
+    """The answer to a submission; `is_new` is False when the same bytes had come before.
+
+    `is_replayed`: it answers an earlier request of the same key; see `idempotency`.
+    """
 
     submission: Submission
     is_new: bool
+    is_replayed: bool = False
 
 
 def submit(
@@ -60,86 +58,148 @@ def submit(
     description: str = "",
     paper_url: str = "",
     code_url: str = "",
+    method_details: Mapping[str, object] | None = None,
     note: str = "",
     commit: str = "",
     may_edit: bool = True,
+    measured: files.StoredFile | None = None,
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
     The same bytes again, for the same split, method and manifest, are answered with the first submission,
     cost nothing and change nothing. Once a correction has another manifest, the same bytes are another
     submission: their keys may mean other sequences. With a new file, details that differ from the method's
-    own replace them, through `methods.edit`; without `may_edit` they are refused. Raises `Refused` or
+    own replace them, through `methods.edit`; without `may_edit` they are refused. `method_details` are those
+    of the registry. `measured` is for who has hashed the file already. Raises `Refused` or
     `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
-    name = clean_name("method", method_name)
-    details = methods.MethodDetails(
-        description=clean_text("description", description, limit=2000, required=False),
-        paper_url=clean_url("paper_url", paper_url),
-        code_url=clean_url("code_url", code_url),
+    asked = _Asked(
+        user=user,
+        split=split,
+        method_name=clean_name("method", method_name),
+        details=methods.cleaned(
+            {
+                "description": description,
+                "paper_url": paper_url,
+                "code_url": code_url,
+                **(method_details or {}),
+            }
+        ),
+        row={
+            "via": via,
+            "filename": _clean_filename(filename),
+            "note": clean_text("note", note, limit=500, required=False),
+            "commit": clean_text("commit", commit, limit=64, required=False),
+        },
+        upload=_checked(upload),
+        now=now,
+        may_edit=may_edit,
     )
-    note = clean_text("note", note, limit=500, required=False)
-    commit = clean_text("commit", commit, limit=64, required=False)
-    upload = _checked(upload)
-    first = _before_the_quota(user=user, split=split, method_name=name, upload=upload, now=now)
-    if first is None and not may_edit:
-        first = _before_an_edit(user=user, split=split, method_name=name, upload=upload, details=details)
+    file = measured or files.measure(asked.upload)
+    first = _admit(asked, file)
     if first is not None:
         return Submitted(submission=first, is_new=False)
-    kept = files.keep_predictions(upload, now=now)
-    refused = cleaning.unless_refused(Refused, quotas.QuotaExceeded, digest=kept.digest)
-    with refused, transaction.atomic():
-        cleaning.hold(kept.digest)
-        files.keep_still(upload, digest=kept.digest)
-        # Before the team: whoever founds a team has the audit trail from then on, and waits for nothing more.
-        # From here on the board stays, so the file is queued in an edition with the manifest named below.
-        split = Split.objects.lock_shared(split.pk)
-        quotas.hold_before_founding(user=user)
-        team = teams.team_of(user=user)
-        quotas.hold(team=team)
-        teams.require_member(team, user)
-        admissions.require(team=team, split=split)
-        method = _method(team=team, name=name, details=details, now=now)
-        file = SentFile(kept.digest, _manifest_digest(split))
-        standing = Submission.objects.standing().filter(split=split, method=method, **file._asdict())
-        first = standing.first()
-        if first is not None:
-            return Submitted(submission=first, is_new=False)
-        changes = details.changes_of(method)
-        if changes and not may_edit:
+    files.save_predictions(asked.upload, measured=file, now=now)
+    with orphans.unless_refused(Refused, quotas.QuotaExceeded, digest=file.digest), transaction.atomic():
+        submitted = _record(asked, file)
+    if submitted.is_new:
+        log.info(
+            "submission_received",
+            submission_id=str(submitted.submission.pk),
+            split=split.pk,
+            via=via,
+            digest=file.digest,
+            size_bytes=file.size_bytes,
+        )
+    return submitted
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """A request to submit: who sends what for which method and split, its texts clean."""
+
+    user: User
+    split: Split
+    method_name: str
+    details: Mapping[str, Any]  # of the method; an empty one says nothing, and changes nothing
+    row: Mapping[str, str]  # what stands in the submission's row as it came
+    upload: "File[bytes]"
+    now: datetime
+    may_edit: bool
+
+    def changes_of(self, method: Method) -> dict[str, Any]:
+        """What the request changes of the method. Raises `Refused`; `TokenSplit` if it may change nothing."""
+        given = {name: value for name, value in self.details.items() if value not in (None, "")}
+        changes = {name: value for name, value in given.items() if getattr(method, name) != value}
+        if changes and not self.may_edit:
             raise _token_split(method, changes)
-        quotas.require(team=team, user=user, split=split, size_bytes=kept.size_bytes, now=now)
-        try:
-            with transaction.atomic():
-                submission = Submission.objects.create(
-                    split=split,
-                    method=method,
-                    submitted_by=user,
-                    submitted_at=now,
-                    via=via,
-                    **file._asdict(),
-                    size_bytes=kept.size_bytes,
-                    filename=_clean_filename(filename),
-                    note=note,
-                    commit=commit,
-                )
-        except IntegrityError:
-            # The same bytes came twice at once, and the other request was first.
-            return Submitted(submission=standing.get(), is_new=False)
-        _queue(submission, split=split)
-        if changes:
-            submission.method = methods.edit(method=method, changes=changes, actor=user)
-        audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=user)
-    log.info(
-        "submission_received",
-        submission_id=str(submission.pk),
-        split=split.pk,
-        via=via,
-        digest=kept.digest,
-        size_bytes=kept.size_bytes,
+        methods.require_hardware(changes, method=method)
+        return changes
+
+
+def _admit(asked: _Asked, file: files.StoredFile) -> Submission | None:
+    """Refuse what cannot be taken, before its bytes are written; certain it is only in `_record`.
+
+    Returns the submission that had the same bytes before, if there is one. Raises `Refused` or
+    `quotas.QuotaExceeded`.
+    """
+    team = teams.current_team_of(user=asked.user)
+    admissions.require(team=team, split=asked.split)
+    method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
+    first = _sent_before(file, split=asked.split, method=method) if method else None
+    if first is not None:
+        return first
+    quotas.require(team=team, user=asked.user, split=asked.split, size_bytes=file.size_bytes, now=asked.now)
+    if method is not None:
+        asked.changes_of(method)
+    else:
+        methods.require_hardware(asked.details, method=None)
+        if team is not None:
+            methods.require_distinct_name(asked.method_name, team=team, field="method")
+    return None
+
+
+def _record(asked: _Asked, file: files.StoredFile) -> Submitted:
+    """Write the rows of a file that is stored, and queue it: in a transaction, in which all this is certain.
+
+    Raises `Refused` or `quotas.QuotaExceeded`.
+    """
+    orphans.lock(file.digest)
+    files.require_unchanged(asked.upload, digest=file.digest)
+    # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
+    split = Split.objects.select_related("published_edition__ground_truth").lock_shared(asked.split.pk)
+    team = _held_team(asked.user)
+    admissions.require(team=team, split=split)
+    method = _method(asked, team=team)
+    first = _sent_before(file, split=split, method=method)
+    if first is not None:
+        return Submitted(submission=first, is_new=False)
+    changes = asked.changes_of(method)
+    quotas.require(team=team, user=asked.user, split=split, size_bytes=file.size_bytes, now=asked.now)
+    submission = Submission.objects.create(
+        split=split,
+        method=method,
+        submitted_by=asked.user,
+        submitted_at=asked.now,
+        **_sent_file(file, split)._asdict(),
+        size_bytes=file.size_bytes,
+        **asked.row,
     )
+    _queue(submission, split=split)
+    if changes:
+        submission.method = methods.edit(method=method, changes=changes, actor=asked.user)
+    audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=asked.user)
     return Submitted(submission=submission, is_new=True)
+
+
+def _held_team(user: User) -> Team:
+    """The person's team, new if there is none, for which nobody else submits until the transaction ends."""
+    quotas.hold_accounts(user=user)
+    team = teams.team_of(user=user)
+    quotas.lock(team=team)
+    teams.require_member(team, user)
+    return team
 
 
 def _queue(submission: Submission, *, split: Split) -> None:
@@ -167,62 +227,27 @@ def _open_split(name: str, *, now: datetime) -> Split:
     return split
 
 
-def _before_the_quota(
-    *, user: User, split: Split, method_name: str, upload: "File[bytes]", now: datetime
-) -> Submission | None:
-    """Where no slot is open, the submission that had these bytes before. None: go on, and ask again.
-
-    So that a file that cannot be taken is not written first. Raises `Refused` or `quotas.QuotaExceeded`.
-    """
-    team = teams.present_team_of(user=user)
-    admissions.require(team=team, split=split)
-    named = Method.objects.filter(team=team, name=method_name)
-    try:
-        quotas.require(team=team, user=user, split=split, size_bytes=upload.size, now=now)
-    except quotas.QuotaExceeded:
-        file = SentFile(files.measure(upload).digest, _manifest_digest(split))
-        first = Submission.objects.standing().filter(split=split, method__in=named, **file._asdict()).first()
-        if first is None:
-            raise
-        return first
-    if team is not None and not named.exists():
-        methods.require_own_look(method_name, team=team, field="method")
-    return None
-
-
-def _before_an_edit(
-    *, user: User, split: Split, method_name: str, upload: "File[bytes]", details: methods.MethodDetails
-) -> Submission | None:
-    """Of who may not change the method, the submission that had these bytes before. None: there is no change.
-
-    So that a file that cannot be taken is not written first. Raises `Refused`.
-    """
-    method = Method.objects.filter(team=teams.present_team_of(user=user), name=method_name).first()
-    changes = details.changes_of(method) if method is not None else {}
-    if method is None or not changes:
-        return None
-    file = SentFile(files.measure(upload).digest, _manifest_digest(split))
-    first = Submission.objects.standing().filter(split=split, method=method, **file._asdict()).first()
-    if first is None:
-        raise _token_split(method, changes)
-    return first
-
-
 def _token_split(method: Method, changes: Mapping[str, str]) -> TokenSplit:
     first = next(iter(changes))
     return TokenSplit(
         "token-split",
-        f"The token is good for one split alone, and the field{'s' if len(changes) > 1 else ''} "
+        f"The token is valid for one split only, and the field{'s' if len(changes) > 1 else ''} "
         f"{', '.join(map(repr, changes))} would change the method {method.name!r} on every split; expected "
         "what stands there, nothing, or a token for every split.",
         field=first,
     )
 
 
-def _manifest_digest(split: Split) -> str:
-    """The manifest that is public now. The split takes submissions, so it has a published edition."""
-    assert split.published_edition is not None  # noqa: S101 - for the type checker: the caller has looked
-    return split.published_edition.ground_truth.manifest_digest
+def _sent_before(file: files.StoredFile, *, split: Split, method: Method) -> Submission | None:
+    """The standing submission of the same bytes under the manifest that is public now."""
+    names = _sent_file(file, split)._asdict()
+    return Submission.objects.standing().filter(split=split, method=method, **names).first()
+
+
+def _sent_file(file: files.StoredFile, split: Split) -> SentFile:
+    """The file as it is read: with the manifest that is public now."""
+    assert split.published_edition is not None  # noqa: S101 - for the type checker: the split takes files
+    return SentFile(file.digest, split.published_edition.ground_truth.manifest_digest)
 
 
 def _checked(upload: "File[bytes] | None") -> "File[bytes]":
@@ -243,18 +268,17 @@ def too_large(*, found_bytes: int) -> str:
     )
 
 
-def _method(*, team: Team, name: str, details: methods.MethodDetails, now: datetime) -> Method:
+def _method(asked: _Asked, *, team: Team) -> Method:
     """The team's method of that name, as it is; a new one is made with these details, and is private.
 
-    Raises `Refused` for a name that looks like another one of the team's.
+    The caller holds the team. Raises `Refused` for a name that looks like another one of the team's.
     """
-    method = Method.objects.filter(team=team, name=name).first()
+    method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
     if method is None:
-        teams.locked(team)
-        method = Method.objects.filter(team=team, name=name).first()
-    if method is None:
-        methods.require_own_look(name, team=team, field="method")
-        return Method.objects.create(team=team, name=name, created_at=now, **details.given)
+        methods.require_distinct_name(asked.method_name, team=team, field="method")
+        method = Method.objects.create(
+            team=team, name=asked.method_name, created_at=asked.now, **asked.details
+        )
     return method
 
 
@@ -276,11 +300,11 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
         if not changed:
             return False
         lifecycle.cancel(submission=submission, actor=actor)
-        # Before looking who is private: whoever shows a method holds this until it is shown.
-        audit.hold(actor)
-        if Method.objects.shown().filter(pk=submission.method_id).exists():
-            boards.changed(submission.split_id)
         audit.record(verb="withdrawn", noun="Submission", noun_id=submission.pk, actor=actor)
+        # Before looking who is private: whoever shows a method holds this until it is shown.
+        versions.hold()
+        if Method.objects.shown().filter(pk=submission.method_id).exists():
+            versions.changed(submission.split_id)
     submission.withdrawn_at = now
     return True
 
@@ -293,13 +317,14 @@ class Progress:
     """What its team sees of a submission."""
 
     state: str
-    state_label: str
     received_at: datetime
     queued_at: datetime | None = None
     started_at: datetime | None = None
     finished_at: datetime | None = None
     n_ahead: int | None = None
     estimate_s: float | None = None
+    is_late: bool = False  # it takes much longer than was to be expected
+    first_run: Evaluation | None = None  # in the first edition, where another edition's speaks for it
     scores: Mapping[str, float | None] | None = None
     intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
     counts: Mapping[str, int] = field(default_factory=dict)
@@ -328,6 +353,11 @@ def evaluation_of(submission: Submission) -> Evaluation:
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
 
 
+def _first_run(submission: Submission, speaking: Evaluation) -> Evaluation | None:
+    first = min(submission.evaluations.all(), key=lambda each: each.edition.number)
+    return first if first.pk != speaking.pk and first.is_final else None
+
+
 def _place_of_edition(evaluation: Evaluation) -> tuple[bool, int]:
     return evaluation.edition.published_at is not None, evaluation.edition.number
 
@@ -336,20 +366,23 @@ def progress(submission: Submission) -> Progress:
     """How far a submission is, and what came of it."""
     evaluation = evaluation_of(submission)
     report = evaluation.report or {}
+    counts = report.get("counts", {})
     place = estimates.place_of(evaluation)
-    scored = scored_of(evaluation.scores.all()) if evaluation.status == Status.SCORED else None
+    scored = scored_of(evaluation) if evaluation.status == Status.SCORED else None
     return Progress(
         state=evaluation.status,
-        state_label=Status(evaluation.status).label,
         received_at=submission.submitted_at,
         queued_at=evaluation.queued_at,
         started_at=evaluation.started_at,
         finished_at=evaluation.finished_at,
         n_ahead=place.n_ahead if place else None,
         estimate_s=place.estimate_s if place else None,
+        is_late=place is not None and place.is_late,
+        first_run=_first_run(submission, evaluation),
         scores=scored.values if scored else None,
         intervals=scored.intervals if scored else {},
-        counts=report.get("counts", {}),
+        # PostgreSQL gives JSON back in an order of its own.
+        counts={name: counts[name] for name in evaluation.edition.rules.interval_names if name in counts},
         truncated=report.get("truncated", {}),
         n_out_of_range=report.get("n_out_of_range"),
         warnings=report.get("warnings", []),

@@ -70,6 +70,12 @@ def moment(at: datetime) -> SafeString:
 
 
 @register.simple_tag
+def second(at: datetime) -> SafeString:
+    """Day, second and zone."""
+    return _time(at, "%Y-%m-%d %H:%M:%S UTC")
+
+
+@register.simple_tag
 def clock(at: datetime) -> SafeString:
     """The time of day to the second, with day and zone on hover."""
     return _time(at, "%H:%M:%S")

@@ -1,12 +1,14 @@
-"""What every page knows: the site's name, where the reader is, and the splits to go to."""
+"""Context of every page: the site's name, the section, and the splits."""
 
 from typing import Any
+from urllib.parse import urlsplit
 
 from django.conf import settings
 from django.http import Http404, HttpRequest
 from django.utils.functional import SimpleLazyObject
+from django.utils.http import url_has_allowed_host_and_scheme
 
-from leaderboard import snapshots
+from leaderboard.boards.snapshots import splits_of
 from leaderboard.models import Split
 
 _SECTIONS = {
@@ -24,6 +26,7 @@ _SECTIONS = {
     "withdraw": "submissions",
     "method_edit": "board",
     "method_visibility": "board",
+    "method_delete": "board",
     "team": "account",
     "join_team": "account",
     "invite": "account",
@@ -34,21 +37,19 @@ _SECTIONS = {
 _PREFIXES = {"account_": "account", "maintain": "maintain"}
 
 
-def splits_of(request: HttpRequest) -> list[Split]:
-    """Every split, with what is kept of its board; asked for once a request."""
-    found: list[Split] | None = getattr(request, "splits", None)
-    if found is None:
-        found = snapshots.splits()
-        request.splits = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
-    return found
-
-
 def split_or_404(request: HttpRequest, name: str) -> Split:
     """The split of that name."""
     found = next((split for split in splits_of(request) if split.pk == name), None)
     if found is None:
         raise Http404(f"There is no split {name!r}.")
     return found
+
+
+def _board_split(request: HttpRequest) -> str:
+    """The split whose board the page is about; empty where it is about none that there is."""
+    match = getattr(request, "resolver_match", None)
+    name = match.kwargs.get("split", "") if match and _SECTIONS.get(match.url_name or "") == "board" else ""
+    return name if name and any(split.pk == name for split in splits_of(request)) else ""
 
 
 def site(request: HttpRequest) -> dict[str, Any]:
@@ -63,4 +64,27 @@ def site(request: HttpRequest) -> dict[str, Any]:
             _SECTIONS.get(name, ""),
         ),
         "splits": SimpleLazyObject(lambda: splits_of(request)),
+        # Only the pages of errors ask for it, which nobody remembers.
+        "came_from": SimpleLazyObject(lambda: _came_from(request)),
+        # Views of pages that are about a board without its name in their address say it themselves.
+        "board_split": _board_split(request),
     }
+
+
+def _came_from(request: HttpRequest) -> str:
+    """The page of this site whose link or form led here; empty for any other, and for the page itself."""
+    path = page_before(request)
+    return "" if path == request.get_full_path() else path
+
+
+def page_before(request: HttpRequest) -> str:
+    """The address, without a host, of the page of this site that the request names as its origin; or empty.
+
+    The settings name the site: `request.get_host` raises where the host itself is the fault.
+    """
+    address = request.headers.get("Referer", "")
+    is_ours = url_has_allowed_host_and_scheme(address, allowed_hosts={urlsplit(settings.SITE_URL).netloc})
+    parts = urlsplit(address if is_ours else "")
+    path = f"{parts.path}?{parts.query}" if parts.query else parts.path
+    # A path that begins with two slashes would name another site where it is linked.
+    return "" if path.startswith("//") else path

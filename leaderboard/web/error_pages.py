@@ -1,14 +1,14 @@
-"""The page for an error of ours, which says what it knows of it."""
+"""The page for a failure of the server."""
 
 import sys
 
-from django.http import HttpRequest, HttpResponse, HttpResponseServerError, JsonResponse
+from django.http import HttpRequest, HttpResponse, HttpResponseServerError
 from django.template.loader import render_to_string
 from django.views import defaults
 
-from leaderboard import outages, problem_codes
+from leaderboard.errors import outages, problem_codes
 
-SORRY = "That was our fault, not yours. It stands in our logs; the same request may well work later."
+SORRY = "This was an error on our side. We logged it; try again later."
 
 
 def server_error(request: HttpRequest) -> HttpResponse:
@@ -23,12 +23,7 @@ def server_error(request: HttpRequest) -> HttpResponse:
         else (500, "server-error", SORRY, {})
     )
     if request.path.startswith("/api/"):
-        return JsonResponse(
-            problem_codes.document(status=status, code=code, detail=sentence),
-            status=status,
-            headers=headers,
-            content_type=problem_codes.MEDIA_TYPE,
-        )
+        return problem_codes.response(status=status, code=code, detail=sentence, headers=headers)
     if outage is None:
         return HttpResponseServerError(render_to_string("500.html"))
     page = render_to_string("outage.html", {"outage": outage})
@@ -39,9 +34,5 @@ def bad_request(request: HttpRequest, exception: Exception) -> HttpResponse:
     """Django's handler of a request that is malformed before any view has seen it."""
     if not request.path.startswith("/api/"):
         return defaults.bad_request(request, exception)
-    sentence = "The request is malformed, or was broken off; expected it whole, as the API describes it."
-    return JsonResponse(
-        problem_codes.document(status=400, code="bad-request", detail=sentence),
-        status=400,
-        content_type=problem_codes.MEDIA_TYPE,
-    )
+    sentence = "The request is malformed or incomplete; expected a complete request, as the API describes it."
+    return problem_codes.response(status=400, code="bad-request", detail=sentence)

@@ -1,4 +1,4 @@
-"""Doors for those who watch: is it alive, can it work, how is it doing."""
+"""Monitoring: liveness, readiness and Prometheus metrics."""
 
 import ipaddress
 import secrets
@@ -11,7 +11,7 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 from prometheus_client import CONTENT_TYPE_LATEST
 
-from leaderboard import health, metrics
+from leaderboard.ops import health, prometheus
 
 log = structlog.get_logger(__name__)
 
@@ -38,9 +38,9 @@ def healthz(request: HttpRequest) -> HttpResponse:
 @never_cache
 @require_safe
 def readyz(request: HttpRequest) -> HttpResponse:
-    """Database, broker and sweep; 503 if one of them fails."""
+    """Database, broker, sweep and what it found; 503 if one fails without which nothing works."""
     checks = readiness()
-    is_ready = all(check.is_ok for check in checks)
+    is_ready = all(check.is_ok for check in checks if check.is_vital)
     return JsonResponse(
         {
             "status": "ready" if is_ready else "not ready",
@@ -52,14 +52,14 @@ def readyz(request: HttpRequest) -> HttpResponse:
 
 @never_cache
 @require_safe
-def prometheus(request: HttpRequest) -> HttpResponse:
+def exposition(request: HttpRequest) -> HttpResponse:
     """Figures, for whoever may read them."""
     if not may_read_metrics(request):
         return HttpResponse(
             "Metrics are for the operator's monitoring.\n", status=403, content_type="text/plain"
         )
     try:
-        return HttpResponse(metrics.exposition(), content_type=CONTENT_TYPE_LATEST)
+        return HttpResponse(prometheus.exposition(), content_type=CONTENT_TYPE_LATEST)
     except DatabaseProblem as fault:
         log.warning("metrics_unavailable", reason=str(fault)[:200])
         return _sentence("The database does not answer.", status=503)

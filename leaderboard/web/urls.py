@@ -1,30 +1,24 @@
 """Addresses of the pages."""
 
 from django.urls import include, path, register_converter
-from django.views.generic import RedirectView
 
-from leaderboard.keeping import kept, takes
-from leaderboard.web import (
-    analysis_views,
-    audit_views,
+from leaderboard.http import cacheable, takes
+from leaderboard.web.account import team_views, token_views
+from leaderboard.web.boards import (
+    badge_and_feed_views,
     board_query,
+    board_views,
     chart_views,
     compare_views,
     edition_views,
     export_views,
-    maintainer_views,
-    method_views,
-    outside_views,
-    queue_views,
-    quota_views,
-    receipt_views,
-    team_views,
-    token_views,
-    views,
 )
+from leaderboard.web.docs import docs_views
+from leaderboard.web.maintain import audit_views, maintainer_views, queue_views, quota_views
+from leaderboard.web.methods import method_views
+from leaderboard.web.submissions import analysis_views, receipt_views, submission_views
 
-SAME_QUERY = {"query_string": True, "http_method_names": ["get", "head"]}
-register_converter(export_views.FormConverter, "board_form")
+register_converter(export_views.FormatConverter, "export_format")
 MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
     path("progress/", maintainer_views.edition_progress, name="maintain_progress"),
@@ -35,52 +29,52 @@ MAINTAINED_EDITION = [
     path("discard/", maintainer_views.discard, name="maintain_discard"),
 ]
 urlpatterns = [
-    path("", kept(views.home, board_query.PARAMETERS), name="home"),
-    path("board/<slug:split>/", kept(views.board, board_query.PARAMETERS), name="board"),
-    path("board/<slug:split>/charts/", kept(chart_views.board_charts), name="charts"),
-    path("board/<slug:split>/editions/", kept(edition_views.editions), name="editions"),
+    path("", cacheable(board_views.home, board_query.PARAMETERS), name="home"),
+    path("board/<slug:split>/", cacheable(board_views.board, board_query.PARAMETERS), name="board"),
+    path("board/<slug:split>/charts/", takes(chart_views.board_charts), name="charts"),
+    path(
+        "board/<slug:split>/charts/progress.json",
+        cacheable(chart_views.progress_options),
+        name="progress_options",
+    ),
+    path("board/<slug:split>/editions/", cacheable(edition_views.editions), name="editions"),
     path(
         "board/<slug:split>/editions/<int:number>/",
-        kept(edition_views.edition, board_query.PARAMETERS),
+        cacheable(edition_views.edition, board_query.PARAMETERS),
         name="edition",
     ),
-    # The API's own document, with the same query: there is one shape of a board.
     path(
-        "board/<slug:split>.json", RedirectView.as_view(**SAME_QUERY, pattern_name="api-board"), name="json"
-    ),
-    path(
-        "board/<slug:split>/editions/<int:number>.json",
-        RedirectView.as_view(**SAME_QUERY, pattern_name="api-edition-board"),
-        name="edition_json",
-    ),
-    path(
-        "board/<slug:split>.<board_form:form>",
-        kept(export_views.board, export_views.PARAMETERS),
+        "board/<slug:split>.<export_format:chosen>",
+        cacheable(export_views.board, export_views.PARAMETERS),
         name="export",
     ),
     path(
-        "board/<slug:split>/editions/<int:number>.<board_form:form>",
-        kept(export_views.edition, export_views.PARAMETERS),
+        "board/<slug:split>/editions/<int:number>.<export_format:chosen>",
+        cacheable(export_views.edition, export_views.PARAMETERS),
         name="edition_export",
     ),
-    path("board/<slug:split>/feed.atom", kept(outside_views.feed), name="feed"),
-    path("feed.atom", kept(outside_views.feed), name="feed_of_all"),
+    path("board/<slug:split>/feed.atom", cacheable(badge_and_feed_views.feed), name="feed"),
+    path("feed.atom", cacheable(badge_and_feed_views.feed), name="feed_of_all"),
     path(
         "methods/<uuid:method_id>/badge.svg",
-        kept(outside_views.badge, outside_views.PARAMETERS),
+        cacheable(badge_and_feed_views.badge, badge_and_feed_views.PARAMETERS),
         name="badge",
     ),
-    path("submit/", views.submit, name="submit"),
-    path("submissions/", views.submissions, name="submissions"),
-    path("submissions/<uuid:submission_id>/", views.submission, name="submission"),
+    path("submit/", submission_views.submit, name="submit"),
+    path("submit/template/<slug:split>.json", submission_views.template, name="template"),
+    path("submissions/", submission_views.submission_list, name="submissions"),
+    path("submissions/<uuid:submission_id>/", submission_views.submission, name="submission"),
     path("submissions/<uuid:submission_id>/analysis/", analysis_views.analysis, name="analysis"),
-    path("submissions/<uuid:submission_id>/state/", views.submission_state, name="submission_state"),
+    path(
+        "submissions/<uuid:submission_id>/state/", submission_views.submission_state, name="submission_state"
+    ),
     path("submissions/<uuid:submission_id>/receipt.json", receipt_views.receipt, name="receipt"),
-    path("submissions/<uuid:submission_id>/withdraw/", views.withdraw, name="withdraw"),
-    path("methods/<uuid:method_id>/", kept(views.method), name="method"),
+    path("submissions/<uuid:submission_id>/withdraw/", submission_views.withdraw, name="withdraw"),
+    path("methods/<uuid:method_id>/", cacheable(method_views.method), name="method"),
     path("compare/", takes(compare_views.compare, compare_views.PARAMETERS), name="compare"),
     path("methods/<uuid:method_id>/edit/", method_views.edit, name="method_edit"),
-    path("methods/<uuid:method_id>/visibility/", method_views.visibility, name="method_visibility"),
+    path("methods/<uuid:method_id>/delete/", method_views.delete, name="method_delete"),
+    path("methods/<uuid:method_id>/visibility/", method_views.change_visibility, name="method_visibility"),
     path("team/", team_views.team, name="team"),
     path("team/invite/", team_views.invite, name="invite"),
     path(
@@ -92,18 +86,18 @@ urlpatterns = [
     path("team/leave/", team_views.leave, name="leave_team"),
     path("team/members/<uuid:handle>/hand-over/", team_views.hand_over, name="hand_over_team"),
     path("team/members/<uuid:handle>/remove/", team_views.remove, name="remove_member"),
-    path("tokens/", token_views.tokens, name="tokens"),
+    path("tokens/", token_views.token_page, name="tokens"),
     path("tokens/revoke/", token_views.revoke, name="revoke_token"),
-    path("docs/", views.docs, name="docs"),
-    path("docs/api/", views.api_reference, name="api_reference"),
+    path("docs/", docs_views.docs, name="docs"),
+    path("docs/api/", docs_views.api_page, name="api_reference"),
     path("maintain/", maintainer_views.hub, name="maintain"),
     path("maintain/audit/", audit_views.events, name="maintain_audit"),
-    path("maintain/audit/events.csv", audit_views.events_csv, name="maintain_audit_csv"),
-    path("maintain/audit/events.json", audit_views.events_json, name="maintain_audit_json"),
+    path("maintain/audit/events.csv", audit_views.events, {"kind": "csv"}, name="maintain_audit_csv"),
+    path("maintain/audit/events.json", audit_views.events, {"kind": "json"}, name="maintain_audit_json"),
     path("maintain/queue/", queue_views.queue, name="maintain_queue"),
     path("maintain/queue/state/", queue_views.queue_state, name="maintain_queue_state"),
     path("maintain/queue/retry/", queue_views.retry, name="maintain_retry"),
-    path("maintain/quotas/", quota_views.quotas, name="maintain_quotas"),
+    path("maintain/quotas/", quota_views.quota_rules, name="maintain_quotas"),
     path("maintain/quotas/<uuid:team_id>/", quota_views.team_quotas, name="maintain_team_quotas"),
     path("maintain/quotas/<uuid:team_id>/<slug:split>/", quota_views.override, name="maintain_quota"),
     path(

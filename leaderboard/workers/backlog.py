@@ -1,4 +1,4 @@
-"""What workers do when no submission waits: counts of changed labels, comparisons, intervals, analyses.
+"""Jobs of low priority: draw boards, count changed labels, compare, compute intervals, analyse.
 
 Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
 for longer than a fraction of a second.
@@ -12,22 +12,16 @@ from functools import partial
 import structlog
 
 from evaluator import Rejected
-from leaderboard import (
-    analyses,
-    comparisons,
-    ground_truth,
-    inference,
-    lifecycle,
-    quarantine,
-    questions,
-    scoring,
-)
+from leaderboard.boards import snapshots
+from leaderboard.editions import ground_truth
+from leaderboard.scoring import analyses, comparisons, confidence, questions, sandbox, worker
+from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
 
 # Of each kind at most so much in one go, so that every kind has its turn.
 MAX_AT_ONCE = 50
-FAULTS = (OSError, Rejected, quarantine.ChildDied, quarantine.ChildNotReady, quarantine.LeaseLost)
+FAULTS = (OSError, Rejected, sandbox.ChildDied, sandbox.ChildNotReady, sandbox.LeaseLost)
 
 
 class Stopping(Exception):
@@ -39,7 +33,9 @@ def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], boo
 
     What fails is logged and left for the next time, and keeps nothing else from being done.
     """
-    between = partial(_let_live_work_by, rng=rng, is_stopping=is_stopping)
+    between = partial(_yield_to_live_work, rng=rng, is_stopping=is_stopping)
+    # Before all that lets submissions by: it takes a moment, and spares the next reader one.
+    snapshots.redraw(now=now)
     try:
         return sum(_done(task, between) for task in _tasks(now=now, between=between))
     except Stopping:
@@ -57,7 +53,7 @@ def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
 
 
 def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[], object]]:
-    held = ground_truth.held()
+    held = truth_values.readable_digests()
     for old, new in ground_truth.uncompared(held=held):
         yield partial(ground_truth.count_changes, old, new)
     asked = questions.waiting(held=held).select_related(
@@ -68,22 +64,17 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
     while len(begun) < MAX_AT_ONCE and (row := asked.exclude(pk__in=begun).first()) is not None:
         begun.append(row.pk)
         yield partial(comparisons.compute, row, now=now)
-    for edition in inference.stale(now=now, held=held):
-        yield partial(inference.infer, edition=edition, now=now, between=between)
+    # Before entries are read: those of what waits are to be among them.
+    between()
+    for entries in confidence.stale(now=now, held=held):
+        yield partial(confidence.infer, entries, now=now, between=between)
     for evaluation in analyses.missing(held=held)[:MAX_AT_ONCE]:
         yield partial(analyses.make, evaluation, now=now)
 
 
-def _let_live_work_by(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
+def _yield_to_live_work(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
     """Decide what waits before going on: somebody watches a page for it."""
-    while not is_stopping() and lifecycle.waiting_ids(limit=1) and scoring.run_next(rng=rng):
+    while not is_stopping() and worker.run_next(rng=rng):
         pass
     if is_stopping():
         raise Stopping
-
-
-def editions_waiting(*, now: datetime) -> list[int]:
-    """Editions of which something waits, for whoever tells the workers. Also forgets what must not stay."""
-    analyses.forget_hidden()
-    asked = questions.waiting().values_list("edition", flat=True)[:MAX_AT_ONCE]
-    return sorted({edition.pk for edition in inference.stale(now=now, held=None)} | set(asked))

@@ -1,4 +1,4 @@
-"""What is removed by itself, every few hours: files that no submission names, and what has had its time."""
+"""Cleaning every few hours: files that no submission names, and rows that have expired."""
 
 from dataclasses import dataclass
 from datetime import datetime
@@ -6,8 +6,10 @@ from datetime import datetime
 import structlog
 from django.db.models import F
 
-from leaderboard import cleaning, idempotency, questions
 from leaderboard.models import SweepBeat
+from leaderboard.scoring import questions
+from leaderboard.storage import orphans
+from leaderboard.submissions import idempotency
 
 log = structlog.get_logger(__name__)
 
@@ -28,13 +30,13 @@ def clean(*, now: datetime) -> Cleaned:
 
     Raises `OSError` if the store does not answer; what was removed until then stays removed.
     """
-    n_keys = idempotency.forget(now=now)
-    n_questions = questions.forget(now=now)
+    n_keys = idempotency.purge(now=now)
+    n_questions = questions.delete_expired(now=now)
     n_files = n_bytes = n_leftovers = 0
-    for orphan in cleaning.orphans(now=now):
-        if cleaning.remove(orphan, now=now):
+    for orphan in orphans.orphans(now=now):
+        if orphans.remove(orphan, now=now):
             n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
-    for path in cleaning.leftovers():
+    for path in orphans.leftovers():
         path.unlink(missing_ok=True)
         n_leftovers += 1
     SweepBeat.objects.update(

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+PROGRAMS = ("evaluator", "baselines", "leaderboard")
 CODE = ("evaluator", "leaderboard", "tests", "benchmarks")
 MAX_LINES = 400
 # A name that says nothing collects everything.
@@ -22,7 +23,7 @@ FORBIDDEN_NAMES = {
     "manager",
     "managers",
 }
-STATUS_WRITERS = {Path("leaderboard/lifecycle.py")}
+STATUS_WRITERS = {Path("leaderboard/scoring/lifecycle.py")}
 
 
 def python_files(*folders: str) -> list[Path]:
@@ -66,7 +67,7 @@ def test_every_module_is_named_for_what_it_holds() -> None:
         return {part.removesuffix(".py").removeprefix("test_") for part in path.parts}
 
     # Tests start real services, and call them so.
-    programs = python_files("evaluator", "leaderboard", "benchmarks")
+    programs = python_files(*PROGRAMS, "benchmarks")
     assert [path for path in programs if names(path) & FORBIDDEN_NAMES] == []
 
 
@@ -93,7 +94,7 @@ def writes_a_status(call: ast.Call) -> bool:
         return (
             len(call.args) > 1 and isinstance(call.args[1], ast.Constant) and call.args[1].value == "status"
         )
-    if name in {"update", "insert"}:  # of `leaderboard.bulk`, which takes the names of columns
+    if name in {"update", "insert"}:  # of `leaderboard.db.bulk`, which takes the names of columns
         texts = {node.value for arg in call.args for node in ast.walk(arg) if isinstance(node, ast.Constant)}
         if "status" in texts:
             return True
@@ -153,52 +154,49 @@ def test_no_row_is_locked_with_its_key() -> None:
     assert locks_with_the_key(ast.parse("Split.objects.select_for_update(of=('self',)).get()")) == [1]
 
 
-# --- models <- verbs <- doors ------------------------------------------------------------------------------
-
-DOORS = {"admin", "api", "management", "tasks", "web"}
-# What holds the rest together: Django's and Celery's entry points, settings and what settings need.
-FRAME = {"__init__", "apps", "celery", "logs", "migrations", "openapi", "settings", "urls", "wsgi"}
+# --- rooms: what they may import is pyproject.toml's, checked by import-linter ---------------------------
 
 
-def room(module: str) -> str:
-    """The part of the leaderboard that a module belongs to: `leaderboard.web.forms` to `web`."""
-    name = module.partition(".")[2].partition(".")[0]
-    # Django wants what templates call to stand here; it is as much the pages' as the rest of `web`.
-    return "web" if name == "templatetags" else name or "__init__"
+def test_few_modules_stand_outside_the_rooms() -> None:
+    outside = {path.name for path in (REPOSITORY / "leaderboard").glob("*.py")} - {"__init__.py"}
+    assert len(outside) <= 10, outside
 
 
-def rooms_used(path: Path) -> set[str]:
-    """The parts of the leaderboard that a file imports, wherever in it the import stands."""
-    used = set()
-    for node in ast.walk(tree(path)):
-        if isinstance(node, ast.Import):
-            used |= {room(alias.name) for alias in node.names if alias.name.startswith("leaderboard")}
-        if isinstance(node, ast.ImportFrom) and node.module == "leaderboard":
-            used |= {alias.name for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and (node.module or "").startswith("leaderboard."):
-            used.add(room(node.module or ""))
-    return used
-
-
-def kind(name: str) -> str:
-    """What a part of the leaderboard is: every module that is nothing else is a verb's."""
-    if name in DOORS:
-        return "door"
-    return name if name == "models" else "frame" if name in FRAME else "verb"
-
-
-MAY_USE = {"models": {"models"}, "verb": {"models", "verb"}, "door": {"models", "verb"}}
-
-
-def test_imports_in_the_leaderboard_run_one_way() -> None:
-    wrong = [
-        f"{path} ({kind(own)}) imports leaderboard.{used} ({kind(used)})"
-        for path in written_by_hand("leaderboard")
-        for own in [room(".".join(path.with_suffix("").parts))]
-        for used in sorted(rooms_used(path) - {own})
-        if kind(own) != "frame" and kind(used) not in MAY_USE[kind(own)]
+def test_every_room_says_what_it_is_for() -> None:
+    rooms = {path.parent for path in written_by_hand(*PROGRAMS)}
+    silent = [
+        room
+        for room in sorted(rooms)
+        if room.parts[-1] not in {"management", "commands", "templatetags"}
+        and not ast.get_docstring(tree(room / "__init__.py"))
     ]
-    assert wrong == []
+    assert silent == []
+
+
+# --- names -------------------------------------------------------------------------------------------------
+
+
+def test_no_class_name_is_used_twice_in_the_leaderboard() -> None:
+    places: dict[str, list[str]] = {}
+    for path in written_by_hand("leaderboard"):
+        for node in tree(path).body:
+            # Django looks for the class `Command` in each command.
+            if isinstance(node, ast.ClassDef) and node.name != "Command":
+                places.setdefault(node.name, []).append(str(path))
+    assert {name: paths for name, paths in places.items() if len(paths) > 1} == {}
+
+
+def test_modules_are_called_by_their_names() -> None:
+    """`verbs.create` means nothing to somebody who searches; `tokens.create` does."""
+    renamed = [
+        f"{path}: {alias.name} as {alias.asname}"
+        for path in written_by_hand("leaderboard", "baselines")
+        for node in ast.walk(tree(path))
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(("leaderboard", "baselines"))
+        for alias in node.names
+        if alias.asname and alias.asname != "celery_app"
+    ]
+    assert renamed == []
 
 
 # --- habits that the house does without --------------------------------------------------------------------
@@ -225,8 +223,7 @@ def bad_habits(module: ast.Module, *, is_model: bool) -> set[str]:
 
 def test_nothing_is_evaluated_no_signal_is_connected_no_save_is_overridden() -> None:
     found = {
-        path: bad_habits(tree(path), is_model="models" in path.parts)
-        for path in python_files("evaluator", "leaderboard")
+        path: bad_habits(tree(path), is_model="models" in path.parts) for path in python_files(*PROGRAMS)
     }
     assert {path: habits for path, habits in found.items() if habits} == {}
 
@@ -236,7 +233,7 @@ def test_every_ignore_carries_its_reason() -> None:
     reasoned = re.compile(r"#\s*(?:noqa: [A-Z0-9, ]+|type: ignore\[[a-z-, ]+\])\s*(?:--?|#)\s*\S.{5,}")
     bare = [
         f"{path}:{number}: {line.strip()}"
-        for path in written_by_hand("evaluator", "leaderboard")
+        for path in written_by_hand(*PROGRAMS)
         for number, line in enumerate(text_of(path).splitlines(), 1)
         if marker.search(line) and not reasoned.search(line)
     ]

@@ -29,9 +29,10 @@ def texts() -> list[Path]:
         ("examples", "*"),
         ("templates", "*.html"),
         ("evaluator", "*.py"),
+        ("baselines", "*.py"),
     ):
         found += [path for path in (REPOSITORY / folder).rglob(pattern) if path.is_file()]
-    return found
+    return [path for path in found if path.suffix not in {".jpg", ".pyc"}]
 
 
 def test_nothing_that_we_tell_people_to_type_installs_by_the_bare_name() -> None:

@@ -1,4 +1,4 @@
-"""What a researcher gets from `pip install .`: the evaluator and its command, and no web framework."""
+"""What a researcher gets from `pip install .`: evaluator, baselines and their command; no web framework."""
 
 import re
 import shutil
@@ -11,7 +11,7 @@ from zipfile import ZipFile
 
 import pytest
 
-from tests.evaluator.console import EXAMPLES, recorded, shell
+from tests.evaluator.cli.console import EXAMPLES, recorded, shell
 from tests.services import ServiceMissing, skip_or_fail
 
 pytestmark = pytest.mark.slow
@@ -40,7 +40,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(REPOSITORY / name, source)
-    for name in ("evaluator", "leaderboard"):
+    for name in ("evaluator", "baselines", "leaderboard"):
         shutil.copytree(REPOSITORY / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
     pip(Path(sys.executable), "wheel", "--no-deps", "--wheel-dir", out, source)
     (built,) = out.glob("tsttc-*.whl")
@@ -61,14 +61,23 @@ def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterat
     shutil.rmtree(home)
 
 
-def test_wheel_holds_the_evaluator_alone(wheel: Path) -> None:
+def test_wheel_holds_evaluator_and_baselines_alone(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         names = archive.namelist()
     tops = {name.partition("/")[0] for name in names}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"evaluator"}
-    assert {"evaluator/py.typed", "evaluator/cli/__init__.py", "evaluator/client.py"} <= set(names)
-    present = {path.relative_to(REPOSITORY).as_posix() for path in (REPOSITORY / "evaluator").rglob("*.py")}
-    assert present <= set(names), "every module of the evaluator is in the wheel"
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"evaluator", "baselines"}
+    assert {
+        "evaluator/py.typed",
+        "baselines/py.typed",
+        "evaluator/cli/__init__.py",
+        "evaluator/client/client.py",
+    } <= set(names)
+    present = {
+        path.relative_to(REPOSITORY).as_posix()
+        for folder in ("evaluator", "baselines")
+        for path in (REPOSITORY / folder).rglob("*.py")
+    }
+    assert present <= set(names), "every module of the two is in the wheel"
 
 
 def test_environment_has_no_web_framework(environment: Path) -> None:
@@ -82,27 +91,18 @@ def test_environment_has_no_web_framework(environment: Path) -> None:
     assert not re.search(r"^(django|celery|redis|psycopg|pandas)", listed, re.MULTILINE)
 
 
-def test_installed_command_scores_the_examples(environment: Path) -> None:
-    with shell([str(environment / "tsttc")], {}) as run:
-        assert run("tsttc --version") == f"tsttc {version_of(environment)}\n"
-        assert "60 sequences" in run("tsttc score predictions.json --truth truth.csv")
-        assert run("tsttc check predictions.json --manifest manifest.csv; echo $?").endswith("\n0\n")
-
-
-def test_installed_command_prints_what_the_examples_show(environment: Path) -> None:
+def test_installed_command_prints_its_version_and_what_the_examples_show(environment: Path) -> None:
     text = (EXAMPLES / "README.md").read_text()
     with shell([str(environment / "tsttc")], {}) as run:
+        assert run("tsttc --version") == f"tsttc {version_of(environment)}\n"
         assert recorded(text, run) == text
 
 
-def test_installed_package_is_typed_for_its_users(environment: Path) -> None:
-    program = (
-        "import evaluator, pathlib; print((pathlib.Path(evaluator.__file__).parent / 'py.typed').exists())"
-    )
-    done = subprocess.run(
-        [environment / "python", "-c", program], capture_output=True, text=True, check=True, cwd=environment
-    )
-    assert done.stdout == "True\n"
+def test_installed_command_lists_the_baselines_and_says_how_to_install_opencv(environment: Path) -> None:
+    missing = "Error: The baselines need OpenCV; install it with: pip install '.[baselines]' in a checkout."
+    with shell([str(environment / "tsttc")], {}) as run:
+        assert "as published with --measure area" in run("tsttc baseline list")
+        assert run("tsttc baseline run detection . --out p.json; echo $?") == f"{missing}\n2\n"
 
 
 def version_of(environment: Path) -> str:

@@ -8,6 +8,7 @@ from urllib.parse import urlsplit
 from playwright.sync_api import Browser, BrowserContext, Page, Request, sync_playwright
 
 from tests import services
+from tests.browser.site import PASSWORD
 
 FLAGS = (
     "--no-sandbox",
@@ -69,10 +70,19 @@ def tab_to(page: Page, name: str, *, backwards: bool = False) -> None:
     raise AssertionError(f"{name!r} is not reached with {key}; passed {passed}")
 
 
+def sign_in(page: Page, email: str, *, password: str = PASSWORD) -> None:
+    """Enter with an account that there is."""
+    page.goto("/accounts/login/")
+    page.get_by_label("Email").fill(email)
+    page.get_by_label("Password", exact=True).fill(password)
+    page.get_by_role("button", name="Sign in").click()
+    page.wait_for_url("**/submit/")
+
+
 FOCUSED_NAME = """() => {
   const e = document.activeElement;
   const label = e.labels && e.labels[0] ? e.labels[0].innerText : e.innerText;
-  return (label || e.getAttribute("aria-label") || "").trim().split("\\n")[0];
+  return (e.getAttribute("aria-label") || label || "").trim().split("\\n")[0];
 }"""
 
 OVERFLOW_PX = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"

@@ -1,5 +1,6 @@
 """One site for all tests in a browser, and a browser for each module of them."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from urllib.parse import urlsplit
@@ -10,10 +11,9 @@ from playwright.sync_api import Browser, Page, expect
 import evaluator
 from tests import services
 from tests.browser.chromium import WIDE, Complaints, chromium
-from tests.browser.site import open_split, web_alone
+from tests.browser.site import PASSWORD, open_split, web_alone
 from tests.journeys.production import Site
 
-PASSWORD = "kestrel-altimeter-9"
 PATIENCE_MS = 120_000
 MAX_PREDICTIONS_BYTES = 200_000
 
@@ -84,11 +84,13 @@ def sign_up(page: Page, *, email: str, name: str) -> None:
 def submit(page: Page, data: bytes, *, method: str, split: str = "test") -> None:
     """Send a file through the form; the page is the submission's afterwards."""
     page.goto("/submit/")
-    page.get_by_role("radio", name=split).check()
+    page.get_by_role("radio", name=re.compile(rf"^{split}\b")).check()
     page.get_by_label("Method", exact=True).fill(method)
     page.get_by_label("Prediction file").set_input_files(
         {"name": "predictions.json", "mimeType": "application/json", "buffer": data}
     )
+    # With a script the file is checked first, and one with problems is sent once that is asked for.
+    expect(page.get_by_text("Checking the file…")).to_have_count(0)
     page.get_by_role("button", name="Submit").click()
     page.wait_for_url("**/submissions/*/")
 
@@ -96,11 +98,11 @@ def submit(page: Page, data: bytes, *, method: str, split: str = "test") -> None
 def show(page: Page) -> None:
     """Make the method of the submission that the page shows public, as its team does; then go back to it."""
     submission = page.url
-    page.locator(".facts-list a").click()
-    page.get_by_role("link", name="Show it to everybody…").click()
+    page.locator(".facts-list a[href^='/methods/']").click()
+    page.get_by_role("link", name="Publish…").click()
     page.locator("input[value=PUBLIC]").check()
-    page.get_by_role("button", name="See what others will see").click()
+    page.get_by_role("button", name="Preview").click()
     page.get_by_role("checkbox").check()
-    page.get_by_role("button", name="Show it, public").click()
+    page.get_by_role("button", name="Publish", exact=True).click()
     page.wait_for_url("**/methods/*/")
     page.goto(submission)

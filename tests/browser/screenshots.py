@@ -16,7 +16,7 @@ from typing import Final, Literal
 
 from playwright.sync_api import Browser, Page
 
-from tests.browser.chromium import NARROW, WIDE, chromium
+from tests.browser.chromium import NARROW, WIDE, chromium, sign_in
 from tests.browser.pictures import smaller
 from tests.browser.site import web_alone, worker
 from tests.journeys.production import REPOSITORY, Site, await_that
@@ -44,17 +44,17 @@ ASK: Final = """
 import json
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
-from leaderboard import comparisons
 from leaderboard.models import Method, Split, Submission
+from leaderboard.scoring import comparisons
 shown = Method.objects.exclude(visibility="PRIVATE").filter(submissions__split="demo").order_by("created_at")
 pair = [method.pk for method in shown[:2]]
 comparisons.of(methods=pair, split=Split.objects.get(pk="demo"), viewer=AnonymousUser(), now=timezone.now())
 own = Submission.objects.filter(submitted_by__email="demo@example.org")
 print(json.dumps({
     "a": str(pair[0]), "b": str(pair[1]),
-    "scored": str(own.get(method__name="Box height, smoothed").pk),
+    "scored": str(own.get(method__name="Detection, box height").pk),
     "rejected": str(own.get(method__name="First try").pk),
-    "own": str(own.get(method__name="Box height, smoothed").method_id),
+    "own": str(own.get(method__name="Detection, box height").method_id),
 }))
 """
 PUBLIC: Final = {
@@ -123,14 +123,6 @@ def photograph(page: Page, address: str, name: str, *, darkroom: Page) -> None:
         (SHOWN / f"{name}.png").write_bytes(smaller(picture, page=darkroom))
 
 
-def sign_in(page: Page, demo: Demo) -> None:
-    page.goto("/accounts/login/")
-    page.get_by_label("Email").fill(demo.email)
-    page.get_by_label("Password").fill(demo.password)
-    page.get_by_role("button", name="Sign in").click()
-    page.wait_for_url("**/submit/")
-
-
 def photograph_all(browser: Browser, demo: Demo) -> None:
     """Every page on every screen."""
     darkroom = browser.new_page()
@@ -142,7 +134,7 @@ def photograph_all(browser: Browser, demo: Demo) -> None:
         ).new_page()
         for name, address in PUBLIC.items():
             photograph(page, address.format(**demo.known), f"{name}-{size}-{scheme}", darkroom=darkroom)
-        sign_in(page, demo)
+        sign_in(page, demo.email, password=demo.password)
         for name, address in PRIVATE.items():
             photograph(page, address.format(**demo.known), f"{name}-{size}-{scheme}", darkroom=darkroom)
         page.context.close()

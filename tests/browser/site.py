@@ -1,4 +1,4 @@
-"""The leaderboard as `make demo` runs it, small: SQLite, a broker in files, one web process, one worker."""
+"""The leaderboard as `make demo` runs it, small: SQLite, one web process, one worker."""
 
 import os
 import sys
@@ -13,9 +13,10 @@ import evaluator
 from leaderboard.demo.truth import simulate
 from tests.journeys.production import BIN, Site, await_that, free_port, running
 
+PASSWORD = "kestrel-altimeter-9"
 WEB = (sys.executable, "-m", "waitress")
 WORKER = (
-    *(str(BIN / "celery"), "--app=leaderboard", "worker", "--pool=solo", "--beat"),
+    *(str(BIN / "celery"), "--app=leaderboard", "worker", "--pool=solo"),
     *("--without-gossip", "--without-mingle", "--without-heartbeat", "--loglevel=info"),
 )
 
@@ -63,7 +64,8 @@ def worker(site: Site) -> Iterator[None]:
 
 def open_split(site: Site, split: str) -> evaluator.GroundTruth:
     """Give a split made-up ground truth: 1,200 sequences in 40 recordings."""
-    truth = simulate(rng=np.random.default_rng(len(split)), n_sequences=1_200, n_recordings=40)
+    # No two splits may have the same truth: the site refuses the second.
+    truth = simulate(rng=np.random.default_rng([*split.encode()]), n_sequences=1_200, n_recordings=40)
     table = site.directory / f"{split}.csv"
     table.write_bytes(truth.to_csv())
     site.manage("import_truth", split, str(table))

@@ -12,7 +12,7 @@ from playwright.sync_api import Browser, Page
 import evaluator
 from tests.browser import world
 from tests.browser.addresses import addresses
-from tests.browser.chromium import NARROW, WIDE
+from tests.browser.chromium import NARROW, WIDE, sign_in
 from tests.browser.conftest import NewPage
 from tests.journeys.production import Site
 
@@ -24,7 +24,7 @@ RUN = """() => axe.run(document, {resultTypes: ["violations"]}).then(found => fo
   .flatMap(({id, nodes}) => nodes.map(node => [id, node.target, node.failureSummary].join(": "))))"""
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 # What leads to no page, or to none that a sample is needed for.
-OTHERS = {"form": "csv", "secret": "none", "handle": str(UUID(int=0)), "invitation_id": str(UUID(int=0))}
+OTHERS = {"chosen": "csv", "secret": "none", "handle": str(UUID(int=0)), "invitation_id": str(UUID(int=0))}
 VIEWS = (
     "/board/val/?columns=mid&nerf=no",
     "/board/val/?columns=rte&q=nothing+like+it",
@@ -125,14 +125,6 @@ def test_what_looks_for_faults_finds_one_that_is_there(page: Page, site: Site) -
     page.evaluate(AXE)
     page.evaluate("document.querySelector('main').append(document.createElement('button'))")
     assert [fault.partition(":")[0] for fault in page.evaluate(RUN)] == ["button-name"]
-
-
-def sign_in(page: Page, email: str) -> None:
-    page.goto("/accounts/login/")
-    page.get_by_label("Email").fill(email)
-    page.get_by_label("Password").fill(world.PASSWORD)
-    page.get_by_role("button", name="Sign in").click()
-    page.wait_for_url("**/submit/")
 
 
 def cookies_of(page: Page) -> dict[str, str]:

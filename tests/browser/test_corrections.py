@@ -9,9 +9,9 @@ from playwright.sync_api import Page, expect
 
 import evaluator
 from tests import services
-from tests.browser.chromium import NARROW, WIDE
-from tests.browser.conftest import PASSWORD, NewPage, show, sign_up, submit
-from tests.browser.site import open_split, predictions, web_alone, worker
+from tests.browser.chromium import NARROW, WIDE, sign_in
+from tests.browser.conftest import NewPage, show, sign_up, submit
+from tests.browser.site import PASSWORD, open_split, predictions, web_alone, worker
 from tests.browser.test_looks import SCREENS, look_at
 from tests.journeys.production import Site, await_that, get
 
@@ -55,15 +55,6 @@ def corrected(site: Site, *, factor: float) -> Path:
     return path
 
 
-def sign_in(page: Page) -> None:
-    """Enter as the maintainer."""
-    page.goto("/accounts/login/")
-    page.get_by_label("Email").fill(KEEPER)
-    page.get_by_label("Password").fill(PASSWORD)
-    page.get_by_role("button", name="Sign in").click()
-    page.wait_for_url("**/submit/")
-
-
 def rows(page: Page) -> list[str]:
     """The board's rows, without the tag that only their own team sees."""
     page.goto(BOARD)
@@ -97,7 +88,7 @@ def test_from_opening_to_the_board_and_back(
     submission, before = team.url, rows(keeper)
     site.manage("open_edition", SPLIT, "--truth", str(corrected(site, factor=3.0)))
 
-    sign_in(keeper)
+    sign_in(keeper, KEEPER)
     keeper.get_by_role("link", name="Maintain").click()
     keeper.get_by_role("link", name="Edition 2").click()
     expect(keeper.locator(".progress-words")).to_have_text("0 %: 0 of 2.")
@@ -116,8 +107,9 @@ def test_from_opening_to_the_board_and_back(
     keeper.goto(DESK)
     keeper.get_by_role("link", name="Publish…").click()
     decide(keeper, reason="Twelve boxes were wrong.", button="Publish edition 2")
-    expect(keeper.get_by_role("status")).to_have_text(f"Edition 2 is the board of {SPLIT}.")
-    expect(keeper.locator(".facts")).to_contain_text("what changed: edition 2, 12 labels corrected")
+    # The cross closes the message.
+    expect(keeper.locator(".messages[role=status]")).to_have_text(f"Edition 2 is the board of {SPLIT}.×")
+    expect(keeper.locator(".facts")).to_contain_text("latest change: edition 2, 12 labels corrected")
     assert rows(keeper) != before
     team.goto(submission)
     expect(team.locator("#outcome .notice")).to_contain_text("Re-scored in edition 2 on")
@@ -130,7 +122,7 @@ def test_from_opening_to_the_board_and_back(
     decide(keeper, reason="They were right.", button="Roll back to edition 1")
     assert rows(keeper) == before
     team.goto(SECOND)
-    expect(team.locator(".notice").first).to_contain_text("Taken back on")
+    expect(team.locator(".notice").first).to_contain_text("Rolled back to")
     team.goto(f"{BOARD}editions/")
     expect(team.locator(".changelog li")).to_have_count(3)
     expect(team.locator(".changelog li").first).to_contain_text("They were right.")
@@ -143,7 +135,7 @@ def test_team_withdraws_its_entry_for_good(page: Page, site: Site, val_truth: ev
     with worker(site):
         expect(page.locator("[aria-current=step] .label")).to_have_text("Scored")
     page.get_by_role("link", name="Withdraw this submission…").click()
-    page.get_by_role("button", name="Withdraw it for good").click()
+    page.get_by_role("button", name="Withdraw", exact=True).click()
     expect(page.locator("#outcome .notice")).to_contain_text("Withdrawn by its team on")
     page.goto(BOARD)
     row = page.locator("tr.withdrawn")
@@ -158,7 +150,7 @@ def test_every_page_of_editions_fits_its_screen_and_can_be_read(
     site.manage("open_edition", SPLIT, "--truth", str(corrected(site, factor=5.0)))
     page = new_page(viewport=WIDE if size == "wide" else NARROW, color_scheme=scheme)
     look_at(page, (BOARD, f"{BOARD}editions/", FIRST, f"{BOARD}?at=2020-01-01"))
-    sign_in(page)
+    sign_in(page, KEEPER)
     newest = page.goto("/maintain/") and page.locator(".preparing a").first.get_attribute("href")
     assert newest
     look_at(

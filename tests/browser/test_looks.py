@@ -48,32 +48,6 @@ def look_at(page: Page, addresses: tuple[str, ...]) -> None:
         assert page.evaluate(LOW_CONTRAST) == [], address
 
 
-def test_phone_shows_rank_method_and_the_two_overall_errors(
-    new_page: NewPage, truth: evaluator.GroundTruth
-) -> None:
-    page = new_page(viewport=NARROW)
-    page.goto("/")
-    shown = page.locator("table.board thead tr").last.locator("th:visible")
-    assert [text.split("\n")[0] for text in shown.all_inner_texts()] == ["Rank", "Method", "MiD", "RTE"]
-    expect(page.locator("table.board tbody tr").first.locator("th:visible, td:visible")).to_have_count(4)
-
-
-def test_phone_reaches_all_columns_while_rank_and_method_stay(
-    new_page: NewPage, truth: evaluator.GroundTruth
-) -> None:
-    page = new_page(viewport=NARROW)
-    page.goto("/")
-    page.get_by_label("All columns").check()
-    assert page.evaluate(OVERFLOW_PX) <= 0
-    first = page.locator("table.board tbody tr").first
-    before = [first.locator(part).bounding_box() for part in (".rank", ".method")]
-    page.locator(".board-scroll").evaluate("e => e.scrollLeft = e.scrollWidth")
-    assert [first.locator(part).bounding_box() for part in (".rank", ".method")] == before
-    last = first.locator("td").last.bounding_box()
-    assert last is not None
-    assert last["x"] + last["width"] <= NARROW["width"]
-
-
 def test_decimal_points_stand_in_one_line(page: Page, truth: evaluator.GroundTruth) -> None:
     page.goto("/board/test/")
     points = page.evaluate(
@@ -114,7 +88,7 @@ def test_print_has_the_whole_table_and_no_navigation(
     page.emulate_media(media="print")
     page.goto("/")
     expect(page.locator(".site-nav")).to_be_hidden()
-    expect(page.locator("table.board thead tr").last.locator("th:visible")).to_have_count(15)
+    expect(page.locator("table.board thead tr").last.locator("th:visible")).to_have_count(12)
 
 
 def test_site_has_an_icon_of_its_own(page: Page, truth: evaluator.GroundTruth) -> None:

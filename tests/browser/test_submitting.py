@@ -1,15 +1,18 @@
 """From signing up to the board, in a real browser with a real worker."""
 
+import base64
+import json
 import re
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Page, expect
+from playwright.sync_api import Browser, Page, expect
 
 import evaluator
 from tests.browser.chromium import NARROW, tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import predictions, worker
+from tests.evaluator import faulty_files
 from tests.journeys.production import Site, await_that, get
 
 pytestmark = pytest.mark.browser
@@ -52,6 +55,9 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
         write(text)
     press("Enter")
     page.wait_for_url("**/submit/")
+    # Chosen already where it is the only one that is open; which splits are is for other tests to say.
+    tab_to(page, "test The hidden test set: the numbers that papers quote.")
+    press("Space")
     tab_to(page, "Method")
     write("By keyboard")
     tab_to(page, "Prediction file")
@@ -68,17 +74,17 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
         # Afterwards the page stands still, and the other method is on the board as well.
         expect(page.locator("[aria-current=step] .note")).to_have_count(0)
         await_that(lambda: "By somebody else" in get(f"{site.url}/board/test/").text, what="all is scored")
-    tab_to(page, "Make it public…")
+    tab_to(page, "Publish…")
     press("Enter")
     page.wait_for_url("**/visibility/")
     tab_to(page, "anonymous")
     press("ArrowDown")
-    tab_to(page, "See what others will see")
+    tab_to(page, "Preview")
     press("Enter")
     page.wait_for_url("**/visibility/?visibility=PUBLIC*")
-    tab_to(page, "Show it like this. I know that it cannot be taken back.")
+    tab_to(page, "I know that this cannot be undone.")
     press("Space")
-    tab_to(page, "Show it, public")
+    tab_to(page, "Publish")
     press("Enter")
     page.wait_for_url("**/methods/*/")
     tab_to(page, "Board")
@@ -90,7 +96,8 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     for method in ("By keyboard", "By somebody else"):
         tab_to(page, f"Compare {method}")
         press("Space")
-    tab_to(page, "Compare the chosen")
+    # The tray at the end of the page has what is ticked.
+    tab_to(page, "Compare")
     press("Enter")
     page.wait_for_url("**/compare/?*")
     expect(page.locator(".verdict")).to_contain_text("being computed")
@@ -100,7 +107,9 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     tab_to(page, "Test", backwards=True)
     press("Enter")
     page.wait_for_url("**/board/test/")
-    tab_to(page, "CSV", backwards=True)
+    tab_to(page, "Export", backwards=True)
+    press("Enter")
+    tab_to(page, "Download CSV")
     with page.expect_download() as taken:
         press("Enter")
     assert "By keyboard" in taken.value.path().read_text()
@@ -114,18 +123,92 @@ DROP = """([selector, type]) => {
 }"""
 
 
-def test_a_file_dropped_on_the_form_is_chosen_and_beside_it_is_not_opened(page: Page, site: Site) -> None:
+def test_a_file_dropped_on_the_form_is_chosen_and_beside_it_is_not_opened(
+    page: Page, site: Site, truth: evaluator.GroundTruth
+) -> None:
     sign_up(page, email="drops@example.org", name="Drops")
     page.goto("/submit/")
     is_left_to_the_browser = page.evaluate(DROP, ["header", "drop"])
     assert not is_left_to_the_browser
     expect(page.locator("#chosen")).to_have_text("")
+    # Chosen already where it is the only split that is open.
+    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
     page.evaluate(DROP, ["legend", "dragover"])
     expect(page.locator("form.dropping")).to_be_visible()
     page.evaluate(DROP, ["legend", "drop"])
     expect(page.locator("#chosen")).to_have_text("2 bytes")
     assert page.evaluate("document.querySelector('input[type=file]').files[0].name") == "mine.json"
     expect(page.locator("form.dropping")).to_have_count(0)
+    expect(page.locator("#checked")).to_contain_text("1,200 problems in the file")
+
+
+def test_a_file_is_checked_before_it_is_sent_and_what_was_filled_in_stays(
+    browser: Browser, site: Site, truth: evaluator.GroundTruth
+) -> None:
+    # A context of its own: the browser complains of the answer 422, which is wanted here.
+    with browser.new_context(base_url=site.url) as context:
+        check_and_correct(context.new_page(), truth)
+
+
+def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
+    sign_up(page, email="checks@example.org", name="Checks")
+    sent: list[str] = []
+    page.on("request", lambda request: sent.append(request.method))
+    field = page.get_by_label("Prediction file")
+    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.get_by_label("Method", exact=True).fill("Checked")
+    with page.expect_download() as taken:
+        page.get_by_role("link", name="Template of test").click()
+    field.set_input_files(taken.value.path())
+    expect(page.locator("#checked")).to_contain_text("The value is null; expected a number of seconds.")
+    expect(page.get_by_role("button", name="Submit anyway")).to_be_visible()
+    good = {"name": "p.json", "mimeType": "application/json", "buffer": predictions(truth, factor=1.7)}
+    field.set_input_files(good)
+    expect(page.locator("#checked")).to_have_text("Checked: 1,200 of 1,200 sequences found. No problems.")
+    page.get_by_label("Parameters").fill("25 apples")
+    assert "POST" not in sent
+    page.get_by_role("button", name="Submit").click()
+    expect(page.locator("#id_n_parameters_error")).to_have_text(
+        "Enter a whole number, e.g. 25,000,000 or 25M."
+    )
+    expect(page.get_by_label("Parameters")).to_be_focused()
+    page.get_by_label("Parameters").fill("25M")
+    page.get_by_role("button", name="Submit").click()
+    page.wait_for_url("**/submissions/*/")
+
+
+CHECK = """async ([checker, manifest, files]) => {
+  const worker = new Worker(checker);
+  const answers = {};
+  for (const [name, encoded] of Object.entries(files)) {
+    const file = new File([Uint8Array.from(atob(encoded), (c) => c.charCodeAt(0))], "p.json");
+    const answer = new Promise((resolve) => worker.addEventListener("message", resolve, {once: true}));
+    worker.postMessage({id: 1, manifest, file});
+    const {data} = await answer;
+    answers[name] = data.failed ?? {n_problems: data.n_problems, problems: data.problems};
+  }
+  worker.terminate();
+  return answers;
+}"""
+
+
+def answer_of(data: bytes, manifest: evaluator.Manifest) -> dict[str, object]:
+    try:
+        evaluator.read_predictions(data, manifest=manifest)
+    except evaluator.Rejected as rejected:
+        return rejected.as_dict()
+    return {"n_problems": 0, "problems": []}
+
+
+def test_the_check_in_the_browser_has_the_codes_and_words_of_the_server(page: Page, site: Site) -> None:
+    files = {name: case[0] for name, case in faulty_files.CASES.items()} | faulty_files.FURTHER
+    csv = faulty_files.MANIFEST.to_csv()
+    page.goto("/docs/")
+    page.route("**/manifest-of-the-test", lambda route: route.fulfill(body=csv))
+    checker = json.loads((site.directory / "static" / "staticfiles.json").read_text())["paths"]["check.js"]
+    encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
+    told = page.evaluate(CHECK, [f"/static/{checker}", "/manifest-of-the-test", encoded])
+    assert told == {name: answer_of(data, faulty_files.MANIFEST) for name, data in files.items()}
 
 
 def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
@@ -202,7 +285,7 @@ def test_everything_works_without_script(new_page: NewPage, site: Site, truth: e
     submit(page, predictions(truth, factor=1.4), method="Plain")
     await_step(page, "Queued")
     with worker(site):
-        link = page.get_by_role("link", name="look again")
+        link = page.get_by_role("link", name="reload the page")
         while link.count():
             with page.expect_navigation():
                 link.click()

@@ -4,7 +4,6 @@
 """
 
 import json
-import random
 import tempfile
 from datetime import timedelta
 from pathlib import Path
@@ -16,17 +15,20 @@ from django.db import transaction
 from django.utils import timezone
 
 import evaluator
-from leaderboard import boards, comparisons, ground_truth, lifecycle, quotas, submissions
-from leaderboard.demo.estimators import Estimator
+from leaderboard import versions
 from leaderboard.demo.truth import simulate
+from leaderboard.editions import ground_truth
 from leaderboard.models import BoxSource, Edition, Evaluation, Method, Split, Submission, User, Visibility
+from leaderboard.scoring import comparisons
+from leaderboard.submissions import submissions
 from tests import builders
+from tests.browser.site import PASSWORD
 from tests.journeys.production import Site
-from tests.leaderboard import queue_rows
+from tests.leaderboard.web.maintain import queue_rows
+from tests.noisy_estimates import Estimator
 
 SPLIT = "val"
 OWNER, RIVAL, MAINTAINER = "owner@example.org", "rival@example.org", "maintainer@example.org"
-PASSWORD = "kestrel-altimeter-9"
 N_SEQUENCES, N_RECORDINGS = 1_500, 60
 LONG_NAME = "A method with a rather long name, of the kind that papers like: cross-attention"
 # Whose it is, its noise, its latency in ms; the last sent is the best.
@@ -68,7 +70,7 @@ def populate() -> str:
     submissions.withdraw(submission=gone, actor=rival, now=timezone.now())
     _spread_over_months()
     with transaction.atomic():
-        boards.changed(SPLIT)
+        versions.changed(SPLIT)
     shown = Submission.objects.get(method__name="Feature pyramid, two frames")
     second = Submission.objects.get(method__name="Dense scale matching")
     comparisons.of(
@@ -131,25 +133,18 @@ def _give_maintainers_something_to_do(owner: User, maintainer: User) -> None:
     """Something that failed by our fault, something that waits, and a team with rules of its own."""
     edition = Edition.objects.get(split=SPLIT)
     failed = queue_rows.queued(edition, owner)
-    for _ in range(lifecycle.MAX_POISON_STRIKES):
-        queue_rows.make_due()
-        lifecycle.give_back(
-            queue_rows.claim(), strike=lifecycle.Strike.POISON, reason="signal 9", rng=random.Random(0)
-        )
+    queue_rows.strike_out()
     waiting = queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
     # No worker of another test is to take it.
     never = timezone.now() + timedelta(days=365)
     Evaluation.objects.filter(pk=waiting.pk).update(due_at=never)
-    quotas.override(
-        team=failed.submission.method.team,
-        split=edition.split,
+    builders.override(
+        failed.submission.method.team,
+        split=edition.split_id,
         limit=9,
         window=timedelta(days=2),
-        min_gap=timedelta(0),
-        rejected_limit=None,
         reason="Their deadline is before everybody else's.",
         actor=maintainer,
-        now=timezone.now(),
     )
 
 

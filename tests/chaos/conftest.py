@@ -32,6 +32,6 @@ def truth() -> evaluator.GroundTruth:
 def site(
     installed: None, tmp_path_factory: pytest.TempPathFactory, truth: evaluator.GroundTruth
 ) -> Iterator[Site]:
-    """Web, one worker and beat, with a PostgreSQL and a Redis that nobody else uses."""
+    """Web and one worker, with a PostgreSQL and a Redis that nobody else uses."""
     with running_site(tmp_path_factory.mktemp("site"), truth=truth, n_workers=1) as running:
         yield running

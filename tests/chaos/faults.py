@@ -43,7 +43,6 @@ class Faults:
             (11.0, self._flush_the_broker),
             (29.0, self._restart_the_broker),
             (31.0, self._restart_the_database),
-            (13.0, self._kill_beat),
             (9.0, self._kill_a_web_process),
         ]
         self._repeat(KILL_EVERY_S, self._kill_a_worker, is_regular=True)
@@ -159,10 +158,6 @@ class Faults:
         self._site.postgres.stop(crash=is_crash)
         self._site.postgres.start()
         self.counts["database_restarts"] += 1
-
-    def _kill_beat(self) -> None:
-        self._site.beat.kill()
-        self.counts["beat_kills"] += 1
 
     def _kill_a_web_process(self) -> None:
         processes = self._site.web.children()

@@ -29,7 +29,7 @@ SPLIT = "test"
 
 
 class Site:
-    """Web, workers, beat, PostgreSQL and Redis of one run."""
+    """Web, workers, PostgreSQL and Redis of one run."""
 
     def __init__(self, directory: Path, *, n_workers: int, changes: Mapping[str, str]) -> None:
         self.directory = directory
@@ -48,7 +48,6 @@ class Site:
         ]
         self.web = self._process("web", gunicorn)
         celery = [str(BIN / "celery"), "--app=leaderboard"]
-        self.beat = self._process("beat", [*celery, "beat", "--pidfile=", "--loglevel=info"])
         options = ["--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info"]
         self.workers = [
             self._process(f"worker-{i}", [*celery, "worker", f"--hostname=worker-{i}@%h", *options])
@@ -58,7 +57,7 @@ class Site:
     @property
     def processes(self) -> list[Process]:
         """All but the services."""
-        return [self.web, self.beat, *self.workers]
+        return [self.web, *self.workers]
 
     def _process(self, name: str, command: list[str]) -> Process:
         return Process(name, command, directory=self.directory, environment=self.environment)

@@ -94,7 +94,7 @@ def reader_memory_bytes(truth: evaluator.GroundTruth, *, directory: Path) -> int
     """
     path = directory / "manifest.npz"
     truth.manifest.save(path)
-    command = [sys.executable, "-m", "evaluator.quarantine", str(path), "4000000000", "60"]
+    command = [sys.executable, "-m", "evaluator.predictions.sandbox", str(path), "4000000000", "60"]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=REPOSITORY) as reader:
         assert reader.stdout is not None
         if reader.stdout.readline() != READY:

@@ -12,10 +12,10 @@ from click.testing import CliRunner, Result
 from hypothesis import settings
 
 from evaluator.cli import main
-from evaluator.client import Client
+from evaluator.client.client import Client
+from tests.evaluator.cli.keyrings import NoKeyring
+from tests.evaluator.cli.recorded_site import RecordedSite
 from tests.evaluator.fake_time import FakeTime
-from tests.evaluator.keyrings import NoKeyring
-from tests.evaluator.recorded_site import RecordedSite
 
 # How long an example takes says more about the machine than about the code.
 settings.register_profile("unhurried", deadline=None)

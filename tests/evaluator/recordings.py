@@ -2,9 +2,11 @@
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import stats
 
 from evaluator import GroundTruth, Predictions
-from evaluator.tables import Table
+from evaluator.scoring.differences import sign_flips
+from evaluator.truth.csv_tables import Table
 
 Floats = NDArray[np.float64]
 N_BAGS = 40
@@ -37,3 +39,21 @@ def some_sums(seed: int, *, n_entries: int = 6, step: float = 0.5) -> tuple[Floa
     counts = rng.integers(1, 30, (N_BAGS, 1)).astype(float)
     errors = 20 + rng.normal(0, 3, (1, N_BAGS, 1)) + rng.normal(0, 1.5, (n_entries, N_BAGS, 1))
     return counts * (errors + step * np.arange(n_entries)[:, None, None]), counts
+
+
+def sign_flip_p(differences: Floats, *, rng: np.random.Generator, n_flips: int = 9_999) -> Floats:
+    """The p of every column of `differences` (recordings, columns), which needs no counts."""
+    return sign_flips(differences, np.ones_like(differences), rng=rng, n_flips=n_flips).p
+
+
+def permutation_p(gaps: Floats, *, n_resamples: int) -> float:
+    """The p of one column by scipy's test."""
+    found = stats.permutation_test(
+        (gaps,),
+        lambda x, axis: x.sum(axis=axis),
+        permutation_type="samples",
+        n_resamples=n_resamples,
+        vectorized=True,
+        rng=np.random.default_rng(0),
+    )
+    return float(found.pvalue)

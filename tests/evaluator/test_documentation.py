@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from evaluator import INTERVALS, PROBLEM_CODES, PROTOCOLS, GroundTruth, read_predictions
-from evaluator.tables import Table
+from evaluator.truth.csv_tables import Table
 from tests.evaluator.worlds import REPOSITORY
 
 FORMAT = (REPOSITORY / "docs" / "file-format.md").read_text(encoding="utf-8")

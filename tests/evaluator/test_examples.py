@@ -12,9 +12,8 @@ import pytest
 from evaluator import INTERVALS, evaluate, read_predictions, read_truth
 from evaluator.cli import main
 from evaluator.cli.exits import Exit
-from tests.evaluator.worlds import REPOSITORY
+from tests.evaluator.worlds import EXAMPLES, REPOSITORY
 
-EXAMPLES = REPOSITORY / "examples"
 PROGRAMS = sorted(EXAMPLES.glob("*.py"))
 PAGE = (REPOSITORY / "docs" / "ci.md").read_text(encoding="utf-8")
 

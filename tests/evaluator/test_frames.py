@@ -1,13 +1,10 @@
 """`evaluator.frames`: pandas frames in and out."""
 
-from pathlib import Path
-
 import pytest
 
 from evaluator import GroundTruth, Rejected, evaluate, read_truth
 from evaluator.frames import manifest_frame, predictions_from_frame
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+from tests.evaluator.worlds import EXAMPLES
 
 
 @pytest.fixture(scope="module")

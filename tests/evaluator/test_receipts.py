@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluator import receipts
-from evaluator.protocol import INTERVAL_NAMES, SCORE_NAMES
+from evaluator.metrics.protocol import SCORE_NAMES, get_protocol
 
 SEED = bytes(range(32))
 OTHER_SEED = bytes(range(1, 33))
@@ -33,7 +33,7 @@ def fields(**changed: Any) -> dict[str, Any]:
         "file": "sha256:" + "b" * 64,
         "method": {"id": UUID, "name": "Foo τ “++”"},
         "scores": dict.fromkeys(SCORE_NAMES, "15.03") | {"rte_negative": None},
-        "counts": dict.fromkeys(INTERVAL_NAMES, 120),
+        "counts": dict.fromkeys(get_protocol("tsttc-1").interval_names, 120),
         "scored_at": "2026-11-21T10:00:00Z",
         **changed,
     }

@@ -3,16 +3,24 @@
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+import subprocess
+import sys
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
+from typing import Any
+
+from click.testing import Result
 
 from evaluator import GroundTruth
-from evaluator.tables import Table
+from evaluator.truth.csv_tables import Table
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+EXAMPLES = REPOSITORY / "examples"
 GOLDEN = REPOSITORY / "tests" / "golden" / "toolkit.json"
-SHARED_DATA = Path(os.environ.get("TSTTC_SHARED_DATA", REPOSITORY.parent / "shared" / "data"))
+
+# The command in this process, as the fixture of this name runs it.
+Tsttc = Callable[..., Result]
 
 
 def screen_text(terminal: int) -> str:
@@ -22,6 +30,27 @@ def screen_text(terminal: int) -> str:
         while piece := screen.read(1 << 16):
             shown += piece
     return shown.decode()
+
+
+def process(*arguments: object, **options: Any) -> "subprocess.CompletedProcess[str]":
+    """What the command does as a process of its own; it has the recorded site's address from the test's."""
+    streams = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | options
+    command = [sys.executable, "-m", "evaluator", *map(str, arguments)]
+    done: subprocess.CompletedProcess[str] = subprocess.run(
+        command, text=True, check=False, cwd=REPOSITORY, **streams
+    )
+    return done
+
+
+def on_terminal(
+    *arguments: object, stream: str = "stderr", **environment: str
+) -> "tuple[subprocess.CompletedProcess[str], str]":
+    """The same with one of its streams led to a terminal, and what that shows."""
+    terminal, end = os.openpty()
+    options: dict[str, Any] = {"stdin": subprocess.DEVNULL, stream: end}
+    done = process(*arguments, **options, env=os.environ | {"TERM": "xterm"} | environment)
+    os.close(end)
+    return done, screen_text(terminal)
 
 
 def make_truth(ttc_s: Iterable[float], *, anno_ids: Sequence[int] | None = None) -> GroundTruth:

@@ -2,10 +2,9 @@
 
 import select
 import socket
-import threading
-from contextlib import suppress
 from enum import Enum
-from typing import Self
+
+from tests.leaderboard.scoring.cutting_proxy import Proxy
 
 PIECE = 1 << 14
 
@@ -17,44 +16,19 @@ class Cut(Enum):
     BEFORE_THE_ANSWER = "when the server has done it, and before anybody hears so"
 
 
-class CutNetwork:
+class CutNetwork(Proxy):
     """Passes on to a port of this machine; the next uploads are cut as `cuts` says, one after the other."""
 
     def __init__(self, port: int, *cuts: Cut) -> None:
-        self._target = ("127.0.0.1", port)
-        self._listener = socket.create_server(("127.0.0.1", 0))
-        self.url = f"http://127.0.0.1:{self._listener.getsockname()[1]}"
-        self._lock = threading.Lock()
+        super().__init__(host="127.0.0.1", port=port)
+        self.url = f"http://127.0.0.1:{self.port}"
         self._cuts = list(cuts)
         self.n_uploads = 0
-        self._thread = threading.Thread(target=self._accept, name="network", daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._listener.shutdown(socket.SHUT_RDWR)
-        self._listener.close()
-        self._thread.join(10)
 
     @property
     def n_cuts_left(self) -> int:
         """Cuts that no upload has met yet."""
         return len(self._cuts)
-
-    def _accept(self) -> None:
-        while True:
-            try:
-                client, _ = self._listener.accept()
-            except OSError:
-                return
-            threading.Thread(target=self._serve, args=(client,), name="passed on", daemon=True).start()
-
-    def _serve(self, client: socket.socket) -> None:
-        """Whichever side breaks off ends it for both, and is no fault of the network."""
-        with suppress(ConnectionError):
-            self._pass_on(client)
 
     def _cut_of(self, said: bytes) -> Cut | None:
         """What is to happen to the upload that begins with this, if one does."""

@@ -1,6 +1,4 @@
-"""The leaderboard as it runs in production, started by a test: web, worker and beat as processes of their
-own.
-"""
+"""The leaderboard as it runs in production, started by a test: web and worker as processes of their own."""
 
 import os
 import signal
@@ -16,6 +14,7 @@ from pathlib import Path
 import httpx
 
 from tests.services import environment_of_its_own
+from tests.signals import default_signals
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
@@ -110,7 +109,7 @@ def settings_for(directory: Path, *, url: str, postgres_url: str, redis_url: str
 @contextmanager
 def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[bytes]]:
     """A process of the site; asked to finish at the end, and made to if it does not."""
-    with (site.directory / f"{name}.log").open("wb") as log:
+    with (site.directory / f"{name}.log").open("wb") as log, default_signals():
         process = subprocess.Popen(
             command,
             cwd=REPOSITORY,
@@ -153,7 +152,7 @@ def _answers(site: Site, name: str) -> bool:
 def production_site(
     directory: Path, *, postgres_url: str, redis_url: str, truth: Path, split: str, protocol: str = "tsttc-1"
 ) -> Iterator[Site]:
-    """Migrate, import the ground truth, start web, worker and beat; all of it ends with the context."""
+    """Migrate, import the ground truth, start web and worker; all of it ends with the context."""
     url = f"http://127.0.0.1:{free_port()}"
     environment = settings_for(directory, url=url, postgres_url=postgres_url, redis_url=redis_url)
     site = Site(url=url, directory=directory, environment=environment)
@@ -164,7 +163,6 @@ def production_site(
     celery = str(BIN / "celery")
     worker = ("worker", "--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info")
     with ExitStack() as processes:
-        processes.enter_context(running(site, "beat", celery, "--app=leaderboard", "beat", "--loglevel=info"))
         processes.enter_context(running(site, "worker", celery, "--app=leaderboard", *worker))
         processes.enter_context(web_process(site))
         yield site

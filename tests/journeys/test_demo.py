@@ -17,8 +17,9 @@ import pytest
 from leaderboard.demo.seed import ENTRIES
 from tests.journeys.people import Visitor
 from tests.journeys.production import PATIENCE_S, REPOSITORY, Site, await_that, free_port, get
-from tests.leaderboard.child_processes import kernel_says
+from tests.leaderboard.scoring.child_processes import kernel_says
 from tests.services import environment_of_its_own
+from tests.signals import default_signals
 
 pytestmark = pytest.mark.slow
 
@@ -33,15 +34,17 @@ def environment(directory: Path) -> dict[str, str]:
 @contextmanager
 def demo(directory: Path, *, port: int) -> Iterator[subprocess.Popen[str]]:
     """The demo's supervisor, ended at the end however the test went."""
-    with subprocess.Popen(
-        [sys.executable, "manage.py", "demo", "--port", str(port)],
-        cwd=REPOSITORY,
-        env=environment(directory),
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        start_new_session=True,
-    ) as supervisor:
+    with default_signals():
+        supervisor = subprocess.Popen(
+            [sys.executable, "manage.py", "demo", "--port", str(port)],
+            cwd=REPOSITORY,
+            env=environment(directory),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            start_new_session=True,
+        )
+    with supervisor:
         try:
             yield supervisor
         finally:
@@ -83,7 +86,7 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
     with demo(tmp_path, port=port) as supervisor:
         said = banner(supervisor)
         assert url in said
-        n_scored = sum(entry.estimator is not None for entry in ENTRIES)
+        n_scored = sum(entry.run is not None for entry in ENTRIES)
         await_that(lambda: len(entries(url)) == n_scored, what="every demo submission is scored")
 
         login = re.search(r"Sign in as (\S+) with the password (\S+)", said)

@@ -1,6 +1,6 @@
 """What the project exists for, on the real thing: a prediction file in, a ranked board out.
 
-Real processes (gunicorn, a Celery worker, beat), a real PostgreSQL and a real Redis; the people use forms
+Real processes (gunicorn, a Celery worker), a real PostgreSQL and a real Redis; the people use forms
 and the programs use tokens.
 """
 
@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 
 import evaluator
@@ -86,30 +85,6 @@ def test_a_file_with_faults_is_rejected_with_their_list_and_the_next_good_one_is
     data = predictions(truth, factor=0.9)
     accepted = program.submit(split="test", method="Nanoseconds", data=data)
     assert program.outcome(accepted)["scores"] == offline(data, truth)
-
-
-def test_what_is_not_ones_own_does_not_exist(
-    site: Site, people: People, programs: Programs, truth: evaluator.GroundTruth
-) -> None:
-    owner = programs(site, "owner@example.org")
-    submission = owner.submit(split="test", method="Private matters", data=predictions(truth, factor=1.5))
-    assert owner.outcome(submission)["state"] == "SCORED"
-
-    stranger = people(site)
-    assert stranger.get(f"/submissions/{submission}/").url.path == "/accounts/login/"
-    assert stranger.get(f"/api/v1/submissions/{submission}").status_code == 401
-    stranger.sign_up(email="stranger@example.org", name="")
-    assert stranger.get(f"/submissions/{submission}/").status_code == 404
-    assert stranger.get(f"/api/v1/submissions/{submission}").status_code == 404
-
-
-def test_the_public_manifest_has_every_sequence_and_no_time_to_contact(
-    site: Site, people: People, truth: evaluator.GroundTruth
-) -> None:
-    lines = people(site).get("/api/v1/splits/test/manifest").text.splitlines()
-    assert lines[0] == "anno_id,bag_stamp,cam_id,ts,track_id"
-    assert len(lines) == 1 + truth.n_sequences
-    assert np.unique(lines).size == len(lines)
 
 
 def test_the_check_that_containers_use_finds_the_web_process_alive(site: Site) -> None:

@@ -18,7 +18,7 @@ import pytest
 import evaluator
 from tests.journeys.people import Program, Visitor
 from tests.journeys.production import Site, production_site
-from tests.services import ServiceMissing, shared_data, skip_or_fail, throwaway_database, throwaway_redis
+from tests.services import ServiceMissing, skip_or_fail, throwaway_database, throwaway_redis
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -26,15 +26,6 @@ ESTIMATORS = ("box-height", "box-sqrt-area", "box-area", "pointrcnn-height")
 FORMS = ("ttc", "scale_ratio")
 TRUNCATED_NEAR_ZERO = {"tsttc-1": {"box-area"}, "toolkit": set[str]()}
 EMAIL = "researcher@example.org"
-
-
-@pytest.fixture(scope="module")
-def kitti() -> Path:
-    """The folder of the data."""
-    shared = shared_data()
-    if shared is None or not (shared / "kitti-dev").is_dir():
-        pytest.skip("kitti-dev is not here: TSTTC_SHARED_DATA names no folder that has it")
-    return shared / "kitti-dev"
 
 
 @pytest.fixture(scope="module", params=["tsttc-1", "toolkit"])

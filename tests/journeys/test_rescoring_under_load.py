@@ -1,6 +1,6 @@
 """A correction while people read, teams upload and a worker dies: nobody sees anything but a whole board.
 
-Real processes (gunicorn, two Celery workers, beat), a PostgreSQL and a Redis of their own. Five hundred
+Real processes (gunicorn, two Celery workers), a PostgreSQL and a Redis of their own. Five hundred
 submissions are scored anew; four readers ask for the board without pause. What every submission must show
 in each edition is computed here, by the evaluator alone, so that every number of every answer can be held
 against the edition that the answer names.

@@ -25,4 +25,5 @@ def test_rows_of_an_older_release_survive_every_migration(postgres_url: str, tmp
         "rules": [30, 3650, None],
         "is_shown": [True],
         "mailboxes": ["ada@example.org"],
+        "audit": [4, []],
     }

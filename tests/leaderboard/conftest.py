@@ -5,10 +5,12 @@ from pathlib import Path
 import pytest
 from django.test import Client
 
-from leaderboard import teams
-from leaderboard.models import Edition, Membership, Split, Submission, User
+from leaderboard.models import Edition, Membership, Split, Submission, Team, User
+from leaderboard.people import teams
+from leaderboard.scoring.lifecycle import Lease
 from tests import builders
 from tests.editions import FACTORS, corrected, open_edition
+from tests.leaderboard.web.maintain import queue_rows
 
 
 @pytest.fixture
@@ -26,6 +28,12 @@ def teammate(owner: User) -> User:
 
 
 @pytest.fixture
+def team(owner: User, teammate: User) -> Team:
+    """The owner's team, with a teammate in it."""
+    return teams.team_of(user=owner)
+
+
+@pytest.fixture
 def stranger(db: None) -> User:
     """Somebody else, in a team of their own."""
     return User.objects.create_user("stranger@example.org", "correct horse", name="Strangers")
@@ -38,9 +46,23 @@ def maintainer(db: None) -> User:
 
 
 @pytest.fixture
+def signed_in(client: Client, owner: User) -> Client:
+    """The owner's browser."""
+    client.force_login(owner)
+    return client
+
+
+@pytest.fixture
 def edition(benchmark: None, tmp_path: Path) -> Edition:
     """The test split, open, with made-up ground truth."""
     return builders.import_truth(tmp_path)
+
+
+@pytest.fixture
+def lease(edition: Edition, owner: User) -> Lease:
+    """Of a claimed evaluation of a file that nobody will read."""
+    queue_rows.queued(edition, owner)
+    return queue_rows.claim()
 
 
 @pytest.fixture

@@ -1,5 +1,7 @@
-"""The audit trail: append-only, and a chain that shows what was done to it."""
+"""The audit trail: append-only, and sealed into a chain that shows what was done to it."""
 
+import random
+import re
 from datetime import timedelta
 from io import StringIO
 from typing import Any
@@ -12,6 +14,7 @@ from django.utils import timezone
 from leaderboard import audit
 from leaderboard.models import AuditEvent, Edition, Evaluation, User
 from leaderboard.models.audit import GENESIS, AppendOnly
+from leaderboard.workers import queue
 from tests import builders
 
 SQLITE_ONLY = pytest.mark.skipif("connection.vendor != 'sqlite'", reason="there the database refuses it")
@@ -29,6 +32,13 @@ def record(n: int = 1, **fields: Any) -> AuditEvent:
     return event
 
 
+def sealed(n: int = 1, **fields: Any) -> AuditEvent:
+    """The same, and seal all that there is."""
+    event = record(n, **fields)
+    audit.seal()
+    return AuditEvent.objects.get(pk=event.pk)
+
+
 def in_sql(statement: str, *values: str | int | None) -> None:
     with connection.cursor() as cursor:
         cursor.execute(statement, values)
@@ -43,32 +53,54 @@ def verify_audit(*arguments: str) -> str:
 # --- the chain -------------------------------------------------------------------------------------------
 
 
-def test_each_event_is_bound_to_the_one_before_it(owner: User) -> None:
-    hashes = AuditEvent.objects.order_by("pk").values_list("previous_hash", "hash")
-    record(3, actor=owner)
-    (first, one), (second, two), (third, _) = hashes
+def test_each_sealed_event_is_bound_to_the_one_before_it(owner: User) -> None:
+    hashes = AuditEvent.objects.order_by("seal_number").values_list("seal_number", "previous_hash", "hash")
+    sealed(2, actor=owner)
+    sealed(actor=owner)
+    assert [row[0] for row in hashes] == [1, 2, 3]
+    (_, first, one), (_, second, two), (_, third, _) = hashes
     assert (first, second, third) == (GENESIS, one, two)
 
 
-def test_events_written_together_are_chained_in_their_order(db: None) -> None:
-    record()
+def test_events_written_together_are_sealed_in_their_order(db: None) -> None:
+    sealed()
     audit.record_many(("scored", "Evaluation", number, {"attempt": 1}) for number in range(500))
-    record()
-    assert list(AuditEvent.objects.order_by("pk").values_list("noun_id", flat=True)[1:501]) == [
-        str(number) for number in range(500)
-    ]
+    sealed()
+    in_order = AuditEvent.objects.order_by("seal_number").values_list("noun_id", flat=True)
+    assert list(in_order[1:501]) == [str(number) for number in range(500)]
     found = audit.verify()
-    assert (found.n_events, found.breaks) == (502, ())
+    assert (found.n_events, found.breaks, found.unsealed.n_events) == (502, (), 0)
 
 
-def test_a_deed_that_is_undone_leaves_no_gap(db: None) -> None:
+def test_an_event_that_is_committed_late_is_sealed_when_it_is_found(db: None) -> None:
+    """By then events with greater ids and later moments are sealed, and it follows them."""
+    sealed(3)
+    late = AuditEvent.objects.create(
+        pk=-1, at=timezone.now() - timedelta(hours=1), verb="tried", noun="Door", noun_id="late"
+    )
+    assert audit.seal() == 1
+    late.refresh_from_db()
+    assert late.seal_number == 4
+    assert (audit.verify().n_events, audit.verify().breaks) == (4, ())
+    assert audit.seal() == 0
+
+
+def test_verifying_says_what_is_not_sealed_yet(db: None) -> None:
+    tip = sealed(2).hash
     record()
-    with transaction.atomic():
-        record()
-        transaction.set_rollback(True)
-    record()
-    assert audit.verify().n_events == 2
-    assert audit.verify().breaks == ()
+    AuditEvent.objects.create(
+        at=timezone.now() - timedelta(seconds=50), verb="tried", noun="Door", noun_id="late"
+    )
+    said = verify_audit().splitlines()
+    assert said[0] == f"audit: 2 events, unbroken, last hash {tip}"
+    assert re.fullmatch(r"not sealed yet: 2, the oldest for 5[0-9] s", said[1])
+
+
+def test_every_sweep_seals(db: None) -> None:
+    record(3)
+    queue.sweep(rng=random.Random(0))
+    assert AuditEvent.objects.unsealed().n_events == 0
+    assert audit.verify().n_events == 3
 
 
 def test_an_empty_trail_holds(db: None) -> None:
@@ -84,9 +116,8 @@ def test_an_empty_trail_holds(db: None) -> None:
     ],
 )
 def test_details_come_back_as_they_were_hashed(db: None, details: dict[str, Any]) -> None:
-    record(details=details, noun_id="a\x00b")
-    record()
-    assert audit.verify().breaks == ()
+    sealed(details=details, noun_id="a\x00b")
+    assert (audit.verify().n_events, audit.verify().breaks) == (1, ())
 
 
 @pytest.mark.parametrize("value", [1.5, float("nan"), b"bytes", timezone.now(), {"in": [0.1]}])
@@ -129,18 +160,39 @@ def test_the_application_can_neither_change_nor_delete(db: None) -> None:
 
 @POSTGRESQL_ONLY
 @pytest.mark.parametrize(
-    "statement",
+    "change",
     [
         "UPDATE leaderboard_auditevent SET verb = 'never'",
-        "UPDATE leaderboard_auditevent SET verb = 'never' WHERE id < 0",
+        "UPDATE leaderboard_auditevent SET hash = NULL",
+        "UPDATE leaderboard_auditevent SET seal_number = seal_number + 10",
         "DELETE FROM leaderboard_auditevent",
     ],
 )
-def test_postgresql_refuses_to_change_and_to_delete(db: None, statement: str) -> None:
-    record(2)
+@pytest.mark.parametrize("is_sealed", [True, False])
+def test_postgresql_refuses_to_change_and_to_delete(db: None, change: str, is_sealed: bool) -> None:
+    (sealed if is_sealed else record)(2)
     with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
-        in_sql(statement)
-    assert audit.verify().n_events == 2
+        in_sql(change)
+    audit.seal()
+    assert (audit.verify().n_events, audit.verify().breaks) == (2, ())
+
+
+@POSTGRESQL_ONLY
+@pytest.mark.parametrize(
+    "seal",
+    [
+        "hash = 'a'",
+        "seal_number = 1, hash = 'a'",
+        "seal_number = 1, previous_hash = 'b', hash = 'a', noun_id = 'other'",
+        "seal_number = 1, previous_hash = 'b', hash = 'a', at = now()",
+        "seal_number = 1, previous_hash = 'b', hash = 'a', details = '{}'",
+    ],
+)
+def test_postgresql_allows_a_whole_seal_and_nothing_beside_it(db: None, seal: str) -> None:
+    record()
+    with pytest.raises(IntegrityError, match="append-only"), transaction.atomic():
+        in_sql(f"UPDATE leaderboard_auditevent SET {seal}")
+    in_sql("UPDATE leaderboard_auditevent SET seal_number = 1, previous_hash = 'b', hash = 'a'")
 
 
 @POSTGRESQL_ONLY
@@ -150,12 +202,12 @@ def test_postgresql_refuses_to_empty_the_trail(db: None) -> None:
         in_sql("TRUNCATE leaderboard_auditevent")
 
 
-def test_the_chain_cannot_fork(db: None) -> None:
-    event = record()
+@pytest.mark.parametrize("column", ["seal_number", "previous_hash", "hash"])
+def test_the_chain_cannot_fork(db: None, column: str) -> None:
+    event = sealed()
+    seal = {"seal_number": 9, "previous_hash": "e" * 64, "hash": "f" * 64, column: getattr(event, column)}
     with pytest.raises(IntegrityError), transaction.atomic():
-        AuditEvent.objects.create(
-            verb="v", noun="n", noun_id="1", previous_hash=event.previous_hash, hash="f" * 64
-        )
+        AuditEvent.objects.create(verb="v", noun="n", noun_id="1", **seal)
 
 
 # --- tampering is found ----------------------------------------------------------------------------------
@@ -174,7 +226,7 @@ def test_the_chain_cannot_fork(db: None) -> None:
     ],
 )
 def test_a_changed_event_is_named(owner: User, column: str, value: str | None) -> None:
-    record(3, actor=owner)
+    sealed(3, actor=owner)
     second = AuditEvent.objects.order_by("pk")[1]
     in_sql(f"UPDATE leaderboard_auditevent SET {column} = %s WHERE id = %s", value, second.pk)
     [found] = audit.verify().breaks
@@ -183,13 +235,13 @@ def test_a_changed_event_is_named(owner: User, column: str, value: str | None) -
 
 @SQLITE_ONLY
 def test_a_changed_event_with_a_fitting_hash_is_betrayed_by_the_next(db: None) -> None:
-    record(3)
+    sealed(3)
     second = AuditEvent.objects.order_by("pk")[1]
     second.verb = "other"
     in_sql(
         "UPDATE leaderboard_auditevent SET verb = %s, hash = %s WHERE id = %s",
         second.verb,
-        second.expected_hash(),
+        second.hash_after(second.previous_hash or ""),
         second.pk,
     )
     [found] = audit.verify().breaks
@@ -199,7 +251,7 @@ def test_a_changed_event_with_a_fitting_hash_is_betrayed_by_the_next(db: None) -
 @SQLITE_ONLY
 @pytest.mark.parametrize("index", [0, 1])
 def test_a_removed_event_is_missed(db: None, index: int) -> None:
-    record(3)
+    sealed(3)
     removed = AuditEvent.objects.order_by("pk")[index]
     in_sql("DELETE FROM leaderboard_auditevent WHERE id = %s", removed.pk)
     [found] = audit.verify().breaks
@@ -209,14 +261,24 @@ def test_a_removed_event_is_missed(db: None, index: int) -> None:
 
 @SQLITE_ONLY
 def test_two_events_that_changed_places_are_found(db: None) -> None:
-    last = record(3).pk
-    in_sql("UPDATE leaderboard_auditevent SET id = -1 WHERE id = %s", last)
-    assert [found.event_id for found in audit.verify().breaks] == [-1, last - 2]
+    last = sealed(3).pk
+    in_sql("UPDATE leaderboard_auditevent SET seal_number = 0 WHERE id = %s", last)
+    assert [found.event_id for found in audit.verify().breaks] == [last, last - 2]
+
+
+@SQLITE_ONLY
+def test_an_event_whose_seal_was_taken_off_is_missed_also_once_it_is_sealed_again(db: None) -> None:
+    second = sealed(3).pk - 1
+    unsealed = "verb = 'other', seal_number = NULL, previous_hash = NULL, hash = NULL"
+    in_sql(f"UPDATE leaderboard_auditevent SET {unsealed} WHERE id = %s", second)
+    audit.seal()
+    [found] = audit.verify().breaks
+    assert found.event_id == second + 1
 
 
 @SQLITE_ONLY
 def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) -> None:
-    noted = record(3).hash
+    noted = str(sealed(3).hash)
     assert verify_audit("--expect", noted).startswith("audit: 3 events, unbroken")
     in_sql("DELETE FROM leaderboard_auditevent WHERE hash = %s", noted)
     assert verify_audit().startswith("audit: 2 events, unbroken")
@@ -226,9 +288,9 @@ def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) 
 
 @SQLITE_ONLY
 def test_the_command_says_where_and_exits_with_1(db: None) -> None:
-    event = record(2)
+    event = sealed(2)
     in_sql("UPDATE leaderboard_auditevent SET verb = 'other' WHERE id = %s", event.pk)
-    with pytest.raises(CommandError, match=f"2 events does not hold:\n  event {event.pk}: says") as caught:
+    with pytest.raises(CommandError, match=f"2 events is damaged:\n  event {event.pk}: says") as caught:
         verify_audit()
     assert caught.value.returncode == 1
 

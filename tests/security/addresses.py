@@ -5,7 +5,7 @@ from itertools import product
 from typing import Any
 from urllib.parse import urlencode
 
-from leaderboard.standings import SORTABLE
+from leaderboard.boards.boards import SORTABLE
 from tests.security.people import ABSENT
 from tests.security.routes import Route, operations, routes
 from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, HIDDEN_TEAM, Scene
@@ -15,7 +15,7 @@ FORMS = ("csv", "json", "tex", "md", "bib", "nonsense")
 TIMES = ("2026-03-01", "2026-03-03", "2026-03-05T12:00:00Z", "2026-03-11", "2099-01-01", "nonsense", "")
 PAGES = ("1", "2", "0", "-1", "999999", "last", "x")
 TEXTS = ("secret", "Secret Agency", "Owls", "Anonymous", "Very Secret Net", "%", "'", "")
-# By the names of leaderboard.filters: what each takes, what is there, what is hidden, and what it refuses.
+# By the names of the filters: what each takes, what is there, what is hidden, and what it refuses.
 FILTERS: dict[str, tuple[str, ...]] = {
     "frames": ("2", "6", "7"),
     "cameras": ("one", "several", "x"),
@@ -89,7 +89,8 @@ def _filled(route: Route, scene: Scene) -> Iterator[str]:
         "format": FORMATS,
         "secret": ("nonsense",),
         "handle": (ABSENT,),
-        "form": ("csv", "tex", "md", "bib"),
+        "invitation_id": (ABSENT,),
+        "chosen": ("csv", "tex", "md", "bib"),
         "id": (1,),
         "object_id": ("1",),
         "content_type_id": ("1",),
@@ -97,7 +98,7 @@ def _filled(route: Route, scene: Scene) -> Iterator[str]:
         "url": ("nowhere",),
     }
     names = sorted(route.parameters)
-    for values in product(*(choices.get(name, (ABSENT, "1")) for name in names)):
+    for values in product(*(choices[name] for name in names)):
         yield route.filled(dict(zip(names, values, strict=True)))
 
 

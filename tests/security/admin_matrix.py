@@ -12,8 +12,7 @@ from tests.security.routes import Route
 
 # Models of which maintainers may add, change and delete rows by hand. All others come from verbs.
 BY_HAND = {
-    *("auth_group", "leaderboard_admission", "leaderboard_quotaoverride", "leaderboard_user"),
-    "account_emailaddress",
+    *("account_emailaddress", "auth_group", "leaderboard_admission", "leaderboard_user"),
 }
 # Of these they may change what the form shows, and no more.
 CHANGED_ONLY = {"leaderboard_split"}
@@ -55,7 +54,7 @@ def admin_line(route: Route) -> Line | None:
         "changelist": ("200", None),
         "add": (by_hand, by_hand),
         "change": ("200", "200" if model in CHANGED_ONLY else by_hand),
-        "delete": (by_hand, None),
+        "delete": (by_hand, by_hand),
         "history": ("200", None),
     }.get(view)
     if answers is None:

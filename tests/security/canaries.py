@@ -66,10 +66,7 @@ def forms(values: Iterable[float]) -> Iterator[Form]:
             yield Form(value, f"{order}-endian hex", data.hex().encode())
             yield Form(value, f"{order}-endian HEX", data.hex().upper().encode())
             for shift in range(3):
-                for alphabet, encode in (
-                    ("", base64.b64encode),
-                    (" for addresses", base64.urlsafe_b64encode),
-                ):
+                for alphabet, encode in ALPHABETS.items():
                     how = f"{order}-endian base64{alphabet}, place {shift}"
                     yield Form(value, how, _inner(data, shift, encode(bytes(shift) + data)))
 

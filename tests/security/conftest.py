@@ -3,9 +3,12 @@
 from pathlib import Path
 
 import pytest
+from pytest_django.fixtures import Settings
 
 from leaderboard.models import Edition, User
 from tests import builders
+from tests.security import people
+from tests.security.people import World
 
 
 @pytest.fixture
@@ -18,3 +21,10 @@ def owner(db: None) -> User:
 def edition(benchmark: None, tmp_path: Path) -> Edition:
     """The test split, open, with made-up ground truth."""
     return builders.import_truth(tmp_path)
+
+
+@pytest.fixture
+def world(edition: Edition, settings: Settings) -> World:
+    """The seven roles, around one private method."""
+    settings.ACCOUNT_RATE_LIMITS = False  # one address asks a thousand times
+    return people.populate(edition)

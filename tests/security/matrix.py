@@ -21,7 +21,7 @@ OPEN = "200 200 200 200 200 200 200"
 SIGNED_IN = "in  200 200 200 200 in  in"
 OWN = "in  404 200 200 200 in  in"  # maintainers may look at everybody's
 TEAM = "in  404 200 200 404 in  in"  # and act for nobody
-KEEPERS = "404 404 404 404 200 404 404"
+KEEPERS = "in  404 404 404 200 in  in"
 
 API_OPEN = "200 200 200 200 200 403 401"
 API_SIGNED_IN = "401 200 200 200 200 403 401"
@@ -64,14 +64,12 @@ LINES: dict[str, Line] = {
     "home": line(GET=OPEN),
     "board": line(GET=OPEN),
     "charts": line(GET=OPEN),
+    "progress_options": line(GET=OPEN),
     "editions": line(GET=OPEN),
     "edition": line(GET=OPEN),
     "compare": line(GET=OPEN),
-    "export": line(GET=OPEN, at={"form": "csv"}),
-    "edition_export": line(GET=OPEN, at={"form": "tex"}),
-    # To the API's document.
-    "json": line(GET=all_of("302")),
-    "edition_json": line(GET=all_of("302")),
+    "export": line(GET=OPEN, at={"chosen": "csv"}),
+    "edition_export": line(GET=OPEN, at={"chosen": "tex"}),
     "feed": line(GET=OPEN),
     "feed_of_all": line(GET=OPEN),
     # What stands in a README is what everybody sees, whoever looks: the owner's method is private.
@@ -82,6 +80,7 @@ LINES: dict[str, Line] = {
     "method": line(GET="404 404 200 200 200 404 404"),
     # --- one's own ---
     "submit": line(GET=SIGNED_IN, POST="in 422 422 422 422 in in"),
+    "template": line(GET=OPEN),
     "submissions": line(GET=SIGNED_IN),
     "submission": line(GET=OWN),
     # 286: it is scored and has its intervals, do not ask again.
@@ -93,13 +92,15 @@ LINES: dict[str, Line] = {
     "receipt_keys": line(GET=OPEN),
     # Sent without a field, an edit changes nothing; showing a method needs to be said.
     "method_edit": line(GET=TEAM, POST="in 404 302 302 404 in in"),
+    # It has a score.
+    "method_delete": line(GET=TEAM, POST="in 404 422 422 404 in in"),
     "method_visibility": line(GET=TEAM, POST="in 404 422 422 404 in in"),
     # --- one's own team; the maintainer is in none ---
     "team": line(GET=SIGNED_IN, POST="in 422 422 422 422 in in"),
-    "invite": line(POST="in 200 422 200 404 in in"),
+    "invite": line(POST="in 302 422 302 404 in in"),
     "revoke_invitation": line(POST="in 404 422 302 404 in in"),
     # Whoever has the link may look; who is in the team already does not join it.
-    "join_team": line(GET=SIGNED_IN, POST="in 302 422 422 302 in in"),
+    "join_team": line(GET=OPEN, POST="in 302 422 422 302 in in"),
     # An owner who is not alone hands over first.
     "leave_team": line(POST="in 302 302 422 404 in in"),
     "hand_over_team": line(POST="in 404 422 302 404 in in"),
@@ -115,19 +116,19 @@ LINES: dict[str, Line] = {
     "maintain_queue": line(GET=KEEPERS),
     "maintain_queue_state": line(GET=KEEPERS),
     # Without anything chosen there is nothing to retry, without rules none to set.
-    "maintain_retry": line(POST="404 404 404 404 422 404 404"),
+    "maintain_retry": line(POST="in 404 404 404 422 in in"),
     "maintain_quotas": line(GET=KEEPERS),
     "maintain_team_quotas": line(GET=KEEPERS),
-    "maintain_quota": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
-    "maintain_quota_end": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
-    "maintain_open": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
+    "maintain_quota": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_quota_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_open": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_edition": line(GET=KEEPERS),
-    "maintain_progress": line(GET="404 404 404 404 286 404 404"),
+    "maintain_progress": line(GET="in 404 404 404 286 in in"),
     "maintain_preview_csv": line(GET=KEEPERS),
     "maintain_preview_json": line(GET=KEEPERS),
-    "maintain_publish": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
-    "maintain_roll_back": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
-    "maintain_discard": line(GET=KEEPERS, POST="404 404 404 404 422 404 404"),
+    "maintain_publish": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_roll_back": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_discard": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     # --- the API ---
     "api-submissions": line(GET=API_SIGNED_IN, POST="401 422 422 422 422 403 401"),
     "api-submission": line(GET=API_OWN),

@@ -14,8 +14,9 @@ from django.test import Client
 from django.utils import timezone
 from knox.settings import CONSTANTS
 
-from leaderboard import admissions, invitations, quotas, teams
 from leaderboard.models import ApiToken, Edition, Invitation, Membership, Method, Submission, User, Visibility
+from leaderboard.people import invitations, teams
+from leaderboard.quotas import admissions
 from tests import builders
 from tests.security.matrix import ROLES
 
@@ -119,17 +120,20 @@ def _fill_the_administration(maintainer: User, submission: Submission) -> None:
     EmailAddress.objects.create(user=maintainer, email=maintainer.email, primary=True, verified=True)
     team, split, now = submission.method.team, submission.split, timezone.now()
     admissions.admit(team=team, split=split, reason="a test", actor=maintainer, now=now)
-    quotas.override(
-        team=team,
-        split=split,
-        limit=50,
-        window=timedelta(days=1),
-        min_gap=timedelta(0),
-        rejected_limit=None,
-        reason="a test",
-        actor=maintainer,
-        now=now,
-    )
+    builders.override(team, limit=50, actor=maintainer)
+
+
+def browser_of(user: User) -> Client:
+    """Their browser, which is shown failures as everybody's is."""
+    client = Client(raise_request_exception=False)
+    client.force_login(user)
+    return client
+
+
+def program_of(user: User) -> Client:
+    """A program of theirs, with a token that may do everything."""
+    authorization = {"Authorization": f"Bearer {builders.token(user)}"}
+    return Client(raise_request_exception=False, headers=authorization)
 
 
 def ask(

@@ -24,8 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator import Difference, published
-from evaluator.differences import rounded_difference, sign_flips
-from evaluator.uncertainty import Bootstrap
+from evaluator.scoring.differences import rounded_difference, sign_flips
+from evaluator.scoring.uncertainty import Bootstrap
 
 Floats = NDArray[np.float64]
 Masks = NDArray[np.int64]
@@ -122,8 +122,8 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
 
     The mean and its interval, and difference, interval and class of p beside another team's public method.
     """
-    from leaderboard import disclosure  # noqa: PLC0415 - needs Django's settings
     from leaderboard.models import Edition, Split  # noqa: PLC0415 - as above
+    from leaderboard.scoring import disclosure  # noqa: PLC0415 - needs Django's settings
 
     edition = Edition(split=Split(is_hidden=True), decimals=1)
     counts = world.counts[:, [column]]

@@ -16,14 +16,21 @@ from kombu import Connection
 from pytest_django.fixtures import Settings
 
 import evaluator
-from leaderboard import benchmark, ground_truth, logs, queue, rescoring, scoring
-from leaderboard import broker as broker_verbs
+from leaderboard.benchmark import splits
+from leaderboard.editions import corrections, ground_truth
 from leaderboard.models import Edition, Evaluation, Split, Status, User
+from leaderboard.ops import broker as broker_verbs
+from leaderboard.ops import logs
+from leaderboard.scoring import worker
+from leaderboard.storage import truth_values
+from leaderboard.workers import queue
 from tests import builders
 from tests.security import canaries
 from tests.security.canaries import Search
 from tests.security.crawler import crawl
 from tests.security.routes import routes
+
+pytestmark = pytest.mark.slow
 
 RNG = random.Random(0)
 
@@ -44,15 +51,11 @@ def log() -> Iterator[io.StringIO]:
 
 
 @pytest.fixture
-def broker(tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> Path:
+def broker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A broker made of files, whose messages nobody takes."""
     folder = tmp_path / "broker"
     folder.mkdir()
-    options = {
-        **settings.CELERY_BROKER_TRANSPORT_OPTIONS,
-        **dict.fromkeys(("data_folder_in", "data_folder_out"), str(folder)),
-    }
-    # Not by a setting: Celery reads those once in a process, and another test may have been first.
+    options = dict.fromkeys(("data_folder_in", "data_folder_out", "control_folder"), str(folder))
     pool = Connection("filesystem://", transport_options=options).Pool(4)
     monkeypatch.setattr(broker_verbs, "_connections", lambda: pool)
     return folder
@@ -104,7 +107,7 @@ def test_no_value_leaves_the_private_directory(
     """Submit, score, reject, fail, re-score, preview, publish, infer: pages, API, administration, worker."""
     settings.BACKOFF_S = 0.0
     settings.ACCOUNT_RATE_LIMITS = False
-    benchmark.ensure_splits()
+    splits.ensure_splits()
     values = canaries.plant(tmp_path / "truth.csv")
     table = tmp_path / "truth.csv"
     edition = ground_truth.import_truth(split_name="test", path=table, now=timezone.now())
@@ -117,7 +120,7 @@ def test_no_value_leaves_the_private_directory(
     _live(edition, people[0])
     second = _correct(edition, settings.GROUND_TRUTH_DIR, people[1])
     seen = _look(people)
-    rescoring.publish(edition=second, reason="Labels.", now=timezone.now(), actor=people[1], replaces=1)
+    corrections.publish(edition=second, reason="Labels.", now=timezone.now(), actor=people[1], replaces=1)
     builders.infer_all()
     queue.sweep(rng=RNG)
     seen |= {f"after {where}": body for where, body in _look(people).items()}
@@ -151,20 +154,20 @@ def _live(edition: Edition, owner: User) -> None:
             assert client.post(path, form).status_code in {200, 201, 302}
     builders.score_all()
     # Ours: the values cannot be read, every time.
-    values = ground_truth.values_path(edition.ground_truth_id)
+    values = truth_values.values_path(edition.ground_truth_id)
     kept = values.read_bytes()
     for damage in (kept[:-200], kept[:300], b"no archive"):
         values.write_bytes(damage)
-        ground_truth.load.cache_clear()
+        truth_values.load.cache_clear()
         # Other bytes each time, which the same bytes again would not be a submission for.
         file = io.BytesIO(good[2] + b" " * (len(damage) % 97))
         form = {"split": "test", "method": "Given up", "file": file}
         assert program.post("/api/v1/submissions", form).status_code in {200, 201}
         for _ in range(40):
-            if not scoring.run_next(rng=RNG):
+            if not worker.run_next(rng=RNG):
                 break
     values.write_bytes(kept)
-    ground_truth.load.cache_clear()
+    truth_values.load.cache_clear()
     assert Evaluation.objects.filter(status=Status.SYSTEM_ERROR).exists()
     builders.infer_all()
 
@@ -177,7 +180,7 @@ def _correct(edition: Edition, private: Path, keeper: User) -> Edition:
     of_zero = [*table[:-1], table[-1].rpartition(",")[0] + ",0.0"]
 
     def open_edition(path: Path) -> Edition:
-        return rescoring.open_edition(
+        return corrections.open_edition(
             split_name="test", path=path, protocol=None, now=timezone.now(), actor=keeper
         )
 

@@ -1,4 +1,4 @@
-"""The same with real processes: web, worker and beat, PostgreSQL, and a Redis whose traffic is kept."""
+"""The same with real processes: web and worker, PostgreSQL, and a Redis whose traffic is kept."""
 
 import codecs
 import socket
@@ -134,7 +134,7 @@ def test_no_value_leaves_the_workers(tmp_path: Path, postgres_url: str, redis_ur
     }
     assert b"leaderboard_score" in dump
     assert b"leaderboard.tasks.nudge" in haystacks["what was said to Redis"]
-    assert {"web.log", "worker.log", "beat.log"} <= set(haystacks)
+    assert {"web.log", "worker.log"} <= set(haystacks)
     assert len(answers) > 150
     assert Search(values).in_all(haystacks) == []
     private = canaries.files_below(directory / "ground-truth", but=directory / "nowhere")

@@ -16,6 +16,9 @@ from leaderboard.models import Edition, Evaluation, Split, Status, Submission, U
 from tests import builders, pages
 from tests.evaluator.worlds import make_truth
 from tests.security.hostile_files import LARGE_BYTES, corpus
+from tests.security.people import browser_of, program_of
+
+pytestmark = pytest.mark.slow
 
 if TYPE_CHECKING:  # it lives in the stubs alone
     from django.test.client import _MonkeyPatchedWSGIResponse
@@ -46,17 +49,6 @@ def test_there_are_as_many_as_promised() -> None:
     assert len(CORPUS) >= 120
 
 
-def browser_of(user: User) -> Client:
-    client = Client(raise_request_exception=False)
-    client.force_login(user)
-    return client
-
-
-def program_of(user: User) -> Client:
-    authorization = {"Authorization": f"Bearer {builders.token(user)}"}
-    return Client(raise_request_exception=False, headers=authorization)
-
-
 def sent(client: Client, path: str, name: str, data: bytes) -> "_MonkeyPatchedWSGIResponse":
     file = SimpleUploadedFile("predictions.json", data, content_type="application/json")
     return client.post(path, {"split": "test", "method": f"M {zlib.crc32(name.encode())}", "file": file})
@@ -76,6 +68,9 @@ def test_every_file_is_taken_or_refused_in_words(edition: Edition, owner: User, 
         if len(data) >= LARGE_BYTES:
             assert (by_program.status_code, by_page.status_code) == (413, 413), name
             assert re.search(r"The file has [\d,]+ bytes; expected at most", answer["detail"]), name
+        elif not data:
+            # A slip of the hand, which the page tells at once.
+            assert (by_program.status_code, by_page.status_code) == (201, 422), name
         else:
             assert (by_program.status_code, by_page.status_code) == (201, 302), (name, answer)
             assert by_page.headers["Location"] == f"/submissions/{answer['id']}/", name

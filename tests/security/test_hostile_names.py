@@ -14,13 +14,16 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django.fixtures import Settings
 
-from evaluator.escaping import guarded
-from leaderboard import lifecycle
-from leaderboard.lifecycle import Outcome
+from evaluator.tables.escaping import guarded
 from leaderboard.models import Edition, Method, Split, Status, User, Visibility
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import Outcome
 from tests import builders, pages
-from tests.leaderboard.test_pages_everywhere import assert_nothing_from_elsewhere, assert_nothing_inline
+from tests.leaderboard.web.test_every_page import assert_nothing_from_elsewhere, assert_nothing_inline
 from tests.security.hostile_names import NAMES
+from tests.security.people import browser_of, program_of
+
+pytestmark = pytest.mark.slow
 
 WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
 # At every form and address; as names of methods all of them are sent.
@@ -39,15 +42,6 @@ class Named:
     owner: User
     names: list[str]
     refused: list[str]
-
-
-def clients(owner: User) -> tuple[Client, Client]:
-    program = Client(
-        raise_request_exception=False, headers={"Authorization": f"Bearer {builders.token(owner)}"}
-    )
-    browser = Client(raise_request_exception=False)
-    browser.force_login(owner)
-    return program, browser
 
 
 def raw(name: str) -> bytes:
@@ -69,7 +63,7 @@ def named(edition: Edition, owner: User, settings: Settings) -> Named:
     """Every name sent as a method's, with the same as its description, note, commit and file name."""
     settings.QUOTAS = False
     Split.objects.update(quota_limit=None, quota_rejected_limit=None)
-    program, browser = clients(owner)
+    program, browser = program_of(owner), browser_of(owner)
     data = builders.predictions(edition)
     refused = []
     for n, name in enumerate(NAMES):
@@ -177,9 +171,7 @@ def _in_latex(visitor: Client) -> None:
     for line in rows:
         bare = re.sub(r"\\[\\{}%$&#_^~]", "", line.replace("\\textbackslash", ""))
         assert bare.count("{") == bare.count("}"), line
-        assert not re.search(r"\\(?:input|write|immediate|openout|end|begin|include|def|catcode)\b", line), (
-            line
-        )
+        assert not RUN_BY_LATEX.search(line), line
         assert not re.search(r"(?<!\\)[%#]|\^\^", bare), line
 
 

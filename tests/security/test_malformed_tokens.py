@@ -46,6 +46,8 @@ def test_no_address_asks_the_database_for_what_is_no_token(
                 client = Client(raise_request_exception=False)
                 response = client.generic(method, route.filled(values), headers={"Authorization": header})
             assert response.status_code == 401, (route.name, method)
+            assert response.headers["WWW-Authenticate"] == "Bearer"
             assert response.headers["Content-Type"] == "application/problem+json"
+            assert response.json()["detail"]
             n_asked += 1
     assert n_asked > 10

@@ -7,17 +7,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlencode
 
+import pytest
 from django.db import transaction
 from django.http import HttpResponse, StreamingHttpResponse
 from django.test import Client
 
-from leaderboard import filters
+from leaderboard.boards import filters
 from leaderboard.models import Method, Snapshot, Submission
-from leaderboard.web import kept
-from leaderboard.web.board_query import BoardQuery
+from leaderboard.web.boards.board_query import BoardQuery
+from leaderboard.web.middleware import page_cache
 from tests.security.addresses import FILTERS, QUERIES, TOGETHER, addresses
 from tests.security.people import ADDRESS
 from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, START, build
+
+pytestmark = pytest.mark.slow
 
 WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
 ADDRESSES_IN_THE_SUITE = 640
@@ -135,7 +138,7 @@ def test_nobody_sees_what_is_hidden_at_any_address(db: None, tmp_path: Path) -> 
 
 
 def test_boards_are_asked_whatever_their_pages_ask(db: None, tmp_path: Path) -> None:
-    assert set(FILTERS) == set(filters.NAMES)
+    assert set(FILTERS) == set(filters.FILTERS)
     asked = {name for name in QUERIES if name not in {"format", "team", "intervals", "mine", "as"}}
     assert BoardQuery(given=dict.fromkeys(asked, "x")).href(page="x").count("=") == len(asked)
     for name, values in FILTERS.items():
@@ -164,7 +167,7 @@ def test_what_is_hidden_is_there_and_would_be_noticed(db: None, tmp_path: Path) 
     paths = ["/", f"/methods/{HIDDEN_METHODS[0]}/", "/board/test/?sort=team"]
 
     def look() -> list[Seen]:
-        kept.memory.clear()
+        page_cache.memory.clear()
         return [seen(Client(REMOTE_ADDR=ADDRESS).get(path)) for path in paths]
 
     before = look()

@@ -2,20 +2,18 @@
 
 import json
 import re
-from pathlib import Path
 from typing import Any
 
 import pytest
 from django.db import transaction
 from django.http import HttpResponse, HttpResponseBase, StreamingHttpResponse
-from pytest_django.fixtures import Settings
 
-from tests import builders
-from tests.security import people
 from tests.security.admin_matrix import admin_line
 from tests.security.matrix import LINES, ROLES, Line
 from tests.security.people import ABSENT, World, ask
 from tests.security.routes import Route, operations, routes
+
+pytestmark = pytest.mark.slow
 
 METHODS = ("GET", "POST", "PUT", "PATCH", "DELETE")
 # What a method that a line does not name may be answered; anything else would do something.
@@ -24,12 +22,6 @@ REFUSALS = {"401", "403", "404", "405", "in"}
 EMPTY_FORM = {"200", "302"}
 SIGN_IN = re.compile(r"^/(?:accounts|admin)/login/\?next=")
 RANDOM = re.compile(rb'name="csrfmiddlewaretoken" value="[^"]+"')
-
-
-@pytest.fixture
-def world(benchmark: None, tmp_path: Path, settings: Settings) -> World:
-    settings.ACCOUNT_RATE_LIMITS = False  # one address asks a thousand times
-    return people.populate(builders.import_truth(tmp_path))
 
 
 def line_of(route: Route) -> Line | None:

@@ -8,8 +8,9 @@ from django.db import transaction
 from django.test import Client
 
 import evaluator
-from leaderboard import boards, ground_truth
+from leaderboard import versions
 from leaderboard.models import Edition, Method, Split, User, Visibility
+from leaderboard.storage import truth_values
 from tests import builders
 
 ADDRESS = "/api/v1/compare"
@@ -17,7 +18,7 @@ ADDRESS = "/api/v1/compare"
 
 def network(edition: Edition, *, own: int, run: int, size: float) -> bytes:
     """The predictions of a network that finds some recordings hard, whichever way it is trained."""
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     of, n = truth.manifest.recording_index, truth.manifest.n_recordings
     hard = np.random.default_rng(own).lognormal(0, 0.8, n) * np.random.default_rng(run).lognormal(0, 0.1, n)
     return evaluator.write_predictions(
@@ -64,7 +65,7 @@ def test_an_anonymous_successor_is_not_told_from_its_predecessor(
 
     Method.objects.filter(pk=later).update(visibility=Visibility.PUBLIC)
     with transaction.atomic():
-        boards.changed("test")
+        versions.changed("test")
     strangers, relatives = correlation(client, other, later), correlation(client, former, later)
     assert strangers is not None
     assert relatives is not None

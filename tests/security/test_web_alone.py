@@ -29,8 +29,8 @@ from django.utils import timezone
 for command in (["migrate"], ["collectstatic"], ["import_truth", "test", {truth!r}]):
     options = {{}} if command[0] == "import_truth" else {{"interactive": False, "verbosity": 0}}
     call_command(*command, stdout=sys.stderr, **options)
-from leaderboard import teams, tokens
 from leaderboard.models import User
+from leaderboard.people import teams, tokens
 user = User.objects.create_user("owner@example.org", "correct horse", name="Owls")
 teams.team_of(user=user)
 print(json.dumps(tokens.create(user=user, name="CI", now=timezone.now())))

@@ -11,15 +11,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from typing import Any
 from uuid import UUID
 
 from django.conf import settings
-from django.core.files.base import ContentFile
 from django.utils import timezone
 
-from leaderboard import benchmark, ground_truth, seeds, submissions, teams, tokens, visibility
+from leaderboard.benchmark import splits
+from leaderboard.editions import ground_truth
+from leaderboard.methods import visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -31,7 +33,10 @@ from leaderboard.models import (
     Team,
     User,
 )
-from leaderboard.web import kept
+from leaderboard.people import teams, tokens
+from leaderboard.storage import seeds, truth_values
+from leaderboard.submissions import submissions
+from leaderboard.web.middleware import page_cache
 from tests import builders
 
 START = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
@@ -40,6 +45,7 @@ WITH_IDS = (Team, Method, Submission, Evaluation)
 HIDDEN_METHODS = tuple(UUID(int=0xA000_0000_0000_4000_8000_0000_0000_0000 + n) for n in range(8))
 HIDDEN_SUBMISSIONS = tuple(UUID(int=0xB000_0000_0000_4000_8000_0000_0000_0000 + n) for n in range(8))
 HIDDEN_TEAM = UUID(int=0xC000_0000_0000_4000_8000_0000_0000_0000)
+submit = partial(builders.submit, visibility="PRIVATE")
 PUBLIC = (
     # team, method, factor, visibility
     ("Owls", "Foo++", 1.05, "PUBLIC"),
@@ -100,8 +106,8 @@ def build(directory: Path, *, has_secrets: bool) -> Scene:
     settings.GROUND_TRUTH_DIR.mkdir()
     seeds.path().write_text("0" * 2 * seeds.N_BYTES)
     settings.FILES_DIR = directory / "files"
-    ground_truth.load.cache_clear()
-    benchmark.ensure_splits()
+    truth_values.load.cache_clear()
+    splits.ensure_splits()
     Split.objects.update(quota_limit=None, quota_min_gap=timedelta(0), quota_rejected_limit=None)
     path = builders.truth_csv(directory / "truth.csv")
     edition = ground_truth.import_truth(split_name="test", path=path, now=START)
@@ -159,19 +165,6 @@ def _enter(
             hardware=f"{user.name}'s GPU",
             paper_url=f"https://{user.pk}.example.org/",
         )
-
-
-def submit(user: User, data: bytes, *, method: str, now: datetime) -> Submission:
-    """A submission through the verb at a time of its own."""
-    return submissions.submit(
-        user=user,
-        split_name="test",
-        method_name=method,
-        upload=ContentFile(data, name="predictions.json"),
-        via=Submission.Via.WEB,
-        now=now,
-        filename="predictions.json",
-    ).submission
 
 
 class Secrets:
@@ -250,9 +243,9 @@ def _renamed(made: Submission, pk: uuid.UUID) -> Submission:
 def _change_the_values(edition: Edition, directory: Path) -> None:
     """Other hidden values than those that were scored against: what reads them now would show it."""
     other = builders.truth_csv(directory / "other.csv", seed=1)
-    values = ground_truth.values_path(edition.ground_truth_id)
+    values = truth_values.values_path(edition.ground_truth_id)
     values.write_bytes(other.read_bytes())
-    ground_truth.load.cache_clear()
+    truth_values.load.cache_clear()
 
 
 def _settle(scene: Scene, edition: Edition) -> None:
@@ -266,4 +259,4 @@ def _settle(scene: Scene, edition: Edition) -> None:
     User.objects.filter(membership__team__in=scene.teams).update(date_joined=START)
     Edition.objects.update(inferred_at=START + timedelta(days=12))
     Snapshot.objects.all().delete()
-    kept.memory.clear()
+    page_cache.memory.clear()

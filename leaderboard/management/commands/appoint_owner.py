@@ -4,20 +4,20 @@ import re
 from argparse import ArgumentParser
 from typing import Any, Final
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.db.models import Q
 
-from leaderboard import teams
+from leaderboard.management.refusing import RefusingCommand
 from leaderboard.models import Team, User
-from leaderboard.texts import Refused
+from leaderboard.people import teams
 
 UUID_TEXT: Final = re.compile(r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}")
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Makes a member the owner of their team."""
 
-    help = "Make a member the owner of their team, where its owner's account is closed or out of reach."
+    help = "Make a member the owner of a team whose owner has no usable account."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """TEAM, EMAIL, reason."""
@@ -35,10 +35,7 @@ class Command(BaseCommand):
         heir = User.objects.filter(email=email).first()
         if heir is None:
             raise CommandError(f"There is no account for {options['email']!r}.")
-        try:
-            teams.appoint(team=team, to=heir, reason=reason)
-        except Refused as refusal:
-            raise CommandError(str(refusal)) from refusal
+        teams.appoint(team=team, to=heir, reason=reason)
         self.stdout.write(f"{email} owns the team {team.name}.")
 
 

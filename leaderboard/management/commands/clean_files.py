@@ -6,18 +6,19 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
-from leaderboard import cleaning, idempotency
+from leaderboard.storage import orphans
+from leaderboard.submissions import idempotency
 
 
 class Command(BaseCommand):
     """Lists or removes files that no submission names; with them go old idempotency keys."""
 
-    help = "List stored files that no submission has named for a day; with --remove, remove them."
+    help = "List stored files without a submission that are older than a day; --remove deletes them."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Whether to remove."""
         parser.add_argument(
-            "--remove", action="store_true", help="remove what is listed, each with an audit row"
+            "--remove", action="store_true", help="delete the listed files, each with an audit event"
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -26,11 +27,11 @@ class Command(BaseCommand):
             self._files(remove=options["remove"])
         except OSError as fault:
             raise CommandError(f"The file store does not answer: {fault.strerror or fault}") from fault
-        for path in cleaning.leftovers():
+        for path in orphans.leftovers():
             self.stdout.write(f"half-written: {path.name}")
             if options["remove"]:
                 path.unlink(missing_ok=True)
-        n_keys = idempotency.forget(now=timezone.now()) if options["remove"] else 0
+        n_keys = idempotency.purge(now=timezone.now()) if options["remove"] else 0
         if n_keys:
             keys = "1 idempotency key" if n_keys == 1 else f"{n_keys} idempotency keys"
             self.stdout.write(f"{keys} of more than {idempotency.KEPT.days} days ago removed.")
@@ -38,13 +39,13 @@ class Command(BaseCommand):
     def _files(self, *, remove: bool) -> None:
         now = timezone.now()
         n_found = n_removed = n_bytes = 0
-        for orphan in cleaning.orphans(now=now):
+        for orphan in orphans.orphans(now=now):
             self.stdout.write(
                 f"{orphan.name}  {orphan.size_bytes:,} bytes, written {orphan.modified_at:%Y-%m-%d %H:%M} UTC"
             )
             n_found += 1
             n_bytes += orphan.size_bytes
-            n_removed += remove and cleaning.remove(orphan, now=now)
+            n_removed += remove and orphans.remove(orphan, now=now)
         found = f"{n_found} file{'s' if n_found != 1 else ''} without a submission, {n_bytes:,} bytes"
         done = f"removed {n_removed}" if remove else "nothing was removed (--remove does)"
         self.stdout.write(f"{found}; {done}.")

@@ -4,36 +4,37 @@ from argparse import ArgumentParser
 from typing import Any
 
 from django.core.exceptions import ValidationError
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.core.validators import validate_email
 from django.db import transaction
 from django.utils import timezone
 
-from leaderboard import tokens
+from leaderboard.management.refusing import RefusingCommand
 from leaderboard.models import Scope, User
+from leaderboard.people import tokens
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Makes an API token."""
 
-    help = "Make an API token and print it, once. An address without an account gets one without a password."
+    help = "Create an API token and print it once. An address without an account gets one without a password."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """EMAIL, the token's name, and its limits."""
         parser.add_argument("email")
-        parser.add_argument("--name", required=True, help="what the token is for, such as 'nightly CI'")
+        parser.add_argument("--name", required=True, help="name of the token, such as 'nightly CI'")
         parser.add_argument(
             "--scope",
             action="append",
             choices=Scope.values,
-            help="what it may be used for; may be given twice (default: both)",
+            help="scope of the token; may be given twice (default: both)",
         )
-        parser.add_argument("--split", default="", help="the only split that it is good for (default: all)")
+        parser.add_argument("--split", default="", help="restrict the token to this split (default: all)")
         parser.add_argument(
             "--days",
             type=int,
             default=tokens.DAYS,
-            help=f"when it ends, at most {tokens.MAX_DAYS} (%(default)s)",
+            help=f"when it expires, at most {tokens.MAX_DAYS} (%(default)s)",
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -43,20 +44,17 @@ class Command(BaseCommand):
             validate_email(email)
         except ValidationError as fault:
             raise CommandError(f"{email!r} is no e-mail address.") from fault
-        try:
-            with transaction.atomic():
-                secret = tokens.create(
-                    user=self._account(email),
-                    name=options["name"],
-                    scopes=options["scope"] or tokens.ALL_SCOPES,
-                    split_name=options["split"],
-                    days=options["days"],
-                    now=timezone.now(),
-                )
-        except tokens.Refused as refusal:
-            raise CommandError(str(refusal)) from refusal
+        with transaction.atomic():
+            secret = tokens.create(
+                user=self._account(email),
+                name=options["name"],
+                scopes=options["scope"] or tokens.ALL_SCOPES,
+                split_name=options["split"],
+                days=options["days"],
+                now=timezone.now(),
+            )
         self.stdout.write(secret)
-        self.stderr.write(f"This is the only time the token is shown. It ends after {options['days']} days.")
+        self.stderr.write(f"The token is shown only once. It expires after {options['days']} days.")
 
     def _account(self, email: str) -> User:
         user = User.objects.filter(email=email).first()

@@ -1,5 +1,6 @@
-"""`manage.py demo`: everything in one terminal, on SQLite and a broker made of files."""
+"""`manage.py demo`: everything in one terminal, on SQLite and without a broker."""
 
+import asyncio
 import io
 import logging
 import os
@@ -37,7 +38,7 @@ class Command(BaseCommand):
         if not port_is_free(host, port):
             raise CommandError(
                 f"Port {port} on {host} is in use. "
-                "End what listens there, or choose another: make demo PORT=8010"
+                "Stop the program there, or choose another port: make demo PORT=8010"
             )
         # Database, logs and mails in them, of this run and of former ones, are for their owner alone.
         os.umask(0o077)
@@ -57,12 +58,8 @@ class Command(BaseCommand):
             f"Logs and mail are in {settings.DATA_DIR / 'logs'}\n"
         )
         try:
-            supervise(
-                _processes(host, port, address=address),
-                host=host,
-                port=port,
-                ready=lambda: self._say(banner),
-            )
+            processes = _processes(host, port, address=address)
+            asyncio.run(supervise(processes, host=host, port=port, ready=lambda: self._say(banner)))
         except StartFailed as fault:
             raise CommandError(str(fault)) from fault
 
@@ -102,7 +99,7 @@ def _processes(host: str, port: int, *, address: str) -> list[Process]:
         "leaderboard.wsgi:application",
     ]
     worker = [
-        *(sys.executable, "-m", "celery", "-A", "leaderboard", "worker", "-P", "solo", "-B"),
+        *(sys.executable, "-m", "celery", "-A", "leaderboard", "worker", "-P", "solo"),
         *("--without-gossip", "--without-mingle", "--without-heartbeat", "--loglevel=info"),
     ]
     return [

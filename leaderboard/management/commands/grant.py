@@ -1,7 +1,8 @@
 """`manage.py grant`: let the application's own role work on PostgreSQL, after each `migrate`.
 
-The role owns nothing. It reads and writes every table but two: of the audit trail it reads and adds rows, of
-the applied migrations it reads. So a fault in a web process or a worker cannot take the trail's triggers off.
+The role owns nothing. It reads and writes every table but two: of the audit trail it reads, adds and seals
+rows, of the applied migrations it reads. So a fault in a web process or a worker cannot take the trail's
+triggers off.
 """
 
 from typing import Any, Final
@@ -11,7 +12,10 @@ from django.core.management.base import BaseCommand, CommandError
 from django.db import connection, transaction
 from psycopg import sql
 
-ONLY: Final = {"leaderboard_auditevent": "SELECT, INSERT", "django_migrations": "SELECT"}
+ONLY: Final = {
+    "leaderboard_auditevent": "SELECT, INSERT, UPDATE (seal_number, previous_hash, hash)",
+    "django_migrations": "SELECT",
+}
 _ROLE: Final = "SELECT 1 FROM pg_roles WHERE rolname = %s"
 _MAY: Final = "SELECT, INSERT, UPDATE, DELETE"
 

@@ -5,21 +5,21 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.utils import timezone
 
-from leaderboard import benchmark
-from leaderboard.texts import Refused
+from leaderboard.benchmark import splits
+from leaderboard.management.refusing import RefusingCommand
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Puts the rows of a paper on the boards."""
 
-    help = "Add the rows of a paper to the boards, from now on. Boards of the past do not change."
+    help = "Add the rows of a paper to the boards. Boards as of earlier dates do not change."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """FILE, replace."""
-        parser.add_argument("file", help="a document such as those in leaderboard/published/")
+        parser.add_argument("file", help="a document such as those in leaderboard/benchmark/published/")
         parser.add_argument("--replace", action="store_true", help="replace rows that have other content")
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -31,12 +31,7 @@ class Command(BaseCommand):
             raise CommandError(f"{path} cannot be read: {error.strerror}.") from error
         except ValueError as error:
             raise CommandError(f"{path} is no JSON: {error}.") from error
-        try:
-            done = benchmark.import_published(
-                document=document, now=timezone.now(), is_replacing=options["replace"]
-            )
-        except Refused as refusal:
-            raise CommandError(str(refusal)) from refusal
+        done = splits.import_published(document=document, now=timezone.now(), is_replacing=options["replace"])
         for outcome, names in vars(done).items():
             for name in names:
                 self.stdout.write(f"{outcome}: {name}")

@@ -4,14 +4,13 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
-from evaluator import Rejected
-from leaderboard import ground_truth
+from leaderboard.editions import ground_truth
+from leaderboard.management.refusing import RefusingCommand
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Opens a split with its ground truth."""
 
     help = "Validate a ground truth (CSV, or the toolkit's annotation folder), keep it, and open an edition."
@@ -24,19 +23,12 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Import, and say what came of it."""
-        try:
-            edition = ground_truth.import_truth(
-                split_name=options["split"],
-                path=options["path"],
-                protocol=options["protocol"],
-                now=timezone.now(),
-            )
-        except Rejected as rejected:
-            raise CommandError(
-                f"{options['path']} was refused; nothing was changed.\n{rejected}"
-            ) from rejected
-        except ground_truth.Refused as refused:
-            raise CommandError(str(refused)) from refused
+        edition = ground_truth.import_truth(
+            split_name=options["split"],
+            path=options["path"],
+            protocol=options["protocol"],
+            now=timezone.now(),
+        )
         truth = edition.ground_truth
         self.stdout.write(
             f"{edition}: {truth.n_sequences:,} sequences in {truth.n_recordings:,} recordings, "

@@ -4,7 +4,7 @@ from typing import Any
 
 from django.core.management.base import BaseCommand
 
-from leaderboard import seeds
+from leaderboard.storage import seeds
 
 
 class Command(BaseCommand):

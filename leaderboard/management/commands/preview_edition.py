@@ -4,14 +4,13 @@ import json
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
-
-from leaderboard import exports, preview, rescoring
+from evaluator.tables.formats import csv_lines
+from leaderboard.editions import preview
 from leaderboard.management.commands.open_edition import counts, line
-from leaderboard.models import Edition
+from leaderboard.management.refusing import RefusingCommand, edition_of
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Shows what an edition would change."""
 
     help = "Show what publishing an edition would change, as a table, CSV or JSON."
@@ -24,20 +23,14 @@ class Command(BaseCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print the preview."""
-        edition = Edition.objects.filter(split=options["split"], number=options["number"]).first()
-        if edition is None:
-            raise CommandError(f"There is no edition {options['number']} of {options['split']!r}.")
-        try:
-            found = preview.preview(edition)
-        except rescoring.Refused as refused:
-            raise CommandError(str(refused)) from refused
+        found = preview.preview(edition_of(options))
         getattr(self, f"_{options['format']}")(found)
 
     def _json(self, found: preview.Preview) -> None:
         self.stdout.write(json.dumps(preview.rows(found), indent=2))
 
     def _csv(self, found: preview.Preview) -> None:
-        self.stdout.write(exports.csv_text(preview.rows(found), columns=preview.COLUMNS), ending="")
+        self.stdout.write("".join(csv_lines(preview.rows(found), columns=found.columns)), ending="")
 
     def _table(self, found: preview.Preview) -> None:
         self.stdout.write(

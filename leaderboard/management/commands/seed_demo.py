@@ -3,25 +3,21 @@
 from typing import Any
 
 from django.conf import settings
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.utils import timezone
 
 from leaderboard.demo import seed
+from leaderboard.management.refusing import RefusingCommand
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Fills the split `demo`."""
 
-    help = "Give the split 'demo' simulated ground truth and submissions; what is there already stays."
+    help = "Give the split 'demo' simulated ground truth and submissions; existing data stays."
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Seed, and say how to sign in."""
         if settings.PRODUCTION:
-            raise CommandError(
-                "The demo makes an account whose password it prints; that is not for production."
-            )
-        try:
-            login = seed.seed(now=timezone.now(), login_path=settings.DATA_DIR / "demo-password")
-        except seed.Occupied as refused:
-            raise CommandError(str(refused)) from refused
-        self.stdout.write(f"Sign in as {login.email} with the password {login.password}")
+            raise CommandError("The demo creates an account and prints its password; not for production.")
+        password = seed.seed(now=timezone.now(), password_path=settings.DATA_DIR / "demo-password")
+        self.stdout.write(f"Sign in as {seed.DEMO_EMAIL} with the password {password}")

@@ -11,12 +11,15 @@ from leaderboard import audit
 class Command(BaseCommand):
     """Goes through the audit trail."""
 
-    help = "Check that no audit event was changed, removed or put in. Note the hash it prints somewhere else."
+    help = "Check that no audit event was changed, removed or inserted. Store the printed hash elsewhere."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """The hash noted last time."""
         parser.add_argument(
-            "--expect", metavar="HASH", default="", help="the hash that an earlier run printed; must be there"
+            "--expect",
+            metavar="HASH",
+            default="",
+            help="the hash printed by an earlier run; must still exist",
         )
 
     def handle(self, *args: Any, **options: Any) -> None:
@@ -27,5 +30,8 @@ class Command(BaseCommand):
                 f"  event {each.event_id}: {each.what}" if each.event_id else f"  {each.what}"
                 for each in found.breaks
             )
-            raise CommandError(f"The audit trail of {found.n_events:,} events does not hold:\n{places}")
+            raise CommandError(f"The audit log of {found.n_events:,} events is damaged:\n{places}")
         self.stdout.write(f"audit: {found.n_events:,} events, unbroken, last hash {found.tip}")
+        rest = found.unsealed
+        if rest.n_events:
+            self.stdout.write(f"not sealed yet: {rest.n_events:,}, the oldest for {rest.oldest_age_s:.0f} s")

@@ -29,6 +29,7 @@ class ConfiguredSite(RequestSite):
     def __init__(self) -> None:
         self.name = settings.SITE_NAME
         self.domain = urlsplit(settings.SITE_URL).netloc
+        self.url = settings.SITE_URL
 
 
 class AccountAdapter(DefaultAccountAdapter):
@@ -75,6 +76,17 @@ class AccountAdapter(DefaultAccountAdapter):
 
 class SignupForm(forms.SignupForm):
     """Signs up; an address that has an account already gets a mail, and the same answer."""
+
+    def clean(self) -> dict[str, Any]:
+        """Tell of a bad password and of two that differ at once; a rule that is broken is told once."""
+        cleaned: dict[str, Any] = super().clean()
+        typed = [self.data.get(name) for name in ("password1", "password2")]
+        if all(typed) and typed[0] != typed[1] and "password2" not in self.errors:
+            self.add_error("password2", "You must type the same password each time.")
+        if "password1" in self.errors:
+            # The field as it is drawn has been made by now, with its text.
+            self["password1"].help_text = ""
+        return cleaned
 
     def try_save(self, request: HttpRequest) -> Any:
         """Make the account, or answer as if it had been made, after as much work."""

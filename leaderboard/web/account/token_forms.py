@@ -1,16 +1,20 @@
-"""What people say of a new token, and what they see of those they have."""
+"""The form of a new API token."""
 
-from dataclasses import dataclass
-from datetime import datetime
 from typing import Any
 
 from django import forms
 
-from leaderboard import tokens
-from leaderboard.models import ApiToken, Scope, Split, User
+from leaderboard.models import Scope, Split
+from leaderboard.people import tokens
+from leaderboard.web.forms import SiteForm
 
 
-class TokenForm(forms.Form):
+def _splits() -> list[tuple[str, str]]:
+    names = Split.objects.values_list("pk", flat=True)
+    return [("", "all splits"), *((name, f"{name} only") for name in names)]
+
+
+class TokenForm(SiteForm):
     """A token's name and limits. What is wrong with them the verb says."""
 
     name = forms.CharField(
@@ -20,15 +24,15 @@ class TokenForm(forms.Form):
     )
     scopes = forms.MultipleChoiceField(
         choices=[
-            (Scope.SUBMIT, "submit: send and withdraw files, describe methods and show them to others"),
-            (Scope.READ, "read: ask what became of them"),
+            (Scope.SUBMIT, "submit: submit and withdraw files, edit and publish methods"),
+            (Scope.READ, "read: read results"),
         ],
         initial=list(Scope.values),
         error_messages={"required": "The token has no scope; expected read, submit, or both."},
     )
-    split = forms.ChoiceField(label="Good for", required=False)
+    split = forms.ChoiceField(label="Scope", required=False, choices=_splits)
     days = forms.IntegerField(
-        label="Ends after … days",
+        label="Expires in (days)",
         initial=tokens.DAYS,
         help_text=f"At most {tokens.MAX_DAYS}.",
         widget=forms.NumberInput(attrs={"min": 1, "max": tokens.MAX_DAYS}),
@@ -38,18 +42,8 @@ class TokenForm(forms.Form):
         },
     )
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        """The splits to choose from are all there are."""
-        super().__init__(*args, **options)
-        names = [(name, f"{name} alone") for name in Split.objects.values_list("pk", flat=True)]
-        self.fields["split"].choices = [("", "every split"), *names]  # type: ignore[attr-defined]  # a ChoiceField
-        for name, field in self.fields.items():
-            field.widget.attrs["aria-describedby"] = (
-                f"{name}-help {name}-error" if field.help_text else f"{name}-error"
-            )
-
     def token(self) -> dict[str, Any]:
-        """What was filled in, under the verb's names."""
+        """What was filled in, under the domain function's names."""
         fields = self.cleaned_data
         return {
             "name": fields["name"],
@@ -57,24 +51,3 @@ class TokenForm(forms.Form):
             "split_name": fields["split"],
             "days": fields["days"],
         }
-
-    def refuse(self, refusal: tokens.Refused) -> None:
-        """Put the verb's sentence at the field that it is about."""
-        self.add_error(refusal.field if refusal.field in self.fields else None, str(refusal))
-
-
-@dataclass(frozen=True)
-class TokenRow:
-    """A token as its owner sees it."""
-
-    token: ApiToken
-    state: str
-    is_standing: bool
-
-
-def token_rows(user: User, *, now: datetime) -> list[TokenRow]:
-    """The person's tokens, the newest first; those that have ended stay, to tell what an old job used."""
-    return [
-        TokenRow(token=row, state=tokens.state_of(row, now=now), is_standing=tokens.is_standing(row, now=now))
-        for row in ApiToken.objects.filter(user=user).order_by("-created")
-    ]

@@ -1,4 +1,4 @@
-"""What stands elsewhere: a badge in a README, a feed in a reader; both show what everybody sees."""
+"""The badge for a README and the feed for a reader; both show public rows."""
 
 from typing import Final
 from uuid import UUID
@@ -9,11 +9,13 @@ from django.http import Http404, HttpRequest, HttpResponse
 from django.urls import reverse
 from django.views.decorators.http import require_safe
 
-from leaderboard import badges, feeds, snapshots
-from leaderboard.keeping import matching
+from leaderboard.boards import snapshots
+from leaderboard.boards.snapshots import splits_of
+from leaderboard.exports import badges, feeds
+from leaderboard.http import matching
 from leaderboard.models import Method, Split
-from leaderboard.web.context import split_or_404, splits_of
-from leaderboard.web.views import HOME_SPLIT
+from leaderboard.web.boards.board_views import HOME_SPLIT
+from leaderboard.web.context_processors import split_or_404
 
 PARAMETERS: Final = {"split": matching(r"[a-zA-Z0-9_-]{0,32}")}
 

@@ -1,85 +1,33 @@
-"""Comparisons as they are drawn: the verdict in words, the values, and each pair's differences."""
+"""Tables of comparisons: the verdict in words, the values, the differences of each pair."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from django.utils.html import format_html
-from django.utils.safestring import SafeString
 
 from evaluator import Difference
-from evaluator.protocol import SCORE_NAMES
-from evaluator.report import format_published
-from evaluator.sentences import p_cell
-from evaluator.significance import too_few_recordings
-from leaderboard.comparisons import Compared, Pair
-from leaderboard.standings import Entry
-from leaderboard.web import charts, drawing
-from leaderboard.web.charts import Chart
-from leaderboard.web.drawing import Scale
-from leaderboard.web.tables import Group, Heading, figure_css, score_groups, score_heading
+from evaluator.metrics.protocol import PRIMARY, grouped_names
+from evaluator.scoring.report import format_published
+from evaluator.scoring.significance import too_few_recordings
+from evaluator.tables.sentences import p_cell
+from leaderboard.boards.boards import Entry
+from leaderboard.scoring.comparisons import Compared, Pair
+from leaderboard.web.boards import profile_chart, svg
+from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
+from leaderboard.web.boards.svg import Scale
 
 _DIFFERENCE_PX: Final = 150.0
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
-@dataclass(frozen=True)
-class DifferenceRow:
-    """One column of the board: both values, and first minus second."""
-
-    heading: Heading
-    first: str
-    second: str
-    difference: str
-    interval: str  # both ends as wide as the widest, so that points stand in line
-    p: str
-    reason: str  # why there is neither interval nor p; empty where there are
-    is_significant: bool
-    drawn: SafeString
-
-
-@dataclass(frozen=True)
-class DifferenceGroup:
-    """One of the two errors: its rows on one scale."""
-
-    group: Group
-    axis: SafeString
-    rows: tuple[DifferenceRow, ...]
-
-
-@dataclass(frozen=True)
-class PairTable:
-    """Two methods: what came out in words, and their differences; no groups while they are being computed.
-
-    `others` are sentences of the columns beside overall MiD, `others_lead` says what they are.
-    """
-
-    pair: Pair
-    sentence: str
-    others_lead: str
-    others: tuple[str, ...]
-    groups: tuple[DifferenceGroup, ...]
-    has_intervals: bool
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Everything that the compare page places."""
-
-    compared: Compared
-    verdict: str
-    pairs: tuple[PairTable, ...]
-    profile: Chart
-
-
-def comparison(compared: Compared) -> Comparison:
-    """What was compared, ready to be placed."""
-    return Comparison(
-        compared=compared,
-        verdict=verdict(compared),
-        pairs=tuple(_pair_table(pair) for pair in compared.pairs),
-        profile=charts.profile(compared.entries),
-    )
+def comparison(compared: Compared) -> dict[str, Any]:
+    """What was compared, as the compare page places it."""
+    return {
+        "compared": compared,
+        "verdict": verdict(compared),
+        "pairs": [_pair_table(pair) for pair in compared.pairs],
+        "profile": profile_chart.profile(compared.entries),
+    }
 
 
 def verdict(compared: Compared) -> str:
@@ -91,14 +39,14 @@ def verdict(compared: Compared) -> str:
         return ""
     if len(compared.entries) == len(("first", "second")):
         return compared.pairs[0].sentence()
-    best = min(compared.entries, key=lambda entry: entry.scores["mid"] or 0.0)
+    best = min(compared.entries, key=lambda entry: entry.scores[PRIMARY] or 0.0)
     worse, alike = _told_apart(best, compared.pairs)
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
-        f"{format_published(best.scores['mid'], decimals=best.decimals)}."
+        f"{format_published(best.scores[PRIMARY], decimals=best.decimals)}."
     )
     if compared.reason:
-        return f"{head} There are too few recordings to say what the differences mean."
+        return f"{head} There are too few recordings for confidence intervals and p-values."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
     parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
     said = [head, f"On these recordings it is {', and '.join(parts)}."] if parts else [head]
@@ -112,7 +60,7 @@ def _told_apart(best: Entry, pairs: Sequence[Pair]) -> tuple[list[str], list[str
     for pair in pairs:
         if best in (pair.first, pair.second) and pair.differences and not pair.withheld:
             other = pair.second if pair.first == best else pair.first
-            found = pair.differences.get("mid")
+            found = pair.differences.get(PRIMARY)
             (worse if found and found.is_significant else alike).append(other.method)
     return worse, alike
 
@@ -126,50 +74,46 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _pair_table(pair: Pair) -> PairTable:
+def _pair_table(pair: Pair) -> dict[str, Any]:
+    """Two methods and their differences, in words and as a table; no groups while they are computed."""
     differences = pair.differences or {}
-    others_lead, others = pair.others()
-    return PairTable(
-        pair=pair,
-        sentence=pair.sentence(),
-        others_lead=others_lead,
-        others=others,
-        groups=tuple(
-            _difference_group(group, names, pair, differences)
-            for group, names in zip(score_groups(), (SCORE_NAMES[:5], SCORE_NAMES[5:]), strict=True)
-        )
+    columns = pair.first.scores
+    return {
+        "pair": pair,
+        "sentence": pair.sentence(),
+        "others": pair.others(),
+        "groups": [
+            _difference_group(group, [name for name in names if name in differences], pair, differences)
+            for group, names in zip(score_groups(columns), grouped_names(columns).values(), strict=True)
+        ]
         if differences
-        else (),
-        has_intervals=any(found.low is not None for found in differences.values()),
-    )
+        else [],
+        "has_intervals": any(found.low is not None for found in differences.values()),
+    }
 
 
 def _difference_group(
     group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
-) -> DifferenceGroup:
-    ends = [
-        end
-        for name in names
-        if name in differences
-        for end in (differences[name].low, differences[name].high, differences[name].difference)
-        if end is not None
-    ]
-    scale = drawing.zero_scale(ends, width_px=_DIFFERENCE_PX)
+) -> dict[str, Any]:
+    """One of the metrics: its rows on one scale."""
+    found = [differences[name] for name in names]
+    ends = [end for each in found for end in (each.low, each.high, each.difference) if end is not None]
+    scale = svg.zero_scale(ends, width_px=_DIFFERENCE_PX)
+    # Both ends as wide as the widest, so that points stand in line.
     css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
-    rows = tuple(
-        _difference_row(name, pair, differences[name], scale, css) for name in names if name in differences
-    )
-    return DifferenceGroup(group=group, axis=drawing.axis(scale), rows=rows)
+    rows = [_difference_row(name, pair, differences[name], scale, css) for name in names]
+    return {"group": group, "axis": svg.axis(scale), "rows": rows}
 
 
-def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css: str) -> DifferenceRow:
+def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css: str) -> dict[str, Any]:
+    """One column of the board: both values, and first minus second."""
     decimals = pair.first.decimals  # both are of one edition
-    return DifferenceRow(
-        heading=score_heading(name),
-        first=format_published(pair.first.scores[name], decimals=pair.first.decimals),
-        second=format_published(pair.second.scores[name], decimals=pair.second.decimals),
-        difference=signed(found.difference, decimals=decimals),
-        interval=""
+    return {
+        "heading": score_heading(name),
+        "first": format_published(pair.first.scores[name], decimals=decimals),
+        "second": format_published(pair.second.scores[name], decimals=decimals),
+        "difference": signed(found.difference, decimals=decimals),
+        "interval": ""
         if found.low is None or found.high is None
         else format_html(
             '<span class="{css}">{}</span> to <span class="{css}">{}</span>',
@@ -177,11 +121,12 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css:
             signed(found.high, decimals=decimals),
             css=css,
         ),
-        p=p_cell(found.p, found.p_below),
-        reason="" if found.p_below is not None else too_few_recordings(found.n_effective),
-        is_significant=found.is_significant,
-        drawn=drawing.difference(scale, found.difference, found.low, found.high),
-    )
+        "p": p_cell(found.p, found.p_below),
+        # why there is neither interval nor p
+        "reason": "" if found.p_below is not None else too_few_recordings(found.n_effective),
+        "is_significant": found.is_significant,
+        "drawn": svg.difference(scale, found.difference, found.low, found.high),
+    }
 
 
 def signed(value: float, *, decimals: int = 2) -> str:

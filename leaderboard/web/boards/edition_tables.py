@@ -1,19 +1,20 @@
-"""Editions as they are drawn: what changed in words, how far a re-scoring is, and what it would change."""
+"""Tables of editions: changes in words, progress of re-scoring, and the preview."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import Any, Final
 
-from evaluator.protocol import SCORE_NAMES
-from evaluator.report import format_published
-from leaderboard import editions
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.scoring.report import format_published
+from leaderboard.boards.boards import Board, flat_scores
+from leaderboard.editions import history
+from leaderboard.editions.corrections import RescoringProgress
+from leaderboard.editions.preview import ABSENT, Change, Preview
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status
-from leaderboard.preview import ABSENT, Change, Preview
-from leaderboard.rescoring import Progress
-from leaderboard.standings import Board, flat_scores
 from leaderboard.templatetags.board import duration, grouped
-from leaderboard.web.tables import ABSENT as NO_VALUE
-from leaderboard.web.tables import BoardTable, Heading, score_heading
+from leaderboard.web.boards import tables
+from leaderboard.web.boards.score_columns import column_css, score_heading
+from leaderboard.web.boards.tables import BoardTable
 
 _WHY_UNSCORABLE: Final = {
     "missing-keys": "Edition {} added sequences that its file does not predict.",
@@ -33,16 +34,16 @@ def counted(n: int, singular: str, plural: str = "") -> str:
     return f"{grouped(n)} {singular if n == 1 else plural or singular + 's'}"
 
 
-def truth_words(change: editions.TruthChange | None) -> str:
+def truth_words(change: history.TruthChange | None) -> str:
     """What differs between two ground truths, in words; empty if nothing does.
 
-    >>> truth_words(editions.TruthChange(n_added=3, n_removed=0, n_changed=12, n_renumbered=0))
+    >>> truth_words(history.TruthChange(n_added=3, n_removed=0, n_changed=12, n_renumbered=0))
     '12 labels corrected, 3 sequences added'
-    >>> truth_words(editions.TruthChange(0, 1, 0, 7)), truth_words(None)
-    ('1 sequence removed, 7 sequences renumbered', 'another ground truth')
+    >>> truth_words(history.TruthChange(0, 1, 0, 7)), truth_words(None)
+    ('1 sequence removed, 7 sequences renumbered', 'different ground truth')
     """
     if change is None:
-        return "another ground truth"
+        return "different ground truth"
     parts = (
         (change.n_changed, "label", "corrected"),
         (change.n_added, "sequence", "added"),
@@ -55,17 +56,17 @@ def truth_words(change: editions.TruthChange | None) -> str:
 def truth_choices(split: Split, truths: Sequence[GroundTruth]) -> tuple[tuple[GroundTruth, str], ...]:
     """Ground truths, each with what differs from the board's, in words; "" for the board's own."""
     board = split.published_edition.ground_truth if split.published_edition else None
-    changes = (editions.change_of_truth(board, truth) if board else None for truth in truths)
+    changes = (history.change_of_truth(board, truth) if board else None for truth in truths)
     words = (truth_words(change) if change else "not compared" for change in changes)
     return tuple(zip(truths, words, strict=True))
 
 
 def change_words(old: Edition, new: Edition) -> str:
     """How one edition differs from another: in its labels, its sequences, its protocol."""
-    return _change_words(editions.truth_change(old, new), old, new)
+    return _change_words(history.change_of_truth(old.ground_truth, new.ground_truth), old, new)
 
 
-def _change_words(change: editions.TruthChange | None, old: Edition, new: Edition) -> str:
+def _change_words(change: history.TruthChange | None, old: Edition, new: Edition) -> str:
     truth = truth_words(change)
     rules = f"protocol {new.protocol} instead of {old.protocol}" if old.protocol != new.protocol else ""
     return ", ".join(part for part in (truth, rules) if part)
@@ -73,11 +74,11 @@ def _change_words(change: editions.TruthChange | None, old: Edition, new: Editio
 
 def news(split: Split) -> str:
     """What last changed on a board, for its head; empty while it has its first edition."""
-    publication = editions.latest_change(split)
+    publication = history.latest_change(split)
     if publication is None or publication.replaced is None:
         return ""
     if publication.kind == Publication.Kind.ROLLED_BACK:
-        return f"back to edition {publication.edition.number}"
+        return f"rolled back to edition {publication.edition.number}"
     words = change_words(publication.replaced, publication.edition)
     return f"edition {publication.edition.number}, {words}"
 
@@ -105,36 +106,13 @@ def unscorable_words(code: str, number: int) -> str:
     return _WHY_UNSCORABLE.get(code, "Edition {} cannot score its file.").format(number)
 
 
-@dataclass(frozen=True)
-class PastRow:
-    """One edition in the list of a split's editions."""
-
-    past: editions.Past
-    change: str  # since the edition that it followed
+def past_change(past: history.EditionRecord) -> str:
+    """What changed since the edition that this one followed."""
+    return _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
 
 
-def past_rows(history: Iterable[editions.Past]) -> tuple[PastRow, ...]:
-    """A split's editions, ready to be placed."""
-    return tuple(past_row(past) for past in history)
-
-
-def past_row(past: editions.Past) -> PastRow:
-    """One edition, ready to be placed."""
-    change = _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
-    return PastRow(past=past, change=change)
-
-
-@dataclass(frozen=True)
-class RescoredNotice:
-    """What the last change of the board did to a submission, in words for its team."""
-
-    publication: Publication
-    heading: str  # before the date
-    outcome: str  # after the reason
-
-
-def rescored_notice(rescored: editions.Rescored | None) -> RescoredNotice | None:
-    """The notice on a submission's page; None where the change of the board changed nothing for it."""
+def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:
+    """What the last change of the board did to a submission; None where it changed nothing for it."""
     if rescored is None:
         return None
     old, new, publication = rescored.old, rescored.new, rescored.publication
@@ -144,12 +122,16 @@ def rescored_notice(rescored: editions.Rescored | None) -> RescoredNotice | None
     if old and new and old.status == new.status == Status.REJECTED:
         return None
     if publication.kind == Publication.Kind.ROLLED_BACK:
-        heading = f"Edition {publication.edition.number} is the board again since"
+        heading = f"Rolled back to edition {publication.edition.number} on"
     elif new and new.status == Status.SCORED:
         heading = f"Re-scored in edition {publication.edition.number} on"
     else:
-        heading = f"Edition {publication.edition.number} became the board on"
-    return RescoredNotice(publication, heading, _outcome(old, new, former.number))
+        heading = f"Edition {publication.edition.number} was published on"
+    return {
+        "publication": publication,
+        "heading": heading,
+        "outcome": _outcome(old, new, former.number),
+    }
 
 
 def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str:
@@ -157,20 +139,20 @@ def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str
     before, after = _mid(old), _mid(new)
     if new and new.status == Status.SCORED:
         return f"MiD stays {after}." if before == after else f"MiD {before} → {after}."
-    kept = f" In edition {former} it keeps its result, MiD {before}." if before != NO_VALUE else ""
+    kept = f" Its result in edition {former} stays: MiD {before}." if before != tables.ABSENT else ""
     if new is None or new.status == Status.CANCELLED:
-        return f"This file was left out of it.{kept}"
+        return f"The new edition leaves this file out.{kept}"
     if new.status == Status.REJECTED:
-        return f"It cannot score this file, for the reason below.{kept}"
+        return f"The new edition cannot score this file; see the reason below.{kept}"
     if new.status == Status.SYSTEM_ERROR:
-        return f"Scoring this file in it failed by our fault.{kept}"
-    return f"This file waits to be scored in it.{kept}"
+        return f"Re-scoring this file failed because of a system error.{kept}"
+    return f"This file is waiting to be re-scored.{kept}"
 
 
 def _mid(evaluation: Evaluation | None) -> str:
     if evaluation is None:
-        return NO_VALUE
-    mid = flat_scores(evaluation.scores.all())["mid"]
+        return tables.ABSENT
+    mid = flat_scores(evaluation)[PRIMARY]
     return format_published(mid, decimals=evaluation.edition.decimals)
 
 
@@ -179,7 +161,7 @@ class Running:
     """How far the re-scoring of an edition is. `seen` changes exactly when what is shown does."""
 
     edition: Edition
-    progress: Progress
+    progress: RescoringProgress
     counts: str
     pace: str
 
@@ -194,13 +176,13 @@ class Running:
         return f"{self.progress.n_done}-{self.progress.n_total}"
 
 
-def running(edition: Edition, progress: Progress) -> Running:
+def running(edition: Edition, progress: RescoringProgress) -> Running:
     """A progress, ready to be drawn."""
     parts = [f"{grouped(progress.n_done)} of {grouped(progress.n_total)}"]
     if progress.n_rejected:
         parts.append(f"{grouped(progress.n_rejected)} rejected")
     if progress.n_failed:
-        parts.append(f"{grouped(progress.n_failed)} failed by our fault")
+        parts.append(f"{grouped(progress.n_failed)} with a system error")
     if progress.n_cancelled:
         parts.append(f"{grouped(progress.n_cancelled)} cancelled")
     pace = ""
@@ -213,59 +195,19 @@ def rate_words(rate_per_s: float) -> str:
     """A rate in the unit in which it is more than one.
 
     >>> rate_words(41.7), rate_words(0.25)
-    ('41.7 a second', '15 a minute')
+    ('41.7 per second', '15 per minute')
     """
-    return f"{rate_per_s:.1f} a second" if rate_per_s >= 1 else f"{60 * rate_per_s:.0f} a minute"
+    return f"{rate_per_s:.1f} per second" if rate_per_s >= 1 else f"{60 * rate_per_s:.0f} per minute"
 
 
-@dataclass(frozen=True)
-class Difference:
-    """One number before and after."""
-
-    old: str
-    new: str
-    delta: str
-    css: str
-
-
-@dataclass(frozen=True)
-class ChangeRow:
-    """What a new edition does to one entry, ready to be placed."""
-
-    change: Change
-    old_rank: str
-    new_rank: str
-    status: str
-    is_worse_off: bool  # was scored and will not be
-    differences: tuple[Difference, ...]
-    summary: str = ""  # why it is rejected now and was not, to the first colon
-    reason: str = ""  # the same, whole
-    n_more_problems: int = 0
-
-    @property
-    def is_moved(self) -> bool:
-        """Whether its rank changes."""
-        return self.old_rank != self.new_rank
-
-
-@dataclass(frozen=True)
-class ChangeTable:
-    """Everything that the comparison's template places."""
-
-    headings: tuple[Heading, ...]
-    rows: tuple[ChangeRow, ...]
-    truth: str
-    totals: tuple[tuple[str, str], ...]
-
-
-def change_table(found: Preview) -> ChangeTable:
-    """A preview, ready to be drawn."""
-    return ChangeTable(
-        headings=tuple(score_heading(name) for name in SCORE_NAMES),
-        rows=tuple(_change_row(change) for change in found.changes),
-        truth=_change_words(found.truth, found.published, found.edition),
-        totals=_totals(found),
-    )
+def change_table(found: Preview) -> dict[str, Any]:
+    """A preview, as the comparison's template places it."""
+    return {
+        "headings": [score_heading(name) for name in found.names],
+        "rows": [_change_row(change, found.names) for change in found.changes],
+        "truth": _change_words(found.truth, found.published, found.edition),
+        "totals": _totals(found),
+    }
 
 
 def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
@@ -276,43 +218,43 @@ def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
             ("sequences added", grouped(truth.n_added)),
             ("sequences removed", grouped(truth.n_removed)),
             ("labels changed", grouped(truth.n_changed)),
-            ("another anno_id", "not counted" if truth.n_renumbered is None else grouped(truth.n_renumbered)),
+            ("anno_id changed", "not counted" if truth.n_renumbered is None else grouped(truth.n_renumbered)),
         )
     return (
         *sequences,
         ("entries", grouped(len(found.changes))),
-        ("entries change", grouped(found.n_changed)),
-        ("change rank", grouped(found.n_moved)),
-        ("become rejected", grouped(found.n_newly_rejected)),
+        ("entries changed", grouped(found.n_changed)),
+        ("ranks changed", grouped(found.n_moved)),
+        ("newly rejected", grouped(found.n_newly_rejected)),
     )
 
 
-def _change_row(change: Change) -> ChangeRow:
+def _change_row(change: Change, names: Sequence[str]) -> dict[str, Any]:
+    """What a new edition does to one entry."""
     old_status, new_status = (_STATUS_LABELS[s] for s in (change.old_status, change.new_status))
     is_news = change.problems and change.old_status != change.new_status
     reason = change.problems[0]["message"] if is_news else ""
-    return ChangeRow(
-        change=change,
-        old_rank=_rank(change.old_rank),
-        new_rank=_rank(change.new_rank),
-        status=new_status if old_status == new_status else f"{new_status}, was {old_status}",
-        is_worse_off=change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
-        differences=tuple(_difference(name, change) for name in SCORE_NAMES),
-        summary=reason.partition(": ")[0],
-        reason=reason,
-        n_more_problems=max(0, len(change.problems) - 1),
-    )
+    return {
+        "change": change,
+        "has_changed": change.old_rank != change.new_rank,
+        "status": new_status if old_status == new_status else f"{new_status}, was {old_status}",
+        "is_worse_off": change.old_status == Status.SCORED and change.new_status in _ENDED_BADLY,
+        "differences": [_difference(name, change) for name in names],
+        "summary": reason.partition(": ")[0],
+        "reason": reason,  # why it is rejected now and was not
+        "n_more_problems": max(0, len(change.problems) - 1),
+    }
 
 
-def _difference(name: str, change: Change) -> Difference:
-    delta = change.delta[name]
-    css = {"mid": "primary first", "rte": "overall first"}.get(name, "")
-    return Difference(
-        old=format_published(change.old[name], decimals=change.old_decimals),
-        new=format_published(change.new[name], decimals=change.new_decimals),
-        delta=delta_words(delta, decimals=max(change.old_decimals, change.new_decimals)),
-        css=css if delta else f"{css} same".strip(),
-    )
+def _difference(name: str, change: Change) -> dict[str, str]:
+    """One number before and after."""
+    delta, css = change.delta[name], column_css(name).replace("wide", "")
+    return {
+        "old": format_published(change.old.get(name), decimals=change.old_decimals),
+        "new": format_published(change.new.get(name), decimals=change.new_decimals),
+        "delta": delta_words(delta, decimals=max(change.old_decimals, change.new_decimals)),
+        "css": css if delta else f"{css} same".strip(),
+    }
 
 
 def delta_words(delta: float | None, *, decimals: int = 2) -> str:
@@ -324,26 +266,3 @@ def delta_words(delta: float | None, *, decimals: int = 2) -> str:
     if delta is None:
         return ""
     return f"{delta:+.{decimals}f}".replace("-", "−") if delta else f"{0:.{decimals}f}"
-
-
-def _rank(rank: int | None) -> str:
-    return NO_VALUE if rank is None else str(rank)
-
-
-@dataclass(frozen=True)
-class DeskRow:
-    """One split on the maintainers' desk, ready to be placed."""
-
-    desk: editions.Desk
-    change: str  # since the edition that the board would go back to
-    running: tuple[Running, ...]
-
-
-def desk_row(desk: editions.Desk) -> DeskRow:
-    """A desk, ready to be drawn."""
-    published, former = desk.published, desk.predecessor
-    return DeskRow(
-        desk=desk,
-        change=change_words(former, published) if former and published else "",
-        running=tuple(running(edition, progress) for edition, progress in desk.in_preparation),
-    )

@@ -1,4 +1,4 @@
-"""Small drawings made on the server: scales and whiskers, in SVG that takes its ink from the page around it.
+"""Small SVG drawings: scales and whiskers, in the colour of the page around them.
 
 Whoever cannot see them reads the same numbers as text beside or behind them; the drawings say nothing alone.
 """
@@ -8,13 +8,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
 
-from django.utils.html import format_html
+from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
 WIDTH_PX: Final = 96.0
 HEIGHT_PX: Final = 14.0
-# Values beyond this many times the best would press those near it together; they are drawn at the edge.
-_FAR: Final = 2.0
 _MARGIN_PX: Final = 4.0
 _STEPS: Final = (1.0, 2.0, 2.5, 5.0, 10.0)
 
@@ -52,30 +50,16 @@ def round_ticks(low: float, high: float, *, n: int) -> tuple[float, ...]:
     (0.0, 10.0, 20.0, 30.0, 40.0)
     >>> round_ticks(-0.4, 1.1, n=4)
     (-0.5, 0.0, 0.5, 1.0, 1.5)
+    >>> round_ticks(0.6, 0.6, n=3)
+    (0.6, 0.7)
     """
     span = (high - low) or abs(high) or 1.0
     power = 10.0 ** math.floor(math.log10(span / n))
     steps = (factor * power for factor in (*_STEPS, 20.0, 25.0, 50.0))
     step = next(s for s in steps if math.ceil(high / s - 1e-9) - math.floor(low / s + 1e-9) <= n)
-    first, last = (
-        math.floor(low / step + 1e-9),
-        max(math.ceil(high / step - 1e-9), 1 + math.floor(low / step)),
-    )
+    first = math.floor(low / step + 1e-9)
+    last = max(math.ceil(high / step - 1e-9), 1 + first)
     return tuple(round(i * step, 10) + 0.0 for i in range(first, last + 1))
-
-
-def scale_of(values: Iterable[float], *, n_ticks: int = 3, width_px: float = WIDTH_PX) -> Scale | None:
-    """A scale on which what is near the best stands well apart; None for no values.
-
-    >>> scale_of([14.2, 15.1, 20.0, 900.0]).high
-    20.0
-    """
-    found = sorted(values)
-    if not found:
-        return None
-    near = [value for value in found if value <= _FAR * found[0]]
-    ticks = round_ticks(near[0], near[-1], n=n_ticks)
-    return Scale(low=ticks[0], high=ticks[-1], ticks=ticks, width_px=width_px)
 
 
 def zero_scale(values: Iterable[float], *, width_px: float = WIDTH_PX) -> Scale:
@@ -158,5 +142,5 @@ def _svg(scale: Scale, css: str, parts: list[SafeString]) -> SafeString:
         css,
         f"{scale.width_px:g}",
         f"{HEIGHT_PX:g}",
-        SafeString("".join(parts)),
+        format_html_join("", "{}", ((part,) for part in parts)),
     )

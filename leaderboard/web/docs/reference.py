@@ -4,10 +4,9 @@ from typing import Any, Final
 
 from django.conf import settings
 
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, get_protocol
 from evaluator.problems import PROBLEM_CODES
-from evaluator.protocol import DEFAULT_PROTOCOL, get_protocol
 from leaderboard.templatetags.board import size
-from leaderboard.web.tables import interval_facts
 
 # What only maintainers meet, when they import ground truth.
 GROUND_TRUTH_CODES: Final = frozenset(
@@ -34,7 +33,6 @@ def docs() -> dict[str, Any]:
     return {
         "protocol": protocol,
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
-        "intervals": interval_facts({}),
         "max_size": size(settings.MAX_PREDICTIONS_BYTES),
         "problem_codes": [
             (code, meaning) for code, meaning in PROBLEM_CODES.items() if code not in GROUND_TRUTH_CODES

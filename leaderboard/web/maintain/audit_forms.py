@@ -1,12 +1,13 @@
-"""What maintainers ask the audit trail for."""
+"""The filter form of the audit trail."""
 
 from datetime import UTC, date, datetime, time, timedelta
+from functools import partial
 from typing import Any
-from urllib.parse import urlencode
 
 from django import forms
 
 from leaderboard.models import AuditEvent
+from leaderboard.web.forms import SiteForm
 
 DAY = timedelta(days=1)
 
@@ -21,25 +22,23 @@ def _day(label: str) -> forms.DateField:
     )
 
 
-class AuditFilter(forms.Form):
+def _occurring(name: str) -> list[tuple[str, str]]:
+    words = AuditEvent.objects.order_by(name).values_list(name, flat=True).distinct()
+    return [("", "any"), *((word, word) for word in words)]
+
+
+class AuditFilter(SiteForm):
     """By whom, what, to what, and when (days of UTC, both included)."""
 
-    actor = forms.CharField(label="By (part of an address)", required=False, max_length=254)
-    verb = forms.ChoiceField(label="Verb", required=False)
-    noun = forms.ChoiceField(label="Noun", required=False)
-    noun_id = forms.CharField(label="Identity (its beginning)", required=False, max_length=80)
+    actor = forms.CharField(label="Actor (part of the email address)", required=False, max_length=254)
+    verb = forms.ChoiceField(label="Action", required=False, choices=partial(_occurring, "verb"))
+    noun = forms.ChoiceField(label="Object type", required=False, choices=partial(_occurring, "noun"))
+    noun_id = forms.CharField(label="Object ID (prefix)", required=False, max_length=80)
     since = _day("From")
     until = _day("To")
 
-    def __init__(self, *args: Any, **options: Any) -> None:
-        """The verbs and nouns to choose from are those that occur."""
-        super().__init__(*args, **options)
-        for name in ("verb", "noun"):
-            words = AuditEvent.objects.order_by(name).values_list(name, flat=True).distinct()
-            self.fields[name].choices = [("", "any"), *((word, word) for word in words)]  # type: ignore[attr-defined]  # a ChoiceField
-
     def wanted(self) -> dict[str, Any]:
-        """What was filled in, under the verb's names."""
+        """What was filled in, under the domain function's names."""
         fields = {name: value for name, value in self.cleaned_data.items() if value}
         if "since" in fields:
             fields["since"] = _midnight(fields["since"])
@@ -47,10 +46,6 @@ class AuditFilter(forms.Form):
             # The calendar ends with the year 9999, and has no day after its last.
             fields["until"] = _midnight(min(fields["until"], date.max - DAY) + DAY)
         return fields
-
-    def query(self) -> str:
-        """The same as the query of an address."""
-        return urlencode({name: str(value) for name, value in self.cleaned_data.items() if value})
 
 
 def _midnight(day: date) -> datetime:

@@ -1,4 +1,4 @@
-"""The audit trail for maintainers: to look through, and to take along."""
+"""The audit trail for maintainers: a page and two exports."""
 
 import json
 from collections.abc import Iterator
@@ -9,10 +9,11 @@ from django.http import HttpRequest, HttpResponse, StreamingHttpResponse
 from django.shortcuts import render
 from django.views.decorators.http import require_safe
 
-from leaderboard import audit, exports
+from evaluator.tables.formats import csv_lines
+from leaderboard import audit
 from leaderboard.models import AuditEvent
-from leaderboard.web.audit_forms import AuditFilter
-from leaderboard.web.maintainer_views import maintainers_only
+from leaderboard.web.maintain.audit_forms import AuditFilter
+from leaderboard.web.maintain.maintainer_views import maintainers_only
 
 PER_PAGE = 100
 COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "previous_hash", "hash")
@@ -20,35 +21,16 @@ COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "previous_
 
 @maintainers_only
 @require_safe
-def events(request: HttpRequest) -> HttpResponse:
-    """Who did what to what, the newest first."""
+def events(request: HttpRequest, kind: str = "") -> HttpResponse | StreamingHttpResponse:
+    """Who did what to what, the newest first: a page of it, or all of it as `kind` (csv or json)."""
     asked = AuditFilter(request.GET)
     if not asked.is_valid():
-        return render(request, "maintainers/audit.html", {"form": asked}, status=400)
+        return render(request, "maintain/audit.html", {"form": asked}, status=400)
+    if kind:
+        return _download(asked, kind=kind)
     page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
     context = {"form": asked, "page": page, "query": asked.query(), "rows": [(e, _told(e)) for e in page]}
-    return render(request, "maintainers/audit.html", context)
-
-
-@maintainers_only
-@require_safe
-def events_csv(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
-    """The same as a table for spreadsheets; `details` is JSON."""
-    asked = AuditFilter(request.GET)
-    if not asked.is_valid():
-        return render(request, "maintainers/audit.html", {"form": asked}, status=400)
-    rows = ({**row, "details": json.dumps(row["details"], ensure_ascii=False)} for row in _rows(asked))
-    return _download(exports.csv_lines(rows, columns=COLUMNS), kind="csv", content_type="text/csv")
-
-
-@maintainers_only
-@require_safe
-def events_json(request: HttpRequest) -> HttpResponse | StreamingHttpResponse:
-    """The same as one JSON list."""
-    asked = AuditFilter(request.GET)
-    if not asked.is_valid():
-        return render(request, "maintainers/audit.html", {"form": asked}, status=400)
-    return _download(_json_list(_rows(asked)), kind="json", content_type="application/json")
+    return render(request, "maintain/audit.html", context)
 
 
 def _told(event: AuditEvent) -> list[tuple[str, str]]:
@@ -83,7 +65,13 @@ def _json_list(rows: Iterator[dict[str, Any]]) -> Iterator[str]:
     yield "[]\n" if opening == "[" else "\n]\n"
 
 
-def _download(lines: Iterator[str], *, kind: str, content_type: str) -> StreamingHttpResponse:
+def _download(asked: AuditFilter, *, kind: str) -> StreamingHttpResponse:
+    """Every event that fits. In a cell of CSV, `details` is JSON."""
+    rows, content_type = _rows(asked), "application/json"
+    lines = _json_list(rows)
+    if kind == "csv":
+        cells = ({**row, "details": json.dumps(row["details"], ensure_ascii=False)} for row in rows)
+        lines, content_type = csv_lines(cells, columns=COLUMNS), "text/csv"
     return StreamingHttpResponse(
         lines,
         content_type=f"{content_type}; charset=utf-8",

@@ -1,37 +1,27 @@
-"""What maintainers fill in before an edition is opened, published, taken back or given up."""
+"""Forms for opening, publishing, rolling back and discarding editions."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
-from typing import Any, Final, Self
+from typing import Any, Final
 
 from django import forms
-from django.http import HttpRequest
 
-from evaluator.protocol import PROTOCOLS
+from evaluator.metrics.protocol import PROTOCOLS
 from leaderboard.models import Split
-from leaderboard.rescoring import Refused
+from leaderboard.web.forms import SiteForm
 
-_STALE: Final = "The form does not say which edition was the board when you looked; load the page again."
-
-
-class VerbForm(forms.Form):
-    """A form for one verb. What the verb refuses stands on it, in the verb's own sentence."""
-
-    @classmethod
-    def asked(cls, request: HttpRequest, **options: Any) -> Self:
-        """The form with what this request sends; empty when it only asks for it."""
-        return cls(request.POST if request.method == "POST" else None, **options)
-
-    @contextmanager
-    def refusals(self) -> Iterator[None]:
-        """Put the sentence of a `Refused` on the form."""
-        try:
-            yield
-        except Refused as refused:
-            self.add_error(None, str(refused))
+_STALE: Final = "The form lacks the current edition; reload the page."
 
 
-class OpenForm(VerbForm):
+def reason_field(help_text: str, *, at: str = "audit log", max_length: int = 1000) -> forms.CharField:
+    """A sentence that says why, and where it stands."""
+    return forms.CharField(
+        max_length=max_length,
+        widget=forms.Textarea(attrs={"rows": 3}),
+        help_text=help_text,
+        error_messages={"required": f"No reason was given; expected a sentence for the {at}."},
+    )
+
+
+class OpenForm(SiteForm):
     """Which ground truth and which protocol a new edition is to have."""
 
     digest = forms.ChoiceField(
@@ -58,14 +48,11 @@ class OpenForm(VerbForm):
         self.fields["digest"].choices = [(truth.pk, truth.pk) for truth in self.truths]  # type: ignore[attr-defined]  # a ChoiceField
 
 
-class ReasonForm(VerbForm):
+class ReasonForm(SiteForm):
     """A sentence that says why."""
 
-    reason = forms.CharField(
-        max_length=1000,
-        widget=forms.Textarea(attrs={"rows": 3, "aria-describedby": "reason-help reason-error"}),
-        help_text="A sentence or two. It stands in the public changelog and in the audit log.",
-        error_messages={"required": "No reason was given; expected a sentence for the public changelog."},
+    reason = reason_field(
+        "One or two sentences, for the public changelog and the audit log.", at="public changelog"
     )
 
 
@@ -86,9 +73,4 @@ class PublishForm(RollBackForm):
 class DiscardForm(ReasonForm):
     """A reason for those who look after the benchmark; nothing public changes."""
 
-    reason = forms.CharField(
-        max_length=1000,
-        widget=forms.Textarea(attrs={"rows": 3, "aria-describedby": "reason-help reason-error"}),
-        help_text="A sentence for the audit log. Nothing public changes.",
-        error_messages={"required": "No reason was given; expected a sentence for the audit log."},
-    )
+    reason = reason_field("One sentence for the audit log.")

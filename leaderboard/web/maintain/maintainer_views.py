@@ -1,6 +1,7 @@
-"""The maintainers' pages: open an edition, look before switching, switch, go back. One verb each.
+"""The maintainers' pages of editions: open, preview, publish, roll back, discard.
 
-To everybody else they are not there: the answer is the one for an address that does not exist.
+A visitor signs in first. To everybody else they are not there: the answer is the one for an address that does
+not exist.
 """
 
 from collections.abc import Callable
@@ -8,33 +9,49 @@ from functools import wraps
 from typing import Any, cast
 
 from django.contrib import messages
+from django.contrib.auth.views import redirect_to_login
 from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
+from django_htmx.http import HttpResponseClientRefresh
 
-from leaderboard import editions, exports, preview, quota_rules, quotas, rescoring
+from evaluator.tables.formats import csv_lines
+from leaderboard.editions import corrections, history, preview
+from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
-from leaderboard.web import edition_tables, queue_tables
-from leaderboard.web.maintainer_forms import DiscardForm, OpenForm, PublishForm, RollBackForm, VerbForm
-from leaderboard.web.views import STOP_POLLING
+from leaderboard.quotas import rules
+from leaderboard.web.boards import edition_tables
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain import queue_tables
+from leaderboard.web.maintain.maintainer_forms import (
+    DiscardForm,
+    OpenForm,
+    PublishForm,
+    RollBackForm,
+)
+from leaderboard.web.submissions.submission_views import STOP_POLLING
 
 View = Callable[..., HttpResponseBase]
 asks_first = require_http_methods(["GET", "HEAD", "POST"])
 
 
 def maintainers_only(view: View) -> View:
-    """Let maintainers in, uncached; for others the page does not exist."""
+    """Let maintainers in, uncached; a visitor signs in first, for others the page does not exist."""
     uncached = never_cache(view)
 
     @wraps(view)
     def guarded(request: HttpRequest, *args: Any, **kwargs: Any) -> HttpResponseBase:
-        if not (request.user.is_authenticated and request.user.is_maintainer):
+        if not request.user.is_authenticated:
+            # A part of an open page that asks for news: the whole page leads to the sign-in.
+            htmx = getattr(request, "htmx", None)
+            return HttpResponseClientRefresh() if htmx else redirect_to_login(request.get_full_path())
+        if not request.user.is_maintainer:
             raise Http404
         try:
             return uncached(request, *args, **kwargs)
-        except (rescoring.NotMaintainer, quotas.NotMaintainer) as refusal:
+        except NotMaintainer as refusal:
             # They were one when the request came in.
             raise Http404 from refusal
 
@@ -46,40 +63,43 @@ def maintainers_only(view: View) -> View:
 def hub(request: HttpRequest) -> HttpResponse:
     """What else there is to look after, and every split: its board, what is being prepared, what failed."""
     splits = Split.objects.select_related("published_edition__ground_truth")
-    desks = [edition_tables.desk_row(editions.desk(split)) for split in splits]
-    is_running = any(not shown.is_final for row in desks for shown in row.running)
+    desks = [
+        (desk, [edition_tables.running(*each) for each in desk.in_preparation])
+        for desk in map(history.maintainer_overview, splits)
+    ]
+    is_running = any(not shown.is_final for _, running in desks for shown in running)
     context = {
         "desks": desks,
         "is_running": is_running,
         "queue": queue_tables.totals(),
         "n_overrides": QuotaOverride.objects.count(),
         "n_events": AuditEvent.objects.count(),
-        "ignored": quota_rules.ignored(),
+        "ignored": rules.ignored(),
     }
-    return render(request, "maintainers/hub.html", context)
+    return render(request, "maintain/hub.html", context)
 
 
 @maintainers_only
 @asks_first
 def open_edition(request: HttpRequest, split: str) -> HttpResponse:
-    """Open an edition beside the board and queue every standing submission for it."""
+    """Open a draft edition and queue every active submission for it."""
     found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
     form = OpenForm.asked(request, split=found)
     if form.is_valid():
         with form.refusals():
-            opened = rescoring.open_edition(
-                split_name=split, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            opened = corrections.open_edition(
+                split_name=split, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             return redirect("maintain_edition", split, opened.number)
     choices = edition_tables.truth_choices(found, form.truths)
-    return _form(request, "maintainers/open.html", form, split=found, choices=choices)
+    return form_page(request, "maintain/open.html", form, split=found, choices=choices)
 
 
 @maintainers_only
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """What publishing an edition would change, and how far its re-scoring is."""
-    return render(request, "maintainers/edition.html", _comparison(_edition(split, number)))
+    return render(request, "maintain/edition.html", _comparison(_edition(split, number)))
 
 
 @maintainers_only
@@ -87,23 +107,23 @@ def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
 def edition_progress(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """What a waiting page asks for: nothing new, how far it is, or at the end not to ask any more."""
     found = _edition(split, number)
-    running = edition_tables.running(found, rescoring.progress(found))
+    running = edition_tables.running(found, corrections.progress(found))
     if request.GET.get("seen") == running.seen and not running.is_final:
         return HttpResponse(status=204)
     context: dict[str, Any] = {"running": running}
     if running.is_final and "comparison" in request.GET:
         context |= _comparison(found)
     status = STOP_POLLING if running.is_final else 200
-    return render(request, "maintainers/progress_state.html", context, status=status)
+    return render(request, "maintain/progress_state.html", context, status=status)
 
 
 @maintainers_only
 @require_safe
 def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """The comparison as a table for spreadsheets."""
-    rows = preview.rows(preview.preview(_edition(split, number)))
+    found = preview.preview(_edition(split, number))
     return HttpResponse(
-        exports.csv_text(rows, columns=preview.COLUMNS),
+        "".join(csv_lines(preview.rows(found), columns=found.columns)),
         content_type="text/csv; charset=utf-8",
         headers={"Content-Disposition": _attachment(split, number, "csv")},
     )
@@ -128,12 +148,14 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     form = PublishForm.asked(request, initial={"replaces": context["preview"].replaces})
     if form.is_valid():
         with form.refusals():
-            rescoring.publish(
-                edition=found, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            corrections.publish(
+                edition=found, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             messages.success(request, f"Edition {number} is the board of {split}.")
             return redirect("board", split)
-    return _form(request, "maintainers/publish.html", form, unfinished=rescoring.unfinished(found), **context)
+    return form_page(
+        request, "maintain/publish.html", form, unfinished=corrections.unfinished(found), **context
+    )
 
 
 @maintainers_only
@@ -141,17 +163,17 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
 def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Make the edition that this one replaced the board again."""
     found = _edition(split, number)
-    former = rescoring.predecessor(found.split)
+    former = corrections.predecessor(found.split)
     form = RollBackForm.asked(request, initial={"replaces": number})
     if form.is_valid():
         with form.refusals():
-            rescoring.roll_back(
-                split_name=split, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            corrections.roll_back(
+                split_name=split, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
             messages.success(request, f"The board of {split} is what it was before edition {number}.")
             return redirect("board", split)
     context = {**_comparison(former), "undone": edition_tables.change_words(former, found)} if former else {}
-    return _form(request, "maintainers/roll_back.html", form, leaving=found, former=former, **context)
+    return form_page(request, "maintain/roll_back.html", form, leaving=found, former=former, **context)
 
 
 @maintainers_only
@@ -162,15 +184,16 @@ def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
     form = DiscardForm.asked(request)
     if form.is_valid():
         with form.refusals():
-            rescoring.discard(
-                edition=found, now=timezone.now(), actor=_maintainer(request), **form.cleaned_data
+            corrections.discard(
+                edition=found, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
-            messages.success(request, f"Edition {number} of {split} was given up.")
+            messages.success(request, f"Edition {number} of {split} was discarded.")
             return redirect("maintain")
-    return _form(request, "maintainers/discard.html", form, **_comparison(found))
+    return form_page(request, "maintain/discard.html", form, **_comparison(found))
 
 
-def _maintainer(request: HttpRequest) -> User:
+def maintainer_of(request: HttpRequest) -> User:
+    """Who asks: `maintainers_only` has let them in."""
     return cast("User", request.user)
 
 
@@ -180,7 +203,7 @@ def _edition(split: str, number: int) -> Edition:
 
 
 def _comparison(found: Edition) -> dict[str, Any]:
-    """An edition beside the board, ready to be drawn."""
+    """A draft edition, ready for its template."""
     compared = preview.preview(found)
     return {
         "edition": found,
@@ -190,7 +213,8 @@ def _comparison(found: Edition) -> dict[str, Any]:
     }
 
 
-def _form(request: HttpRequest, template: str, form: VerbForm, **context: Any) -> HttpResponse:
+def form_page(request: HttpRequest, template: str, form: SiteForm, **context: Any) -> HttpResponse:
+    """A page with this form in it, empty or refused."""
     return render(request, template, {"form": form, **context}, status=422 if form.errors else 200)
 
 

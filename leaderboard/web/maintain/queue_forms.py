@@ -1,23 +1,23 @@
-"""What maintainers ask the queue for, and what they have retried."""
+"""Forms of the queue page: filter and retry."""
 
 from typing import Any
-from urllib.parse import urlencode
 
 from django import forms
 
 from leaderboard.models import Evaluation, Split
-from leaderboard.web.queue_tables import STATES
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.queue_tables import STATES
 
-_NONE_CHOSEN = "Nothing was chosen; expected evaluations that failed by our fault."
+_NONE_CHOSEN = "No evaluation was chosen; expected evaluations with a system error."
 
 
-class QueueFilter(forms.Form):
+class QueueFilter(SiteForm):
     """Which of the lists, and of which split."""
 
     state = forms.ChoiceField(
         required=False,
         choices=[("", "all"), *((name, state.heading) for name, state in STATES.items())],
-        error_messages={"invalid_choice": f"There is no such list; expected one of {', '.join(STATES)}."},
+        error_messages={"invalid_choice": f"There is no such state; expected one of {', '.join(STATES)}."},
     )
     split = forms.ChoiceField(required=False)
 
@@ -31,11 +31,6 @@ class QueueFilter(forms.Form):
             f"There is no such split; expected one of {', '.join(names)}."
         )
 
-    def query(self, **more: Any) -> str:
-        """The same as the query of an address, with `more` in it."""
-        asked = {**self.cleaned_data, **more}
-        return urlencode({name: str(value) for name, value in asked.items() if value})
-
 
 class RetryForm(forms.Form):
     """Which evaluations to queue again: at most a page of them."""
@@ -44,6 +39,6 @@ class RetryForm(forms.Form):
         queryset=Evaluation.objects.defer("report", "problems"),
         error_messages={
             "required": _NONE_CHOSEN,
-            "invalid_choice": "There is no evaluation %(value)s; expected ones that failed by our fault.",
+            "invalid_choice": "There is no evaluation %(value)s; expected evaluations with a system error.",
         },
     )

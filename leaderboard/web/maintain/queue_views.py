@@ -1,6 +1,6 @@
-"""The queue for maintainers: what failed by our fault, what runs, what waits; and to have it tried again."""
+"""The queue for maintainers: system errors, running and waiting evaluations, and their retry."""
 
-from typing import Any, cast
+from typing import Any
 
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
@@ -8,12 +8,11 @@ from django.shortcuts import redirect, render
 from django.urls import reverse
 from django.views.decorators.http import require_POST, require_safe
 
-from leaderboard import lifecycle
-from leaderboard.models import User
-from leaderboard.web.edition_tables import counted
-from leaderboard.web.maintainer_views import maintainers_only
-from leaderboard.web.queue_forms import QueueFilter, RetryForm
-from leaderboard.web.queue_tables import shown
+from leaderboard.scoring import lifecycle
+from leaderboard.web.boards.edition_tables import counted
+from leaderboard.web.maintain.maintainer_views import maintainer_of, maintainers_only
+from leaderboard.web.maintain.queue_forms import QueueFilter, RetryForm
+from leaderboard.web.maintain.queue_tables import queue_table
 
 
 @maintainers_only
@@ -31,22 +30,22 @@ def queue_state(request: HttpRequest) -> HttpResponse:
     if not asked.is_valid():
         return HttpResponse(status=400)
     context = _context(request, asked)
-    if request.GET.get("seen") == context["shown"].seen:
+    if request.GET.get("seen") == context["shown"]["seen"]:
         return HttpResponse(status=204)
-    return render(request, "maintainers/queue_state.html", context)
+    return render(request, "maintain/queue_state.html", context)
 
 
 @maintainers_only
 @require_POST
 def retry(request: HttpRequest) -> HttpResponse:
-    """Queue again what failed by our fault, and go back to the list that it was chosen from."""
+    """Queue again system errors, and go back to the list that it was chosen from."""
     form = RetryForm(request.POST)
     if not form.is_valid():
         return _page(request, status=422, refusals=form.errors["evaluation"])
     n_retried = 0
     for evaluation in form.cleaned_data["evaluation"]:
         try:
-            lifecycle.retry(evaluation=evaluation, actor=cast("User", request.user), reason="from the queue")
+            lifecycle.retry(evaluation=evaluation, actor=maintainer_of(request), reason="from the queue")
             n_retried += 1
         except lifecycle.LostRace as race:
             messages.warning(request, f"{str(race).capitalize()}.")
@@ -59,14 +58,14 @@ def retry(request: HttpRequest) -> HttpResponse:
 def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpResponse:
     asked = QueueFilter(request.GET)
     if not asked.is_valid():
-        return render(request, "maintainers/queue.html", {"form": asked}, status=400)
-    return render(request, "maintainers/queue.html", {**_context(request, asked), **more}, status=status)
+        return render(request, "maintain/queue.html", {"form": asked}, status=400)
+    return render(request, "maintain/queue.html", {**_context(request, asked), **more}, status=status)
 
 
 def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
     """What was asked for, ready to be drawn, and how to ask for it again."""
-    found = shown(**asked.cleaned_data, number=request.GET.get("page"))
-    number = found.sections[0].page.number if asked.cleaned_data["state"] else 1
+    found = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
+    number = found["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
     return {
         "form": asked,
         "shown": found,

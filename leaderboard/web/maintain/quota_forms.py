@@ -1,17 +1,18 @@
-"""What maintainers fill in to look up a team, and to give it rules of its own or take them back."""
+"""Forms of quotas: find a team, override its rules, end the override."""
 
 import re
 from datetime import timedelta
 from typing import Any, Final
-from urllib.parse import urlencode
 
 from django import forms
 
-from leaderboard import quotas
 from leaderboard.models.quotas import MAX_SPAN, QuotaRules
-from leaderboard.web.maintainer_forms import VerbForm
+from leaderboard.quotas import quotas
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.maintainer_forms import reason_field
 
 MAX_COUNT: Final = 1_000_000
+_FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The team does not see it."
 _UNITS: Final = {
     "day": timedelta(days=1),
     "hour": timedelta(hours=1),
@@ -21,14 +22,10 @@ _UNITS: Final = {
 _SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s+({'|'.join(_UNITS)})s?\s*", re.ASCII | re.IGNORECASE)
 
 
-class TeamLookup(forms.Form):
+class TeamLookup(SiteForm):
     """A part of a team's name, or of the address of somebody in it."""
 
-    team = forms.CharField(label="Team, or address of somebody in it", required=False, max_length=254)
-
-    def query(self) -> str:
-        """The same as the query of an address."""
-        return urlencode({"team": self.cleaned_data["team"]})
+    team = forms.CharField(label="Team, or email address of a member", required=False, max_length=254)
 
 
 class SpanField(forms.CharField):
@@ -36,7 +33,7 @@ class SpanField(forms.CharField):
 
     default_error_messages = {
         "not_a_span": "%(given)s is no span of time; expected one like 30 days, 24 hours or 90 minutes.",
-        "too_short": "A window of no length holds nothing; expected one like 30 days or 24 hours.",
+        "too_short": "The window is empty; expected one like 30 days or 24 hours.",
         "too_long": f"That is longer than ten years; expected at most {quotas.span(MAX_SPAN)}.",
     }
 
@@ -71,48 +68,29 @@ def _count(label: str, help_text: str) -> forms.IntegerField:
         help_text=help_text,
         widget=forms.NumberInput(attrs={"inputmode": "numeric"}),
         error_messages={
-            "invalid": "That is no whole number; expected one from 0, or nothing.",
-            "min_value": "There are no fewer than 0; expected a whole number from 0, or nothing.",
+            "invalid": "That is not a whole number; expected 0 or more, or an empty field.",
+            "min_value": "The number is negative; expected 0 or more, or an empty field.",
             "max_value": f"That is too many; expected at most {MAX_COUNT:,}, or nothing.",
         },
     )
 
 
-def _reason(missing: str) -> forms.CharField:
-    return forms.CharField(
-        max_length=500,
-        widget=forms.Textarea(attrs={"rows": 3}),
-        help_text="A sentence for maintainers and the audit log. The team does not see it.",
-        error_messages={"required": missing},
-    )
-
-
-class _DescribedForm(VerbForm):
-    """A form whose fields name their help and their errors to readers by ear."""
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        super().__init__(*args, **options)
-        for name, field in self.fields.items():
-            described = [f"{name}-help"] if field.help_text else []
-            field.widget.attrs["aria-describedby"] = " ".join([*described, f"{name}-error"])
-
-
-class OverrideForm(_DescribedForm):
+class OverrideForm(SiteForm):
     """Four limits and why this team has them. The names are those of `quotas.override`."""
 
-    limit = _count("Submissions", "Within the window. Empty: as many as they like; 0: none at all.")
+    limit = _count("Submissions", "Within the window. Empty: no limit; 0: none.")
     window = SpanField(
         may_be_none=False,
-        help_text="Length of the rolling window, like 30 days or 24 hours.",
+        help_text="Length of the rolling window, for example 30 days or 24 hours.",
         error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
     )
     min_gap = SpanField(
-        label="Apart", may_be_none=True, help_text="Least time between two submissions. Empty: none."
+        label="Min. interval",
+        may_be_none=True,
+        help_text="Minimum time between two submissions. Empty: none.",
     )
-    rejected_limit = _count(
-        "Rejected or cancelled files", "Within 24 hours; they cost nothing else. Empty: as many as they like."
-    )
-    reason = _reason("No reason was given; expected a sentence for the audit log.")
+    rejected_limit = _count("Rejected or cancelled files", "Within 24 hours. Empty: no limit.")
+    reason = reason_field(_FOR_MAINTAINERS, max_length=500)
 
     @staticmethod
     def filled_with(rules: QuotaRules) -> dict[str, Any]:
@@ -125,7 +103,7 @@ class OverrideForm(_DescribedForm):
         }
 
 
-class EndForm(_DescribedForm):
+class EndForm(SiteForm):
     """Why a team's own rules end."""
 
-    reason = _reason("No reason was given; expected a sentence for the audit log.")
+    reason = reason_field(_FOR_MAINTAINERS, max_length=500)

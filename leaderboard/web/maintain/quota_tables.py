@@ -1,54 +1,28 @@
-"""Quotas in words, as maintainers look at them: rules of splits and teams, and what a team has left."""
+"""Quotas in words: rules of splits and teams, and the slots that a team has left."""
 
-from dataclasses import dataclass
 from datetime import datetime
+from typing import Any
 
 from django.db.models import Q, QuerySet
 
-from leaderboard import names, quotas
-from leaderboard.models import Admission, QuotaOverride, Split, Team, User
+from leaderboard.models import QuotaOverride, Split, Team, User
 from leaderboard.models.quotas import QuotaRules
+from leaderboard.people import names
+from leaderboard.quotas import quotas
 from leaderboard.templatetags.board import grouped
 
 MAX_FOUND = 50
 
 
-@dataclass(frozen=True)
-class Rules:
-    """Four limits in words, one by one and in a sentence."""
-
-    limit: str
-    window: str
-    min_gap: str
-    rejected_limit: str
-    sentence: str
-
-
-@dataclass(frozen=True)
-class TeamRow:
-    """A team on one split: the rules that hold for it, and what it has left of them."""
-
-    split: Split
-    own: QuotaOverride | None
-    rules: Rules
-    quota: quotas.Quota
-    admission: Admission | None = None
-
-    @property
-    def is_never(self) -> bool:
-        """Whether no slot opens by itself."""
-        return not self.quota.is_open and self.quota.next_slot_at is None
-
-
-def rules_of(row: QuotaRules) -> Rules:
-    """The rules of a split or of a team on it, in words."""
-    return Rules(
-        limit=_most(row.quota_limit),
-        window=quotas.span(row.quota_window),
-        min_gap=quotas.span(row.quota_min_gap) if row.quota_min_gap else "–",
-        rejected_limit=_most(row.quota_rejected_limit),
-        sentence=sentence_of(row),
-    )
+def rules_of(row: QuotaRules) -> dict[str, str]:
+    """The rules of a split or of a team on it, in words, one by one and in a sentence."""
+    return {
+        "limit": _most(row.quota_limit),
+        "window": quotas.span(row.quota_window),
+        "min_gap": quotas.span(row.quota_min_gap) if row.quota_min_gap else "–",
+        "rejected_limit": _most(row.quota_rejected_limit),
+        "sentence": sentence_of(row),
+    }
 
 
 def sentence_of(row: QuotaRules) -> str:
@@ -78,27 +52,30 @@ def overrides() -> QuerySet[QuotaOverride]:
     return rows.order_by("split__position", "split", "team__name")
 
 
-def team_rows(team: Team, *, viewer: User, now: datetime) -> tuple[TeamRow, ...]:
-    """The team on every split. Whose the question is (`viewer`) makes no difference to a team."""
+def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]]:
+    """The team on every split: the rules that hold for it, and what it has left of them.
+
+    Whose the question is (`viewer`) makes no difference to a team.
+    """
     own = {row.split_id: row for row in team.quota_overrides.select_related("set_by")}
     admitted = {row.split_id: row for row in team.admissions.all()}
-    return tuple(
-        TeamRow(
-            split=split,
-            own=own.get(split.pk),
-            rules=rules_of(own.get(split.pk, split)),
-            quota=quotas.state(team=team, user=viewer, split=split, now=now),
-            admission=admitted.get(split.pk),
-        )
+    return [
+        {
+            "split": split,
+            "own": own.get(split.pk),
+            "rules": rules_of(own.get(split.pk, split)),
+            "quota": quotas.state(team=team, user=viewer, split=split, now=now),
+            "admission": admitted.get(split.pk),
+        }
         for split in Split.objects.all()
-    )
+    ]
 
 
 def teams_like(text: str) -> list[Team]:
     """Teams with this text in their name or in somebody's address; one more than are shown."""
     by_address = Team.objects.filter(members__email__icontains=text).values("pk")
     fits = Q(name__icontains=text) | Q(pk__in=by_address)
-    look = names.look(text)
+    look = names.skeleton(text)
     if look:
         fits |= Q(look__contains=look)
     return list(Team.objects.filter(fits).prefetch_related("members").order_by("name")[: MAX_FOUND + 1])

@@ -1,6 +1,5 @@
-"""Quotas for maintainers: the rules, teams with rules of their own, and what a team has left."""
+"""Quotas for maintainers: rules, overrides, and the slots that a team has left."""
 
-from typing import Any, cast
 from uuid import UUID
 
 from django.conf import settings
@@ -11,36 +10,35 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from leaderboard import quota_rules
-from leaderboard import quotas as verbs
-from leaderboard.models import QuotaOverride, Split, Team, User
-from leaderboard.web import quota_tables as tables
-from leaderboard.web.maintainer_views import asks_first, maintainers_only
-from leaderboard.web.quota_forms import EndForm, OverrideForm, TeamLookup
+from leaderboard.models import QuotaOverride, Split, Team
+from leaderboard.quotas import quotas, rules
+from leaderboard.web.maintain import quota_tables
+from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+from leaderboard.web.maintain.quota_forms import EndForm, OverrideForm, TeamLookup
 
 PER_PAGE = 50
 
 
 @maintainers_only
 @require_safe
-def quotas(request: HttpRequest) -> HttpResponse:
+def quota_rules(request: HttpRequest) -> HttpResponse:
     """The rules of every split, the teams that have others, and a way to look up a team."""
     lookup = TeamLookup(request.GET)
     text = lookup.cleaned_data["team"] if lookup.is_valid() else ""
-    found = tables.teams_like(text) if text else []
-    page = Paginator(tables.overrides(), PER_PAGE).get_page(request.GET.get("page"))
+    found = quota_tables.teams_like(text) if text else []
+    page = Paginator(quota_tables.overrides(), PER_PAGE).get_page(request.GET.get("page"))
     context = {
         "form": lookup,
         "text": text,
-        "found": found[: tables.MAX_FOUND],
-        "is_cut": len(found) > tables.MAX_FOUND,
-        "splits": [(split, tables.rules_of(split)) for split in Split.objects.all()],
+        "found": found[: quota_tables.MAX_FOUND],
+        "is_cut": len(found) > quota_tables.MAX_FOUND,
+        "splits": [(split, quota_tables.rules_of(split)) for split in Split.objects.all()],
         "page": page,
-        "overrides": [(row, tables.rules_of(row)) for row in page],
+        "overrides": [(row, quota_tables.rules_of(row)) for row in page],
         "are_off": not settings.QUOTAS,
-        "ignored": quota_rules.ignored(),
+        "ignored": rules.ignored(),
     }
-    return render(request, "maintainers/quotas.html", context, status=400 if lookup.errors else 200)
+    return render(request, "maintain/quotas.html", context, status=400 if lookup.errors else 200)
 
 
 @maintainers_only
@@ -48,9 +46,9 @@ def quotas(request: HttpRequest) -> HttpResponse:
 def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
     """What a team has spent and has left on every split, and by whose rules."""
     team = get_object_or_404(Team, pk=team_id)
-    rows = tables.team_rows(team, viewer=_maintainer(request), now=timezone.now())
+    rows = quota_tables.team_rows(team, viewer=maintainer_of(request), now=timezone.now())
     context = {"team": team, "people": team.members.order_by("email"), "rows": rows}
-    return render(request, "maintainers/team_quotas.html", {**context, "are_off": not settings.QUOTAS})
+    return render(request, "maintain/team_quotas.html", {**context, "are_off": not settings.QUOTAS})
 
 
 @maintainers_only
@@ -61,14 +59,16 @@ def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     own = QuotaOverride.objects.filter(team=team, split=found).select_related("set_by").first()
     form = OverrideForm.asked(request, initial=OverrideForm.filled_with(own or found))
     if form.is_valid():
-        actor, now = _maintainer(request), timezone.now()
+        actor, now = maintainer_of(request), timezone.now()
         try:
-            verbs.override(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
+            quotas.override(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
         except Team.DoesNotExist:
             raise Http404 from None  # it has just ended
-        messages.success(request, f"{team.name} has rules of its own on {split}.")
+        messages.success(request, f"{team.name} now has an override on {split}.")
         return redirect("maintain_team_quotas", team.pk)
-    return _form(request, "maintainers/quota_override.html", form, team=team, split=found, own=own)
+    lead = "An override replaces the rules of the split from the next submission."
+    words = {"heading": "Override for", "lead": lead, "button": "Save"}
+    return _form(request, form, team=team, split=found, own=own, words=words)
 
 
 @maintainers_only
@@ -79,32 +79,28 @@ def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpRespons
     own = get_object_or_404(rows, team=team_id, split=split)
     form = EndForm.asked(request)
     if form.is_valid():
-        verbs.end_override(row=own, actor=_maintainer(request), **form.cleaned_data)
+        quotas.end_override(row=own, actor=maintainer_of(request), **form.cleaned_data)
         messages.success(request, f"The rules of {split} hold for {own.team.name} again.")
         return redirect("maintain_team_quotas", team_id)
-    return _form(request, "maintainers/quota_end.html", form, team=own.team, split=own.split, own=own)
+    lead = "The rules of the split apply to the team again from the next submission."
+    words = {"heading": "Delete the override for", "lead": lead, "button": "Delete override"}
+    return _form(request, form, team=own.team, split=own.split, own=own, words=words)
 
 
 def _form(
     request: HttpRequest,
-    template: str,
     form: OverrideForm | EndForm,
     *,
     team: Team,
     split: Split,
     own: QuotaOverride | None,
+    words: dict[str, str],
 ) -> HttpResponse:
-    context: dict[str, Any] = {
-        "form": form,
-        "team": team,
-        "split": split,
-        "own": own,
-        "rules": tables.rules_of(split),
-        "own_rules": tables.rules_of(own) if own else None,
-        "quota": verbs.state(team=team, user=_maintainer(request), split=split, now=timezone.now()),
+    """The form below the rules of the split, those of the team, and what is used of them."""
+    quota = quotas.state(team=team, user=maintainer_of(request), split=split, now=timezone.now())
+    told = {
+        "rules": quota_tables.sentence_of(split),
+        "own_rules": quota_tables.sentence_of(own) if own else "",
     }
-    return render(request, template, context, status=422 if form.errors else 200)
-
-
-def _maintainer(request: HttpRequest) -> User:
-    return cast("User", request.user)
+    about = {"team": team, "split": split, "own": own, "quota": quota}
+    return form_page(request, "maintain/quota_form.html", form, **about, **told, **words)

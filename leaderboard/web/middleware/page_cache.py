@@ -1,9 +1,9 @@
-"""Pages and documents that are the same for everybody: made once, then answered from this process's memory.
+"""The page cache: responses that are the same for all anonymous readers, kept in the process's memory.
 
 Whoever brings neither a session nor a token is anybody. What such a reader is shown changes only with the
-number of some split's boards (`leaderboard/boards.py`), so one statement tells whether an answer still holds:
-none is ever old. A view says with `keeping.kept` that this is so of what it answers. The middleware stands
-before sessions and accounts, so that anybody's question costs neither.
+version of some split's boards (`leaderboard/versions.py`) and with the day, so one statement tells whether an
+answer still holds: none is ever old. A view says with `http.cacheable` that this is so of its answer. The
+middleware stands before sessions and accounts, so that anybody's question costs neither.
 
 An answer is remembered under its path and the query parameters that its view reads, each once, in one order;
 what else an address names is dropped before the view is asked, so that no page repeats it. Texts that anybody
@@ -18,10 +18,9 @@ import gzip
 import hashlib
 import re
 import sys
-import threading
-from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass
+from datetime import date
 from functools import lru_cache
 from typing import Final
 from urllib.parse import urlencode
@@ -30,10 +29,12 @@ from django.conf import settings
 from django.contrib.messages.storage.cookie import CookieStorage
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified, QueryDict
 from django.urls import Resolver404, resolve
+from django.utils import timezone
 
-from leaderboard import boards
-from leaderboard.keeping import Parameters, is_kept, is_known, parameters_of
-from leaderboard.web.context import splits_of
+from leaderboard import versions
+from leaderboard.boards.snapshot_store import BoundedCache
+from leaderboard.boards.snapshots import splits_of
+from leaderboard.http import Parameters, is_cacheable, is_known, parameters_of
 
 Next = Callable[[HttpRequest], HttpResponse]
 
@@ -71,7 +72,7 @@ def is_anybodys(request: HttpRequest) -> bool:
 
 
 @dataclass(frozen=True)
-class Answer:
+class CachedResponse:
     """An answer's bytes, as they are and compressed, with the headers that its view gave it."""
 
     body: bytes
@@ -85,7 +86,7 @@ class Answer:
         return OVERHEAD_BYTES + len(self.body) + len(self.compressed)
 
     @classmethod
-    def of(cls, response: HttpResponse) -> "Answer":
+    def of(cls, response: HttpResponse) -> "CachedResponse":
         """The answer that a view made."""
         body = bytes(response.content)
         # The same bytes compress to the same: a moment within would give each process its own ETag.
@@ -120,70 +121,36 @@ class Answer:
         return response
 
 
-class Shelf:
-    """Answers by address, each with the state of the boards as of which it holds; bounded in bytes."""
-
-    def __init__(self, *, limit_bytes: int) -> None:
-        self._limit_bytes = limit_bytes
-        self._lock = threading.Lock()
-        self._answers: OrderedDict[str, tuple[int, Answer]] = OrderedDict()
-        self._n_bytes = 0
-
-    def __len__(self) -> int:
-        """How many answers stand on it."""
-        return len(self._answers)
-
-    def get(self, address: str) -> tuple[int, Answer] | None:
-        """The last answer of this address, and the state as of which it held."""
-        with self._lock:
-            if address in self._answers:
-                self._answers.move_to_end(address)
-            return self._answers.get(address)
-
-    def put(self, address: str, state: int, answer: Answer) -> None:
-        """Remember it; what was not asked for longest is forgotten."""
-        with self._lock:
-            self._forget(address)
-            self._answers[address] = (state, answer)
-            self._n_bytes += self._cost(address, answer)
-            while self._n_bytes > self._limit_bytes:
-                self._forget(next(iter(self._answers)))
-
-    def clear(self) -> None:
-        """Forget everything."""
-        with self._lock:
-            self._answers.clear()
-            self._n_bytes = 0
-
-    def _forget(self, address: str) -> None:
-        old = self._answers.pop(address, None)
-        if old is not None:
-            self._n_bytes -= self._cost(address, old[1])
-
-    @staticmethod
-    def _cost(address: str, answer: Answer) -> int:
-        # Whoever asks chooses the address, and may make it longer than what is answered.
-        return sys.getsizeof(address) + answer.n_bytes
+# The boards' number, and the day in UTC: rows are new for some days, and ranks have moved since a day.
+State = tuple[int, date]
 
 
-class Memory:
-    """What is remembered: plain pages on one shelf, answers to queries on another."""
+def _today(number: int) -> State:
+    return number, timezone.now().date()
+
+
+def _cost(address: str, remembered: tuple[State, CachedResponse]) -> int:
+    # Whoever asks chooses the address, and may make it longer than what is answered.
+    return sys.getsizeof(address) + remembered[1].n_bytes
+
+
+class ResponseCache:
+    """Answers by address, each with the state of the boards as of which it holds; bounded in bytes.
+
+    Plain pages are on one shelf, answers to queries on another.
+    """
 
     def __init__(self, *, plain_bytes: int, queries_bytes: int) -> None:
-        self.plain = Shelf(limit_bytes=plain_bytes)
-        self.queries = Shelf(limit_bytes=queries_bytes)
+        self.plain = BoundedCache[tuple[State, CachedResponse]](plain_bytes, cost=_cost)
+        self.queries = BoundedCache[tuple[State, CachedResponse]](queries_bytes, cost=_cost)
 
-    def shelf_of(self, address: str) -> Shelf:
+    def shelf_of(self, address: str) -> BoundedCache[tuple[State, CachedResponse]]:
         """Where the answer of this address stands."""
         return self.queries if "?" in address else self.plain
 
-    def get(self, address: str) -> tuple[int, Answer] | None:
+    def get(self, address: str) -> tuple[State, CachedResponse] | None:
         """The last answer of this address, and the state as of which it held."""
         return self.shelf_of(address).get(address)
-
-    def put(self, address: str, state: int, answer: Answer) -> None:
-        """Remember it; what was not asked for longest on its shelf is forgotten."""
-        self.shelf_of(address).put(address, state, answer)
 
     def clear(self) -> None:
         """Forget everything."""
@@ -191,7 +158,7 @@ class Memory:
         self.queries.clear()
 
 
-memory = Memory(plain_bytes=MAX_PLAIN_BYTES, queries_bytes=MAX_QUERIES_BYTES)
+memory = ResponseCache(plain_bytes=MAX_PLAIN_BYTES, queries_bytes=MAX_QUERIES_BYTES)
 
 
 def _read_by_view(path: str) -> Parameters | None:
@@ -225,7 +192,7 @@ def _normalise(request: HttpRequest, parameters: Parameters) -> bool:
     return is_worth_it
 
 
-class KeptMiddleware:
+class PageCacheMiddleware:
     """Answers anybody from memory where that holds, and remembers what views of that kind answer."""
 
     # Where such views are; elsewhere not even the path is looked up.
@@ -244,24 +211,27 @@ class KeptMiddleware:
             return self._get_response(request)
         address = request.get_full_path_info()
         found = memory.get(address)
-        if found is None or found[0] != boards.state():
+        if found is None or found[0] != _today(versions.state()):
             return self._made(request, address)
         return found[1].to(request)
 
     def _made(self, request: HttpRequest, address: str) -> HttpResponse:
         """Ask the view, and remember what it answers if it says so."""
         # Before the view looks: what it finds may be newer than this state, and is never older.
-        state = boards.state_of(splits_of(request))
+        state = _today(versions.state_of(splits_of(request)))
         response = self._get_response(request)
-        if not _may_be_kept(response) or request.method == "HEAD":
+        if not _is_cacheable(response) or request.method == "HEAD":
             return response
-        answer = Answer.of(response)
-        memory.put(address, state, answer)
+        answer = CachedResponse.of(response)
+        memory.shelf_of(address).put(address, (state, answer))
         return answer.to(request)
 
 
-def _may_be_kept(response: HttpResponse) -> bool:
+def _is_cacheable(response: HttpResponse) -> bool:
     """Whether a view says so, and the answer is whole and sets nothing for its one reader."""
     return (
-        is_kept(response) and response.status_code == 200 and not response.streaming and not response.cookies
+        is_cacheable(response)
+        and response.status_code == 200
+        and not response.streaming
+        and not response.cookies
     )

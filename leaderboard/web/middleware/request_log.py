@@ -1,4 +1,4 @@
-"""One line a request, with its id, which the response bears as well."""
+"""Logging of requests: one line each, with an id that the response carries as well."""
 
 import re
 

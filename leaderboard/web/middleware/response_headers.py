@@ -1,8 +1,8 @@
-"""The headers of every answer: who may keep it, what it depends on, and what browsers may do with it.
+"""Headers of every response: caching, variation, and browser permissions.
 
 What says who asks (a session, a token) makes the answer that person's alone: `private, no-store`, also where
 the same page would be the same for everybody. What nobody in particular asks for may be kept by anybody who
-asks again whether it holds; a view that knows better, as `leaderboard/web/kept.py` does, says so itself.
+asks again whether it holds; a view that knows better, as the page cache does, says so itself.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""Sessions in the database, which is asked for none that it cannot have."""
+"""Sessions in the database; impossible keys are not looked up."""
 
 import re
 from typing import Final

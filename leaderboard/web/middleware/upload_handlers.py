@@ -1,4 +1,4 @@
-"""Where an upload is kept while it comes in: a file without a name, which vanishes with its process.
+"""The upload handler: an upload goes to a file without a name, which vanishes with its process.
 
 Django's own temporary files have names: those of a process that is killed stay, and those that a full disk
 interrupts go on filling it until the garbage collector comes by.

@@ -1,4 +1,4 @@
-"""The page on which a team looks closer at one of its submissions to an open split."""
+"""The page of the error analysis of one submission to an open split."""
 
 from uuid import UUID
 
@@ -8,10 +8,10 @@ from django.shortcuts import get_object_or_404, render
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_safe
 
-from leaderboard import analyses
-from leaderboard import submissions as verbs
 from leaderboard.models import Status, Submission
-from leaderboard.web import analysis_charts
+from leaderboard.scoring import analyses
+from leaderboard.submissions import submissions
+from leaderboard.web.submissions import analysis_charts
 
 
 @login_required
@@ -21,9 +21,11 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """Error by time to contact, its distribution, predicted against true, the worst recordings."""
     rows = Submission.objects.visible_to(request.user).select_related("method", "split__published_edition")
     found = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
-    progress = verbs.progress(found)
+    progress = submissions.progress(found)
     if progress.is_final and progress.state != Status.SCORED:
-        raise Http404("Nothing of this submission was scored.")
+        raise Http404("This submission has no score.")
     closer = analyses.of(submission=found, viewer=request.user)
-    tables = analysis_charts.closer_tables(closer) if closer else None
-    return render(request, "analysis.html", {"submission": found, "tables": tables, "closer": closer})
+    tables = analysis_charts.error_analysis_tables(closer) if closer else None
+    return render(
+        request, "submissions/analysis.html", {"submission": found, "tables": tables, "closer": closer}
+    )

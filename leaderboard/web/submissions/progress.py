@@ -5,16 +5,17 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Final
 
-from leaderboard.models import Status
-from leaderboard.submissions import Progress
+from leaderboard.models import Evaluation, Status
+from leaderboard.submissions.submissions import Progress
 from leaderboard.templatetags.board import duration, grouped
 
 MAX_POINTS: Final = 20
-INTERVALS_FOLLOW: Final = "intervals follow"
+INTERVALS_FOLLOW: Final = "confidence intervals follow"
+LATE: Final = "Taking longer than usual; nothing is lost."
 _ENDS: Final = {
     Status.SCORED: "Scored",
     Status.REJECTED: "Rejected",
-    Status.SYSTEM_ERROR: "Failed, by our fault",
+    Status.SYSTEM_ERROR: "System error",
     Status.CANCELLED: "Cancelled",
 }
 
@@ -30,7 +31,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Shown:
+class StateLine:
     """What the template places. `seen` changes exactly when the line of state does.
 
     `is_moving`: there is more to come, and the page asks for it by itself.
@@ -44,12 +45,12 @@ class Shown:
     listing: str
 
 
-def shown(progress: Progress, *, awaits_intervals: bool = False) -> Shown:
+def state_line(progress: Progress, *, awaits_intervals: bool = False) -> StateLine:
     """A progress, ready to be drawn. `awaits_intervals`: scored, and its intervals are about to come."""
     more = "-intervals" if awaits_intervals else ""
-    return Shown(
+    return StateLine(
         steps=steps(progress, awaits_intervals=awaits_intervals),
-        seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}{more}",
+        seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}-{progress.is_late}{more}",
         is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
         problems=tuple(progress.problems[:MAX_POINTS]),
@@ -58,14 +59,17 @@ def shown(progress: Progress, *, awaits_intervals: bool = False) -> Shown:
 
 
 def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, ...]:
-    """Received → queued → running → how it ended (or is going to)."""
+    """Received → queued → running → how it ended (or is going to); of another edition's run see `_again`."""
+    if progress.first_run is not None:
+        return _again(progress, progress.first_run, awaits_intervals=awaits_intervals)
     is_queued, is_running = progress.state == Status.QUEUED, progress.state == Status.RUNNING
     received = Step("Received", "done", progress.received_at)
     if is_queued:
         queued = Step("Queued", "now", progress.queued_at, waiting(progress))
         return received, queued, Step("Running", "ahead"), Step("Scored", "ahead")
     queued = Step("Queued", "done", progress.queued_at)
-    running = Step("Running", "now" if is_running else "done", progress.started_at)
+    late = LATE if is_running and progress.is_late else ""
+    running = Step("Running", "now" if is_running else "done", progress.started_at, late)
     if is_running:
         return received, queued, running, Step("Scored", "ahead")
     end = Step(
@@ -77,8 +81,24 @@ def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, 
     return (received, queued, running, end) if progress.started_at else (received, queued, end)
 
 
+def _again(progress: Progress, first: Evaluation, *, awaits_intervals: bool) -> tuple[Step, ...]:
+    """How the first run ended, then the run in the edition that counts: two runs, each with its own times."""
+    received = Step("Received", "done", progress.received_at)
+    before = Step(_ENDS[Status(first.status)], "done", first.finished_at, f"edition {first.edition.number}")
+    now_in = f"edition {progress.edition_number}"
+    if not progress.is_final:
+        label = "Queued again" if progress.state == Status.QUEUED else "Running again"
+        at = progress.queued_at if progress.state == Status.QUEUED else progress.started_at
+        return received, before, Step(label, "now", at, now_in), Step("Re-scored", "ahead")
+    label = "Re-scored" if progress.state == Status.SCORED else _ENDS[Status(progress.state)]
+    note = f"{now_in}, {INTERVALS_FOLLOW}" if awaits_intervals else now_in
+    return received, before, Step(label, "now", progress.finished_at, note)
+
+
 def waiting(progress: Progress) -> str:
     """How many go first, and about how long that takes."""
+    if progress.is_late:
+        return LATE
     if progress.n_ahead is None:
         return ""
     place = f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
@@ -111,4 +131,4 @@ def listing(*, n_problems: int, n_points: int) -> str:
     """
     if n_points == n_problems <= MAX_POINTS:
         return ""
-    return f"Keys at fault in the same way share one point, and at most {MAX_POINTS} points are listed."
+    return f"Keys with the same problem share one point; at most {MAX_POINTS} points are listed."

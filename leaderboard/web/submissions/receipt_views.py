@@ -1,4 +1,4 @@
-"""Score receipts on the pages, and the keys that anybody checks them with."""
+"""Score receipts on the pages, and the public keys that check them."""
 
 from typing import cast
 from uuid import UUID
@@ -9,8 +9,8 @@ from django.shortcuts import get_object_or_404, render
 from django.views.decorators.cache import cache_control, never_cache
 from django.views.decorators.http import require_safe
 
-from leaderboard import receipts
 from leaderboard.models import Submission, User
+from leaderboard.submissions import receipts
 
 
 @require_safe

@@ -1,4 +1,4 @@
-"""The pages' doors: each view calls one verb and hands what it says to a template."""
+"""The pages of submissions: the form, the list, one submission, and its withdrawal."""
 
 from typing import Any, cast
 from uuid import UUID
@@ -7,78 +7,38 @@ from django.contrib import messages
 from django.contrib.auth.decorators import login_required
 from django.core.paginator import Paginator
 from django.db.models import Prefetch
-from django.http import HttpRequest, HttpResponse
+from django.http import (
+    Http404,
+    HttpRequest,
+    HttpResponse,
+    HttpResponseBase,
+    HttpResponseNotModified,
+    JsonResponse,
+)
 from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
 from django.utils import timezone
-from django.utils.functional import SimpleLazyObject
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_safe
 
-from leaderboard import editions, methods, outcomes, quotas, snapshots
-from leaderboard import submissions as verbs
-from leaderboard.models import Edition, Evaluation, Method, Split, Status, Submission, User
-from leaderboard.submissions import Progress
-from leaderboard.web import api_reference as api
-from leaderboard.web import (
-    board_query,
-    edition_tables,
-    export_views,
-    method_tables,
-    outcome_tables,
-    reference,
-    result_tables,
-    tables,
-)
-from leaderboard.web.board_tools import tools
-from leaderboard.web.context import split_or_404, splits_of
-from leaderboard.web.forms import SubmissionForm
-from leaderboard.web.progress import Shown, shown
+from evaluator.predictions import writing
+from leaderboard.editions import history
+from leaderboard.http import is_known
+from leaderboard.models import Evaluation, Status, Submission, User, Visibility
+from leaderboard.quotas import quotas
+from leaderboard.storage import manifests
+from leaderboard.submissions import outcomes, search, submissions
+from leaderboard.submissions.submissions import Progress
+from leaderboard.web.boards import edition_tables
+from leaderboard.web.context_processors import split_or_404
+from leaderboard.web.methods import result_tables
+from leaderboard.web.submissions import outcome_tables
+from leaderboard.web.submissions.forms import SearchForm, SubmissionForm
+from leaderboard.web.submissions.progress import StateLine, state_line
 
-HOME_SPLIT = "test"
 PER_PAGE = 50
 # htmx takes this as "do not ask again".
 STOP_POLLING = 286
-
-
-@require_safe
-def home(request: HttpRequest) -> HttpResponse:
-    """The board that papers quote."""
-    return board(request, HOME_SPLIT)
-
-
-@require_safe
-def board(request: HttpRequest, split: str) -> HttpResponse:
-    """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
-    found = split_or_404(request, split)
-    # Asked for only by a page that tells it: a board of the past does not.
-    news = SimpleLazyObject(lambda: edition_tables.news(found))
-    return draw_board(request, "board.html", split=found, news=news)
-
-
-def draw_board(
-    request: HttpRequest, template: str, *, split: Split, edition: Edition | None = None, **more: Any
-) -> HttpResponse:
-    """A board as its address asks for it; an edition's has no other time."""
-    try:
-        query = board_query.parse(request.GET, now=timezone.now(), has_time=edition is None)
-    except board_query.FAULTS as fault:
-        return render(request, "400.html", {"sentence": str(fault)}, status=400)
-    shown = snapshots.board(
-        split=split,
-        edition=edition,
-        viewer=request.user,
-        sort=query.sort,
-        at=query.at,
-        filters=query.filters,
-    )
-    table = edition_tables.with_reasons(tables.board_table(shown, query=query), shown)
-    context = {
-        "board": shown,
-        "table": table,
-        "tools": tools(shown, query),
-        "exports": export_views.offers(shown, edition, query),
-    }
-    return render(request, template, context | more)
 
 
 @login_required
@@ -87,23 +47,46 @@ def draw_board(
 def submit(request: HttpRequest) -> HttpResponse:
     """Take a prediction file."""
     user = cast("User", request.user)
-    form = SubmissionForm.for_user(user, request)
+    form = SubmissionForm(user, request)
     if request.method == "POST" and form.is_valid():
         try:
-            submitted = verbs.submit(user=user, now=timezone.now(), **form.submission())
-        except (verbs.Refused, quotas.QuotaExceeded) as refusal:
+            submitted = submissions.submit(user=user, now=timezone.now(), **form.submission())
+        except (submissions.Refused, quotas.QuotaExceeded) as refusal:
             form.refuse(refusal)
         else:
             if not submitted.is_new:
-                messages.info(request, "This very file had been submitted before; this is what came of it.")
-            return redirect("submission", submitted.submission.pk)
-    return render(request, "submit.html", {"form": form}, status=422 if form.errors else 200)
+                messages.info(request, "You already submitted this file. Here is its result.")
+            return _taken(request, submitted.submission)
+    return render(request, "submissions/submit.html", {"form": form}, status=422 if form.errors else 200)
+
+
+def _taken(request: HttpRequest, taken: Submission) -> HttpResponse:
+    """Lead to the submission's page; a script that follows the upload is told the address of that page."""
+    if "application/json" in request.headers.get("Accept", ""):
+        return JsonResponse({"page": reverse("submission", args=[taken.pk])}, status=201)
+    return redirect("submission", taken.pk)
+
+
+@require_safe
+def template(request: HttpRequest, split: str) -> HttpResponseBase:
+    """A prediction file of the split with all its anno_ids and no value, to be filled in."""
+    edition = split_or_404(request, split).published_edition
+    if edition is None:
+        raise Http404
+    tag = f'"template-{edition.ground_truth.manifest_digest}"'
+    if is_known(request, tag):
+        return HttpResponseNotModified(headers={"ETag": tag})
+    return HttpResponse(
+        writing.template(manifests.load(edition.ground_truth.manifest_digest)),
+        content_type="application/json",
+        headers={"ETag": tag, "Content-Disposition": f'attachment; filename="tsttc-{split}-template.json"'},
+    )
 
 
 @login_required
 @never_cache
 @require_safe
-def submissions(request: HttpRequest) -> HttpResponse:
+def submission_list(request: HttpRequest) -> HttpResponse:
     """What the reader's own team has sent."""
     evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
     sent = (
@@ -111,8 +94,10 @@ def submissions(request: HttpRequest) -> HttpResponse:
         .select_related("method", "split", "submitted_by")
         .prefetch_related(Prefetch("evaluations", evaluations))
     )
-    page = Paginator(sent, PER_PAGE).get_page(request.GET.get("page"))
-    return render(request, "submissions.html", {"page": page, "rows": result_tables.submission_rows(page)})
+    form = SearchForm.of(request)
+    page = Paginator(search.matching(sent, **form.wanted()), PER_PAGE).get_page(request.GET.get("page"))
+    table = result_tables.submission_table(page)
+    return render(request, "submissions/submissions.html", {"page": page, "table": table, "form": form})
 
 
 @login_required
@@ -121,7 +106,9 @@ def submissions(request: HttpRequest) -> HttpResponse:
 def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """One submission: its state, then its result or its problems."""
     found, progress, now_shown = _looked_at(request, submission_id)
-    return render(request, "submission.html", _outcome(request, found, progress) | {"shown": now_shown})
+    return render(
+        request, "submissions/submission.html", _outcome(request, found, progress) | {"shown": now_shown}
+    )
 
 
 @login_required
@@ -137,7 +124,7 @@ def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
         return HttpResponse(status=204)
     context = _outcome(request, found, progress) | {"shown": now_shown, "is_fragment": True}
     status = 200 if now_shown.is_moving else STOP_POLLING
-    return render(request, "submission_state.html", context, status=status)
+    return render(request, "submissions/state.html", context, status=status)
 
 
 @login_required
@@ -148,46 +135,15 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     user = cast("User", request.user)
     own = Submission.objects.filter(method__team__memberships__user=user)
     found = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
-    if request.method == "POST" and verbs.withdraw(submission=found, actor=user, now=timezone.now()):
+    if request.method == "POST" and submissions.withdraw(submission=found, actor=user, now=timezone.now()):
         messages.success(request, "The submission is withdrawn.")
-    if request.method == "POST" or found.withdrawn_at:
+    if request.method == "POST" or not outcomes.can_be_withdrawn(found):
         return redirect("submission", found.pk)
-    return render(request, "withdraw.html", {"submission": found})
+    is_waiting = not submissions.progress(found).is_final
+    return render(request, "submissions/withdraw.html", {"submission": found, "is_waiting": is_waiting})
 
 
-@require_safe
-def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """A method: what it is, and what it achieved on each split."""
-    rows = Method.objects.visible_to(request.user).select_related("team")
-    found = get_object_or_404(rows, pk=method_id)
-    results = methods.results(method=found, viewer=request.user, splits=splits_of(request))
-    profile = methods.profile(method=found, viewer=request.user)
-    context = {
-        "profile": profile,
-        "details": method_tables.detail_words(profile.details),
-        "visibility": found.visibility,
-        "is_named": found.is_named_for(request.user),
-        "is_mine": Method.objects.of(request.user).filter(pk=found.pk).exists(),
-        "method_id": found.pk,
-        "results": result_tables.method_results(results),
-        **export_views.of_method(results),
-    }
-    return render(request, "method.html", context)
-
-
-@require_safe
-def docs(request: HttpRequest) -> HttpResponse:
-    """How to submit, the file's format, the errors, the API."""
-    return render(request, "docs.html", reference.docs())
-
-
-@require_safe
-def api_reference(request: HttpRequest) -> HttpResponse:
-    """Every path, parameter and shape of the API."""
-    return render(request, "api_reference.html", {"api": api.reference()})
-
-
-def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, Shown]:
+def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:
     """A submission that the reader may see and its line of state: all that a page asks for while it waits."""
     evaluations = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
     rows = (
@@ -196,16 +152,16 @@ def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, P
         .prefetch_related(Prefetch("evaluations", evaluations))
     )
     found = get_object_or_404(rows, pk=submission_id)
-    progress = verbs.progress(found)
+    progress = submissions.progress(found)
     awaits = outcomes.awaits_intervals(found, progress, now=timezone.now())
-    return found, progress, shown(progress, awaits_intervals=awaits)
+    return found, progress, state_line(progress, awaits_intervals=awaits)
 
 
 def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dict[str, Any]:
     """What came of it, for the templates."""
     now = timezone.now()
     is_mine = found.method.team.memberships.filter(user=cast("User", request.user)).exists()
-    rescored = edition_tables.rescored_notice(editions.rescored(found))
+    rescored = edition_tables.rescored_notice(history.rescored(found))
     quota = None
     if progress.state == Status.REJECTED and rescored is None:
         quota = quotas.state(team=found.method.team, user=found.submitted_by, split=found.split, now=now)
@@ -222,4 +178,8 @@ def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dic
         "cost": outcome_tables.rejected_sentence(quota),
         "rescored": rescored,
         "is_mine": is_mine,
+        "can_be_withdrawn": is_mine and outcomes.can_be_withdrawn(found),
+        "can_be_published": is_mine
+        and found.withdrawn_at is None
+        and found.method.visibility != Visibility.PUBLIC,
     }

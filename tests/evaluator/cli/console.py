@@ -1,6 +1,6 @@
 """Runs the console examples of documents, so that what they show is what the command prints.
 
-`python -m tests.evaluator.console` writes the present output into them; read the difference afterwards.
+`python -m tests.evaluator.cli.console` writes the present output into them; read the difference afterwards.
 """
 
 from __future__ import annotations
@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import Any
 
 from evaluator import read_manifest, receipts
-from evaluator.protocol import SCORE_NAMES
-from tests.evaluator.recorded_site import RecordedSite, Reply, problem
+from evaluator.metrics.protocol import SCORE_NAMES
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.worlds import EXAMPLES, REPOSITORY
 
-REPOSITORY = Path(__file__).resolve().parents[2]
-EXAMPLES = REPOSITORY / "examples"
 DOCUMENTS = (REPOSITORY / "docs" / "cli.md", EXAMPLES / "README.md")
 
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
@@ -187,7 +186,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         {"split": "test", "limit": 3, "used": 3, "left": 0, "is_open": False, "window_s": window_s}
         | {
             "next_slot_at": "2026-12-04T09:13:00Z",
-            "sentence": "Your team has spent the 3 submissions to test that it has in 30 days; the next slot "
+            "sentence": "Your team has used 3 submissions to test, its quota for 30 days; the next slot "
             "opens at 2026-12-04 09:13 UTC.",
         },
     ]
@@ -251,7 +250,8 @@ def _foreseen() -> dict[str, Any]:
 
 def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object]:
     """The paper's five baselines and one submission, by rank."""
-    paper = json.loads((REPOSITORY / "leaderboard" / "published" / "tsttc-2023.json").read_text())
+    source = REPOSITORY / "leaderboard" / "benchmark" / "published" / "tsttc-2023.json"
+    paper = json.loads(source.read_text())
     names = {method["slug"]: method["name"] for method in paper["methods"]}
     entries: list[dict[str, Any]] = [
         {

@@ -11,8 +11,8 @@ import pytest
 from evaluator.cli import EPILOG, main
 from evaluator.cli.exits import MEANINGS, Exit
 from evaluator.cli.gates import OPERATORS
-from evaluator.protocol import SCORE_NAMES
-from tests.evaluator.console import DOCUMENTS, REPOSITORY, documented_shell, recorded
+from evaluator.metrics.protocol import SCORE_NAMES
+from tests.evaluator.cli.console import DOCUMENTS, REPOSITORY, documented_shell, recorded
 
 GUIDE = REPOSITORY / "docs" / "cli.md"
 

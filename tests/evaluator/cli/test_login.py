@@ -7,18 +7,16 @@ import os
 import pty
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import keyring
 import pytest
-from click.testing import Result
 
-from tests.evaluator.keyrings import LockedKeyring, NoKeyring, RememberingKeyring
-from tests.evaluator.recorded_site import RecordedSite, Reply, problem
-from tests.evaluator.worlds import REPOSITORY
+from tests.evaluator.cli.keyrings import LockedKeyring, NoKeyring, RememberingKeyring
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.worlds import REPOSITORY, Tsttc
 
-Tsttc = Callable[..., Result]
 TOKEN = "tsttc_" + "a1" * 32
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
 SCORED = {"id": ID, "state": "SCORED", "split": "val", "method": "Foo++"}
@@ -46,7 +44,7 @@ def test_login_tries_the_token_keeps_it_and_other_commands_find_it_and_the_serve
     site.put(f"GET /api/v1/submissions/{ID}", Reply(SCORED))
     result = tsttc("login", "--server", f"{site.url}/", stdin=f" {TOKEN}\n".encode())
     assert (result.exit_code, result.stderr) == (0, "")
-    assert result.stdout == f"The token is good, and kept for {site.url}/ (A keyring of the tests).\n"
+    assert result.stdout == f"The token is valid and saved for {site.url}/ (A keyring of the tests).\n"
     assert ring.kept == {("tsttc", site.url): TOKEN}
     assert tsttc("status", ID).exit_code == 0, "without naming token or server"
     assert [request.headers["Authorization"] for request in site.requests] == [f"Bearer {TOKEN}"] * 2
@@ -60,7 +58,7 @@ def test_token_that_the_server_refuses_is_not_kept(
     site.put("GET /api/v1/quota", Reply(problem(words, code="token-expired"), 401))
     result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
     assert result.exit_code == 4
-    assert result.stderr.startswith(f"Error: {words}\nMake a new one at {site.url}/tokens/")
+    assert result.stderr.startswith(f"Error: {words}\nCreate a token at {site.url}/tokens/")
     assert ring.kept == {}
     assert TOKEN not in result.output
 
@@ -89,14 +87,14 @@ def test_keyring_that_stays_locked_is_told_and_means_no_token(tsttc: Tsttc, site
     site.put("GET /api/v1/quota", Reply([]))
     result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
     assert result.exit_code == 4
-    assert "The keyring did not take the token (the collection is locked)." in result.stderr
+    assert "The keyring did not accept the token (the collection is locked)." in result.stderr
     keyring.set_keyring(NoKeyring())
 
 
 def test_without_any_token_nothing_is_sent_and_both_ways_are_named(tsttc: Tsttc, site: RecordedSite) -> None:
     result = tsttc("status", ID, "--server", site.url)
     assert (result.exit_code, site.requests) == (4, [])
-    assert "TSTTC_TOKEN is not set, and tsttc login has kept none" in result.stderr
+    assert "TSTTC_TOKEN is not set, and tsttc login has saved none" in result.stderr
     assert f"{site.url}/tokens/" in result.stderr
 
 
@@ -146,7 +144,10 @@ def test_terminal_is_asked_and_does_not_show_the_token(site: RecordedSite, tmp_p
         cwd=REPOSITORY,
         start_new_session=True,
         env=os.environ
-        | {"PYTHON_KEYRING_BACKEND": "tests.evaluator.keyrings.RememberingKeyring", "HOME": str(tmp_path)},
+        | {
+            "PYTHON_KEYRING_BACKEND": "tests.evaluator.cli.keyrings.RememberingKeyring",
+            "HOME": str(tmp_path),
+        },
     )
     os.close(end)
     with open(terminal, "r+b", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
@@ -154,9 +155,9 @@ def test_terminal_is_asked_and_does_not_show_the_token(site: RecordedSite, tmp_p
         while b"Token:" not in shown:
             shown += screen.read(1 << 16)
         screen.write(TOKEN.encode() + b"\n")
-        while b"is good" not in shown:
+        while b"is valid" not in shown:
             shown += screen.read(1 << 16)
         assert running.wait(30) == 0
-    assert b"it is not shown" in shown
+    assert b"the input is hidden" in shown
     assert TOKEN.encode() not in shown
     assert site.requests[0].headers["Authorization"] == f"Bearer {TOKEN}"

@@ -4,27 +4,21 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import Result
 
 from evaluator import compare_predictions, read_predictions, read_truth
-from evaluator.protocol import SCORE_NAMES
-from evaluator.sentences import sentence
-from tests.evaluator.console import METHOD_ID, RECEIPT, RECEIPT_KEYS
-from tests.evaluator.recorded_site import RecordedSite, Reply, problem
-from tests.evaluator.worlds import REPOSITORY
+from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.tables.sentences import sentence
+from tests.evaluator.cli.console import METHOD_ID, RECEIPT, RECEIPT_KEYS
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.worlds import EXAMPLES, Tsttc, process
 
-Tsttc = Callable[..., Result]
 pytestmark = pytest.mark.usefixtures("at_site")
 
-EXAMPLES = REPOSITORY / "examples"
-SENTENCE = "Your team has spent the 3 submissions to test; the next slot opens at 2026-12-04 09:13 UTC."
+SENTENCE = "Your team has used 3 submissions to test; the next slot opens at 2026-12-04 09:13 UTC."
 QUOTAS: list[dict[str, Any]] = [
     {"split": "val", "limit": None, "used": 4, "left": None, "is_open": True, "sentence": "Any number."},
     {"split": "test", "limit": 3, "used": 3, "left": 0, "is_open": False, "sentence": SENTENCE}
@@ -74,12 +68,7 @@ def test_compare_asks_until_it_is_computed_and_shows_interval_and_p(tsttc: Tsttc
     found["mid_crucial"] = {"difference": -4.1, "low": -5.3, "high": -2.9, "p": 0.0003}
     found["rte"] = {"difference": -0.1, "low": -0.3, "high": 0.1, "p": 0.4}
     told = tsttc("compare", "A", "id-b", "--split", "val").stdout.split("A is better.\n")[1]
-    assert told == (
-        "Of 2 other columns 1 differs significantly, each by itself "
-        "(of twenty columns of equals, one does):\n"
-        "  A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; "
-        "p = 0.0003).\n"
-    )
+    assert told == "1 of the 2 other metrics differs significantly (α = 0.05, uncorrected).\n"
     assert site.requests[-1].path == "/api/v1/compare?split=val&m=id-a&m=id-b"
     assert json.loads(tsttc("compare", "A", "B", "--split", "val", "--json").stdout) == ready
 
@@ -91,8 +80,8 @@ def test_compare_names_what_it_does_not_find_and_what_cannot_be_compared(
     unknown = tsttc("compare", "A", "C")
     assert (unknown.exit_code, "has no method 'C'" in unknown.stderr) == (2, True)
     printed = tsttc("compare", "A", "Paper")
-    assert (printed.exit_code, "published in a paper" in printed.stderr) == (2, True)
-    words = "A method was named twice; expected different ones to compare."
+    assert (printed.exit_code, "quoted from a paper" in printed.stderr) == (2, True)
+    words = "One method is given twice; expected different methods to compare."
     site.put("GET /api/v1/compare", Reply(problem(words, where="m"), 400))
     twice = tsttc("compare", "A", "A")
     assert (twice.exit_code, twice.stderr) == (2, f"Error: {words}\n")
@@ -116,7 +105,7 @@ def test_files_are_compared_offline_as_the_library_does(
     assert document["first"]["scores"]["overall"]["mid"] < document["second"]["scores"]["overall"]["mid"]
     said = tsttc(*arguments).stdout
     assert sentence(str(files[0]), str(files[1]), name="mid", found=expected["mid"]) in said
-    assert f"  {files[0]}'s RTE is " in said
+    assert "9 of the 9 other metrics differ significantly" in said
     assert site.requests == []
     bad = tsttc("compare", EXAMPLES / "broken.json", files[0], "--truth", truth_of_30_recordings)
     assert bad.exit_code == 1
@@ -161,33 +150,35 @@ def test_publish_shows_one_s_own_method_once_it_is_confirmed(
     site.put(SHOW, Reply(MINE | {"visibility": "PUBLIC", "url": "https://e.example/methods/x/"}))
     asked = tsttc("publish", name)
     assert (asked.exit_code, asked.stdout, site.posts) == (2, "", [])
-    assert "Say --yes if it is meant." in asked.stderr
+    assert "Use --yes to confirm." in asked.stderr
     result = tsttc("publish", name, "--yes")
     assert (result.exit_code, result.stdout) == (0, "Foo++ is public now: https://e.example/methods/x/\n")
     assert json.loads(site.posts[0].body) == {"visibility": "PUBLIC", "confirm": True, "reveal_at": None}
+    n_previews = sum(request.path.endswith("/visibility?as=PUBLIC") for request in site.requests)
+    assert n_previews == 1, "what is confirmed is not shown first"
 
 
 def test_publish_shows_what_everybody_will_see_before_it_asks(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/methods", Reply([MINE]))
     site.put(FORESEE, Reply(FORESEEN))
     lines = tsttc("publish", "Foo++").stderr.splitlines()
-    assert lines[0] == r"Everybody will see Foo++, team TJU-V\x1b[2J:"
+    assert lines[0] == r"Everyone will see Foo++, team TJU-V\x1b[2J:"
     assert [line.split() for line in lines[1:4]] == [
         ["split", "rank", "of", "MiD", "RTE", "now"],
-        ["test", "3", "1,207", "14.00", "–", "not", "seen"],
-        ["val", "1", "6", "14.00", "14.00", "seen", "as", "Anonymous", "3f9c2a"],
+        ["test", "3", "1,207", "14.00", "–", "not", "visible"],
+        ["val", "1", "6", "14.00", "14.00", "visible", "as", "Anonymous", "3f9c2a"],
     ]
     assert lines[4] == (
         "On test other ranks change: M3 3 to 4, M4 4 to 5, M5 5 to 6, M6 6 to 7, M7 7 to 8, and 2 more."
     )
-    assert lines[6].startswith("Error: This shows Foo++ to everybody")
+    assert lines[6].startswith("Error: This publishes Foo++, with")
     assert site.requests[-1].path.endswith(f"/{METHOD_ID}/visibility?as=PUBLIC")
     refused = tsttc("publish", "Foo++", "--as", "anonymous", "--json")
     assert json.loads(refused.stdout)["preview"] == FORESEEN
     assert site.requests[-1].path.endswith("?as=ANONYMOUS")
     site.put(FORESEE, Reply(FORESEEN | {"splits": []}))
     tsttc("publish", "Foo++")
-    assert "It has no scored submission on a board yet." in tsttc("publish", "Foo++").stderr
+    assert "The method has no scored submission on a board yet." in tsttc("publish", "Foo++").stderr
 
 
 def test_publish_asks_a_person_after_what_everybody_will_see(site: RecordedSite) -> None:
@@ -195,30 +186,14 @@ def test_publish_asks_a_person_after_what_everybody_will_see(site: RecordedSite)
     site.put(FORESEE, Reply(FORESEEN))
     keyboard, end = os.openpty()
     os.write(keyboard, b"n\n")
-    environment = {"TSTTC_URL": site.url, "TSTTC_TOKEN": "secret-token"}
-    done = subprocess.run(
-        [sys.executable, "-m", "evaluator", "publish", "Foo++"],
-        stdin=end,
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=REPOSITORY,
-        env=os.environ | environment,
-    )
+    done = process("publish", "Foo++", stdin=end)
     os.close(end)
     os.close(keyboard)
     assert (done.returncode, done.stdout, site.posts) == (2, "", [])
-    seen, _, asked = done.stderr.partition("This shows Foo++ to everybody")
-    assert seen.startswith("Everybody will see Foo++")
-    assert "Go on? [y/N]: " in asked
+    seen, _, asked = done.stderr.partition("This publishes Foo++, with")
+    assert seen.startswith("Everyone will see Foo++")
+    assert "Publish? [y/N]: " in asked
     assert asked.endswith("Error: Nothing was changed.\n")
-
-
-def test_publish_that_is_confirmed_needs_no_preview(tsttc: Tsttc, site: RecordedSite) -> None:
-    site.put("GET /api/v1/methods", Reply([MINE]))
-    site.put(SHOW, Reply(MINE | {"visibility": "PUBLIC"}))
-    assert tsttc("publish", "Foo++", "--yes").exit_code == 0
-    assert [request.method for request in site.requests] == ["GET", "POST"]
 
 
 def test_publish_under_a_pseudonym_until_a_day(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -236,10 +211,15 @@ def test_publish_knows_one_s_own_methods_alone_and_tells_the_server_s_words(
     tsttc: Tsttc, site: RecordedSite
 ) -> None:
     site.put("GET /api/v1/methods", Reply([MINE]))
-    site.put(SHOW, Reply(problem("The method 'Foo++' is public, for good.", where="visibility"), 422))
+    site.put(
+        SHOW, Reply(problem("The method 'Foo++' is public; this is permanent.", where="visibility"), 422)
+    )
     assert tsttc("publish", "Theirs", "--yes").exit_code == 2
     refused = tsttc("publish", "Foo++", "--as", "anonymous", "--yes")
-    assert (refused.exit_code, refused.stderr) == (2, "Error: The method 'Foo++' is public, for good.\n")
+    assert (refused.exit_code, refused.stderr) == (
+        2,
+        "Error: The method 'Foo++' is public; this is permanent.\n",
+    )
 
 
 # --- receipts ---------------------------------------------------------------------------------------------
@@ -269,7 +249,7 @@ def test_verify_asks_the_named_server_for_its_keys_and_no_other(
     site.put(KEYS, Reply(RECEIPT_KEYS))
     result = tsttc("verify", receipt)
     assert result.exit_code == 0
-    assert result.stdout.startswith("The receipt holds.\n")
+    assert result.stdout.startswith("The receipt is valid.\n")
     assert "13.92" in result.stdout
     # A name is a word of the team and can change; the id cannot.
     assert (

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from typing import Any
 
 import pytest
-from click.testing import Result
 
-from evaluator.client import Client
+from evaluator.client.client import Client
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply
+from tests.evaluator.cli.test_submissions import GET, ID, POST, QUEUED, SCORED, submit
 from tests.evaluator.fake_time import FakeTime
-from tests.evaluator.recorded_site import RecordedSite, Reply
-from tests.evaluator.test_cli_submissions import GET, ID, POST, QUEUED, SCORED, submit
+from tests.evaluator.worlds import Tsttc
 
 INTERVAL = {"low": 9.6, "high": 10.905, "rank_low": 1, "rank_high": 3, "is_with_best": True}
 AWAITED = SCORED | {"intervals": {}, "awaits_intervals": True, "rank": 2, "visibility": "PUBLIC"}
 SURE = AWAITED | {"awaits_intervals": False, "intervals": {"mid": INTERVAL, "rte": INTERVAL}}
 MISSING = {"rank_low": None, "rank_high": None, "is_with_best": None}
 
-Tsttc = Callable[..., Result]
+pytestmark = pytest.mark.usefixtures("at_site")
 
 
 def said(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> list[str]:
@@ -31,7 +30,6 @@ def said(tsttc: Tsttc, site: RecordedSite, document: dict[str, Any]) -> list[str
     return lines[1 : lines.index("")]
 
 
-@pytest.mark.usefixtures("at_site")
 def test_rank_and_errors_come_with_where_they_may_lie(tsttc: Tsttc, site: RecordedSite) -> None:
     assert said(tsttc, site, SURE) == [
         "rank 2 (1–3)",
@@ -47,30 +45,26 @@ def test_rank_and_errors_come_with_where_they_may_lie(tsttc: Tsttc, site: Record
         ({"intervals": {"mid": INTERVAL | {"rank_low": 2, "rank_high": 2}}}, ["rank 2 (2)"]),
         (
             {"visibility": "PRIVATE", "intervals": {"mid": INTERVAL | MISSING}},
-            ["shown to everybody it would be rank 2"],
+            ["if published: rank 2"],
         ),
         ({"rank": None, "intervals": {"mid": INTERVAL | {"low": None}}}, []),
     ],
 )
-@pytest.mark.usefixtures("at_site")
 def test_what_is_not_known_is_left_out(
     tsttc: Tsttc, site: RecordedSite, more: dict[str, Any], expected: list[str]
 ) -> None:
     assert [line for line in said(tsttc, site, SURE | more) if "rank" in line] == expected
 
 
-@pytest.mark.usefixtures("at_site")
 def test_server_that_tells_neither_is_no_fault(tsttc: Tsttc, site: RecordedSite) -> None:
     assert said(tsttc, site, SCORED) == []
 
 
-@pytest.mark.usefixtures("at_site")
 def test_status_says_that_intervals_are_computed_and_does_not_wait(tsttc: Tsttc, site: RecordedSite) -> None:
-    assert said(tsttc, site, AWAITED) == ["rank 2", "Intervals are being computed."]
+    assert said(tsttc, site, AWAITED) == ["rank 2", "The confidence intervals are being computed."]
     assert len(site.requests) == 1
 
 
-@pytest.mark.usefixtures("at_site")
 def test_wait_and_watch_end_with_the_intervals(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(AWAITED), Reply(AWAITED), Reply(SURE))

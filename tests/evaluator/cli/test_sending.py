@@ -3,10 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +10,11 @@ import pytest
 from click.testing import Result
 
 from evaluator import read_manifest
-from tests.evaluator.recorded_site import CUT, RecordedSite, Reply, problem
-from tests.evaluator.worlds import REPOSITORY, screen_text
+from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
+from tests.evaluator.worlds import EXAMPLES, Tsttc, on_terminal, process
 
-Tsttc = Callable[..., Result]
-pytestmark = pytest.mark.usefixtures("at_site")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
 
-EXAMPLES = REPOSITORY / "examples"
 MANIFEST = EXAMPLES / "manifest.csv"
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
 QUEUED: dict[str, Any] = {"id": ID, "state": "QUEUED", "split": "val", "method": "Foo++"}
@@ -54,7 +48,7 @@ def test_bad_file_is_told_in_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc
     checked = tsttc("check", EXAMPLES / "broken.json", "--manifest", MANIFEST)
     result = submit(tsttc, "broken.json")
     assert (result.exit_code, result.stdout) == (1, "")
-    assert result.stderr == checked.stderr + "Nothing was sent, so it costs nothing.\n"
+    assert result.stderr == checked.stderr + "Nothing was submitted; your quota is not used.\n"
     assert site.posts == []
     document = json.loads(submit(tsttc, "broken.json", "--json").stdout)
     assert (document["code"], document["n_problems"]) == ("rejected", 7)
@@ -146,8 +140,8 @@ def test_key_of_one_s_own_is_sent_as_it_is(
 def test_answer_that_was_lost_is_no_file_sent_before(tsttc: Tsttc, site: RecordedSite) -> None:
     replayed = Reply(QUEUED, status=200, headers={"Idempotent-Replayed": "true"})
     site.put(POST, Reply(fault=CUT), replayed)
-    assert "sent before" not in submit(tsttc).stdout
-    assert "sent before" in submit(tsttc, "predictions.json", "--idempotency-key", "7").stdout
+    assert "already submitted" not in submit(tsttc).stdout
+    assert "already submitted" in submit(tsttc, "predictions.json", "--idempotency-key", "7").stdout
 
 
 def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -158,14 +152,14 @@ def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, 
     )
     shown = submit(tsttc).stdout
     assert shown.endswith(
-        'is private: its results are your team\'s alone. Show them with: tsttc publish "Foo\\x1b[2J++"\n'
+        'is private: only your team sees its results. Publish it with: tsttc publish "Foo\\x1b[2J++"\n'
     )
     for _ in range(2):
         again = submit(tsttc)
         assert (again.exit_code, "private" in again.output) == (0, False)
 
 
-NOTICE = "Foo++ is public: everybody sees its results on every split."
+NOTICE = "Foo++ is public: everyone sees its results on every split."
 PUBLIC = {"id": "m1", "name": "Foo++", "visibility": "PUBLIC", "notice": NOTICE}
 
 
@@ -197,21 +191,10 @@ def test_terminal_shows_a_bar_and_a_pipe_does_not(site: RecordedSite, tmp_path: 
     site.put(POST, Reply(QUEUED, status=201))
     large = tmp_path / "large.json"
     large.write_bytes(b" " * 3_000_000)
-    terminal, end = os.openpty()
-    command = [sys.executable, "-m", "evaluator", "submit", str(large), "--split", "val", "--method", "Foo"]
-    done = subprocess.run(
-        command,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=end,
-        check=True,
-        cwd=REPOSITORY,
-        env=os.environ | {"TERM": "xterm"},
-    )
-    os.close(end)
-    shown = screen_text(terminal)
+    command = ["submit", large, "--split", "val", "--method", "Foo"]
+    done, shown = on_terminal(*command)
     assert "large.json" in shown
     assert "MB" in shown
-    assert done.stdout.startswith(b"Submission ")
-    piped = subprocess.run(command, capture_output=True, check=True, cwd=REPOSITORY)
-    assert piped.stderr == b""
+    assert done.stdout.startswith("Submission ")
+    piped = process(*command)
+    assert (piped.returncode, piped.stderr) == (0, "")

@@ -7,18 +7,17 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
 from click.testing import Result
 
-from evaluator.protocol import SCORE_NAMES
-from tests.evaluator.recorded_site import CUT, RecordedSite, Reply, problem
-from tests.evaluator.worlds import screen_text
+from evaluator.metrics.protocol import SCORE_NAMES
+from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
+from tests.evaluator.worlds import REPOSITORY, Tsttc, on_terminal
+from tests.signals import default_signals
 
-REPOSITORY = Path(__file__).resolve().parents[2]
 PREDICTIONS = REPOSITORY / "examples" / "predictions.json"
 
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
@@ -59,8 +58,7 @@ REJECTED = QUEUED | {
 }
 
 
-Tsttc = Callable[..., Result]
-pytestmark = pytest.mark.usefixtures("at_site")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
 
 
 def submit(tsttc: Tsttc, *more: object) -> Result:
@@ -128,7 +126,7 @@ def test_file_sent_before_is_said_to_be(tsttc: Tsttc, site: RecordedSite) -> Non
     site.put(POST, Reply(SCORED, status=200))
     result = submit(tsttc, "--wait")
     assert result.exit_code == 0
-    assert "This file was sent before; this is its first submission." in result.stdout
+    assert "You already submitted this file; this is its first submission." in result.stdout
     assert len(site.posts) == 1
 
 
@@ -142,7 +140,7 @@ def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
     assert lines[1:3] == ["SCORED: Foo++ on val", ""]
     assert lines[3].split() == COLUMNS
     assert lines[4].split()[:4] == ["error", "10.25", "11.25", "–"]
-    assert "28,600 sequences, 458 of them with |τ| > 20 s, which count in MiD and RTE alone." in lines
+    assert "28,600 sequences, 458 of them in no TTC range, which count in the overall scores only." in lines
     assert "Truncated predictions: 3 to -20 s, 1 to 0.05 s, 12 to 20 s." in lines
 
 
@@ -244,9 +242,9 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
 @pytest.mark.parametrize(
     ("reply", "exit_code", "words"),
     [
-        (Reply(problem("Invalid token."), 401), 4, "Error: Invalid token.\nMake a new one at http://"),
+        (Reply(problem("Invalid token."), 401), 4, "Error: Invalid token.\nCreate a token at http://"),
         (Reply(problem("Not yours."), 403), 4, "Error: Not yours."),
-        (Reply(problem("There is nothing here."), 404), 8, "Error: There is nothing here."),
+        (Reply(problem("Page not found."), 404), 8, "Error: Page not found."),
         (Reply(problem("The split is closed.", where="split"), 409), 8, "Error: The split is closed."),
         (Reply(problem("It has 21 MB.", where="file"), 413), 1, "Error: It has 21 MB."),
         (Reply(problem("No such split 'x'.", where="split"), 422), 2, "Error: No such split 'x'."),
@@ -260,8 +258,8 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
         (Reply(b"<html>gateway</html>", 500), 7, "The server failed (500: Internal Server Error)."),
         (Reply(b"<html>", 401), 4, "The server does not accept the token (401: Unauthorized)."),
         (Reply(status=418), 8, "The server refused (418"),
-        (Reply(status=301, headers={"Location": "https://e.example/"}), 3, "points to https://e.example/"),
-        (Reply(b"<html>hello</html>", 200), 3, "gave no leaderboard's answer: not JSON"),
+        (Reply(status=301, headers={"Location": "https://e.example/"}), 3, "redirects to https://e.example/"),
+        (Reply(b"<html>hello</html>", 200), 3, "did not answer like a leaderboard: not JSON"),
         (Reply({"hello": "world"}, 200), 3, "Object missing required field"),
     ],
 )
@@ -297,36 +295,29 @@ def test_name_of_a_method_cannot_steer_the_terminal(tsttc: Tsttc, site: Recorded
 
 def test_ctrl_c_while_waiting_ends_quietly_with_130(site: RecordedSite) -> None:
     site.put(GET, Reply(QUEUED))
-    waiting = subprocess.Popen(
-        [sys.executable, "-m", "evaluator", "status", ID, "--watch"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=REPOSITORY,
-        env=os.environ | {"TSTTC_URL": site.url, "TSTTC_TOKEN": "secret-token"},
-    )
-    assert waiting.stderr is not None
-    assert waiting.stderr.readline() == "QUEUED, 2 ahead, about 4 s\n"
-    waiting.send_signal(signal.SIGINT)
-    stdout, stderr = waiting.communicate(timeout=120)
+    with default_signals():
+        waiting = subprocess.Popen(
+            [sys.executable, "-m", "evaluator", "status", ID, "--watch"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            cwd=REPOSITORY,
+            env=os.environ | {"TSTTC_URL": site.url, "TSTTC_TOKEN": "secret-token"},
+        )
+    try:
+        assert waiting.stderr is not None
+        assert waiting.stderr.readline() == "QUEUED, 2 ahead, about 4 s\n"
+        waiting.send_signal(signal.SIGINT)
+        stdout, stderr = waiting.communicate(timeout=120)
+    finally:
+        waiting.kill()
     assert (waiting.returncode, stdout, stderr.strip()) == (130, "", "Interrupted.")
 
 
 def test_terminal_shows_the_state_live_and_cannot_be_steered_by_it(site: RecordedSite) -> None:
     hostile = QUEUED | {"state": "[red]\x1b[2JNEW"}
     site.put(GET, Reply(QUEUED), Reply(hostile), Reply(SCORED))
-    terminal, end = os.openpty()
-    done = subprocess.run(
-        [sys.executable, "-m", "evaluator", "status", ID, "--watch", "--json"],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=end,
-        check=False,
-        cwd=REPOSITORY,
-        env=os.environ | {"TERM": "xterm"},
-    )
-    os.close(end)
-    shown = screen_text(terminal)
+    done, shown = on_terminal("status", ID, "--watch", "--json")
     assert (done.returncode, json.loads(done.stdout)) == (0, SCORED)
     assert "QUEUED, 2 ahead, about 4 s" in shown
     assert r"[red]\x1b[2JNEW" in shown

@@ -14,18 +14,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import Result
 
 from evaluator import Rejected, read_manifest, read_predictions, write_predictions
-from evaluator.conversion import convert
-from evaluator.protocol import SCORE_NAMES
-from evaluator.scale import ttc_to_scale_ratio
-from tests.evaluator.recorded_site import RecordedSite, Reply
-from tests.evaluator.worlds import REPOSITORY
+from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.metrics.scale import ttc_to_scale_ratio
+from evaluator.predictions.conversion import convert
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply
+from tests.evaluator.worlds import EXAMPLES, REPOSITORY, Tsttc
 
-Tsttc = Callable[..., Result]
-
-EXAMPLES = REPOSITORY / "examples"
 MANIFEST = read_manifest(EXAMPLES / "manifest.csv")
 PREDICTIONS = (EXAMPLES / "predictions.json").read_bytes()
 TTC_S = read_predictions(PREDICTIONS, manifest=MANIFEST).ttc_s
@@ -101,7 +97,7 @@ def test_rows_that_others_do_not_see_are_marked_and_take_no_mark_of_a_column(
     assert "Owl (private) " in text
     assert "Bat (anonymous) " in text
     assert "Anonymous 77aa00 " in text
-    assert "Not what everybody sees: rows marked (private)" in text
+    assert "Not public: only one team sees rows marked (private)" in text
     best = {"latex": "textbf{{{}}}", "markdown": "**{}**"}[form]
     assert best.format("14.50") in text
     assert best.format("1.00") not in text
@@ -185,7 +181,7 @@ def test_rate_of_each_key_is_its_own() -> None:
         ('{"unit": "scale_ratio", "fps": 2, "predictions": {"a": -1}}', {"not-positive"}),
         ('{"unit": "scale_ratio", "frame_gap": {"a": 6}, "predictions": {"a": 1}}', {"bad-rate"}),
         ('{"unit": "scale_ratio", "frame_gap": {"b": 1}, "predictions": {"a": 1}}', {"missing-keys"}),
-        ('{"unit": "scale_ratio", "fps": "2", "predictions": {"a": 1}}', {"not-a-number"}),
+        ('{"unit": "scale_ratio", "fps": "2", "predictions": {"a": 1}}', {"bad-rate"}),
         ('{"a": 0}', {"zero"}),
         ("[]", {"wrong-top-level"}),
     ],

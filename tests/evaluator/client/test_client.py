@@ -10,12 +10,12 @@ from pathlib import Path
 
 import pytest
 
-from evaluator.answers import BadAnswer, Redirected, Refused, Unreachable
-from evaluator.client import Client
-from evaluator.exchange import Patience
+from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
+from evaluator.client.client import Client
+from evaluator.client.exchange import RetryPolicy
 from evaluator.problems import Problem
+from tests.evaluator.cli.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
 from tests.evaluator.fake_time import FakeTime
-from tests.evaluator.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
 
 SUBMISSIONS = "POST /api/v1/submissions"
 ONE = "GET /api/v1/submissions/abc"
@@ -29,27 +29,6 @@ SCORED = QUEUED | {
 
 def send(client: Client, data: bytes = b'{"0": 5.3}') -> object:
     return client.submit(io.BytesIO(data), filename="p.json", split="val", method="Foo++")
-
-
-def test_submit_sends_the_file_the_fields_and_the_token(client: Client, site: RecordedSite) -> None:
-    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
-    submission = client.submit(
-        io.BytesIO(b'{"0": 5.3}'),
-        filename="p.json",
-        split="val",
-        method="Foo++",
-        details={"commit": "c0ffee"},
-    )
-    assert (submission.id, submission.state, submission.is_new) == ("abc", "QUEUED", True)
-    assert submission.document == QUEUED
-    request = site.requests[0]
-    assert request.headers["Authorization"] == "Bearer secret-token"
-    assert request.parts() == {
-        "split": (None, b"val"),
-        "method": (None, b"Foo++"),
-        "commit": (None, b"c0ffee"),
-        "file": ("p.json", b'{"0": 5.3}'),
-    }
 
 
 def test_file_is_streamed_in_blocks_with_its_length_told_first(
@@ -74,11 +53,6 @@ def test_file_is_streamed_in_blocks_with_its_length_told_first(
     assert site.requests[0].headers["Transfer-Encoding"] is None
 
 
-def test_bytes_sent_before_give_the_first_submission(client: Client, site: RecordedSite) -> None:
-    site.put(SUBMISSIONS, Reply(QUEUED, status=200))
-    assert send(client).is_new is False  # type: ignore[attr-defined]
-
-
 @pytest.mark.parametrize("fault", [CUT, CUT_SHORT])
 def test_upload_whose_answer_was_cut_is_sent_again_whole(
     client: Client, site: RecordedSite, clock: FakeTime, fault: str
@@ -96,26 +70,8 @@ def test_server_that_keeps_cutting_is_reported_after_a_few_tries(
     with pytest.raises(Unreachable) as caught:
         client.submission("abc")
     assert caught.value.was_connected
-    assert len(site.requests) == Patience().n_tries
+    assert len(site.requests) == RetryPolicy().n_tries
     assert clock.slept_s == sorted(clock.slept_s)
-
-
-def test_board_is_asked_for_as_of_a_time_in_an_edition_and_with_intervals(
-    client: Client, site: RecordedSite
-) -> None:
-    answer = Reply({"split": "test", "edition": 2, "entries": []})
-    site.put("GET /api/v1/splits/test/board", answer)
-    site.put("GET /api/v1/splits/test/editions/1/board", answer)
-    board = client.board("test", at="2026-11-20", has_intervals=True)
-    client.board("test", edition=1)
-    assert [request.path for request in site.requests] == [
-        "/api/v1/splits/test/board?sort=rank&at=2026-11-20&intervals=1",
-        "/api/v1/splits/test/editions/1/board?sort=rank",
-    ]
-    assert client.board_page(board) == f"{site.url}/board/test/editions/2/"
-    assert client.board_page(board, sort="-mid", at="2026-11-20") == (
-        f"{site.url}/board/test/?at=2026-11-20&sort=-mid"
-    )
 
 
 def test_one_s_own_method_is_found_on_any_page_and_the_token_goes_nowhere_else(
@@ -142,12 +98,6 @@ def test_pages_that_lead_to_themselves_end(client: Client, site: RecordedSite) -
     site.put("GET /api/v1/methods", Reply([row], headers={"Link": '</m?after=1>; rel="next"'}))
     assert client.own_method("nowhere") is None
     assert len(site.requests) == 2
-
-
-def test_busy_server_is_asked_again_when_it_said(client: Client, site: RecordedSite, clock: FakeTime) -> None:
-    site.put(ONE, Reply(status=503, headers={"Retry-After": "7"}), Reply(SCORED))
-    assert client.submission("abc").is_final
-    assert clock.slept_s == [7.0]
 
 
 def test_retry_after_as_a_date_is_understood(client: Client, site: RecordedSite, clock: FakeTime) -> None:
@@ -257,28 +207,6 @@ def test_names_cannot_lead_out_of_their_place_in_the_address(client: Client, sit
     assert site.requests[0].path == "/api/v1/submissions/..%2Fsplits%3Fx%3D1%23y"
 
 
-def test_board_is_asked_for_with_its_order(client: Client, site: RecordedSite) -> None:
-    entry = {
-        "rank": 1,
-        "method": "Foo++",
-        "team": None,
-        "kind": "submission",
-        "scores": {"mid": 14.2},
-        "new": 1,
-    }
-    site.put("GET /api/v1/splits/test/board", Reply({"split": "test", "edition": 2, "entries": [entry]}))
-    board = client.board("test", sort="rte")
-    assert site.requests[0].path.endswith("?sort=rte")
-    assert (board.entries[0].rank, board.entries[0].scores) == (1, {"mid": 14.2})
-    assert board.document["entries"] == [entry]
-
-
-def test_manifest_is_given_as_it_came(client: Client, site: RecordedSite) -> None:
-    table = b"anno_id,bag_stamp,cam_id,ts,track_id\n0,a,1,5,9\n"
-    site.put("GET /api/v1/splits/val/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
-    assert client.manifest("val") == table
-
-
 def test_token_is_not_shown(client: Client) -> None:
     assert "secret-token" not in repr(client)
 
@@ -294,7 +222,7 @@ def test_proxy_of_the_environment_is_not_asked_for_this_machine(
 
 
 def test_delay_is_never_shorter_than_the_server_asked_for() -> None:
-    patience = Patience()
+    patience = RetryPolicy()
     rng = random.Random(1)
     delays_s = [patience.delay_s(n_failed=n, retry_after_s=4.0, rng=rng) for n in range(1, 30)]
     assert min(delays_s) == 4.0

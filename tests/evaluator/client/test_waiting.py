@@ -2,31 +2,20 @@
 
 from __future__ import annotations
 
-import io
 import random
 import socket
 from contextlib import ExitStack
 
 import pytest
 
-from evaluator.answers import Refused, TimedOut, Unreachable
-from evaluator.client import Client
-from evaluator.exchange import Patience
+from evaluator.client.answers import Refused, TimedOut, Unreachable
+from evaluator.client.client import Client
+from evaluator.client.exchange import RetryPolicy
+from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply
+from tests.evaluator.client.test_client import ONE, QUEUED, SCORED, SUBMISSIONS, send
 from tests.evaluator.fake_time import FakeTime
-from tests.evaluator.recorded_site import CUT, RecordedSite, Reply
 
-SUBMISSIONS = "POST /api/v1/submissions"
-ONE = "GET /api/v1/submissions/abc"
-QUEUED = {"id": "abc", "state": "QUEUED", "split": "val", "method": "Foo++", "url": "/submissions/abc/"}
-SCORED = QUEUED | {
-    "state": "SCORED",
-    "scores": {"mid": 14.21, "mid_crucial": None},
-    "counts": {"overall": 60},
-}
-
-
-def send(client: Client) -> object:
-    return client.submit(io.BytesIO(b'{"0": 5.3}'), filename="p.json", split="val", method="Foo++")
+pytestmark = pytest.mark.slow
 
 
 def test_watch_gives_every_state_until_the_final_one(client: Client, site: RecordedSite) -> None:
@@ -113,7 +102,7 @@ def test_held_answer_is_not_asked_for_longer_than_one_waits(client: Client, site
 def test_server_that_has_answered_is_waited_for_when_it_goes_away(clock: FakeTime) -> None:
     with RecordedSite() as site:
         site.put("GET /api/v1/quota", Reply([], headers={"Connection": "close"}))
-        client = Client(url=site.url, sleep=clock.sleep, patience=Patience(n_tries=5))
+        client = Client(url=site.url, sleep=clock.sleep, patience=RetryPolicy(n_tries=5))
         assert client.quota() == []
     with client, pytest.raises(Unreachable):
         client.quota()
@@ -139,17 +128,6 @@ def test_busy_server_is_asked_again_within_a_minute(
     )
     send(client)
     assert clock.slept_s == [55.0, 2.0]
-
-
-def test_progress_is_told_as_the_file_is_read_and_begins_anew_with_each_try(
-    client: Client, site: RecordedSite
-) -> None:
-    site.put(SUBMISSIONS, Reply(fault=CUT), Reply(QUEUED, status=201))
-    told: list[int] = []
-    data = b" " * 300_000
-    client.submit(io.BytesIO(data), filename="p", split="val", method="F", on_progress=told.append)
-    assert told.count(len(data)) >= 2
-    assert [request.parts()["file"][1] for request in site.requests] == [data] * 2
 
 
 # --- first contact ----------------------------------------------------------------------------------------
@@ -187,7 +165,7 @@ def test_address_where_nothing_ever_listens_is_reported_within_a_quarter_of_a_mi
     assert (caught.value.url, caught.value.was_connected, caught.value.was_refused) == (url, False, True)
     assert clock.slept_s == sorted(clock.slept_s)
     assert 7 < clock.now_s < 15
-    patience = Patience(n_first_tries=1)
+    patience = RetryPolicy(n_first_tries=1)
     with Client(url=url, sleep=clock.sleep, patience=patience) as client, pytest.raises(Unreachable):
         client.board("test")
     assert clock.now_s < 15, "one try is one try"

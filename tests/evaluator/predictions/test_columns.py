@@ -10,9 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from evaluator import Manifest, Rejected, read_predictions
-from evaluator.alignment import read_slowly
-from evaluator.columns import read_column
-from evaluator.scale import Floats
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.alignment import read_slowly
+from evaluator.predictions.columns import read_column
 from tests.evaluator.worlds import envelope, flat, make_truth
 
 SMALL = make_truth([4.0, -10.0, 1.0]).manifest
@@ -43,11 +43,10 @@ def values_or_rejection(data: bytes, manifest: Manifest) -> Floats | Rejected:
         return rejected
 
 
-def assert_equivalent(data: bytes, manifest: Manifest, *, by_columns: bool | None = None) -> None:
-    """By columns a file gives what the strict reading gives, or nothing."""
+def assert_equivalent(data: bytes, manifest: Manifest, *, by_columns: bool = False) -> None:
+    """By columns a file gives what the strict reading gives, or nothing unless it must be read so."""
     quick = read_column(data, manifest)
-    if by_columns is not None:
-        assert (quick is not None) is by_columns
+    assert quick is not None or not by_columns
     if quick is not None:
         document = quick.document
         assert reading(data, manifest) == (
@@ -212,6 +211,10 @@ TOKENS += ["true", "NaN", '"', "\\", "\\u0030", '"unit"', '"ttc"', '"predictions
 @example(start=b'{"0":5.25   ,"1":6.25   ,"2":7.25,}', edits=[])
 @example(start=b'{"0":5.25,"1":6.25,"2":7.25},{}', edits=[])
 @example(start=b'{"0":5,"1":6,"2":7}', edits=[])
+@example(start=b'{"0": 1.5, "1": 2.5, "2": 3.5, "2": 3.5}', edits=[])
+@example(start=b'{"0": 1.5, "1": 2.5, "1": 3.5}', edits=[])
+@example(start=b'{"0": 1.5, "1": 2.5}', edits=[])
+@example(start=b'{"0": 1.5, "1": 2.5, "3": 3.5}', edits=[])
 def test_mangled_files_read_the_same_both_ways(start: bytes, edits: Sequence[tuple[int, int, str]]) -> None:
     data = start
     for at, n_removed, token in edits:
@@ -219,8 +222,20 @@ def test_mangled_files_read_the_same_both_ways(start: bytes, edits: Sequence[tup
     assert_equivalent(data, SMALL)
 
 
-@settings(max_examples=300)
-@given(data=st.binary(max_size=200) | st.text(max_size=100).map(str.encode))
+documents = st.recursive(
+    st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+    lambda inner: (
+        st.lists(inner, max_size=3)
+        | st.dictionaries(
+            st.sampled_from(["0", "1", "2", "unit", "fps", "meta", "predictions", "x"]), inner, max_size=5
+        )
+    ),
+    max_leaves=20,
+).map(json.dumps)
+
+
+@settings(max_examples=500)
+@given(data=st.binary(max_size=200) | (st.text(max_size=100) | documents).map(str.encode))
 @example(data=b'{"\xe4":1,"1":2,"2":3}')
 @example(data=b'{"0":1,"1":2,"2":\xff}')
 @example(data=b'{"unit":"ttc","predictions":{"0":1,"1":2,"2":3},"meta":{"\xff":1}}')
@@ -237,6 +252,7 @@ def test_mangled_files_read_the_same_both_ways(start: bytes, edits: Sequence[tup
 @example(data=b'{"unit":"scale_ratio","frame_gap":1e400,"predictions":{"0":1,"1":1,"2":1}}')
 @example(data=b'{"unit":"scale_ratio","fps":1e-320,"predictions":{"0":1e308,"1":1e-308,"2":1}}')
 def test_no_bytes_raise_anything_but_a_rejection(data: bytes) -> None:
+    assert_equivalent(data, SMALL)
     outcome = values_or_rejection(data, SMALL)
     if isinstance(outcome, Rejected):
         assert 1 <= len(outcome.problems) <= outcome.n_problems + 1
@@ -244,25 +260,6 @@ def test_no_bytes_raise_anything_but_a_rejection(data: bytes) -> None:
         assert all(line.isprintable() for line in str(outcome).splitlines())
     else:
         assert np.abs(outcome).min() > 0
-
-
-@settings(max_examples=200)
-@given(
-    text=st.recursive(
-        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
-        lambda inner: (
-            st.lists(inner, max_size=3)
-            | st.dictionaries(
-                st.sampled_from(["0", "1", "2", "unit", "fps", "meta", "predictions", "x"]), inner, max_size=5
-            )
-        ),
-        max_leaves=20,
-    ).map(json.dumps)
-)
-def test_no_json_raises_anything_but_a_rejection(text: str) -> None:
-    assert_equivalent(text.encode(), SMALL)
-    outcome = values_or_rejection(text.encode(), SMALL)
-    assert outcome.problems if isinstance(outcome, Rejected) else np.abs(outcome).min() > 0
 
 
 # --- which way is taken ----------------------------------------------------------------------------------
@@ -281,24 +278,6 @@ def test_files_of_common_layouts_are_read_by_columns(
         data = json.dumps(members, separators=separators).encode()
         assert_equivalent(data, manifest, by_columns=True)
         assert_equivalent(b'{"unit": "ttc", "predictions": ' + data + b"}", manifest, by_columns=True)
-
-
-@pytest.mark.parametrize(
-    "data",
-    [
-        b'{"0": 1.5, "1": 2.5, "2": 0}',
-        b'{"0": 1.5, "1": 2.5, "2": NaN}',
-        b'{"0": 1.5, "1": 2.5, "2": true}',
-        b'{"0": 1.5, "1": 2.5, "2": "3"}',
-        b'{"0": 1.5, "1": 2.5, "2": 3.5, "2": 3.5}',
-        b'{"0": 1.5, "1": 2.5, "1": 3.5}',
-        b'{"0": 1.5, "1": 2.5}',
-        b'{"0": 1.5, "1": 2.5, "3": 3.5}',
-        b'{"0": 1.5, "1": 2.5, "2": 1e400}',
-    ],
-)
-def test_anything_unusual_is_left_to_the_strict_reading(data: bytes) -> None:
-    assert_equivalent(data, SMALL, by_columns=False)
 
 
 def test_many_sequences_in_any_order_read_the_same_both_ways() -> None:

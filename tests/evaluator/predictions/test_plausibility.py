@@ -1,25 +1,21 @@
 """Warnings: of files whose values belong to other sequences, and of no others."""
 
 import itertools
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import Result
 
 from evaluator import GroundTruth, Predictions, read_manifest, read_predictions, read_truth
-from evaluator.plausibility import MAX_ROUGHNESS, roughness, warnings_of, warnings_with_truth
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.plausibility import MAX_ROUGHNESS, roughness, warnings_of, warnings_with_truth
 from evaluator.problems import WARNING_CODES
-from evaluator.scale import Floats
-from evaluator.tables import Table
-from tests.evaluator.recorded_site import RecordedSite, Reply
+from evaluator.truth.csv_tables import Table
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.toolkit_folders import driving_folder
-from tests.evaluator.worlds import SHARED_DATA, flat, make_truth
+from tests.evaluator.worlds import Tsttc, flat, make_truth
 
-KITTI = SHARED_DATA / "kitti-dev"
 RNG = np.random.default_rng(7)
-Tsttc = Callable[..., Result]
 
 
 @pytest.fixture(scope="module")
@@ -127,7 +123,7 @@ def test_submit_warns_before_it_sends_and_sends_all_the_same(
 
 
 def test_every_code_is_described_in_the_docs() -> None:
-    page = (Path(__file__).resolve().parents[2] / "docs/file-format.md").read_text()
+    page = (Path(__file__).resolve().parents[3] / "docs/file-format.md").read_text()
     rows = [line for line in page.splitlines() if line.startswith("| `")]
     for code, meaning in WARNING_CODES.items():
         assert any(line.startswith(f"| `{code}`") and meaning in line for line in rows)
@@ -137,11 +133,9 @@ def test_every_code_is_described_in_the_docs() -> None:
 
 
 @pytest.fixture(scope="module")
-def kitti() -> tuple[GroundTruth, np.ndarray]:
+def windows(kitti: Path) -> tuple[GroundTruth, np.ndarray]:
     """KITTI's windows as the dataset cuts them, by time; and their rows in the whole table."""
-    if not KITTI.is_dir():
-        pytest.skip("shared/data/kitti-dev is not there")
-    table = read_truth(KITTI / "truth.csv").to_table()
+    table = read_truth(kitti / "truth.csv").to_table()
     ends: dict[tuple[str, str, str], int] = {}
     rows = []
     for row in sorted(range(len(table.ts_ns)), key=lambda row: (table.bag_stamp[row], table.ts_ns[row])):
@@ -158,11 +152,11 @@ def kitti() -> tuple[GroundTruth, np.ndarray]:
 
 @pytest.mark.parametrize("name", ["box-area", "box-sqrt-area", "box-height", "pointrcnn-height"])
 def test_estimators_of_real_driving_are_not_warned_of_and_their_shuffled_values_are(
-    kitti: tuple[GroundTruth, np.ndarray], name: str
+    kitti: Path, windows: tuple[GroundTruth, np.ndarray], name: str
 ) -> None:
-    truth, rows = kitti
-    data = (KITTI / "predictions" / f"{name}.ttc.json").read_bytes()
-    ttc_s = read_predictions(data, manifest=read_manifest(KITTI / "truth.csv")).ttc_s[rows]
+    truth, rows = windows
+    data = (kitti / "predictions" / f"{name}.ttc.json").read_bytes()
+    ttc_s = read_predictions(data, manifest=read_manifest(kitti / "truth.csv")).ttc_s[rows]
     assert codes(truth, ttc_s) == ([], [])
     found = roughness(truth.manifest, ttc_s)
     assert found is not None

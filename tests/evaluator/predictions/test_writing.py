@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluator import Manifest, Rejected, read_predictions, write_predictions
-from evaluator.scale import scale_ratio_to_ttc
+from evaluator.metrics.scale import scale_ratio_to_ttc
 from tests.evaluator.worlds import make_truth
 
 MANIFEST = make_truth([4.0, -10.0, 1.0], anno_ids=[7, 0, 12]).manifest

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from evaluator import Predictions, evaluate
-from evaluator.floors import floor_of, floor_sentence
-from evaluator.protocol import PROTOCOLS, SCORE_NAMES
+from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
+from evaluator.scoring.floors import floor_of, floor_sentence
 from tests.evaluator.worlds import errors_of_the_toolkit, make_truth
 
 TIMES_S = [-300.0, -45.0, -20.0, -12.0, -0.12, 0.03, 1.0, 4.0, 12.0, 20.0, 25.0, 1e6]

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from evaluator import SCORE_NAMES, confidence_intervals, evaluate, uncertainty
-from evaluator.uncertainty import Bootstrap
+from evaluator import SCORE_NAMES, confidence_intervals, evaluate
+from evaluator.scoring import uncertainty
+from evaluator.scoring.uncertainty import Bootstrap
 from tests.evaluator.recordings import N_BAGS, Floats, predictions, some_sums, world
 
 # --- sums ------------------------------------------------------------------------------------------------
@@ -16,6 +17,7 @@ from tests.evaluator.recordings import N_BAGS, Floats, predictions, some_sums, w
 def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> None:
     truth = world(1)
     report = evaluate(predictions(truth, 2), truth, keep_sequences=True, keep_bags=True)
+    assert report.sequences is not None
     expected, counts = np.zeros((2, N_BAGS, 10))
     ranges = {
         "": (-np.inf, np.inf),
@@ -29,7 +31,7 @@ def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> No
             metric, _, interval = name.partition("_")
             low, high = ranges.get(interval, (-np.inf, np.inf))
             if low <= tau <= high:
-                expected[int(truth.manifest.bag_stamp[row]), column] += getattr(report.sequences, metric)[row]
+                expected[int(truth.manifest.bag_stamp[row]), column] += report.sequences[metric][row]
                 counts[int(truth.manifest.bag_stamp[row]), column] += 1
     assert report.bags is not None
     assert report.bags.sums == pytest.approx(expected, rel=1e-12)
@@ -44,7 +46,7 @@ def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> No
 def test_intervals_are_those_of_a_plain_loop_over_the_same_weights() -> None:
     truth = world(3)
     mine = predictions(truth, 4)
-    bags = uncertainty.bag_sums(mine, truth)
+    bags = uncertainty.recording_sums(mine, truth)
     weights = uncertainty.generator_of(truth.digest, purpose="weights").standard_exponential(
         (10_000, N_BAGS), dtype=np.float32
     )

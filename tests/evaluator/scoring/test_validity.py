@@ -6,9 +6,9 @@ Here few repetitions, with room for their own chance; the command makes thousand
 import numpy as np
 import pytest
 
-from evaluator import differences
 from tests import error_models, validity
 from tests.error_models import Model
+from tests.evaluator.recordings import sign_flip_p
 
 pytestmark = pytest.mark.slow
 
@@ -52,7 +52,7 @@ def test_a_test_of_single_sequences_is_wrong_most_of_the_time() -> None:
 def test_a_test_of_recordings_is_right_where_that_of_sequences_is_not() -> None:
     rng = np.random.default_rng(2)
     drawn = error_models.MODELS[0].draw(100, 400, rng)
-    p = differences.sign_flip_p(drawn.first - drawn.second, rng=rng, n_flips=999)
+    p = sign_flip_p(drawn.first - drawn.second, rng=rng, n_flips=999)
     assert 0.02 <= (p < 0.05).mean() <= 0.09
 
 

@@ -4,9 +4,8 @@ import re
 
 import pytest
 
-from evaluator.differences import Difference
-from evaluator.sentences import others, sentence
-from evaluator.significance import detectable_difference
+from evaluator.scoring.significance import Difference
+from evaluator.tables.sentences import sentence
 
 FAR = Difference(-4.1, -5.3, -2.9, 0.0003)
 
@@ -49,25 +48,23 @@ def test_an_undecided_difference_says_what_would_have_been_found(
 ) -> None:
     text = said(found)
     assert f"(95 % confidence interval: {ends}; p = {found.p:.4f})." in text
-    assert text.endswith(
-        f"That is not significant. A difference above {detectable} would have been found in four of five "
-        "such tests."
-    )
+    assert "The difference is not significant." in text
+    assert text.endswith(f" The test detects a difference above {detectable} with 80 % power.")
 
 
 def test_the_detectable_difference_is_that_of_80_percent_power() -> None:
     stats = pytest.importorskip("scipy.stats")
     ratio = (stats.norm.ppf(0.975) + stats.norm.ppf(0.8)) / stats.norm.ppf(0.975)
-    found = detectable_difference(Difference(-0.1, -1.1, 0.9, 0.8))
+    found = Difference(-0.1, -1.1, 0.9, 0.8).detectable_difference
     assert found == pytest.approx(ratio, rel=1e-6)
-    assert detectable_difference(FAR) is None
-    assert detectable_difference(Difference(-0.1, None, None, None)) is None
+    assert FAR.detectable_difference is None
+    assert Difference(-0.1, None, None, None).detectable_difference is None
 
 
 def test_errors_in_percent_differ_by_percentage_points() -> None:
     text = said(Difference(0.7, -0.2, 1.6, 0.12), name="rte_small")
     assert text.startswith("A's RTE on small is 0.70 percentage points higher than B's (95 %")
-    assert "A difference above 1.29 percentage points would" in text
+    assert "detects a difference above 1.29 percentage points with" in text
 
 
 @pytest.mark.parametrize(
@@ -103,7 +100,7 @@ def test_digits_are_no_more_than_are_published() -> None:
 def test_where_p_itself_is_not_told_its_class_is(p_below: float, words: str, is_significant: bool) -> None:
     text = said(Difference(-2.0, -3.0, -1.0, None, p_below))
     assert f"(95 % confidence interval: 1.0 to 3.0 lower; {words})." in text
-    assert ("That is not significant." in text) is not is_significant
+    assert ("The difference is not significant." in text) is not is_significant
 
 
 def test_with_too_few_recordings_a_difference_means_nothing() -> None:
@@ -111,9 +108,3 @@ def test_with_too_few_recordings_a_difference_means_nothing() -> None:
     assert text == (
         "A's MiD is 0.40 lower than B's; there are too few recordings to say whether that is significant."
     )
-
-
-def test_other_columns_are_told_with_their_number() -> None:
-    lead, told = others("A", "B", {"mid": FAR, "mid_small": FAR, "rte": Difference(0.1, -0.2, 0.4, 0.5)})
-    assert lead.startswith("Of 2 other columns 1 differs significantly")
-    assert told == (sentence("A", "B", name="mid_small", found=FAR),)

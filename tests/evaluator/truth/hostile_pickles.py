@@ -1,4 +1,4 @@
-"""Pickles that ask for nothing forbidden and cost all the more: they nest, they copy, they collide.
+"""Pickles that ask for nothing forbidden and cost all the more: they nest, copy, collide and exaggerate.
 
 The sizes are just large enough for a reader without bounds to die, or to take gigabytes or minutes.
 """
@@ -115,5 +115,21 @@ HOSTILE: Final[dict[str, Callable[[], bytes]]] = {
         )
         + b"u"
     ),
+    "a place in the memo that is far away": lambda: whole(b"Nr" + struct.pack("<I", 2**31) + b"0"),
+    "a text of an exabyte": lambda: whole(b"\x8d" + struct.pack("<Q", 2**60)),
+    "a text of negative length": lambda: whole(b"T" + struct.pack("<i", -5)),
+    "bytes of a terabyte": lambda: whole(b"\x8e" + struct.pack("<Q", 2**40)),
+    "bytes of four exabytes in place": lambda: whole(b"\x96" + struct.pack("<Q", 2**62)),
+    "bytes of a little less than there is": lambda: whole(b"B" + struct.pack("<I", 200 << 20)),
+    "a frame of an exabyte": lambda: whole(b"\x95" + struct.pack("<Q", 2**60)),
+    "a number of two gigabytes": lambda: whole(b"\x8b" + struct.pack("<i", 2**31 - 1)),
+    "a pair of a pair of pairs as a key": lambda: whole(b"})" + b"2\x86" * 60 + b"Ns"),
 }
 """By what they do; made when they are asked for."""
+
+CHEAP: Final = {
+    "nested tuple for an encoding", "nested tuple in the state of a dtype", "arrays of one large content",
+    "an array with a shape of large numbers", "whole numbers of one hash",
+    "whole numbers of one hash in a set", "fractions of one hash",
+}  # fmt: skip
+"""Those that may be read, as the empty lists that they are: they cost about a second, or nothing."""

@@ -1,6 +1,7 @@
 """Folders of annotation files are read by a child process, and a hostile file ends no more than that."""
 
 import os
+import resource
 import signal
 import struct
 import subprocess
@@ -10,14 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from evaluator import Rejected, annotation_folders, read_manifest, read_truth
-from evaluator.annotation_folders import list_files, read_annotations
-from tests.evaluator.hostile_pickles import HOSTILE
+from evaluator import Rejected, read_manifest, read_truth
+from evaluator.truth import annotation_folders
+from evaluator.truth.annotation_folders import list_files, read_annotations
 from tests.evaluator.toolkit_folders import camera, foreign_class, write_folder
-from tests.leaderboard.child_processes import children, kernel_says, limits
+from tests.evaluator.truth.hostile_pickles import CHEAP, HOSTILE
+from tests.leaderboard.scoring.child_processes import children, kernel_says, limits
 
 SIX = list(range(6))
-ENDS_OF_THE_CHILD = ("MiB", "too long", "signal", "failed")
 
 
 def problem_of(folder: Path) -> tuple[str, str, str]:
@@ -27,13 +28,34 @@ def problem_of(folder: Path) -> tuple[str, str, str]:
     return problem.code, problem.where, problem.message
 
 
+def cpu_s() -> float:
+    """What the children that have ended have computed."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("case", HOSTILE)
-def test_hostile_pickle_is_refused_before_it_costs_anything(tmp_path: Path, case: str) -> None:
+def test_hostile_pickle_is_refused_in_words_within_the_limits(tmp_path: Path, case: str) -> None:
     write_folder(tmp_path, {"a.pkl": [camera({7: SIX})], "b.pkl": HOSTILE[case]()})
-    code, where, message = problem_of(tmp_path)
-    assert (code, where) in {("bad-annotations", "b.pkl"), ("too-large", "b.pkl")}
-    # The reader's own words: it did not come to the limits of its process.
-    assert not any(words in message for words in ENDS_OF_THE_CHILD)
+    before = cpu_s()
+    try:
+        assert read_manifest(tmp_path).n_sequences == 1
+        assert case in CHEAP
+    except Rejected as rejected:
+        [problem] = rejected.problems
+        assert (problem.code, problem.where) in {("bad-annotations", "b.pkl"), ("too-large", "b.pkl")}
+    assert cpu_s() - before < 4
+    assert not children()
+
+
+def test_pickle_that_takes_all_memory_is_refused_without_limits_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(annotation_folders, "HAS_LIMITS", False)
+    write_folder(tmp_path, {"a.pkl": HOSTILE["a text of an exabyte"]()})
+    message = "Reading the files needs more memory than there is; expected annotations of the toolkit."
+    assert problem_of(tmp_path) == ("too-large", tmp_path.name, message)
 
 
 @pytest.mark.parametrize("has_limits", [True, False])

@@ -24,7 +24,7 @@ SIX = list(range(6))
 @pytest.fixture(autouse=True)
 def _without_a_child(monkeypatch: pytest.MonkeyPatch) -> None:
     """Read here, as where a process has no limits; `test_annotation_folders` reads in the child."""
-    monkeypatch.setattr("evaluator.annotation_folders.HAS_LIMITS", False)
+    monkeypatch.setattr("evaluator.truth.annotation_folders.HAS_LIMITS", False)
 
 
 def last_frames(folder: Path) -> list[tuple[str, int]]:
@@ -48,11 +48,6 @@ def test_attribute_dicts_of_any_class_are_read_without_it(tmp_path: Path, name: 
     truth = read_truth(tmp_path)
     assert truth.manifest.natural_keys == ("0007/1/1600000000500000000/7",)
     assert truth.ttc_s.tolist() == [9.5]
-
-
-def test_the_target_is_the_last_of_six_frames(tmp_path: Path) -> None:
-    write_folder(tmp_path, {"a.pkl": [camera({7: SIX})]})
-    assert last_frames(tmp_path) == [("7", 5)]
 
 
 def test_sequences_are_cut_without_overlap(tmp_path: Path) -> None:
@@ -188,14 +183,10 @@ def test_names_that_no_table_can_hold_are_refused(tmp_path: Path, changes: dict[
 def test_a_frame_mentioned_many_times_in_many_cameras_is_not_walked_that_often(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("evaluator.annotations.MAX_OBJECTS", 2_000)
+    monkeypatch.setattr("evaluator.truth.annotations.MAX_OBJECTS", 2_000)
     objects = [seen(frame=0)] * 500
     write_folder(tmp_path, {"a.pkl": [dict.fromkeys(range(500), objects)] * 1_000_000})
     assert "more than 2,000 objects" in rejection(tmp_path).problems[0].message
-
-
-def test_a_folder_without_annotation_files_is_refused(tmp_path: Path) -> None:
-    assert rejection(tmp_path).problems[0].code == "unreadable"
 
 
 def test_annotations_without_any_sequence_are_refused(tmp_path: Path) -> None:

@@ -3,20 +3,18 @@
 import json
 import re
 import shlex
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import Result
 
 from evaluator import Rejected, evaluate, read_manifest, read_predictions, read_truth
-from evaluator.conversion import convert
-from evaluator.numbering import read_numbering
+from evaluator.predictions.conversion import convert
+from evaluator.truth.numbering import read_numbering
 from tests.evaluator.toolkit_folders import driving_folder, list_backwards, toolkit_results
-from tests.evaluator.worlds import flat
+from tests.evaluator.worlds import Tsttc, flat
 
-Tsttc = Callable[..., Result]
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -88,12 +86,12 @@ def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
     assert checked.exit_code == 0
     assert checked.stdout == (
         f"{results} is well-formed: 327 sequences, each predicted once.\n"
-        f"The toolkit gives {n_renumbered} of the 327 sequences of the folder another "
-        "anno_id than the manifest: this machine lists the files in another order.\n"
+        f"The toolkit numbers {n_renumbered} of the 327 sequences of the folder differently "
+        "from the manifest: the order of files is another one.\n"
     )
     shuffled, numbering = checked.stderr.splitlines()
     assert shuffled.startswith("Warning: The values look shuffled: ")
-    assert "The values are smooth in the toolkit's numbering alone, so the toolkit has written" in numbering
+    assert "The values are smooth in the toolkit's numbering only, so the toolkit wrote" in numbering
     command = shlex.split(numbering[numbering.index("tsttc convert") :])
     assert command == ["tsttc", "convert", str(results), "--annotations", str(folder), "-o", "natural.json"]
     document = json.loads(tsttc("check", results, "--annotations", folder, "--json").stdout)
@@ -108,7 +106,7 @@ def test_check_does_not_warn_of_a_file_in_the_manifest_s_numbers(
     path.write_bytes(flat(read_truth(folder).ttc_s.tolist()))
     checked = tsttc("check", path, "--annotations", folder)
     assert (checked.exit_code, checked.stderr) == (0, "")
-    assert "this machine lists the files in another order" in checked.stdout
+    assert "the order of files is another one" in checked.stdout
 
 
 def test_check_of_natural_keys_needs_no_warning(tsttc: Tsttc, folder: Path, results: Path) -> None:
@@ -123,7 +121,7 @@ def test_few_sequences_are_warned_of_by_the_order_alone(tsttc: Tsttc, folder: Pa
     path = tmp_path / "results.json"
     path.write_bytes(flat({anno_id: ttc_s for anno_id, (_, ttc_s) in toolkit_results(folder).items()}))
     checked = tsttc("check", path, "--annotations", folder)
-    assert re.search("^Warning: .*If the toolkit has written the file: give it natural keys", checked.stderr)
+    assert re.search("^Warning: .*If the toolkit wrote the file: give it natural keys", checked.stderr)
     assert checked.stderr.count("\n") == 1
 
 
@@ -135,15 +133,14 @@ def test_same_order_is_said_as_well(tsttc: Tsttc, tmp_path: Path, monkeypatch: p
         file.unlink()
     made = tsttc("manifest", folder, "-o", tmp_path / "manifest.csv")
     assert made.stderr == (
-        "The toolkit gives every sequence of the folder the manifest's anno_id: this machine lists the files "
-        "in the same order.\n"
+        "The toolkit numbers the folder like the manifest: the order of files is the same.\n"
     )
 
 
 def test_manifest_of_a_folder_says_how_the_toolkit_numbers_it(tsttc: Tsttc, folder: Path) -> None:
     n_renumbered = read_numbering(folder).n_renumbered
     made = tsttc("manifest", folder)
-    assert made.stderr.startswith(f"The toolkit gives {n_renumbered} of the 327 sequences")
+    assert made.stderr.startswith(f"The toolkit numbers {n_renumbered} of the 327 sequences")
     assert json.loads(tsttc("manifest", folder, "--json").stdout)["n_renumbered"] == n_renumbered
 
 

@@ -3,12 +3,12 @@
 import pytest
 from rest_framework.test import APIClient
 
-from evaluator.protocol import SCORE_NAMES
+from evaluator.metrics.protocol import SCORE_NAMES
 from leaderboard.models import Edition, Method, Submission, User, Visibility
 from tests import builders
-from tests.leaderboard.test_api_submissions import client_of
+from tests.leaderboard.api.test_submissions import client_of
 
-pytestmark = pytest.mark.usefixtures("open_values")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
 
 
 def address(*methods: object, split: str = "test", more: str = "") -> str:
@@ -40,7 +40,7 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
         assert found["low"] <= found["difference"] <= found["high"]
         assert "MiD is" in pair["sentence"]
         is_undecided = found["detectable_difference"] is not None
-        assert is_undecided == ("would have been found" in pair["sentence"]) == (not found["is_significant"])
+        assert is_undecided == ("with 80 % power" in pair["sentence"]) == (not found["is_significant"])
         names = {entry["method_id"]: entry["method"] for entry in body["entries"]}
         for name, found in pair["differences"].items():
             if found is not None:

@@ -6,9 +6,11 @@ import pytest
 from django.test import Client
 
 from leaderboard.models import Edition, Submission, User
-from leaderboard.web.kept import memory
+from leaderboard.web.middleware.page_cache import memory
 from tests import builders
 from tests.openapi import schema
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture

@@ -4,17 +4,16 @@ from datetime import timedelta
 from io import StringIO
 
 import pytest
-from django.core.files.base import ContentFile
 from django.core.management import call_command
 from django.db import connection
 from django.utils import timezone
 from rest_framework.test import APIClient
 
-from leaderboard import idempotency, submissions
 from leaderboard.models import Edition, IdempotencyKey, Membership, Method, Split, Submission, User
+from leaderboard.submissions import idempotency, submissions
 from tests import builders
-from tests.leaderboard.test_api_submissions import client_of, post
-from tests.leaderboard.test_lifecycle_races import at_once
+from tests.leaderboard.api.test_submissions import client_of, post
+from tests.leaderboard.scoring.test_lifecycle_races import at_once
 
 
 def keyed(client: APIClient, key: str, data: bytes, **fields: str):
@@ -120,14 +119,7 @@ def test_one_key_at_the_same_moment_is_one_submission(edition: Edition, owner: U
 
     def send(key: str, number: int) -> str:
         def submit() -> submissions.Submitted:
-            return submissions.submit(
-                user=owner,
-                split_name="test",
-                method_name="Foo",
-                upload=ContentFile(files[number % n_bodies], name="p.json"),
-                via="API",
-                now=now,
-            )
+            return builders.send(owner, files[number % n_bodies], now=now)
 
         try:
             answer = idempotency.once(
@@ -135,7 +127,7 @@ def test_one_key_at_the_same_moment_is_one_submission(edition: Edition, owner: U
             )
         except idempotency.KeyReused:
             return "reused"
-        return str(answer.submitted.submission.pk)
+        return str(answer.submission.pk)
 
     winners = set()
     for key in ("a", "b", "c"):

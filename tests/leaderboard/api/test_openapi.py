@@ -48,7 +48,7 @@ def test_every_field_and_parameter_has_a_description(schema: dict[str, Any]) -> 
         for parameter in operation.get("parameters", [])
         if not parameter.get("description")
     ]
-    assert silent == [], "say what they mean in leaderboard/api/descriptions.py, or by help_text"
+    assert silent == [], "describe them by help_text"
 
 
 def test_every_operation_says_what_it_does_and_has_the_errors_that_all_have(schema: dict[str, Any]) -> None:

@@ -10,10 +10,13 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 from rest_framework.test import APIClient
 
-from leaderboard import outcomes, submissions
 from leaderboard.models import Edition, Evaluation, Method, Submission, User
+from leaderboard.submissions import outcomes, submissions
 from tests import board_rows, builders
 from tests.editions import corrected, open_edition, publish
+from tests.leaderboard.api.test_submissions import client_of
+
+pytestmark = pytest.mark.slow
 
 LIST = "/api/v1/submissions"
 BOARD = "/api/v1/splits/test/board"
@@ -22,10 +25,7 @@ PARTS = {"low", "high", "rank_low", "rank_high", "is_with_best"}
 
 @pytest.fixture
 def client(owner: User) -> APIClient:
-    """A program of the owner's, which may ask as often as these tests do."""
-    made = APIClient()
-    made.credentials(HTTP_AUTHORIZATION=f"Bearer {builders.token(owner)}")
-    return made
+    return client_of(owner)
 
 
 def look(client: APIClient, submission: Submission, **query: str) -> dict[str, Any]:
@@ -68,19 +68,12 @@ def test_too_few_recordings_are_not_waited_for(
     assert look(client, sent)["awaits_intervals"] is False
 
 
-def test_ends_of_intervals_are_no_finer_than_what_is_published(
-    client: APIClient, entries: list[Submission]
-) -> None:
-    builders.infer_all()
-    ends = [found[end] for found in look(client, entries[0])["intervals"].values() for end in ("low", "high")]
-    assert ends
-    assert ends == [round(end, 2) for end in ends]
-
-
 def test_waiting_submission_has_neither(client: APIClient, edition: Edition, owner: User) -> None:
     sent = builders.submit(owner, builders.predictions(edition))
-    body = look(client, sent)
+    with CaptureQueriesContext(connection) as queries:
+        body = look(client, sent)
     assert (body["intervals"], body["awaits_intervals"], body["rank"]) == ({}, False, None)
+    assert not [each for each in queries.captured_queries if "snapshot" in each["sql"]], "no board is read"
 
 
 def test_private_one_has_intervals_no_range_and_the_rank_that_it_would_have(
@@ -167,12 +160,3 @@ def test_list_asks_no_more_of_the_database_for_many_than_for_few(
     builders.board_changed("test")
     client.get(LIST)
     assert n_queries(client, LIST) == before
-
-
-def test_place_on_the_board_is_looked_up_for_nobody_who_waits(
-    client: APIClient, edition: Edition, owner: User
-) -> None:
-    sent = builders.submit(owner, builders.predictions(edition))
-    with CaptureQueriesContext(connection) as queries:
-        look(client, sent)
-    assert not [each for each in queries.captured_queries if "snapshot" in each["sql"]]

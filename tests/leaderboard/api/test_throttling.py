@@ -7,14 +7,14 @@ from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries, Settings
 from rest_framework.test import APIClient
 
-from leaderboard.api.throttles import MalformedThrottle
+from leaderboard.api.throttling import MalformedTokenThrottle
 from leaderboard.models import ApiToken, Edition, User
 from tests import builders
-from tests.leaderboard.test_api_submissions import client_of, post
-from tests.leaderboard.test_tokens import client_with
+from tests.leaderboard.api.test_submissions import client_of, post
+from tests.leaderboard.people.test_tokens import client_with
 
 # As of a time: the present board is answered from memory, which is counted nowhere.
-BOARD = "/api/v1/splits/test/board?at=2026-01-01"
+BOARD = "/api/v1/splits/test/board?at=2026-01-01T00:00:00Z"
 REVOKE = "/api/v1/tokens/revoke"
 NEXT_S = 3600 / 3
 
@@ -22,7 +22,7 @@ NEXT_S = 3600 / 3
 @pytest.fixture(autouse=True)
 def rates(settings: Settings) -> None:
     """Three of everything, counted from nothing: the next comes after longer than any test takes."""
-    MalformedThrottle.memory.forget()
+    MalformedTokenThrottle.memory.forget()
     settings.API_RATES = dict.fromkeys(settings.API_RATES, "3/hour")
 
 
@@ -84,6 +84,18 @@ def test_files_have_a_rate_of_their_own(edition: Edition, owner: User, settings:
     data = builders.predictions(edition)
     assert [post(client, data).status_code for _ in range(4)] == [201, 200, 200, 429]
     assert statuses(client, "/api/v1/submissions") == [200] * 4
+
+
+def test_boards_as_of_a_time_have_a_rate_of_their_own(
+    edition: Edition, owner: User, settings: Settings
+) -> None:
+    settings.API_RATES = dict.fromkeys(settings.API_RATES) | {"as_of": "1/hour"}
+    for client in (APIClient(), client_of(owner)):
+        assert statuses(client, n=2) == [200, 429]
+        assert statuses(client, "/api/v1/splits/test/board?q=x") == [200] * 4
+    # A day that is over is answered from memory, when somebody has asked for it.
+    statuses(APIClient(REMOTE_ADDR="192.0.2.9"), "/api/v1/splits/test/board?at=2026-01-01", n=1)
+    assert statuses(APIClient(), "/api/v1/splits/test/board?at=2026-01-01") == [200] * 4
 
 
 def test_reports_of_leaked_tokens_are_throttled(db: None) -> None:

@@ -11,12 +11,14 @@ from django.db import DatabaseError, connection
 from pytest_django import Settings
 from rest_framework.test import APIClient
 
-from leaderboard import waiting
 from leaderboard.api.submission_views import _is_gone
 from leaderboard.models import Edition, Submission, User
+from leaderboard.submissions import long_poll
 from tests import builders
-from tests.leaderboard.test_api_submissions import client_of
-from tests.leaderboard.test_lifecycle_races import at_once
+from tests.leaderboard.api.test_submissions import client_of
+from tests.leaderboard.scoring.test_lifecycle_races import at_once
+
+pytestmark = pytest.mark.slow
 
 RNG = random.Random(0)
 PATIENCE_S = 60
@@ -47,7 +49,7 @@ class Looks:
 class Waiter(threading.Thread):
     """Somebody who waits for a submission; `is_held` is what they were told."""
 
-    def __init__(self, watcher: waiting.Watcher, *, is_gone=stays) -> None:
+    def __init__(self, watcher: long_poll.Watcher, *, is_gone=stays) -> None:
         super().__init__(daemon=True)
         self.watcher, self.is_gone = watcher, is_gone
         self.submission_id = uuid4()
@@ -76,14 +78,14 @@ def ended() -> None:
 
 
 @pytest.fixture
-def watcher(looks: Looks) -> Iterator[waiting.Watcher]:
-    made = waiting.Watcher(look=looks, n_places=lambda: 3, every_s=0.01)
+def watcher(looks: Looks) -> Iterator[long_poll.Watcher]:
+    made = long_poll.Watcher(look=looks, n_places=lambda: 3, every_s=0.01)
     yield made
     made.close()
     ended()
 
 
-def seated(watcher: waiting.Watcher, looks: Looks, n: int, **options) -> list[Waiter]:
+def seated(watcher: long_poll.Watcher, looks: Looks, n: int, **options) -> list[Waiter]:
     """So many waiters, once the watcher looks for all of them."""
     waiters = [Waiter(watcher, **options) for _ in range(n)]
     while not looks.asked or len(looks.asked[-1]) < n:
@@ -92,7 +94,7 @@ def seated(watcher: waiting.Watcher, looks: Looks, n: int, **options) -> list[Wa
 
 
 def test_one_watcher_asks_for_all_and_lets_each_go_when_its_own_is_final(
-    watcher: waiting.Watcher, looks: Looks
+    watcher: long_poll.Watcher, looks: Looks
 ) -> None:
     before = set(threading.enumerate())
     first, second, third = seated(watcher, looks, 3)
@@ -109,7 +111,7 @@ def test_one_watcher_asks_for_all_and_lets_each_go_when_its_own_is_final(
 
 
 def test_who_finds_no_place_is_answered_at_once_and_the_later_the_more_there_are(
-    watcher: waiting.Watcher, looks: Looks
+    watcher: long_poll.Watcher, looks: Looks
 ) -> None:
     waiters = seated(watcher, looks, 3)
     assert not watcher.hold(uuid4(), wait_s=WAIT_S, is_gone=stays)
@@ -119,7 +121,7 @@ def test_who_finds_no_place_is_answered_at_once_and_the_later_the_more_there_are
     assert 8 <= watcher.retry_after_s(rng=RNG) <= 13
     for _ in range(2_000):
         watcher.hold(uuid4(), wait_s=WAIT_S, is_gone=stays)
-    assert watcher.retry_after_s(rng=RNG) == waiting.LONGEST_RETRY_AFTER_S
+    assert watcher.retry_after_s(rng=RNG) == long_poll.LONGEST_RETRY_AFTER_S
     # A place that is free again is given away again.
     looks.final = {waiter.submission_id for waiter in waiters}
     assert all(waiter.has_come_back() for waiter in waiters)
@@ -127,7 +129,7 @@ def test_who_finds_no_place_is_answered_at_once_and_the_later_the_more_there_are
 
 
 def test_a_watcher_does_not_ask_for_who_has_left(looks: Looks) -> None:
-    slow = waiting.Watcher(look=looks, n_places=lambda: 3, every_s=2)
+    slow = long_poll.Watcher(look=looks, n_places=lambda: 3, every_s=2)
     # Seen to be gone at the first look, and away well before the next one.
     [waiter] = seated(slow, looks, 1, is_gone=lambda: True)
     assert waiter.has_come_back()
@@ -135,7 +137,7 @@ def test_a_watcher_does_not_ask_for_who_has_left(looks: Looks) -> None:
     assert len(looks.asked) == 1
 
 
-def test_who_has_gone_takes_no_place(watcher: waiting.Watcher, looks: Looks) -> None:
+def test_who_has_gone_takes_no_place(watcher: long_poll.Watcher, looks: Looks) -> None:
     is_gone = threading.Event()
     [waiter] = seated(watcher, looks, 1, is_gone=is_gone.is_set)
     is_gone.set()
@@ -143,7 +145,7 @@ def test_who_has_gone_takes_no_place(watcher: waiting.Watcher, looks: Looks) -> 
 
 
 def test_a_process_that_ends_lets_everybody_go_and_takes_nobody(
-    watcher: waiting.Watcher, looks: Looks
+    watcher: long_poll.Watcher, looks: Looks
 ) -> None:
     waiters = seated(watcher, looks, 3)
     watcher.close()
@@ -154,7 +156,7 @@ def test_a_process_that_ends_lets_everybody_go_and_takes_nobody(
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
 @pytest.mark.parametrize("fault", [DatabaseError("away"), OSError("away"), ValueError("a bug")])
 def test_nobody_hangs_on_a_watcher_that_fails(
-    watcher: waiting.Watcher, looks: Looks, fault: Exception
+    watcher: long_poll.Watcher, looks: Looks, fault: Exception
 ) -> None:
     waiters = seated(watcher, looks, 2)
     looks.fault = fault
@@ -199,8 +201,8 @@ def test_bad_wait_is_a_400(waiting_one: Submission, owner: User, wait: str) -> N
 def test_who_asks_again_and_again_keeps_nobody_else_in_memory(
     monkeypatch: pytest.MonkeyPatch, looks: Looks
 ) -> None:
-    monkeypatch.setattr(waiting, "LONGEST_RETRY_AFTER_S", 0)
-    full = waiting.Watcher(look=looks, n_places=lambda: 0, every_s=0.01)
+    monkeypatch.setattr(long_poll, "LONGEST_RETRY_AFTER_S", 0)
+    full = long_poll.Watcher(look=looks, n_places=lambda: 0, every_s=0.01)
     stubborn, others = uuid4(), [uuid4() for _ in range(5)]
     for asker in (stubborn, *others, stubborn):
         assert not full.hold(asker, wait_s=1, is_gone=stays)
@@ -232,10 +234,10 @@ def test_all_are_looked_for_in_two_questions(
 ) -> None:
     made = [builders.submit(owner, builders.predictions(edition, factor=1 + n / 10)) for n in range(1, 4)]
     with django_assert_num_queries(2):
-        assert waiting.final_among([row.pk for row in made]) == set()
+        assert long_poll.final_among([row.pk for row in made]) == set()
     builders.score_all()
     gone = uuid4()
-    assert waiting.final_among([made[0].pk, gone]) == {made[0].pk, gone}
+    assert long_poll.final_among([made[0].pk, gone]) == {made[0].pk, gone}
 
 
 @pytest.fixture

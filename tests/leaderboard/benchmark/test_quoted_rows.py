@@ -11,9 +11,10 @@ from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import benchmark, inference
+from leaderboard.benchmark import splits
 from leaderboard.models import AuditEvent, Edition, PublishedResult, Snapshot, Split
 from leaderboard.models.benchmark import SINCE_EVER
+from leaderboard.scoring import confidence
 from tests.editions import board_now, corrected, open_edition, paper, publish, quote, roll_back
 
 FORMS = ("/board/test/editions/1/", "/board/test/editions/1.csv", "/board/test/editions/1.tex")
@@ -76,9 +77,9 @@ def test_a_board_that_stands_has_every_row_and_a_former_one_those_of_its_time(
 
 def test_ranges_of_a_former_edition_count_the_rows_of_its_time(former: Edition) -> None:
     first, second = Edition.objects.order_by("number").select_related("split")
-    before = [inference.digest_of(edition, []) for edition in (first, second)]
+    before = [confidence.digest_of(edition, []) for edition in (first, second)]
     quote("later")
-    after = [inference.digest_of(edition, []) for edition in (first, second)]
+    after = [confidence.digest_of(edition, []) for edition in (first, second)]
     assert before[0] == after[0]
     assert before[1] != after[1]
 
@@ -87,7 +88,7 @@ def test_ranges_of_a_former_edition_count_the_rows_of_its_time(former: Edition) 
 def test_rows_that_come_with_their_split_stand_since_ever_and_later_ones_since_their_day() -> None:
     PublishedResult.objects.filter(slug="sot").delete()
     assert set(PublishedResult.objects.values_list("added_at", flat=True)) == {SINCE_EVER}
-    benchmark.ensure_splits()
+    splits.ensure_splits()
     later = PublishedResult.objects.filter(slug="sot")
     assert later.count() == 2
     assert all(timezone.now() - row.added_at < A_DAY for row in later)
@@ -117,10 +118,10 @@ def test_a_document_is_imported_once_and_another_content_replaces_only_when_told
     [
         ({"results": {"nowhere": {"later": [1.0] * 10}}}, "There is no split 'nowhere'"),
         ({"results": {"test": {"later": [1.0] * 9}}}, "has it in another form"),
-        ({"results": {"test": {"later": [float("nan")] * 10}}}, "are no ten numbers from 0"),
+        ({"results": {"test": {"later": [float("nan")] * 10}}}, "are no numbers from 0, one for each name"),
         ({"results": {"test": {"other": [1.0] * 10}}}, "lacks 'other'"),
         ({"results": {}}, "has no rows"),
-        ({"columns": ["mid"] * 10}, "are no ten numbers from 0"),
+        ({"columns": ["mid"] * 10}, "are no numbers from 0, one for each name"),
         ({"methods": "none"}, "has it in another form"),
     ],
 )

@@ -2,19 +2,23 @@
 
 from typing import Any
 
+import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from leaderboard import standings, visibility
+from leaderboard.boards import boards
+from leaderboard.methods import visibility
 from leaderboard.models import Edition, Method, Split, User
 from tests import builders
+
+pytestmark = pytest.mark.slow
 
 ANYBODY = AnonymousUser()
 
 
-def rows(viewer: Any = ANYBODY) -> dict[str, standings.Entry]:
+def rows(viewer: Any = ANYBODY) -> dict[str, boards.Entry]:
     split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
-    return {entry.method: entry for entry in standings.board(split=split, viewer=viewer).entries}
+    return {entry.method: entry for entry in boards.board(split=split, viewer=viewer).entries}
 
 
 def test_attempts_are_those_of_what_the_team_shows_and_of_an_anonymous_method_its_own(

@@ -8,19 +8,13 @@ import pytest
 from django.db import connection, transaction
 from django.test import Client
 
-from leaderboard import boards
+from leaderboard import versions
 from leaderboard.models import BoardVersion, Score, Split, User
 from tests import board_rows, builders
+from tests.services import ON_POSTGRESQL
 
 API = "/api/v1/splits/test/board"
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.services,
-    pytest.mark.django_db(transaction=True),
-    pytest.mark.skipif(
-        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
-    ),
-]
+pytestmark = [pytest.mark.slow, *ON_POSTGRESQL]
 
 
 def test_no_reader_gets_a_board_that_is_half_changed(benchmark: None, tmp_path: Path, owner: User) -> None:
@@ -42,7 +36,7 @@ def test_no_reader_gets_a_board_that_is_half_changed(benchmark: None, tmp_path: 
         with transaction.atomic():
             Score.objects.filter(interval="overall", metric="mid").update(value=value)
             Score.objects.filter(interval="overall", metric="rte").update(value=value)
-            boards.changed("test")
+            versions.changed("test")
 
     set_all(1.0)
     readers = [threading.Thread(target=read, args=(i,)) for i in range(3)]
@@ -70,7 +64,7 @@ def test_numbers_of_changes_that_come_at_once_are_all_counted(benchmark: None) -
     def change() -> None:
         for _ in range(10):
             with transaction.atomic():
-                boards.changed_everywhere()
+                versions.changed_everywhere()
         connection.close()
 
     threads = [threading.Thread(target=change) for _ in range(4)]

@@ -8,13 +8,15 @@ from pathlib import Path
 
 import pytest
 from django.conf import settings
-from django.core.files.base import ContentFile
 from django.db import connection, transaction
 from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
-from leaderboard import boards, methods, snapshots, standings, submissions, teams, visibility
+from leaderboard import versions
+from leaderboard.boards import boards, snapshots
+from leaderboard.boards.snapshot_store import decode
+from leaderboard.methods import methods, visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -27,15 +29,18 @@ from leaderboard.models import (
     User,
     Visibility,
 )
-from leaderboard.snapshots import BOARD, FORMS
-from leaderboard.web.kept import Shelf, memory
+from leaderboard.people import teams
+from leaderboard.submissions import submissions
+from leaderboard.web.middleware.page_cache import ResponseCache, memory
 from tests import board_rows, builders
 from tests.editions import corrected, open_edition, publish
 from tests.public_pages import addresses_of
 
+pytestmark = pytest.mark.slow
+
 API = "/api/v1/splits/test/board"
 PAGE = "/board/test/"
-MAX_QUERIES = 3
+MAX_QUERIES, MAX_QUERIES_AS_OF = 3, 8
 
 
 @pytest.fixture
@@ -48,18 +53,19 @@ def by_hand(change: Callable[[], object], *, split: str = "test") -> None:
     """Change rows past the verbs, and say so as a verb would."""
     with transaction.atomic():
         change()
-        boards.changed(split)
+        versions.changed(split)
 
 
 def n_queries(client: Client, address: str) -> int:
     with CaptureQueriesContext(connection) as captured:
         assert client.get(address).status_code == 200, address
-    return len(captured)
+    # A test is one transaction: what would begin and end one within is none of the page's statements.
+    return sum(not query["sql"].startswith(("SAVEPOINT", "RELEASE")) for query in captured)
 
 
 def forget_what_was_read() -> None:
-    for form in FORMS.values():
-        form.memory.clear()
+    snapshots.snapshot_cache.clear()
+    snapshots.as_of_cache.clear()
 
 
 def etag(client: Client, address: str = API) -> str:
@@ -70,30 +76,40 @@ def etag(client: Client, address: str = API) -> str:
 
 
 def test_what_is_kept_is_what_the_database_says(edition: Edition, filled: list[Method]) -> None:
-    drawn = snapshots.draw(edition, BOARD)
-    kept = BOARD.read(bytes(Snapshot.objects.get().body))
+    drawn = snapshots.draw(edition)
+    kept = decode(bytes(Snapshot.objects.get().body))
     assert kept == drawn
     assert kept is not None
-    assert kept.entries == standings.everybodys(split=edition.split, edition=edition)
+    assert kept.entries == boards.public_rows(split=edition.split, edition=edition)
     assert len(kept.entries) == 12 + edition.split.published_results.count()
     assert {attempt.method_id for attempt in kept.attempts} == {method.pk for method in filled}
+
+
+def test_a_kept_row_has_its_scores_in_the_order_of_its_protocol(
+    edition: Edition, filled: list[Method]
+) -> None:
+    """Equal mappings may differ in it, and pages show it."""
+    snapshots.draw(edition)
+    kept = decode(bytes(Snapshot.objects.get().body))
+    assert kept is not None
+    assert {tuple(entry.scores) for entry in kept.entries} == {edition.rules.score_names}
 
 
 def test_two_processes_that_draw_the_same_write_the_same_bytes(
     edition: Edition, filled: list[Method]
 ) -> None:
-    first, second = snapshots._at_present(edition, BOARD)[0], snapshots._at_present(edition, BOARD)[0]
+    first, second = snapshots._as_of_now(edition)[0], snapshots._as_of_now(edition)[0]
     assert first == second
 
 
 def test_the_order_in_which_rows_lie_changes_no_byte(edition: Edition, filled: list[Method]) -> None:
-    shown, _ = snapshots._at_present(edition, BOARD)
+    shown, _ = snapshots._as_of_now(edition)
     for row in Evaluation.objects.order_by("-pk"):
         # PostgreSQL writes it anew, behind all others.
         Evaluation.objects.filter(pk=row.pk).update(last_error="")
     for result in PublishedResult.objects.order_by("-pk"):
         PublishedResult.objects.filter(pk=result.pk).update(year=result.year)
-    assert snapshots._at_present(edition, BOARD)[0] == shown
+    assert snapshots._as_of_now(edition)[0] == shown
 
 
 def test_another_program_s_snapshot_is_drawn_anew(
@@ -132,7 +148,7 @@ def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
 ) -> None:
     builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
     builders.score_all()
-    number, is_shown = boards.number("test"), list[bool]()
+    number, is_shown = versions.number("test"), list[bool]()
 
     def show_meanwhile(execute, sql, params, many, context):
         # Before the row of its team is held, which whoever changes a method waits for.
@@ -143,39 +159,31 @@ def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
 
     data = builders.predictions(edition, factor=1.2)
     with connection.execute_wrapper(show_meanwhile):
-        submissions.submit(
-            user=owner,
-            split_name="test",
-            method_name="Foo",
-            upload=ContentFile(data, name="x"),
-            via="API",
-            now=timezone.now(),
-            description="Said anew.",
-        )
+        builders.send(owner, data, description="Said anew.")
     assert is_shown
-    assert boards.number("test") == number + 1
+    assert versions.number("test") == number + 1
 
 
 def test_changing_outside_of_a_transaction_is_refused() -> None:
     with pytest.raises(RuntimeError, match="outside of the transaction"):
-        boards.changed("test")
+        versions.changed("test")
 
 
 def test_nobody_hears_of_a_change_that_was_taken_back(edition: Edition, filled: list[Method]) -> None:
-    before = boards.state()
+    before = versions.state()
     with transaction.atomic():
-        boards.changed("test")
+        versions.changed("test")
         transaction.set_rollback(True)
-    assert boards.state() == before
+    assert versions.state() == before
 
 
 def test_editions_in_preparation_move_no_number(
     edition: Edition, entries: list[Submission], second: Edition
 ) -> None:
-    before = boards.state()
+    before = versions.state()
     assert builders.score_all() > 0
     assert second.evaluations.filter(status=Status.SCORED).count() == len(entries)
-    assert boards.state() == before
+    assert versions.state() == before
 
 
 def test_what_was_changed_by_hand_is_found_by_the_sweep(
@@ -192,44 +200,11 @@ def test_what_was_changed_by_hand_is_found_by_the_sweep(
 
 
 def test_a_worker_draws_what_changed_before_anybody_asks(edition: Edition, filled: list[Method]) -> None:
-    assert snapshots.redraw(split_id="test", now=timezone.now())
-    assert not snapshots.redraw(split_id="test", now=timezone.now())
+    assert snapshots.redraw(now=timezone.now())
+    assert not snapshots.redraw(now=timezone.now())
     by_hand(lambda: None)
-    assert not snapshots.redraw(split_id="test", now=timezone.now())  # again at once: left to the reader
-    assert snapshots.redraw(split_id="test", now=timezone.now() + timedelta(seconds=2))
-    assert not snapshots.redraw(split_id="val", now=timezone.now())  # there is no board yet
-    assert not snapshots.redraw(split_id="nowhere", now=timezone.now())
-
-
-# --- what is private moves nothing -------------------------------------------------------------------------
-
-
-def test_a_private_submission_changes_no_byte_and_no_tag(
-    edition: Edition, filled: list[Method], owner: User, client: Client
-) -> None:
-    before = {address: client.get(address) for address in addresses_of(filled)}
-    method = Method.objects.create(team=teams.team_of(user=owner), name="Secret")
-    by_hand(lambda: board_rows.score(edition, methods=[method], user=owner))
-    for address, old in before.items():
-        new = client.get(address)
-        assert new.content == old.content, address
-        assert new.headers.get("ETag") == old.headers.get("ETag"), address
-
-
-def test_own_private_rows_are_added_for_their_team_alone(
-    edition: Edition, filled: list[Method], owner: User, stranger: User, client: Client
-) -> None:
-    builders.submit(owner, builders.predictions(edition), method="Secret")
-    Method.objects.filter(name="Secret").update(visibility=Visibility.PRIVATE)
-    builders.score_all()
-    public = client.get(API).json()["entries"]
-    client.force_login(owner)
-    mine = client.get(API)
-    assert [e["method"] for e in mine.json()["entries"] if e not in public] == ["Secret"]
-    assert mine["Cache-Control"].startswith("private")
-    assert "Cookie" in mine["Vary"]
-    client.force_login(stranger)
-    assert client.get(API).json()["entries"] == public
+    assert not snapshots.redraw(now=timezone.now())  # again at once: left to the reader
+    assert snapshots.redraw(now=timezone.now() + timedelta(seconds=2))
 
 
 # --- what it costs -----------------------------------------------------------------------------------------
@@ -243,16 +218,27 @@ def test_a_public_page_takes_three_statements_whatever_its_size(
     client.get(PAGE)  # whoever finds a changed board draws it, for all who follow
     addresses = addresses_of(rows)
     for address in addresses:
-        # Whoever compares first asks a worker to, and whoever asks for the past first draws it.
-        if address.startswith("/compare/") or "?at=" in address:
+        # Whoever compares first asks a worker to, and whoever asks for a time first reads its board.
+        if address.startswith("/compare/") or address.endswith("/charts/") or "?at=" in address:
             client.get(address)
-    for forget in (lambda: None, forget_what_was_read):
+    for forget, n_as_of in ((lambda: None, MAX_QUERIES), (forget_what_was_read, MAX_QUERIES_AS_OF)):
         memory.clear()
         forget()
         counts = {address: n_queries(client, address) for address in addresses}
-        assert {address: count for address, count in counts.items() if count > MAX_QUERIES} == {}
-    # What anybody can make up, as a text to find, is answered each time anew.
-    anew = ("compare", "?at=", "q=", "latency=", "parameters=", "page=", "pretraining=", "hardware=")
+        allowed = {address: n_as_of if "?at=" in address else MAX_QUERIES for address in addresses}
+        assert {address: n for address, n in counts.items() if n > allowed[address]} == {}
+    # What anybody can make up, as a text to find, and what workers still compute is answered each time anew.
+    anew = (
+        "compare",
+        "/charts/",
+        "?at=",
+        "q=",
+        "latency=",
+        "parameters=",
+        "page=",
+        "pretraining=",
+        "hardware=",
+    )
     kept = [address for address in addresses if not any(part in address for part in anew)]
     assert len(kept) > 8
     assert {n_queries(client, address) for address in kept} == {1}
@@ -323,7 +309,7 @@ def test_security_headers_are_those_of_any_page(
 
 def test_only_whole_answers_are_remembered(edition: Edition, client: Client) -> None:
     for address in (
-        *(f"{API}?sort=nothing", "/board/nowhere/", f"{API}?at=2026-01-01"),
+        *(f"{API}?sort=nothing", "/board/nowhere/", f"{API}?at=2026-01-01T00:00:00Z"),
         f"/api/v1/methods/{uuid.uuid4()}",
     ):
         first = client.get(address)
@@ -363,12 +349,12 @@ def test_nobody_chooses_what_others_are_answered_from_memory(edition: Edition, t
 
 
 def test_what_is_remembered_is_bounded(edition: Edition, filled: list[Method], client: Client) -> None:
-    small = Shelf(limit_bytes=100_000)
+    small = ResponseCache(plain_bytes=100_000, queries_bytes=0).plain
     client.get(API)
     found = memory.get(API)
     assert found is not None
     for i in range(50):
-        small.put(f"/{i}", *found)
+        small.put(f"/{i}", found)
     assert small.get("/0") is None
     assert small.get("/49") is not None
 
@@ -380,11 +366,11 @@ def test_a_long_address_counts_as_well_as_its_answer(
     client.get(badge)
     found = memory.get(badge)
     assert found is not None
-    small = Shelf(limit_bytes=1_000_000)
+    small = ResponseCache(plain_bytes=0, queries_bytes=1_000_000).queries
     addresses = [f"{badge}?{i:04000}" for i in range(1000)]
     for address in addresses:
-        small.put(address, *found)
+        small.put(address, found)
     assert sum(len(address) for address in addresses if small.get(address)) < 1_000_000
     for address in addresses:
-        small.put(address, *found)  # the same again takes no room of its own
+        small.put(address, found)  # the same again takes no room of its own
     assert small.get(addresses[-100]) is not None

@@ -7,9 +7,9 @@ from django.db import DataError, IntegrityError, connection, transaction
 from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
-from leaderboard import bulk
+from leaderboard.db import bulk
 from leaderboard.models import Edition, Evaluation, Method, Score, Status, Submission, Team, User
-from tests.leaderboard import queue_rows
+from tests.leaderboard.web.maintain import queue_rows
 
 
 @pytest.fixture
@@ -97,7 +97,9 @@ def test_constraints_of_the_database_hold_for_many_rows_as_for_one(
         )
     if connection.vendor == "postgresql":
         with pytest.raises(DataError), transaction.atomic():
-            bulk.insert(Score, columns, [(evaluation.pk, "longer than eight", "overall", 1.0)])
+            bulk.insert(
+                Score, columns, [(evaluation.pk, "longer than thirty-two characters", "overall", 1.0)]
+            )
 
 
 def test_no_rows_are_no_statement(

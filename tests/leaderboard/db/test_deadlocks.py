@@ -7,7 +7,7 @@ as well.
 import os
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import product
+from itertools import permutations, product
 from pathlib import Path
 
 import pytest
@@ -15,18 +15,21 @@ from django.db import connection
 from django.utils import timezone
 
 from evaluator import read_predictions
-from evaluator.protocol import get_protocol
-from evaluator.scoring import Scorer
-from leaderboard import bags, ground_truth, lifecycle, quotas, rescoring
+from evaluator.metrics.protocol import get_protocol
+from evaluator.scoring.scoring import Scorer
+from leaderboard.editions import ground_truth
+from leaderboard.errors.outages import outage_of
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Team, User
 from leaderboard.models.submissions import SentFile
-from leaderboard.outages import outage_of
-from leaderboard.texts import Refused
+from leaderboard.quotas import quotas
+from leaderboard.scoring import lifecycle, recording_sums
+from leaderboard.storage import truth_values
 from tests import builders
-from tests.interlocking import Meeting, Outcome, at_the_audit_lock
+from tests.interlocking import Meeting, Outcome, at_the_board_lock, at_the_event
 from tests.locking_scene import World, scene
 from tests.locking_verbs import VERBS
-from tests.services import crowd_on_postgres
+from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
 N_ROUNDS = int(os.environ.get("TSTTC_DEADLOCK_ROUNDS", "1"))
 DEADLOCK_DETECTED = "40P01"
@@ -34,18 +37,11 @@ DEADLOCK_DETECTED = "40P01"
 ANSWERS = (
     Refused,
     quotas.QuotaExceeded,
-    rescoring.Refused,
+    Refused,
     lifecycle.LostRace,
     Team.DoesNotExist,  # it has just ended, which is a 404
 )
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.services,
-    pytest.mark.django_db(transaction=True),
-    pytest.mark.skipif(
-        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
-    ),
-]
+pytestmark = [pytest.mark.slow, *ON_POSTGRESQL]
 
 
 @pytest.fixture
@@ -53,12 +49,12 @@ def world(benchmark: None, maintainer: User, tmp_path: Path) -> World:
     edition = builders.import_truth(tmp_path, n=40, n_recordings=10)
     path = builders.truth_csv(tmp_path / "corrected.csv", n=40, n_recordings=10, seed=2)
     row = ground_truth.add(split_name="test", path=path, now=timezone.now(), actor=None)
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     predictions = read_predictions(builders.predictions(edition), manifest=truth.manifest)
     report = Scorer(truth, get_protocol(edition.protocol)).report(predictions, keep_bags=True)
     files = [SentFile(f"sha256:{number:064}", truth.manifest.digest) for number in range(5)]
     for file in files:
-        bags.keep(edition, file=file, bags=report.bags)
+        recording_sums.save(edition, file=file, bags=report.bags)
     return World(edition=edition, files=files, correction=row, maintainer=maintainer, folder=tmp_path)
 
 
@@ -70,11 +66,15 @@ def meeting(world: World) -> Iterator[Meeting]:
 
 
 def meet(world: World, meeting: Meeting, first: str, *others: str, at: int = 0) -> Outcome:
-    """One round: the first verb is held at its statement `at`, or where it has the audit trail."""
-    there = scene(world)
-    deeds = [VERBS[name](there) for name in (first, *others)]
-    where = (lambda number, sql: number == at) if at else at_the_audit_lock
-    return meeting.of(*deeds, at=where)
+    """One round: the first verb is held at its statement `at`, or where it has all its locks."""
+    places = [lambda number, sql: number == at] if at else [at_the_board_lock, at_the_event]
+    for place in places:
+        there = scene(world)
+        deeds = [VERBS[name](there) for name in (first, *others)]
+        outcome = meeting.of(*deeds, at=place)
+        if outcome.was_held or any(outcome.faults):
+            break
+    return outcome
 
 
 MET = [
@@ -89,7 +89,7 @@ MET = [
     ("submit", "change an address"),
     ("submit for the first time", "override a loner's quota"),
 ]
-"""Pairs of which one had the audit trail and wanted a row, and the other had the row and wanted the trail."""
+"""Pairs of which one had the lock of all and wanted a row, and the other had the row and wanted the lock."""
 
 
 def test_every_verb_does_its_deed_in_the_scene(world: World) -> None:
@@ -103,6 +103,13 @@ def test_every_verb_does_its_deed_in_the_scene(world: World) -> None:
     assert failed == {}
 
 
+def test_whoever_has_recorded_and_not_ended_keeps_nobody_waiting(world: World, meeting: Meeting) -> None:
+    for first, second in permutations(("make a token", "submit for the first time")):
+        there = scene(world)
+        outcome = meeting.of(VERBS[first](there), VERBS[second](there), at=at_the_event)
+        assert (outcome.was_held, outcome.n_waited, outcome.faults) == (True, 0, (None, None))
+
+
 def test_what_once_waited_for_each_other_for_ever_does_not(world: World, meeting: Meeting) -> None:
     faults = {}
     for first, second in MET:
@@ -113,7 +120,7 @@ def test_what_once_waited_for_each_other_for_ever_does_not(world: World, meeting
 
 
 def test_no_verbs_wait_for_each_other_for_ever(world: World, meeting: Meeting) -> None:
-    """Each is held once where it has the audit trail, and meets half of the others: so all pairs meet."""
+    """Each is held once where it has all its locks, and meets half of the others: so all pairs meet."""
     found: Counter[str] = Counter()
     n_statements = {}
     for first, others in crowds().items():

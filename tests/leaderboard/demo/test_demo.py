@@ -6,24 +6,30 @@ from datetime import UTC, datetime
 from itertools import pairwise
 from pathlib import Path
 
-import numpy as np
 import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.core.management import CommandError, call_command
 from pytest_django.fixtures import Settings
 
 import evaluator
-from leaderboard import ground_truth, scoring, standings
+from evaluator import INTERVALS
+from leaderboard.boards import boards
 from leaderboard.demo import seed
-from leaderboard.demo.truth import N_RECORDINGS, N_SEQUENCES, SHARES, simulate
+from leaderboard.demo.runs import N_RECORDINGS, N_SEQUENCES
+from leaderboard.demo.truth import SHAPE, demo_split
+from leaderboard.editions import ground_truth
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Split, Status, Submission, User
+from leaderboard.scoring import worker
+
+pytestmark = pytest.mark.slow
 
 NOW = datetime(2026, 1, 1, tzinfo=UTC)
 
 
 @pytest.fixture(scope="module")
 def truth() -> evaluator.GroundTruth:
-    return simulate(rng=np.random.default_rng(seed.SEED))
+    return demo_split().truth
 
 
 def test_the_simulated_truth_has_the_size_and_the_recordings_of_the_test_set(
@@ -33,20 +39,20 @@ def test_the_simulated_truth_has_the_size_and_the_recordings_of_the_test_set(
     assert truth.manifest.n_recordings == N_RECORDINGS == 700
 
 
-@pytest.mark.parametrize(("interval", "share"), [*SHARES.items()])
+@pytest.mark.parametrize(("interval", "share"), [*SHAPE.shares.items()])
 def test_the_simulated_truth_has_the_interval_shares_of_the_test_set(
     truth: evaluator.GroundTruth, interval: str, share: float
 ) -> None:
-    n_inside = truth.n_sequences - truth.n_out_of_range
-    assert truth.interval_counts[interval] / n_inside == pytest.approx(share, abs=5e-5)
+    n_inside = truth.n_sequences - truth.n_outside(INTERVALS)
+    assert truth.counts_of(INTERVALS)[interval] / n_inside == pytest.approx(share, abs=5e-5)
 
 
 def test_a_few_simulated_sequences_lie_in_no_interval_and_none_in_two(truth: evaluator.GroundTruth) -> None:
-    assert truth.n_out_of_range / truth.n_sequences == pytest.approx(0.016, abs=5e-5)
-    assert sum(truth.interval_counts.values()) + truth.n_out_of_range == truth.n_sequences
+    assert truth.n_outside(INTERVALS) / truth.n_sequences == pytest.approx(0.016, abs=5e-5)
+    assert sum(truth.counts_of(INTERVALS).values()) + truth.n_outside(INTERVALS) == truth.n_sequences
 
 
-def test_along_a_track_the_windows_are_cut_without_overlap_and_contact_comes_closer(
+def test_along_a_track_the_windows_are_cut_without_overlap(
     truth: evaluator.GroundTruth,
 ) -> None:
     tracks: dict[str, list[tuple[int, float]]] = {}
@@ -57,11 +63,10 @@ def test_along_a_track_the_windows_are_cut_without_overlap_and_contact_comes_clo
     assert max(len(windows) for windows in tracks.values()) <= 12
     for windows in tracks.values():
         assert {b[0] - a[0] for a, b in pairwise(windows)} <= {600_000_000}
-        assert [ttc_s for _, ttc_s in windows] == sorted((ttc_s for _, ttc_s in windows), reverse=True)
 
 
 def test_the_same_seed_gives_the_same_truth_and_the_same_files(truth: evaluator.GroundTruth) -> None:
-    again = simulate(rng=np.random.default_rng(seed.SEED))
+    again = demo_split().truth
     assert again.digest == truth.digest
     for entry in seed.ENTRIES:
         assert seed.predictions_file(entry, truth=again) == seed.predictions_file(entry, truth=truth)
@@ -69,42 +74,42 @@ def test_the_same_seed_gives_the_same_truth_and_the_same_files(truth: evaluator.
 
 @pytest.mark.slow
 def test_the_worker_decides_what_the_seed_submits(benchmark: None, tmp_path: Path) -> None:
-    seed.seed(now=NOW, login_path=tmp_path / "password")
+    seed.seed(now=NOW, password_path=tmp_path / "password")
     assert Counter(Evaluation.objects.values_list("status", flat=True)) == {Status.QUEUED: len(seed.ENTRIES)}
 
-    while scoring.run_next(rng=random.Random(1)):
+    while worker.run_next(rng=random.Random(1)):
         continue
 
-    n_scored = sum(entry.estimator is not None for entry in seed.ENTRIES)
+    n_scored = sum(entry.run is not None for entry in seed.ENTRIES)
     assert Counter(Evaluation.objects.values_list("status", flat=True)) == {
         Status.SCORED: n_scored,
         Status.REJECTED: 1,
     }
-    board = standings.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
+    board = boards.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
     assert [entry.rank for entry in board.entries] == [*range(1, n_scored + 1)]
-    assert board.entries[0].method == "Dense scale matching"
+    assert board.entries[0].method == "Photometric alignment"
     assert board.split.is_simulated
 
 
 def test_seeding_twice_adds_nothing_and_keeps_the_password(benchmark: None, tmp_path: Path) -> None:
-    login = seed.seed(now=NOW, login_path=tmp_path / "password")
+    password = seed.seed(now=NOW, password_path=tmp_path / "password")
     counts = [model.objects.count() for model in (User, Submission, Evaluation)]
 
-    assert seed.seed(now=NOW, login_path=tmp_path / "password") == login
+    assert seed.seed(now=NOW, password_path=tmp_path / "password") == password
     assert [model.objects.count() for model in (User, Submission, Evaluation)] == counts
-    assert User.objects.get(email=login.email).check_password(login.password)
+    assert User.objects.get(email=seed.DEMO_EMAIL).check_password(password)
 
 
 def test_the_password_is_random_and_kept_readable_by_its_owner_alone(benchmark: None, tmp_path: Path) -> None:
     path = tmp_path / "password"
-    login = seed.seed(now=NOW, login_path=path)
+    password = seed.seed(now=NOW, password_path=path)
     assert path.stat().st_mode & 0o077 == 0
     path.unlink()
-    assert seed.seed(now=NOW, login_path=path).password != login.password
+    assert seed.seed(now=NOW, password_path=path) != password
 
 
-def test_nobody_can_sign_in_as_the_invented_teams(benchmark: None, tmp_path: Path) -> None:
-    seed.seed(now=NOW, login_path=tmp_path / "password")
+def test_nobody_can_sign_in_as_the_teams_of_the_baselines(benchmark: None, tmp_path: Path) -> None:
+    seed.seed(now=NOW, password_path=tmp_path / "password")
     others = User.objects.exclude(email=seed.DEMO_EMAIL)
     assert others
     assert not any(user.has_usable_password() for user in others)
@@ -114,8 +119,8 @@ def test_a_demo_split_with_other_ground_truth_is_left_alone(benchmark: None, tmp
     other = tmp_path / "other.csv"
     other.write_text("anno_id,bag_stamp,cam_id,ts,track_id,ttc\n0,a,1,600000000,1,5.0\n")
     ground_truth.import_truth(split_name="demo", path=other, now=NOW)
-    with pytest.raises(seed.Occupied, match="expected none"):
-        seed.seed(now=NOW, login_path=tmp_path / "password")
+    with pytest.raises(Refused, match="expected none"):
+        seed.seed(now=NOW, password_path=tmp_path / "password")
     assert not Submission.objects.exists()
 
 

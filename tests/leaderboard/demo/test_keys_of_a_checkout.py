@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from secrets import token_urlsafe
 
-from leaderboard import environment
+from leaderboard.ops import environment
 
 
 def test_many_that_start_at_once_read_one_whole_key(tmp_path: Path) -> None:

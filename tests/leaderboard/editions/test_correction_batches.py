@@ -1,7 +1,6 @@
 """Re-scoring in batches: what a worker had in hand when it died, and what it says when it comes back."""
 
 import random
-import uuid
 from pathlib import Path
 
 import pytest
@@ -9,11 +8,17 @@ from django.core.files.base import ContentFile
 from django.utils import timezone
 
 import evaluator
-from leaderboard import broker, files, ground_truth, lifecycle, scoring, standings
-from leaderboard.lifecycle import Lease
+from leaderboard.boards import boards
+from leaderboard.editions import ground_truth
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status
+from leaderboard.ops import broker
+from leaderboard.scoring import lifecycle, worker
+from leaderboard.scoring.lifecycle import Lease
+from leaderboard.storage import files, truth_values
 from tests import builders, crowd
-from tests.leaderboard import queue_rows
+from tests.leaderboard.web.maintain import queue_rows
+
+pytestmark = pytest.mark.slow
 
 N_SUBMISSIONS = lifecycle.RESCORE_BATCH + 50
 
@@ -23,7 +28,7 @@ def edition(benchmark: None, tmp_path: Path) -> Edition:
     """An edition for which more submissions wait to be scored anew than one batch holds."""
     path = builders.truth_csv(tmp_path / "truth-test.csv")
     edition = ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     crowd.join(split_name="test", truth=truth, n=N_SUBMISSIONS, n_files=5)
     return edition
 
@@ -36,10 +41,10 @@ def claim_batch() -> list[Lease]:
 
 def assert_all_scored_once(edition: Edition) -> None:
     """Every submission has the ten numbers that the evaluator alone gives, and was decided once."""
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     rows = Evaluation.objects.filter(edition=edition).select_related("submission__method")
     assert {row.status for row in rows} == {Status.SCORED}
-    found = {row.submission.method.name: standings.flat_scores(row.scores.all()) for row in rows}
+    found = {row.submission.method.name: boards.flat_scores(row) for row in rows}
     assert found == {
         crowd.method_name(number): crowd.published_scores(truth, number) for number in range(N_SUBMISSIONS)
     }
@@ -58,7 +63,7 @@ def test_a_batch_takes_no_more_than_its_size_and_leaves_the_rest_to_others(editi
 def test_a_batch_is_of_one_edition(edition: Edition, tmp_path: Path) -> None:
     path = builders.truth_csv(tmp_path / "truth-val.csv", seed=1)
     other = ground_truth.import_truth(split_name="val", path=path, now=timezone.now())
-    crowd.join(split_name="val", truth=ground_truth.load(other.ground_truth_id), n=5, n_files=0)
+    crowd.join(split_name="val", truth=truth_values.load(other.ground_truth_id), n=5, n_files=0)
     while leases := claim_batch():
         ids = [lease.evaluation_id for lease in leases]
         assert Evaluation.objects.filter(pk__in=ids).values("edition").distinct().count() == 1
@@ -85,7 +90,7 @@ def test_a_worker_that_comes_back_with_a_batch_that_others_finished_changes_noth
     queue_rows.release_expired()
     queue_rows.make_due()
     builders.score_all()
-    assert scoring.rescore(zombie, edition=edition) == []
+    assert worker.rescore(zombie, edition=edition) == []
     assert_all_scored_once(edition)
 
 
@@ -95,7 +100,7 @@ def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edit
     for lease in taken:
         queue_rows.expire(lease)
     queue_rows.release_expired()
-    scoring.rescore(leases, edition=edition)
+    worker.rescore(leases, edition=edition)
     scored = set(Evaluation.objects.filter(status=Status.SCORED).values_list("pk", flat=True))
     assert scored == {lease.evaluation_id for lease in kept}
     queue_rows.make_due()
@@ -107,7 +112,7 @@ def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edit
 def test_a_file_without_its_kept_values_is_read_again_beside_the_batch(
     edition: Edition, left: bytes | None
 ) -> None:
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     digest = evaluator.read_predictions(crowd.contents(truth, 3), manifest=truth.manifest).digest
     store = files.store()
     name = files.aligned_name(manifest_digest=truth.manifest.digest, digest=digest)
@@ -119,7 +124,7 @@ def test_a_file_without_its_kept_values_is_read_again_beside_the_batch(
 
 
 def test_kept_values_that_were_changed_are_not_scored(edition: Edition) -> None:
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     digest = evaluator.read_predictions(crowd.contents(truth, 3), manifest=truth.manifest).digest
     name = files.aligned_name(manifest_digest=truth.manifest.digest, digest=digest)
     store = files.store()
@@ -139,20 +144,20 @@ def test_kept_values_that_were_changed_are_not_scored(edition: Edition) -> None:
 def test_workers_hear_of_every_batch(
     benchmark: None, tmp_path: Path, django_capture_on_commit_callbacks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    nudged: list[uuid.UUID] = []
+    nudged: list[bool] = []
 
-    def nudge(evaluation_id: uuid.UUID) -> bool:
-        nudged.append(evaluation_id)
+    def nudge() -> bool:
+        nudged.append(True)
         return True
 
     monkeypatch.setattr(broker, "nudge", nudge)
     path = builders.truth_csv(tmp_path / "truth-test.csv")
     edition = ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
     with django_capture_on_commit_callbacks(execute=True):
-        truth = ground_truth.load(edition.ground_truth_id)
+        truth = truth_values.load(edition.ground_truth_id)
         crowd.join(split_name="test", truth=truth, n=N_SUBMISSIONS, n_files=0)
     assert len(nudged) == 2
     n_runs = 0
-    while scoring.run_next(rng=random.Random(0)):
+    while worker.run_next(rng=random.Random(0)):
         n_runs += 1
     assert n_runs == len(nudged)

@@ -16,12 +16,13 @@ import pytest
 from django.utils import timezone
 
 import evaluator
-from leaderboard import ground_truth, preview, standings
-from leaderboard.editions import TruthChange
+from leaderboard.boards import boards
+from leaderboard.editions import ground_truth, preview
+from leaderboard.editions.history import TruthChange
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from tests import builders
 from tests.editions import open_edition, publish, roll_back
-from tests.services import REPOSITORY, shared_data
+from tests.services import REPOSITORY
 
 pytestmark = pytest.mark.slow
 
@@ -53,15 +54,6 @@ def tsttc_score(predictions: Path, *, truth: Path) -> Offline:
     command = [sys.executable, "-m", "evaluator", "score", str(predictions), "--truth", str(truth), "--json"]
     done = subprocess.run(command, cwd=REPOSITORY, capture_output=True, text=True, check=False)
     return Offline(exit_code=done.returncode, answer=json.loads(done.stdout))
-
-
-@pytest.fixture(scope="module")
-def kitti() -> Path:
-    """The folder of the data."""
-    shared = shared_data()
-    if shared is None or not (shared / "kitti-dev").is_dir():
-        pytest.skip("kitti-dev is not here: TSTTC_SHARED_DATA names no folder that has it")
-    return shared / "kitti-dev"
 
 
 @pytest.fixture
@@ -163,7 +155,7 @@ def test_a_file_for_the_new_manifest_is_scored_in_the_new_edition_as_offline(
     states = dict(submission.evaluations.values_list("edition__number", "status"))
     assert states == {1: Status.REJECTED, 2: Status.SCORED}
     new = Evaluation.objects.get(submission=submission, edition=edition)
-    assert standings.flat_scores(new.scores.all()) == tsttc_score(file, truth=path).scores
+    assert boards.flat_scores(new) == tsttc_score(file, truth=path).scores
     old = Evaluation.objects.get(submission=submission, edition=published)
     assert old.n_problems == 301
     assert old.problems[0]["message"].startswith("301 sequences have no value")

@@ -10,8 +10,10 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 
 from evaluator import Rejected, read_truth
-from leaderboard import files, ground_truth
+from leaderboard.editions import ground_truth
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, GroundTruth, Split
+from leaderboard.storage import files, truth_values
 from tests import builders
 
 pytestmark = pytest.mark.usefixtures("benchmark")
@@ -31,11 +33,11 @@ def test_first_import_opens_and_publishes_edition_one(tmp_path: Path) -> None:
 
 def test_values_are_kept_in_the_private_directory_for_their_owner_only(tmp_path: Path) -> None:
     edition = builders.import_truth(tmp_path)
-    path = ground_truth.values_path(edition.ground_truth_id)
+    path = truth_values.values_path(edition.ground_truth_id)
     assert stat.S_IMODE(path.stat().st_mode) == 0o600
     assert stat.S_IMODE(path.parent.stat().st_mode) == 0o700
     assert np.array_equal(
-        ground_truth.load(edition.ground_truth_id).ttc_s, read_truth(tmp_path / "truth-test.csv").ttc_s
+        truth_values.load(edition.ground_truth_id).ttc_s, read_truth(tmp_path / "truth-test.csv").ttc_s
     )
 
 
@@ -55,14 +57,14 @@ def test_same_truth_again_is_answered_with_the_edition_that_has_it(tmp_path: Pat
 
 def test_other_truth_for_an_open_split_is_refused(tmp_path: Path) -> None:
     first = builders.import_truth(tmp_path)
-    with pytest.raises(ground_truth.Refused, match="has test edition 1 with other ground truth"):
+    with pytest.raises(Refused, match="has test edition 1 with other ground truth"):
         builders.import_truth(tmp_path, seed=1)
     assert Split.objects.get(name="test").published_edition == first
 
 
 def test_one_truth_belongs_to_one_split(tmp_path: Path) -> None:
     builders.import_truth(tmp_path)
-    with pytest.raises(ground_truth.Refused, match="belongs to the split 'test' already"):
+    with pytest.raises(Refused, match="belongs to the split 'test' already"):
         builders.import_truth(tmp_path, split="val")
     assert not Edition.objects.filter(split="val").exists()
 
@@ -74,7 +76,7 @@ def test_faulty_truth_is_refused_with_its_problems_and_changes_nothing(tmp_path:
         ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
     assert {"duplicate-ids", "duplicate-natural-keys"} <= {problem.code for problem in caught.value.problems}
     assert not GroundTruth.objects.exists()
-    assert not Path(ground_truth.values_path("x")).parent.exists()
+    assert not Path(truth_values.values_path("x")).parent.exists()
 
 
 def test_command_says_what_it_imported(tmp_path: Path) -> None:

@@ -8,12 +8,17 @@ from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import quotas, rescoring, submissions, teams
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Publication, Split, Status, Submission, User
-from leaderboard.quotas import Quota
+from leaderboard.people import teams
+from leaderboard.quotas import quotas
+from leaderboard.quotas.quotas import Quota
+from leaderboard.submissions import submissions
 from tests import builders
 from tests.editions import extended, open_edition, publish, roll_back
-from tests.leaderboard.test_pages_everywhere import assert_sound
+from tests.leaderboard.web.test_every_page import assert_sound
+
+pytestmark = pytest.mark.slow
 
 PUBLISH = "/maintain/test/editions/2/publish/"
 
@@ -44,7 +49,7 @@ def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_know
     sent: Submission, adding: Edition, keeper: Client
 ) -> None:
     sentence = f"test edition 2 rejects 1 entry that the board scores: Foo ({sent.pk})."
-    with pytest.raises(rescoring.Refused) as refused:
+    with pytest.raises(Refused) as refused:
         publish(adding)
     assert sentence in str(refused.value)
     with pytest.raises(CommandError) as failed:
@@ -88,15 +93,10 @@ def test_the_words_are_true_wherever_they_stand(
 ) -> None:
     publish(adding, leave_out=True)
     board = assert_sound(client.get("/board/test/")).one("main").text
-    assert "Nobody has submitted" not in board
-    assert (
-        "Edition 2 scores no submission yet. 1 submission that former editions scored is not in it" in board
-    )
+    assert "no submissions yet" not in board
+    assert "Edition 2 has no scored submission yet. 1 submission keeps its result in former editions" in board
     client.force_login(owner)
-    said = (
-        "Edition 2 cannot score this file. It keeps its result in edition 1, and its slot of the quota is "
-        "given back."
-    )
+    said = "Edition 2 cannot score this file. It keeps its result in edition 1, and your quota is refunded."
     page = assert_sound(client.get(f"/submissions/{sent.pk}/"))
     outcome = page.one("div", id="outcome").text
     assert said in outcome
@@ -106,4 +106,4 @@ def test_the_words_are_true_wherever_they_stand(
 
 
 def test_a_board_to_which_nobody_has_sent_says_so(edition: Edition, client: Client) -> None:
-    assert "Nobody has submitted to test yet." in assert_sound(client.get("/board/test/")).one("main").text
+    assert "test has no submissions yet." in assert_sound(client.get("/board/test/")).one("main").text

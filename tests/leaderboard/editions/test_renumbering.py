@@ -13,11 +13,16 @@ import pytest
 from django.apps import apps
 
 from evaluator import Manifest, evaluate, published, read_manifest, read_predictions, read_truth
-from evaluator.report import Report
-from leaderboard import bags, files, preview, standings
+from evaluator.scoring.report import Report
+from leaderboard.boards import boards
+from leaderboard.editions import preview
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from leaderboard.scoring import recording_sums
+from leaderboard.storage import files
 from tests import builders
 from tests.editions import open_edition, publish, roll_back
+
+pytestmark = pytest.mark.slow
 
 HEAD = "anno_id,bag_stamp,cam_id,ts,track_id,ttc"
 Row = list[str]
@@ -74,7 +79,7 @@ def offline(said: Said, path: Path) -> dict[str, float | None]:
 def scores(submission: Submission, edition: Edition) -> dict[str, float | None]:
     found = submission.evaluations.get(edition=edition)
     assert found.status == Status.SCORED, found.problems
-    return standings.flat_scores(found.scores.all())
+    return boards.flat_scores(found)
 
 
 def first() -> Edition:
@@ -123,7 +128,7 @@ def test_scores_change_exactly_as_an_offline_score_by_natural_keys_says(
         assert scores(submission, editions[dropped]) != scores(submission, first())
         # Another numbering is no other truth: neither are the sums, of which intervals are made.
         before, after = (
-            bags.sums_of(each, file=submission.sent_file) for each in (first(), editions[permuted])
+            recording_sums.sums_of(each, file=submission.sent_file) for each in (first(), editions[permuted])
         )
         assert after == pytest.approx(before, rel=1e-12)
     for found in Evaluation.objects.filter(edition=editions[inserted]):
@@ -162,7 +167,7 @@ def test_the_same_bytes_for_two_manifests_are_two_submissions_that_are_never_mix
         assert scores(submission, first()) == offline(said, tmp_path / "truth-test.csv")
         expected = report(said, path).bags
         assert expected is not None
-        assert bags.sums_of(second, file=submission.sent_file) == pytest.approx(expected.sums)
+        assert recording_sums.sums_of(second, file=submission.sent_file) == pytest.approx(expected.sums)
     assert scores(old, second) != scores(new, second)
 
 

@@ -5,8 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from leaderboard.names import clean_name
-from leaderboard.texts import Refused, clean_text
+from leaderboard.errors.refusals import Refused, clean_text
+from leaderboard.people.names import clean_name
 
 COMPOSED = ["é", "ᾂ", "한", "ǖ"]  # of two, four, three and three characters
 

@@ -1,7 +1,6 @@
 """Exports end up in papers: they hold what everybody sees, and one's own rows for who asks, marked."""
 
 import csv
-import html
 import io
 import re
 
@@ -10,14 +9,17 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from evaluator import answers
-from evaluator.cli import formats
-from leaderboard import teams
+from evaluator.cli.exports import export
+from evaluator.client import answers
+from evaluator.tables.formats import FORMATS
 from leaderboard.models import Edition, Method, User, Visibility
-from tests import board_rows, pages
-from tests.leaderboard.test_exports import boards_changed, text_of
+from leaderboard.people import teams
+from tests import board_rows, builders, pages
+from tests.leaderboard.exports.test_exports import text_of
 
-FORMS = ("csv", "tex", "md", "bib")
+pytestmark = pytest.mark.slow
+
+SUFFIXES = ("csv", "tex", "md", "bib")
 PAPER = "https://example.org/papers/own"
 
 
@@ -35,24 +37,25 @@ def own(edition: Edition, owner: User) -> list[Method]:
             team=team, name=name, visibility=visibility, paper_url=PAPER
         )
     Method.objects.filter(pk=others.pk).update(visibility=Visibility.ANONYMOUS, name="Theirs")
-    boards_changed()
+    builders.board_changed("test")
     return [private, masked, public, others]
 
 
 @pytest.mark.parametrize("query", ["", "?intervals=1", "?q=e&sort=-mid", "?mine=0"])
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", SUFFIXES)
 def test_whoever_takes_a_board_along_takes_what_everybody_sees(
-    own: list[Method], owner: User, teammate: User, client: Client, form: str, query: str
+    own: list[Method], owner: User, teammate: User, stranger: User, client: Client, form: str, query: str
 ) -> None:
     for path in ("/board/test", "/board/test/editions/1"):
         everybodys = Client().get(f"{path}.{form}{query}").content
-        for user in (owner, teammate):
+        for user in (owner, teammate, stranger):
             client.force_login(user)
             answer = client.get(f"{path}.{form}{query}")
             assert answer.content == everybodys
             assert answer["Cache-Control"] == "private, no-store"
     for secret in (b"Secretissimo", b"Maskenball", b"private)", b"anonymous)"):
         assert secret not in everybodys
+    assert query or (own[1].pseudonym.encode() in everybodys) == (form != "bib")
 
 
 @pytest.mark.parametrize("form", ["tex", "md", "bib"])
@@ -73,7 +76,7 @@ def test_one_s_own_rows_come_marked_for_who_asks(
     assert own[1].pseudonym not in text
     assert "Theirs" not in text
     assert (own[3].pseudonym in text) == (form != "bib")
-    assert ("Not what everybody sees" in text) == (form != "bib")
+    assert ("Not public: only one team" in text) == (form != "bib")
 
 
 def test_the_spreadsheet_says_who_sees_each_row(own: list[Method], owner: User, client: Client) -> None:
@@ -99,7 +102,7 @@ def test_private_rows_take_nobody_s_rank_and_no_mark(own: list[Method], owner: U
     assert not re.search("textbf|underline", added.pop())
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", SUFFIXES)
 def test_nobody_s_own_rows_are_a_clear_refusal(own: list[Method], form: str, client: Client) -> None:
     answer = client.get(f"/board/test.{form}?mine=1")
     assert answer.status_code == 400
@@ -114,16 +117,17 @@ def test_who_has_no_such_rows_gets_everybody_s(own: list[Method], stranger: User
 
 
 def links(client: Client, address: str = "/board/test/") -> dict[str, list[str]]:
-    """What a page offers: by the words before, the addresses."""
-    found = pages.page(client.get(address)).all("p", class_="take-along")
-    return {p.text.partition(":")[0]: [a.attributes["href"] for a in p.all("a")] for p in found}
+    """What a page offers: the addresses, for everyone and with one's own rows."""
+    menu = pages.page(client.get(address)).one("details", class_="exports")
+    found = {name: menu.all("div", class_=name) for name in ("public", "with-own")}
+    return {name: [a.attributes["href"] for a in parts[0].all("a")] for name, parts in found.items() if parts}
 
 
 def test_the_page_offers_every_form_with_and_without_intervals(own: list[Method], client: Client) -> None:
     (offered,) = links(client, "/board/test/?sort=rte").values()
     forms = [f"/board/test.{form}?sort=rte" for form in ("csv", "json", "tex", "md", "bib")]
     sure = [f"{address}&intervals=1" for address in forms[:-1]]
-    assert offered == [*forms, *sure, "/board/test/feed.atom"]
+    assert offered == [*forms, *sure]
     for address in offered:
         assert client.get(address, follow=True).status_code == 200
     assert r"\scriptsize" in client.get(sure[2]).text
@@ -133,13 +137,10 @@ def test_the_page_offers_one_s_own_rows_to_who_has_some(
     own: list[Method], owner: User, stranger: User, client: Client
 ) -> None:
     client.force_login(stranger)
-    assert links(client).keys() == {"Take it along"}
+    assert links(client).keys() == {"public"}
     client.force_login(owner)
     offered = links(client)
-    assert offered.keys() == {
-        "Take it along as everybody sees it",
-        "With your own rows, marked, for nobody else",
-    }
+    assert offered.keys() == {"public", "with-own"}
     everybodys, with_own = offered.values()
     # The API's document is that of whoever asks: with their own rows, which it marks.
     assert not [address for address in everybodys if ".json" in address or "mine" in address]
@@ -150,7 +151,7 @@ def test_the_page_offers_one_s_own_rows_to_who_has_some(
     assert told["Maskenball"] == ("ANONYMOUS", own[1].pseudonym)
     assert told[own[3].pseudonym] == ("ANONYMOUS", None)
     # Where no such row fits the filter there is nothing to add.
-    assert links(client, "/board/test/?q=Offenbach").keys() == {"Take it along"}
+    assert links(client, "/board/test/?q=Offenbach").keys() == {"public"}
 
 
 # --- the same from the command line ------------------------------------------------------------------------
@@ -162,13 +163,14 @@ def test_the_page_offers_one_s_own_rows_to_who_has_some(
 def test_command_line_and_site_write_the_same_table(
     own: list[Method], owner: User, client: Client, form: str, path: str, query: str
 ) -> None:
-    write = {"tex": formats.as_latex, "md": formats.as_markdown}[form]
+    (write,) = (each.write for each in FORMATS if each.suffix == form)
     client.force_login(owner)
     query = query.replace("NOW", f"{timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}")
     for reader, mine in ((Client(), ""), (client, "&mine=1")):
         there = text_of(reader, form, f"?{query}{mine}", split=f"test{path}")
         document = reader.get(f"/api/v1/splits/test{path}/board?{query}").json()
         board = msgspec.convert({**document, "document": document}, answers.Board)
-        address = re.search(r"(?<=test: )\S+", html.unescape(there.replace("\\", "")))
+        # In Markdown it is a link, in angle brackets.
+        address = re.search(r"(?<=leaderboard, test: )<?([^\s<>]+)", there.replace("\\", ""))
         assert address is not None
-        assert write(board, address=address[0]) == there
+        assert write(export(board, address=address[1])) == there

@@ -10,6 +10,8 @@ from django.test import Client
 from leaderboard.models import Edition, Evaluation, Method, Publication, Submission, User, Visibility
 from tests import builders
 
+pytestmark = pytest.mark.slow
+
 DAY = datetime(2026, 1, 2, tzinfo=UTC)
 NOON = datetime(2026, 1, 2, 12, 34, 56, tzinfo=UTC)
 ADDRESSES = (

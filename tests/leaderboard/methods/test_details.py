@@ -7,10 +7,13 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 
-from leaderboard import filters, methods, standings
+from leaderboard.boards import boards, filters
+from leaderboard.errors.refusals import Refused
+from leaderboard.methods import methods
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User
-from leaderboard.texts import Refused
 from tests import builders, pages
+
+pytestmark = pytest.mark.slow
 
 ANYBODY = AnonymousUser()
 WHOLE: dict[str, Any] = {
@@ -38,7 +41,7 @@ BAD = [
     *of("cameras", "one", "THREE", 1, True, {}),
     ("box_source", "MADE UP"),
     *of("uses_nerf", "maybe", 1, [], "YES"),
-    *of("n_parameters", 0, -1, 10**16, "1e9", "9" * 5000, 1.5, True),
+    *of("n_parameters", 0, -1, 10**16, "1e-9", "1.5", "25 apples", "9" * 5000, 1.5, True),
     *of("latency_ms", 0, -1, "fast", float("nan"), float("inf"), 1e300, True, 10**400, []),
     *of("paper_url", "javascript:alert(1)", "ftp://example.org", "example.org", 5),
     ("description", "x" * 2001),
@@ -92,6 +95,13 @@ def test_words_mean_what_values_do(method: Method, owner: User) -> None:
     words = {"n_frames": "6", "uses_nerf": "no", "uses_extra_data": "yes", "n_parameters": " 31000000 "}
     kept = methods.edit(method=method, changes={**WHOLE, **words, "latency_ms": "41.5"}, actor=owner)
     assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
+
+
+@pytest.mark.parametrize("count", ["25M", "25 m", "25e6", "2.5e+7", "25,000,000", "25 000 000", "0.025b"])
+def test_a_count_is_read_as_people_write_it(method: Method, owner: User, count: str) -> None:
+    changes = {"n_parameters": count, "latency_ms": "0.05 s", "hardware": "one GPU"}
+    kept = methods.edit(method=method, changes=changes, actor=owner)
+    assert (kept.n_parameters, kept.latency_ms) == (25_000_000, 50.0)
 
 
 @pytest.mark.parametrize(("name", "value"), BAD)
@@ -154,12 +164,15 @@ def test_page_takes_the_details_and_shows_them(client: Client, method: Method, o
     assert client.post(address, sent).status_code == 302
     client.logout()
     shown = pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
-    for words in ("41.5 ms on one GPU", "31,000,000", "one camera", "given boxes", "ImageNet-1k"):
+    for words in ("Latency (ms)41.5", "31,000,000", "one camera", "provided", "ImageNet-1k"):
         assert words in shown
     client.force_login(owner)
     response = client.post(address, {**sent, "n_frames": "9"})
     assert response.status_code == 422
     assert "expected a whole number from 2 to 6" in pages.page(response).one("main").text
+    response = client.post(address, {**sent, "n_parameters": "25 apples", "latency_ms": "fast"})
+    said = pages.page(response).one("div", id="id_n_parameters_error").text
+    assert said == "Enter a whole number, e.g. 25,000,000 or 25M."
 
 
 # --- the API -----------------------------------------------------------------------------------------------
@@ -228,12 +241,12 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     split = Split.objects.select_related("published_edition").get(pk="test")
 
     def names(**query: str) -> list[str]:
-        board = standings.board(split=split, viewer=ANYBODY, filters=filters.parse(query))
+        board = boards.board(split=split, viewer=ANYBODY, filters=filters.parse(query))
         assert all(ranks[entry.method] == entry.rank for entry in board.entries)
         assert board.n_in_all == 7
         return [entry.method for entry in board.entries if entry.kind == "submission"]
 
-    ranks = {entry.method: entry.rank for entry in standings.board(split=split, viewer=ANYBODY).entries}
+    ranks = {entry.method: entry.rank for entry in boards.board(split=split, viewer=ANYBODY).entries}
     both = ["Foo", veiled.pseudonym]
     for query, expected in (
         ({}, both),
@@ -299,7 +312,7 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
         *(("frames", value) for value in ("1", "7", "x", "²")),
         *(("cameras", "three"), ("boxes", "x"), ("nerf", "maybe"), ("code", "1"), ("paper", "\x00")),
         *(("latency", value) for value in ("fast", "nan", "inf", "0", "-1", "1e999")),
-        *(("parameters", value) for value in ("many", "0", "0.0001", "-5", "1e6", "25 GB", "٢٥M", "9" * 17)),
+        *(("parameters", value) for value in ("many", "0", "0.0001", "-5", "1e-6", "25 GB", "٢٥M", "9" * 17)),
         *((name, "x" * 81) for name in ("q", "pretraining", "hardware")),
     ],
 )

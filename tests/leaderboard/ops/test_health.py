@@ -1,31 +1,32 @@
 """`/healthz` and `/readyz`: alive without a database, ready only with database, broker and a recent sweep."""
 
 import random
+import re
 import socket
 from collections.abc import Iterator
 from datetime import timedelta
-from pathlib import Path
 
 import pytest
 from django.db import connection, connections
-from django.db.models import DateTimeField, ExpressionWrapper, Value
 from django.db.models.functions import Now
 from django.test import Client
+from django.utils import timezone
 from django.utils.connection import ConnectionDoesNotExist
 from pytest_django import Settings
 
-from leaderboard import health, queue
-from leaderboard.models import SweepBeat
-from leaderboard.web import health as doors
+from leaderboard.models import AuditEvent, SweepBeat
+from leaderboard.ops import health, prometheus
+from leaderboard.web import monitoring
+from leaderboard.workers import queue
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(autouse=True)
-def _broker_folder(tmp_path: Path, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A broker made of files that nobody else touches, no answer from an earlier test, and no hurry."""
+def _no_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No answer from an earlier test, and no hurry."""
     monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 60)
-    settings.CELERY_BROKER_URL = "filesystem://"
-    settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"data_folder_out": str(tmp_path)}
-    doors.readiness.forget()
+    monitoring.readiness.forget()
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def silent_port() -> Iterator[int]:
 
 def _swept(*, seconds_ago: float) -> None:
     """A sweep, so long ago by the database's clock."""
-    at = ExpressionWrapper(Now() - Value(timedelta(seconds=seconds_ago)), output_field=DateTimeField())
+    at = Now() - timedelta(seconds=seconds_ago)
     SweepBeat.objects.update_or_create(id=SweepBeat.THE_ONE, defaults={"swept_at": at})
 
 
@@ -63,6 +64,7 @@ def test_ready_when_database_broker_and_sweep_are_well() -> None:
         "database": True,
         "sweep": True,
         "ground truth": True,
+        "audit trail": True,
         "broker": True,
     }
 
@@ -74,6 +76,19 @@ def test_sweep_older_than_a_minute_is_not_ready(seconds_ago: float, is_ok: bool)
     response = Client().get("/readyz")
     assert response.json()["checks"]["sweep"]["ok"] is is_ok
     assert response.status_code == (200 if is_ok else 503)
+
+
+@pytest.mark.django_db(transaction=True)
+@pytest.mark.parametrize(("seconds_ago", "is_ok"), [(20, True), (130, False)])
+def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: float, is_ok: bool) -> None:
+    _swept(seconds_ago=1)
+    at = timezone.now() - timedelta(seconds=seconds_ago)
+    AuditEvent.objects.create(at=at, verb="opened", noun="Door", noun_id="1")
+    response = Client().get("/readyz")
+    assert (response.status_code, response.json()["checks"]["audit trail"]["ok"]) == (200, is_ok)
+    figures = prometheus.exposition().decode()
+    assert "tsttc_audit_unsealed 1.0" in figures
+    assert re.search(rf"tsttc_audit_unsealed_age_seconds {seconds_ago // 10}[0-9]\.", figures)
 
 
 @pytest.mark.django_db(transaction=True)
@@ -95,9 +110,9 @@ def test_every_sweep_moves_the_one_beat() -> None:
 
 
 @pytest.mark.django_db(transaction=True)
-def test_broker_whose_folder_is_gone_is_not_ready(settings: Settings, tmp_path: Path) -> None:
+def test_broker_that_is_down_is_not_ready(settings: Settings) -> None:
     _swept(seconds_ago=1)
-    settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"data_folder_out": str(tmp_path / "gone")}
+    settings.CELERY_BROKER_URL = "redis://127.0.0.1:1/0"
     response = Client().get("/readyz")
     assert response.status_code == 503
     assert response.json()["checks"]["broker"] == {"ok": False, "detail": "does not answer"}
@@ -182,8 +197,3 @@ def test_whoever_asks_while_another_asks_gets_the_former_answer() -> None:
     assert recent()[0].detail == "first"
     assert recent()[0].detail == "second"
     assert answers == ["", "first"]
-
-
-@pytest.mark.parametrize("path", ["/healthz", "/readyz", "/metrics"])
-def test_doors_take_no_posts(path: str) -> None:
-    assert Client().post(path).status_code == 405

@@ -17,10 +17,13 @@ from django.test import Client, RequestFactory
 from django.utils.functional import SimpleLazyObject
 from pytest_django import Settings
 
-from leaderboard import files, ground_truth, logs
 from leaderboard.models import Edition, User
-from leaderboard.web.request_log import RequestLogMiddleware
+from leaderboard.ops import logs
+from leaderboard.storage import files, truth_values
+from leaderboard.web.middleware.request_log import RequestLogMiddleware
 from tests import builders
+
+pytestmark = pytest.mark.slow
 
 Lines = Callable[[], list[dict[str, Any]]]
 
@@ -112,7 +115,7 @@ def test_no_secret_no_address_and_no_true_value_is_ever_written(
     assert text.count("evaluation_finished") == 2
     secrets = [token, token[8:], owner.email, "@", "correct horse", "wrong staple", "secret-key-of-the-mail"]
     assert [secret for secret in secrets if secret in text] == []
-    truth = ground_truth.load(opened.ground_truth_id)
+    truth = truth_values.load(opened.ground_truth_id)
     telling = [repr(float(value)) for value in truth.ttc_s if len(repr(float(value))) > 8]
     assert len(telling) > 100
     assert [value for value in telling if value[:8] in text] == []
@@ -172,9 +175,9 @@ def test_library_knows_of_no_submission_and_its_line_names_it_all_the_same(
         logging.getLogger("some.library").warning("reading %s", "slowly")
         return read(digest)
 
-    read = ground_truth.load
+    read = truth_values.load
     submission = builders.submit(owner, builders.predictions(opened))
-    monkeypatch.setattr(ground_truth, "load", load_and_tell)
+    monkeypatch.setattr(truth_values, "load", load_and_tell)
     builders.score_all()
     told = [line for line in lines() if line["logger"] == "some.library"]
     assert {line["event"] for line in told} == {"reading slowly"}
@@ -247,7 +250,7 @@ def test_traceback_is_written_without_local_variables(as_json: bool) -> None:
 
 def test_people_get_a_line_that_they_can_read() -> None:
     structlog_line = logging.LogRecord(
-        "leaderboard.scoring", logging.INFO, __file__, 1, "evaluation_finished", (), None
+        "leaderboard.scoring.worker", logging.INFO, __file__, 1, "evaluation_finished", (), None
     )
     line = logs.formatter(as_json=False).format(structlog_line)
     assert "evaluation_finished" in line
@@ -297,7 +300,7 @@ def test_line_is_no_reason_to_look_up_who_asks(rf: RequestFactory) -> None:
 def test_failure_of_a_page_is_one_line_with_its_traceback(
     db: None, lines: Lines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("leaderboard.web.health.health.Recent.__call__", lambda self: 1 / 0)
+    monkeypatch.setattr("leaderboard.web.monitoring.health.Recent.__call__", lambda self: 1 / 0)
     response = Client(raise_request_exception=False).get("/readyz")
     assert response.status_code == 500
     [line] = [line for line in lines() if line["level"] == "error"]

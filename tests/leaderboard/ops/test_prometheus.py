@@ -13,13 +13,15 @@ from django.test import Client
 from prometheus_client.parser import text_string_to_metric_families
 from pytest_django import DjangoAssertNumQueries, Settings
 
-from leaderboard import lifecycle, metrics, queue
-from leaderboard.lifecycle import Strike
 from leaderboard.models import Edition, Evaluation, User
-from tests.leaderboard import queue_rows
+from leaderboard.ops import prometheus
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import Strike
+from leaderboard.workers import queue
+from tests.leaderboard.web.maintain import queue_rows
 
 RNG = random.Random(0)
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 def figures() -> dict[str, float]:
@@ -72,7 +74,7 @@ def test_runs_are_counted_by_what_came_of_them(edition: Edition, owner: User) ->
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
     lifecycle.finalise(queue_rows.claim(), queue_rows.REJECTED)
-    lifecycle.give_back(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
+    lifecycle.fail_attempt(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
     queue_rows.claim()
     found = figures()
     assert found["tsttc_runs_started_total"] == 5
@@ -88,9 +90,7 @@ def test_system_errors_are_visible_until_they_are_retried(
     edition: Edition, owner: User, maintainer: User
 ) -> None:
     evaluation = queue_rows.queued(edition, owner)
-    for _ in range(lifecycle.MAX_POISON_STRIKES):
-        queue_rows.make_due()
-        lifecycle.give_back(queue_rows.claim(), strike=Strike.POISON, reason="crash", rng=RNG)
+    queue_rows.strike_out()
     found = figures()
     assert found['tsttc_evaluations{status="SYSTEM_ERROR"}'] == 1
     assert found['tsttc_strikes{kind="poison"}'] == lifecycle.MAX_POISON_STRIKES
@@ -123,14 +123,14 @@ def test_age_of_the_last_sweep_is_there(db: None) -> None:
     assert 0 <= figures()["tsttc_last_sweep_age_seconds"] < 30
 
 
-def test_a_scrape_is_four_statements(
+def test_a_scrape_is_five_statements(
     edition: Edition, owner: User, django_assert_num_queries: DjangoAssertNumQueries
 ) -> None:
     for _ in range(3):
         queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
-    with django_assert_num_queries(4):
-        metrics.exposition()
+    with django_assert_num_queries(5):
+        prometheus.exposition()
 
 
 # --- who may read them ----------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ def test_figures_have_no_names_of_people(edition: Edition, owner: User) -> None:
 def test_every_figure_is_documented_and_nothing_else(db: None) -> None:
     documented = set(re.findall(r"\btsttc_[a-z_]+", (REPOSITORY / "docs" / "operations.md").read_text()))
     documented -= {"tsttc_application"}  # a role of the database
-    families = list(text_string_to_metric_families(metrics.exposition().decode()))
+    families = list(text_string_to_metric_families(prometheus.exposition().decode()))
     given = {f"{family.name}_total" if family.type == "counter" else family.name for family in families}
     assert len(given) >= 9
     assert documented == given

@@ -8,17 +8,17 @@ from django.db import connection
 from django.test import Client
 from pytest_django import DjangoAssertNumQueries, Settings
 
-from leaderboard import rates
 from leaderboard.models import Allowance, CachedValue, User
-from leaderboard.rates import InMemory, Rate
-from tests.leaderboard.test_races import at_once
+from leaderboard.ops import rate_limits
+from leaderboard.ops.rate_limits import InMemory, Rate
+from tests.leaderboard.db.test_races import at_once
 
 NOW_S = 1_800_000_000.0
 THREE = Rate(n=3, period_s=60)
 
 
 def taken(*, at_s: float, who: str = "somebody", rate: Rate = THREE) -> bool:
-    return rates.take(who=who, rate=rate, now_s=NOW_S + at_s).is_allowed
+    return rate_limits.take(who=who, rate=rate, now_s=NOW_S + at_s).is_allowed
 
 
 def test_so_many_at_once_and_then_one_at_a_time(db: None) -> None:
@@ -30,14 +30,14 @@ def test_so_many_at_once_and_then_one_at_a_time(db: None) -> None:
 def test_a_refusal_says_when_the_next_is_let_through_and_moves_nothing(db: None) -> None:
     for _ in range(3):
         taken(at_s=0)
-    answers = [rates.take(who="somebody", rate=THREE, now_s=NOW_S + at_s) for at_s in (1, 5)]
+    answers = [rate_limits.take(who="somebody", rate=THREE, now_s=NOW_S + at_s) for at_s in (1, 5)]
     assert [round(answer.wait_s, 3) for answer in answers] == [19, 15]
     assert [answer.n_left for answer in answers] == [0, 0]
     assert taken(at_s=20.1)
 
 
 def test_what_is_left_is_told(db: None) -> None:
-    left = [rates.take(who="somebody", rate=THREE, now_s=NOW_S).n_left for _ in range(3)]
+    left = [rate_limits.take(who="somebody", rate=THREE, now_s=NOW_S).n_left for _ in range(3)]
     assert left == [2, 1, 0]
 
 
@@ -60,8 +60,8 @@ def test_what_is_over_is_forgotten(db: None) -> None:
     CachedValue.objects.create(
         cache_key="x", value="", expires=datetime.fromtimestamp(NOW_S, tz=UTC) + timedelta(seconds=5)
     )
-    assert rates.forget_the_past(now_s=NOW_S + 1) == 0
-    assert rates.forget_the_past(now_s=NOW_S + 30) == 2
+    assert rate_limits.purge_expired(now_s=NOW_S + 1) == 0
+    assert rate_limits.purge_expired(now_s=NOW_S + 30) == 2
     assert not Allowance.objects.exists()
 
 
@@ -69,7 +69,7 @@ def test_memory_counts_like_the_database(db: None) -> None:
     memory = InMemory()
     for at_s in (0, 0, 0, 0, 19, 21, 22, 45, 300):
         answer = memory.take(who="somebody", rate=THREE, now_s=NOW_S + at_s)
-        assert answer == rates.take(who="somebody", rate=THREE, now_s=NOW_S + at_s)
+        assert answer == rate_limits.take(who="somebody", rate=THREE, now_s=NOW_S + at_s)
     memory.forget()
     assert memory.take(who="somebody", rate=THREE, now_s=NOW_S).n_left == 2
 

@@ -20,7 +20,7 @@ def test_token_stands_alone_on_standard_output_and_opens_the_api(owner: User) ->
     token, said = create_token("Owner@example.org")
     response = APIClient().get("/api/v1/submissions", HTTP_AUTHORIZATION=f"Bearer {token}")
     assert response.status_code == 200
-    assert "only time the token is shown" in said
+    assert "token is shown only once" in said
     assert token not in said
     event = AuditEvent.objects.get(verb="created", noun="ApiToken")
     assert event.details["name"] == "nightly CI"
@@ -31,7 +31,7 @@ def test_a_token_can_be_limited(owner: User, benchmark: None) -> None:
     row = ApiToken.objects.get()
     assert (row.scopes, row.split_id) == (("read",), "val")
     assert row.expiry - row.created < timedelta(days=7, minutes=1)
-    assert "It ends after 7 days." in said
+    assert "It expires after 7 days." in said
 
 
 @pytest.mark.parametrize(

@@ -9,22 +9,14 @@ from django.db import connection
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import invitations, teams
 from leaderboard.models import AuditEvent, Edition, Invitation, Membership, Method, Team, User
-from leaderboard.texts import Refused
+from leaderboard.people import invitations, teams
 from tests import builders, pages
+from tests.leaderboard.people.test_teams import refused
+
+pytestmark = pytest.mark.slow
 
 WEEK = timedelta(days=7)
-
-
-def refused(code: str) -> "pytest.RaisesExc[Refused]":
-    return pytest.raises(Refused, check=lambda refusal: refusal.code == code)
-
-
-@pytest.fixture
-def team(owner: User, teammate: User) -> Team:
-    """The owner's team, with a teammate in it."""
-    return teams.team_of(user=owner)
 
 
 def invite(team: Team, actor: User) -> str:
@@ -200,7 +192,7 @@ def test_page_makes_a_link_shows_it_once_and_lets_somebody_in(
     client: Client, owner: User, stranger: User, team: Team, caplog: pytest.LogCaptureFixture
 ) -> None:
     client.force_login(owner)
-    made = pages.page(client.post("/team/invite/"))
+    made = pages.page(client.post("/team/invite/", follow=True))
     link = made.one("code", id="link").text
     address = link[link.index("/team/join/") :]
     secret = address.split("/")[3]
@@ -208,7 +200,12 @@ def test_page_makes_a_link_shows_it_once_and_lets_somebody_in(
     assert "open" in pages.page(client.get("/team/")).one("main").text
 
     client.logout()
-    assert client.get(address).status_code == 302
+    invited = pages.page(client.get(address)).one("main")
+    assert invited.one("h1").text == "Owls invites you"
+    assert [a.attributes["href"] for a in invited.all("a")] == [
+        f"/accounts/{way}/?next={address}" for way in ("signup", "login")
+    ]
+    assert client.post(address).headers["Location"] == f"/accounts/login/?next={address}"
     client.force_login(stranger)
     teams.team_of(user=stranger)
     with caplog.at_level(logging.INFO):
@@ -217,10 +214,10 @@ def test_page_makes_a_link_shows_it_once_and_lets_somebody_in(
     assert "no-store" in response["Cache-Control"]
     main = pages.page(response).one("main")
     assert "Join Owls" in main.one("h1").text
-    assert "You are alone in Strangers" in main.text
+    assert "The team Strangers is deleted." in main.text
     assert not Membership.objects.filter(user=stranger, team=team).exists()
     followed = client.post(address, follow=True)
-    assert "You are in the team Owls now." in pages.page(followed).one("main").text
+    assert "You are now in the team Owls." in pages.page(followed).one("main").text
     assert client.get(address).status_code == 410
     client.force_login(owner)
     assert "used by stranger@example.org" in pages.page(client.get("/team/")).one("main").text

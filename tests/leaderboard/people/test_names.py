@@ -4,10 +4,12 @@ import re
 
 import pytest
 
-from leaderboard import teams
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Team, User
-from leaderboard.names import MAX_LOOK, MAX_NAME, clean_name, like, look
-from leaderboard.texts import Refused
+from leaderboard.people import teams
+from leaderboard.people.names import MAX_LOOK, MAX_NAME, clean_name, confusable_with, skeleton
+
+pytestmark = pytest.mark.slow
 
 ALIKE = [
     ("PayPal", "PayPaI"),
@@ -98,14 +100,14 @@ GOOD = ["Foo++", "=1+1", "<b>x</b>", "深度", "Müller & Søn", "τ-Net", "{{7*
 
 @pytest.mark.parametrize(("name", "other"), ALIKE)
 def test_names_that_look_alike_have_one_look(name: str, other: str) -> None:
-    assert look(name) == look(other)
-    assert like(other, ["Something else", name]) == name
+    assert skeleton(name) == skeleton(other)
+    assert confusable_with(other, ["Something else", name]) == name
 
 
 @pytest.mark.parametrize(("name", "other"), DIFFERENT)
 def test_names_that_differ_to_the_eye_have_two(name: str, other: str) -> None:
-    assert look(name) != look(other)
-    assert like(other, [name]) is None
+    assert skeleton(name) != skeleton(other)
+    assert confusable_with(other, [name]) is None
 
 
 @pytest.mark.parametrize(("text", "code"), NO_NAMES)
@@ -120,7 +122,7 @@ def test_what_is_no_name_is_refused_with_its_reason(text: str, code: str) -> Non
 @pytest.mark.parametrize("text", GOOD)
 def test_names_keep_what_one_can_see(text: str) -> None:
     assert clean_name("name", f"  {text}\u00a0") == text
-    assert len(look(text)) <= MAX_LOOK
+    assert len(skeleton(text)) <= MAX_LOOK
 
 
 def test_spaces_are_those_of_the_keyboard() -> None:

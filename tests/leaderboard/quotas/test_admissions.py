@@ -5,11 +5,15 @@ from django.core.files.base import ContentFile
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import admissions, quotas, teams
+from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.models import Admission, AuditEvent, Edition, Split, Submission, Team, User
+from leaderboard.people import teams
+from leaderboard.quotas import admissions
 from tests import builders, pages
 
-SENTENCE = "Only admitted teams submit to test, and your team is not one of them; write to jury@example.org."
+SENTENCE = (
+    "Only admitted teams can submit to test, and your team is not one of them; write to jury@example.org."
+)
 
 
 @pytest.fixture
@@ -31,9 +35,10 @@ def test_a_team_that_is_not_admitted_is_told_so_everywhere_in_the_same_words(
 ) -> None:
     client.force_login(owner)
     form = pages.page(client.get("/submit/"))
-    assert SENTENCE in form.one("main").text
-    [choice] = [row for row in form.all("input", type="radio") if row.attributes["value"] == "test"]
-    assert "disabled" in choice.attributes
+    assert f"test: {SENTENCE}" in [
+        row.text.partition(" See the ")[0] for row in form.one("ul", class_="closed-splits").all("li")
+    ]
+    assert "test" not in [row.attributes["value"] for row in form.all("input", type="radio", name="split")]
     [quota] = [row for row in client.get("/api/v1/quota").json() if row["split"] == "test"]
     assert (quota["is_open"], quota["next_slot_at"], quota["sentence"]) == (False, None, SENTENCE)
     data = builders.predictions(by_admission)
@@ -71,7 +76,7 @@ def test_an_admitted_team_submits_until_its_admission_ends(
 
 def test_without_a_word_on_how_to_ask_the_maintainers_are_named(by_admission: Edition, owner: User) -> None:
     Split.objects.update(how_to_be_admitted="")
-    with pytest.raises(admissions.NotAdmitted, match="ask the maintainers of this site to admit it"):
+    with pytest.raises(admissions.NotAdmitted, match="ask the maintainers of this site for access"):
         builders.submit(owner, builders.predictions(by_admission))
 
 
@@ -86,8 +91,8 @@ def test_maintainers_admit_from_the_page_of_a_team_and_nobody_else_does(
     form = {"team": str(team.pk), "split": "test", "reason": "They asked."}
     assert keeper.post(address, form).status_code == 302
     assert Admission.objects.get().admitted_by == maintainer
-    [link] = [a for a in pages.page(keeper.get(page)).all("a") if a.text == "end its admission to test"]
+    [link] = [a for a in pages.page(keeper.get(page)).all("a") if a.text == "revoke its admission to test"]
     assert keeper.post(link.attributes["href"] or "", {"post": "yes"}).status_code == 302
     assert not Admission.objects.exists()
-    with pytest.raises(quotas.NotMaintainer):
+    with pytest.raises(NotMaintainer):
         admit(team, owner)

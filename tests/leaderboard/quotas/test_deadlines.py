@@ -4,14 +4,19 @@ import random
 from datetime import datetime, timedelta
 
 import pytest
+from django.core.files.base import ContentFile
 from django.test import Client
 from django.utils import timezone
 from rest_framework.test import APIClient
 
-from leaderboard import boards, deadlines, queue
+from leaderboard import versions
 from leaderboard.models import BoardVersion, Edition, Split, User
+from leaderboard.quotas import deadlines
+from leaderboard.workers import queue
 from tests import builders, pages
-from tests.leaderboard.test_api_submissions import client_of
+from tests.leaderboard.api.test_submissions import client_of, post
+
+pytestmark = pytest.mark.slow
 
 HOUR = timedelta(hours=1)
 LATE, FUTURE, ENDING = "late", "future", "ending"
@@ -37,6 +42,13 @@ def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client
     assert sentence in pages.page(client.get("/board/test/")).one("main").text
     client.force_login(owner)
     assert sentence in pages.page(client.get("/submit/")).one("main").text
+    if kind != ENDING:
+        data = builders.predictions(edition)
+        refused = post(client_of(owner), data)
+        assert (refused.status_code, refused.json()["detail"]) == (409, sentence)
+        form = {"split": "test", "method": "Foo", "file": ContentFile(data, name="p.json")}
+        page = client.post("/submit/", form)
+        assert (page.status_code, sentence in page.content.decode()) == (422, True)
     [quota] = [row for row in client_of(owner).get("/api/v1/quota").json() if row["split"] == "test"]
     split = Split.objects.get(pk="test")
     for answer in (
@@ -64,25 +76,25 @@ def test_nobody_is_asked_to_be_the_first_where_nothing_is_taken(edition: Edition
 def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
     opens_at = timezone.now() + HOUR
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
-    boards.times_passed(now=timezone.now())
-    before = boards.state()
+    versions.times_passed(now=timezone.now())
+    before = versions.state()
     assert "open at" in client.get("/board/test/").text
     # It has opened; then it has closed; then a maintainer gives more time.
     for shift, said in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
         moment = timezone.now() + shift
         Split.objects.filter(pk="test").update(opens_at=moment, closes_at=moment + HOUR)
         queue.sweep(rng=random.Random(0))
-        assert boards.state() > before
-        before = boards.state()
+        assert versions.state() > before
+        before = versions.state()
         assert said in client.get("/board/test/").text
-        assert boards.times_passed(now=timezone.now()) == 0
+        assert versions.times_passed(now=timezone.now()) == 0
     assert BoardVersion.objects.get(split="test").n_times_passed == 1
 
 
 def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> None:
-    before = boards.state()
-    assert boards.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
-    assert boards.state() == before
+    before = versions.state()
+    assert versions.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
+    assert versions.state() == before
     assert deadlines.sentence_of(Split.objects.get(pk="test"), now=timezone.now()) == ""
 
 
@@ -96,7 +108,7 @@ def test_a_filter_does_not_make_the_board_say_that_nobody_has_submitted(
     builders.score_all()
     for query in ("?q=shi", "?q=nothing-like-it"):
         text = pages.page(client.get(f"/board/test/{query}")).one("main").text
-        assert "Nobody has submitted" not in text
+        assert "no submissions yet" not in text
         assert "being computed" not in text
     submission.refresh_from_db()
     client.force_login(owner)

@@ -1,18 +1,17 @@
 """What files cost beside slots: a day's bytes, and those that stop the process that reads them."""
 
-import random
 from pathlib import Path
 
 import pytest
 from pytest_django import Settings
 
-from leaderboard import lifecycle, submissions
-from leaderboard.lifecycle import Strike
 from leaderboard.models import Edition, Evaluation, Status, User
-from leaderboard.quotas import QuotaExceeded
+from leaderboard.quotas.quotas import QuotaExceeded
+from leaderboard.scoring import lifecycle
+from leaderboard.submissions import submissions
 from tests import builders
-from tests.leaderboard import queue_rows
-from tests.leaderboard.test_quotas import HOUR, NOW, bad, limit, other, send, state
+from tests.leaderboard.quotas.test_quotas import HOUR, NOW, bad, limit, other, send, state
+from tests.leaderboard.web.maintain import queue_rows
 
 
 def test_a_file_that_stops_its_reader_counts_as_rejected_until_a_maintainer_retries_it(
@@ -20,14 +19,12 @@ def test_a_file_that_stops_its_reader_counts_as_rejected_until_a_maintainer_retr
 ) -> None:
     limit(limit=3, rejected_limit=1)
     sent = send(owner, other(edition, 1)).submission
-    for _ in range(lifecycle.MAX_POISON_STRIKES):
-        queue_rows.make_due()
-        lifecycle.give_back(queue_rows.claim(), strike=Strike.POISON, reason="died", rng=random.Random(0))
+    queue_rows.strike_out()
     assert (state(owner).used, state(owner).n_rejected) == (0, 1)
     assert submissions.progress(sent).sentence.endswith(
-        "Until then it counts among the files rejected within 24 hours."
+        "Until then it counts as a rejected file for 24 hours."
     )
-    with pytest.raises(QuotaExceeded, match="or stopped the process that read them, and no more are taken"):
+    with pytest.raises(QuotaExceeded, match="or stopped the process that read them"):
         send(owner, other(edition, 2))
     lifecycle.retry(evaluation=Evaluation.objects.get(), actor=maintainer)
     assert (state(owner).used, state(owner).n_rejected) == (1, 0)
@@ -41,7 +38,7 @@ def test_a_machine_that_fails_counts_against_nobody(edition: Edition, owner: Use
         queue_rows.give_back(queue_rows.claim())
     assert Evaluation.objects.get().status == Status.SYSTEM_ERROR
     assert state(owner).n_rejected == 0
-    assert "counts among" not in submissions.progress(sent).sentence
+    assert "counts as a rejected" not in submissions.progress(sent).sentence
 
 
 def sized(n_bytes: int, number: int) -> bytes:

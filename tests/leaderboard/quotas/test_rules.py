@@ -11,10 +11,13 @@ from django.db import IntegrityError, connection, transaction
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import quota_rules, quotas, teams
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
-from leaderboard.texts import Refused
+from leaderboard.people import teams
+from leaderboard.quotas import quotas, rules
 from tests import builders, pages
+
+pytestmark = pytest.mark.slow
 
 NONE, DAY = timedelta(0), timedelta(days=1)
 LONG = timedelta(days=99_999_999)
@@ -27,7 +30,7 @@ BAD_SPANS = [
     ("quota_min_gap", -DAY, f"The least time apart is -1 day, 0:00:00; {GAP}"),
     ("quota_min_gap", LONG, f"The least time apart is 99999999 days, 0:00:00; {GAP}"),
 ]
-RULES: dict[str, Any] = {"limit": 50, "window": DAY, "min_gap": NONE, "rejected_limit": 3}
+RULES: dict[str, Any] = {"limit": 50, "rejected_limit": 3}
 
 
 @contextmanager
@@ -61,13 +64,7 @@ def test_the_administration_refuses_a_rule_that_makes_no_sense(
     before = Split.objects.values().get(pk="test")
     answer = keeper.post("/admin/leaderboard/split/test/change/", split_form(**{field: typed(value)}))
     assert (answer.status_code, sentence in pages.page(answer).text) == (200, True)
-    team = teams.team_of(user=User.objects.get())
-    fields = {"team": str(team.pk), "split": "test", "reason": "R", "quota_limit": "3"}
-    fields |= {"quota_window": "1 00:00:00", "quota_min_gap": "0", "quota_rejected_limit": ""}
-    answer = keeper.post("/admin/leaderboard/quotaoverride/add/", {**fields, field: typed(value)})
-    assert (answer.status_code, sentence in pages.page(answer).text) == (200, True)
     assert Split.objects.values().get(pk="test") == before
-    assert not QuotaOverride.objects.exists()
 
 
 def test_the_administration_takes_rules_that_make_sense_and_refuses_times_that_do_not(
@@ -98,7 +95,7 @@ def test_model_verb_and_database_refuse_it_as_well(
     given = RULES | {field.removeprefix("quota_"): value}
     team = teams.team_of(user=owner)
     with pytest.raises(Refused) as refused:
-        quotas.override(team=team, split=split, reason="R", actor=None, now=timezone.now(), **given)
+        builders.override(team, **given)
     assert (sentence in str(refused.value), refused.value.field) == (True, field)
     assert not AuditEvent.objects.filter(verb="quota_overridden").exists()
 
@@ -124,15 +121,16 @@ def assert_nothing_fails(client: Client, edition: Edition, *, by: User, maintain
     team = teams.team_of(user=by)
     for address in (f"/maintain/quotas/{team.pk}/", f"/maintain/quotas/{team.pk}/test/"):
         assert client.get(address).status_code == 200, address
-    [ignored] = quota_rules.ignored()
+    [ignored] = rules.ignored()
     for address in ("/maintain/", "/maintain/quotas/"):
         assert ignored in pages.page(client.get(address)).one("main").text
     return ignored
 
 
 @pytest.mark.skipif(connection.vendor != "sqlite", reason="PostgreSQL's constraints cannot be bypassed")
+@pytest.mark.parametrize("is_of_team", [True, False])
 @pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)
-def test_a_bad_rule_of_a_team_stops_nothing_and_the_split_s_own_holds(
+def test_a_bad_rule_stops_nothing_and_the_one_behind_it_holds(
     edition: Edition,
     owner: User,
     maintainer: User,
@@ -140,36 +138,23 @@ def test_a_bad_rule_of_a_team_stops_nothing_and_the_split_s_own_holds(
     field: str,
     value: timedelta,
     sentence: str,
+    is_of_team: bool,
 ) -> None:
     team, split = teams.team_of(user=owner), Split.objects.get(pk="test")
-    row = quotas.override(team=team, split=split, reason="R", actor=None, now=timezone.now(), **RULES)
+    if is_of_team:
+        builders.override(team, **RULES)
+    rows = QuotaOverride.objects.all() if is_of_team else Split.objects.filter(pk="test")
     with unchecked():
-        QuotaOverride.objects.filter(pk=row.pk).update(**{field: value})
+        rows.update(**{field: value})
         said = assert_nothing_fails(client, edition, by=owner, maintainer=maintainer)
-        held = quota_rules.rules_of(team=team, split=split)
-    assert said == f"The rules of Owls on test: {sentence} This is ignored until you correct it."
-    assert getattr(held, field.removeprefix("quota_")) == getattr(split, field)
-    assert (held.limit, held.rejected_limit) == (50, 3)
-
-
-@pytest.mark.skipif(connection.vendor != "sqlite", reason="PostgreSQL's constraints cannot be bypassed")
-@pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)
-def test_a_bad_rule_of_a_split_stops_nothing_and_the_one_from_the_start_holds(
-    edition: Edition,
-    owner: User,
-    maintainer: User,
-    client: Client,
-    field: str,
-    value: timedelta,
-    sentence: str,
-) -> None:
-    with unchecked():
-        Split.objects.filter(pk="test").update(**{field: value})
-        said = assert_nothing_fails(client, edition, by=owner, maintainer=maintainer)
-        held = quota_rules.rules_of(team=None, split=Split.objects.get(pk="test"))
-    assert said == f"The rules of test: {sentence} This is ignored until you correct it."
+        held = rules.rules_of(team=team, split=Split.objects.get(pk="test"))
+    whose = "Owls on test" if is_of_team else "test"
+    assert said == f"The rules of {whose}: {sentence} This is ignored until you correct it."
+    # Behind a team's rule stands the split's, behind that the one from the start.
     shipped = {"quota_window": 30 * DAY, "quota_min_gap": DAY}
-    assert getattr(held, field.removeprefix("quota_")) == shipped[field]
+    behind = getattr(split, field) if is_of_team else shipped[field]
+    assert getattr(held, field.removeprefix("quota_")) == behind
+    assert not is_of_team or (held.limit, held.rejected_limit) == (50, 3)
 
 
 @pytest.mark.skipif(connection.vendor != "sqlite", reason="PostgreSQL's constraints cannot be bypassed")

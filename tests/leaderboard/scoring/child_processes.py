@@ -4,19 +4,33 @@ import signal
 from contextlib import suppress
 from pathlib import Path
 
-READERS = ("evaluator.quarantine", "evaluator.annotation_child")
+READERS = ("evaluator.predictions.sandbox", "evaluator.truth.annotation_child")
+FORK_SERVER = "evaluator.predictions.fork_server"
 
 
 def children() -> set[int]:
-    """Readers of untrusted files that this process has started and not yet buried.
+    """Readers of untrusted files that this process has started, or had forked, and not yet buried.
 
     Other tests of the same run have children as well, such as the driver of a browser.
     """
-    found = set()
-    for task in Path("/proc/self/task").iterdir():
-        # A thread that has ended meanwhile has no children.
-        found |= {int(pid) for pid in kernel_says("self", f"task/{task.name}/children").split()}
-    return {pid for pid in found if any(module in kernel_says(pid, "cmdline") for module in READERS)}
+    found = children_of("self")
+    readers = {pid for pid in found if any(module in kernel_says(pid, "cmdline") for module in READERS)}
+    return readers.union(*map(children_of, fork_servers()))
+
+
+def fork_servers() -> set[int]:
+    """The processes that fork readers for this one."""
+    return {pid for pid in children_of("self") if FORK_SERVER in kernel_says(pid, "cmdline")}
+
+
+def children_of(process: int | str) -> set[int]:
+    """What all threads of a process have started."""
+    found: set[int] = set()
+    with suppress(FileNotFoundError):
+        for task in Path(f"/proc/{process}/task").iterdir():
+            # A thread that has ended meanwhile has no children.
+            found |= {int(pid) for pid in kernel_says(process, f"task/{task.name}/children").split()}
+    return found
 
 
 def kernel_says(pid: int | str, name: str) -> str:

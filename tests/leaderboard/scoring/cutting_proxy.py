@@ -22,17 +22,14 @@ class Cut(Enum):
     BEFORE_THE_CLIENT_HEARS = "after"
 
 
-class CuttingProxy:
-    """Passes everything on, and counts round trips from `arm` on, over all its connections."""
+class Proxy:
+    """Listens, and serves each connection in a thread of its own; `_pass_on` says how."""
 
     def __init__(self, *, host: str, port: int) -> None:
         self._target = (host, port)
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port = int(self._listener.getsockname()[1])
         self._lock = threading.Lock()
-        self._n_left = 0
-        self._cut = Cut.BEFORE_THE_SERVER_HEARS
-        self.was_cut = False
         self._thread = threading.Thread(target=self._accept, name="proxy", daemon=True)
 
     def __enter__(self) -> Self:
@@ -46,16 +43,6 @@ class CuttingProxy:
         self._listener.close()
         self._thread.join(10)
 
-    def arm(self, *, at: int, cut: Cut) -> None:
-        """Cut the `at`-th round trip from now, the first being 1."""
-        with self._lock:
-            self._n_left, self._cut, self.was_cut = at, cut, False
-
-    def disarm(self) -> None:
-        """Cut nothing any more."""
-        with self._lock:
-            self._n_left = 0
-
     def _accept(self) -> None:
         while True:
             try:
@@ -68,6 +55,29 @@ class CuttingProxy:
         """Whichever side breaks off ends it for both, and is no fault of the proxy."""
         with suppress(ConnectionError):
             self._pass_on(client)
+
+    def _pass_on(self, client: socket.socket) -> None:
+        raise NotImplementedError
+
+
+class CuttingProxy(Proxy):
+    """Passes everything on, and counts round trips from `arm` on, over all its connections."""
+
+    def __init__(self, *, host: str, port: int) -> None:
+        super().__init__(host=host, port=port)
+        self._n_left = 0
+        self._cut = Cut.BEFORE_THE_SERVER_HEARS
+        self.was_cut = False
+
+    def arm(self, *, at: int, cut: Cut) -> None:
+        """Cut the `at`-th round trip from now, the first being 1."""
+        with self._lock:
+            self._n_left, self._cut, self.was_cut = at, cut, False
+
+    def disarm(self) -> None:
+        """Cut nothing any more."""
+        with self._lock:
+            self._n_left = 0
 
     def _is_the_one(self) -> bool:
         """Count one round trip; whether it is the one to cut."""

@@ -1,16 +1,23 @@
 """The closer look at a submission: for its owner, on open splits, and never of a hidden one."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from django.utils import timezone
 
 import evaluator
-from leaderboard import analyses, files, ground_truth, rescoring, submissions
+from evaluator import get_protocol
+from leaderboard.editions import corrections
 from leaderboard.models import Analysis, Edition, Split, Submission, User
+from leaderboard.scoring import analyses
+from leaderboard.storage import files, truth_values
+from leaderboard.submissions import submissions
 from tests import builders
 from tests.editions import ANYBODY
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -29,8 +36,12 @@ def sent(val: Edition, owner: User) -> Submission:
     return made
 
 
+def means_of(curve: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [{name: value for name, value in part.items() if name != "intervals"} for part in curve]
+
+
 def plain(submission: Submission, edition: Edition) -> evaluator.Report:
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     with files.opened_predictions(submission.digest) as kept:
         predictions = evaluator.read_predictions(kept.read(), manifest=truth.manifest)
     return evaluator.evaluate(predictions, truth, keep_sequences=True)
@@ -39,20 +50,23 @@ def plain(submission: Submission, edition: Edition) -> evaluator.Report:
 def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, owner: User) -> None:
     closer = analyses.of(submission=sent, viewer=owner)
     assert closer is not None
-    content, truth = closer.content, ground_truth.load(val.ground_truth_id)
+    content, truth = closer.content, truth_values.load(val.ground_truth_id)
     sequences = plain(sent, val).sequences
     assert sequences is not None
     assert (content["n_sequences"], content["n_recordings"]) == (120, 24)
     for part in content["curve"]:
         rows = [i for i, tau in enumerate(truth.ttc_s) if part["low_s"] <= tau < part["high_s"]]
         assert part["n"] == len(rows) > 0
-        assert part["mid"] == pytest.approx(float(np.mean(sequences.mid[rows])), abs=0.0051)
-        assert part["rte"] == pytest.approx(float(np.mean(sequences.rte[rows])), abs=0.0051)
+        assert part["mid"] == pytest.approx(float(np.mean(sequences["mid"][rows])), abs=0.0051)
+        assert part["rte"] == pytest.approx(float(np.mean(sequences["rte"][rows])), abs=0.0051)
+        for name, (low, high) in part["intervals"].items():
+            assert low <= part[name] <= high
+    assert any(part["intervals"] for part in content["curve"])
     assert sum(part["n"] for part in content["curve"]) == int((np.abs(truth.ttc_s) < 20).sum())
     assert sum(part["n"] for part in content["histogram"]) == 120
     assert content["histogram"][-1]["high"] is None
     median = next(row["value"] for row in content["distribution"]["mid"] if row["quantile"] == 0.5)
-    assert median == pytest.approx(float(np.median(sequences.mid)), abs=0.0051)
+    assert median == pytest.approx(float(np.median(sequences["mid"])), abs=0.0051)
     points = content["scatter"]
     assert len(points["true_s"]) == len(points["predicted_s"]) == 120
     assert max(map(abs, points["predicted_s"])) <= 20
@@ -61,7 +75,7 @@ def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, 
     bags = np.array(truth.manifest.bag_stamp)
     assert [row["mid"] for row in worst] == sorted((row["mid"] for row in worst), reverse=True)
     for row in worst:
-        own = sequences.mid[bags == row["recording"]]
+        own = sequences["mid"][bags == row["recording"]]
         assert (row["n"], row["mid"]) == (len(own), pytest.approx(float(own.mean()), abs=0.0051))
 
 
@@ -87,7 +101,7 @@ def test_a_split_that_is_hidden_later_shows_and_keeps_nothing(
     Split.objects.filter(pk="val").update(is_hidden=True)
     sent.refresh_from_db()
     assert analyses.of(submission=Submission.objects.get(pk=sent.pk), viewer=owner) is None
-    analyses.forget_hidden()
+    analyses.delete_hidden()
     assert not Analysis.objects.exists()
     analyses.make(val.evaluations.get(), now=timezone.now())
     assert not Analysis.objects.exists()
@@ -108,18 +122,19 @@ def test_hidden_values_are_looked_at_by_no_worker_whatever_the_database_calls_th
 def test_a_correction_that_renumbers_looks_at_the_same_sequences(
     sent: Submission, val: Edition, tmp_path: Path
 ) -> None:
-    table = ground_truth.load(val.ground_truth_id).to_table()
+    table = truth_values.load(val.ground_truth_id).to_table()
     table.anno_id = table.anno_id[::-1]
     path = tmp_path / "renumbered.csv"
     path.write_bytes(evaluator.GroundTruth.from_table(table).to_csv())
-    second = rescoring.open_edition(split_name="val", path=path, now=timezone.now(), actor=None)
+    second = corrections.open_edition(split_name="val", path=path, now=timezone.now(), actor=None)
     assert second.ground_truth_id != val.ground_truth_id
     builders.score_all()
-    rescoring.publish(edition=second, reason="Numbers.", now=timezone.now(), actor=None, replaces=1)
+    corrections.publish(edition=second, reason="Numbers.", now=timezone.now(), actor=None, replaces=1)
     builders.infer_all()
     before, after = (Analysis.objects.get(evaluation__edition=each).content for each in (val, second))
     assert after["worst"] == before["worst"]
-    assert after["curve"] == before["curve"]
+    # Another revision resamples with other weights: the ends of confidence intervals differ by a hair.
+    assert means_of(after["curve"]) == means_of(before["curve"])
 
 
 def test_what_was_withdrawn_before_is_not_looked_at(val: Edition, owner: User) -> None:
@@ -131,7 +146,7 @@ def test_what_was_withdrawn_before_is_not_looked_at(val: Edition, owner: User) -
 
 
 def test_many_sequences_give_a_bounded_number_of_points(val: Edition) -> None:
-    truth = evaluator.GroundTruth.from_table(ground_truth.load(val.ground_truth_id).to_table())
+    truth = evaluator.GroundTruth.from_table(truth_values.load(val.ground_truth_id).to_table())
     rng = np.random.default_rng(3)
     n = 2_000
     table = truth.to_table()
@@ -144,7 +159,7 @@ def test_many_sequences_give_a_bounded_number_of_points(val: Edition) -> None:
     predictions = evaluator.Predictions.from_arrays(
         ttc_s=truth.ttc_s * rng.choice([-1e-3, 1e-3, 1, 30], n), manifest=truth.manifest
     )
-    content = analyses.content_of(predictions, truth, protocol="tsttc-1")
+    content = analyses.content_of(predictions, truth, rules=get_protocol("tsttc-1"))
     points = content["scatter"]["predicted_s"]
     assert len(points) == analyses.MAX_POINTS
     assert all(0.05 <= point <= 20 or -20 <= point <= -0.15 for point in points)

@@ -1,7 +1,9 @@
 """Intervals and rank ranges on the server: what is written beside the scores, when, and for whom."""
 
 import random
-from datetime import timedelta
+import threading
+from collections.abc import Collection
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -11,19 +13,9 @@ from django.db import connection
 from django.utils import timezone
 from scipy import stats
 
-from evaluator import SCORE_NAMES, uncertainty
-from leaderboard import (
-    backlog,
-    bags,
-    broker,
-    disclosure,
-    files,
-    ground_truth,
-    inference,
-    queue,
-    standings,
-    submissions,
-)
+from evaluator import SCORE_NAMES
+from evaluator.scoring import uncertainty
+from leaderboard.boards import boards
 from leaderboard.models import (
     BoardVersion,
     Edition,
@@ -35,13 +27,24 @@ from leaderboard.models import (
     User,
     Visibility,
 )
+from leaderboard.scoring import confidence, disclosure, recording_sums, verdicts
+from leaderboard.scoring.confidence import Entries
+from leaderboard.storage import files, truth_values
+from leaderboard.submissions import submissions
+from leaderboard.workers import backlog, queue
 from tests import builders
 from tests.editions import ANYBODY, board_now, corrected, open_edition, publish
-from tests.leaderboard.inferred_scores import INFERRED, everything, scores_of
+from tests.leaderboard.scoring.inferred_scores import INFERRED, everything, scores_of
+
+pytestmark = pytest.mark.slow
 
 
 def hide(submission: Submission) -> None:
     Method.objects.filter(pk=submission.method_id).update(visibility=Visibility.PRIVATE)
+
+
+def stale(*, now: datetime, held: Collection[str]) -> list[Edition]:
+    return [entries.edition for entries in confidence.stale(now=now, held=held)]
 
 
 def version() -> int:
@@ -50,16 +53,16 @@ def version() -> int:
 
 def plain_interval(submission: Submission, edition: Edition) -> tuple[float, float]:
     """The interval of the overall MiD by a loop over recordings, with the weights of the ground truth."""
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     with files.opened_predictions(submission.digest) as kept:
         predictions = builders.evaluator.read_predictions(kept.read(), manifest=truth.manifest)
     report = builders.evaluator.evaluate(predictions, truth, keep_sequences=True)
     assert report.sequences is not None
-    generator = inference.generator_of(edition, purpose="weights")
+    generator = confidence.generator_of(edition, purpose="weights")
     weights = generator.standard_exponential((10_000, truth.manifest.n_recordings), dtype=np.float32)
     sums, counts = np.zeros(10_000), np.zeros(10_000)
     for row, recording in enumerate(truth.manifest.recording_index):
-        sums += weights[:, recording] * report.sequences.mid[row]
+        sums += weights[:, recording] * report.sequences["mid"][row]
         counts += weights[:, recording]
     # All 24 recordings have five sequences, so they count as 24.
     tail = stats.norm.cdf(-stats.t.ppf(0.975, 24) * (24 / 23) ** 0.5)
@@ -99,7 +102,7 @@ def test_every_value_gets_an_interval_and_a_rank_range_that_hold_what_is_publish
 def test_a_column_in_too_few_recordings_has_no_interval_while_others_have(
     inferred: list[Submission], edition: Edition
 ) -> None:
-    usable = uncertainty.usable_columns(bags.counts_of(edition))
+    usable = uncertainty.usable_columns(recording_sums.counts_of(edition))
     assert 0 < usable.sum() < len(SCORE_NAMES)
     for name, row in scores_of(inferred[0], edition).items():
         has_interval = bool(usable[SCORE_NAMES.index(name)])
@@ -116,9 +119,8 @@ def test_an_edition_without_enough_recordings_has_no_interval_and_says_why(
     assert not Score.objects.exclude(low=None, high=None, rank_low=None, is_with_best=None).exists()
     edition.refresh_from_db()
     assert edition.inferred_at is not None
-    assert inference.why_no_interval(edition) == (
-        "There are no intervals: they would be made of too few recordings (effective number 6.9; at least 8 "
-        "needed)."
+    assert verdicts.why_no_interval(edition) == (
+        "There are no confidence intervals: too few recordings (effective number 6.9; at least 8 needed)."
     )
 
 
@@ -186,50 +188,16 @@ def test_printed_rows_are_counted_where_they_surely_or_possibly_stand(
     PublishedResult.objects.filter(split="test").delete()
     assert builders.infer_all() == 1
     first = scores_of(inferred[0], edition)["mid"]
-    assert (first.rank_low, first.rank_high) == (1, 1)
+    assert (first.rank_low, first.rank_high, first.is_with_best) == (1, 1, True)
     for slug, value in (("above", first.value / 10), ("beside", first.value), ("below", 1e6)):
-        PublishedResult.objects.create(
-            split_id="test",
-            slug=slug,
-            method_name=slug,
-            authors="A",
-            source_title="T",
-            source_url="https://example.org",
-            source_table="1",
-            year=2023,
-            scores={"mid": value},
-        )
+        builders.quote(slug, {"mid": value})
     assert builders.infer_all() == 1
     first.refresh_from_db()
-    assert (first.rank_low, first.rank_high) == (2, 3)
+    assert (first.rank_low, first.rank_high, first.is_with_best) == (2, 3, False)
     for entry in board_now().entries:
         if entry.kind == "submission":
             interval = entry.intervals["mid"]
             assert interval.rank_low <= entry.rank <= interval.rank_high
-
-
-def test_what_may_be_the_best_of_a_column_counts_quoted_rows(
-    inferred: list[Submission], edition: Edition
-) -> None:
-    quoted = PublishedResult.objects.filter(split="test")
-    quoted.delete()
-    builders.infer_all()
-    best = scores_of(inferred[0], edition)["mid"]
-    assert (best.rank_low, best.rank_high, best.is_with_best) == (1, 1, True)
-    PublishedResult.objects.create(
-        split_id="test",
-        slug="leads",
-        method_name="Leads",
-        authors="A",
-        source_title="T",
-        source_url="https://example.org",
-        source_table="1",
-        year=2023,
-        scores={"mid": 0.1},
-    )
-    builders.infer_all()
-    best.refresh_from_db()
-    assert (best.rank_low, best.rank_high, best.is_with_best) == (2, 2, False)
 
 
 def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
@@ -253,7 +221,7 @@ def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
 def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
     inferred: list[Submission], edition: Edition
 ) -> None:
-    then = standings.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
+    then = boards.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
     rows = [entry for entry in then.entries if entry.kind == "submission"]
     assert len(rows) == len(inferred)
     for entry in rows:
@@ -278,18 +246,18 @@ def test_sums_that_are_gone_are_made_anew_from_values_and_from_the_file(
     inferred: list[Submission], edition: Edition
 ) -> None:
     digest, file = inferred[0].digest, inferred[0].sent_file
-    first = bags.sums_of(edition, file=file)
-    path = bags.path(edition, file=file)
+    first = recording_sums.sums_of(edition, file=file)
+    path = recording_sums.path(edition, file=file)
     assert path.is_relative_to(settings.GROUND_TRUTH_DIR)
     path.write_bytes(b"cut off")
-    assert np.array_equal(bags.sums_of(edition, file=file), first)
+    assert np.array_equal(recording_sums.sums_of(edition, file=file), first)
     path.unlink()
-    manifest = ground_truth.load(edition.ground_truth_id).manifest
+    manifest = truth_values.load(edition.ground_truth_id).manifest
     files.store().delete(files.aligned_name(manifest_digest=manifest.digest, digest=digest))
-    assert np.array_equal(bags.sums_of(edition, file=file), first)
+    assert np.array_equal(recording_sums.sums_of(edition, file=file), first)
     assert path.stat().st_size == first.nbytes
-    truth = ground_truth.load(edition.ground_truth_id)
-    means = first.sum(axis=0) / bags.counts_of(edition).sum(axis=0)
+    truth = truth_values.load(edition.ground_truth_id)
+    means = first.sum(axis=0) / recording_sums.counts_of(edition).sum(axis=0)
     with files.opened_predictions(digest) as source:
         predictions = builders.evaluator.read_predictions(source.read(), manifest=truth.manifest)
     assert means == pytest.approx(list(builders.evaluator.evaluate(predictions, truth).flat().values()))
@@ -304,7 +272,7 @@ def test_nothing_is_written_when_the_entries_change_meanwhile(
     def withdraw() -> None:
         submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
 
-    assert not inference.infer(edition=edition, now=timezone.now(), between=withdraw)
+    assert not confidence.infer(Entries.of(edition), now=timezone.now(), between=withdraw)
     assert everything() == before
     assert builders.infer_all() == 1
 
@@ -313,7 +281,7 @@ def test_live_submissions_are_decided_before_the_work_behind_them_goes_on(
     entries: list[Submission], edition: Edition, stranger: User
 ) -> None:
     late = builders.submit(stranger, builders.predictions(edition, factor=1.02), method="Late")
-    later = timezone.now() + 2 * inference.PATIENCE
+    later = timezone.now() + 2 * confidence.PATIENCE
     assert backlog.work_off(now=later, rng=random.Random(0)) == 1
     assert Evaluation.objects.get(submission=late).status == "SCORED"
 
@@ -327,16 +295,16 @@ def test_an_edition_that_is_being_scored_has_patience_but_not_for_ever(
     inferred: list[Submission], edition: Edition, tmp_path: Path
 ) -> None:
     prepared = open_edition(corrected(tmp_path, factor=1.3))
-    held = ground_truth.held()
+    held = truth_values.readable_digests()
     now = timezone.now()
-    assert prepared not in inference.stale(now=now, held=held)
-    assert prepared in inference.stale(now=now + 2 * inference.PATIENCE, held=held)
-    assert prepared not in inference.stale(now=now + 2 * inference.PATIENCE, held=set())
+    assert prepared not in stale(now=now, held=held)
+    assert prepared in stale(now=now + 2 * confidence.PATIENCE, held=held)
+    assert prepared not in stale(now=now + 2 * confidence.PATIENCE, held=set())
 
 
 def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submission], edition: Edition) -> None:
-    chosen = {row.evaluation_id for row in inference.ranked(inference.standing(edition))}
-    board = standings.board(split=edition.split, viewer=ANYBODY)
+    chosen = {row.evaluation_id for row in confidence.ranked(confidence.active_entries(edition))}
+    board = boards.board(split=edition.split, viewer=ANYBODY)
     assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
 
 
@@ -347,36 +315,30 @@ def test_only_one_worker_at_a_time_is_at_an_edition(entries: list[Submission], e
     other = connection.copy()
     try:
         with other.cursor() as cursor:
-            cursor.execute("SELECT pg_advisory_lock(%s, %s)", [inference.LOCKS, edition.pk])
-        assert not inference.infer(edition=edition, now=timezone.now())
+            cursor.execute("SELECT pg_advisory_lock(%s, %s)", [confidence.LOCKS, edition.pk])
+        assert not confidence.infer(Entries.of(edition), now=timezone.now())
     finally:
         other.close()
-    assert inference.infer(edition=edition, now=timezone.now())
+    assert confidence.infer(Entries.of(edition), now=timezone.now())
 
 
-def test_the_sweep_tells_the_workers_of_what_nobody_heard(
-    entries: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
+def test_a_worker_s_own_look_computes_what_no_message_told_of(
+    entries: list[Submission], edition: Edition
 ) -> None:
-    told: list[int] = []
-
-    def tell(about: int) -> bool:
-        told.append(about)
-        return True
-
-    monkeypatch.setattr(broker, "infer", tell)
-    monkeypatch.setattr(broker, "nudge", lambda evaluation_id: True)
-    queue.sweep(rng=random.Random(0))
-    assert told == [edition.pk]
-    builders.infer_all()
-    queue.sweep(rng=random.Random(0))
-    assert told == [edition.pk]
+    queue.poll(rng=random.Random(0), stopping=threading.Event())
+    edition.refresh_from_db()
+    first = edition.inferred_at
+    assert first is not None
+    queue.poll(rng=random.Random(0), stopping=threading.Event())
+    edition.refresh_from_db()
+    assert edition.inferred_at == first, "there was nothing more to do"
 
 
 def test_a_large_board_rests_between_two_rounds(
     inferred: list[Submission], edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(inference, "REST_PER_PAIR", timedelta(seconds=1))
+    monkeypatch.setattr(confidence, "REST_PER_PAIR", timedelta(seconds=1))
     submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
-    held = ground_truth.held()
-    assert inference.stale(now=timezone.now(), held=held) == []
-    assert inference.stale(now=timezone.now() + timedelta(seconds=20), held=held) == [edition]
+    held = truth_values.readable_digests()
+    assert stale(now=timezone.now(), held=held) == []
+    assert stale(now=timezone.now() + timedelta(seconds=20), held=held) == [edition]

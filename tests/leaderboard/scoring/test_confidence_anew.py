@@ -3,10 +3,12 @@
 import pytest
 
 from evaluator import SCORE_NAMES
-from leaderboard import bags, inference
 from leaderboard.models import Comparison, Edition, Evaluation, Score, Split, Submission
+from leaderboard.scoring import confidence, recording_sums
 from tests import builders
-from tests.leaderboard.inferred_scores import everything
+from tests.leaderboard.scoring.inferred_scores import everything
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -20,7 +22,7 @@ def test_what_was_made_in_another_way_is_made_anew(inferred: list[Submission], e
     expected = everything()
     Score.objects.exclude(low=None).update(low=0.0, high=99.0, rank_low=1, rank_high=1)
     edition.refresh_from_db()
-    assert edition.inference_digest.startswith(f"{inference.METHOD} sha256:")
+    assert edition.inference_digest.startswith(f"{confidence.METHOD} sha256:")
     former = edition.inference_digest.partition(" ")[2]
     Edition.objects.filter(pk=edition.pk).update(inference_digest=former)
     assert builders.infer_all() == 1
@@ -31,7 +33,7 @@ def test_an_edition_knows_its_effective_numbers_of_recordings(
     inferred: list[Submission], edition: Edition
 ) -> None:
     edition.refresh_from_db()
-    counts = bags.counts_of(edition)
+    counts = recording_sums.counts_of(edition)
     for column, name in enumerate(SCORE_NAMES):
         exact = (counts[:, column] ** 2).sum() ** 2 / (counts[:, column] ** 4).sum()
         assert 0 <= exact - edition.n_effective[name] < 0.1
@@ -56,7 +58,7 @@ def test_every_random_number_of_an_edition_comes_from_its_seed(
 
     before = everything_drawn()
     assert everything_drawn() == before
-    monkeypatch.setattr(inference, "seed_of", lambda edition: f"secret {edition.ground_truth_id}")
+    monkeypatch.setattr(confidence, "seed_of", lambda edition: f"secret {edition.ground_truth_id}")
     after = everything_drawn()
     assert before[-1] != after[-1]
     assert before[:-1] != after[:-1]

@@ -14,25 +14,19 @@ import pytest
 from django.utils import timezone
 from scipy import stats
 
-from evaluator import SCORE_NAMES, evaluate, published, read_predictions, uncertainty
-from leaderboard import comparisons, ground_truth, inference
+from evaluator import SCORE_NAMES, evaluate, published, read_predictions
+from evaluator.scoring import uncertainty
+from leaderboard.editions import ground_truth
 from leaderboard.models import Edition, Split, Submission, User
+from leaderboard.scoring import comparisons, verdicts
+from leaderboard.storage import truth_values
 from tests import builders
 from tests.editions import ANYBODY, board_now
-from tests.services import shared_data
+from tests.evaluator.recordings import permutation_p
 
 pytestmark = pytest.mark.slow
 
 ESTIMATORS = ("box-height", "box-sqrt-area", "box-area", "pointrcnn-height")
-
-
-@pytest.fixture(scope="module")
-def kitti() -> Path:
-    """The folder of the data."""
-    shared = shared_data()
-    if shared is None or not (shared / "kitti-dev").is_dir():
-        pytest.skip("kitti-dev is not here: TSTTC_SHARED_DATA names no folder that has it")
-    return shared / "kitti-dev"
 
 
 def opened(kitti: Path, path: Path, settings: Any) -> Edition:
@@ -72,7 +66,7 @@ def test_eleven_recordings_have_no_interval_and_the_board_can_say_why(
     assert all(interval.low is None for entry in submitted for interval in entry.intervals.values())
     edition.refresh_from_db()
     assert edition.n_effective["mid"] < 8
-    assert "too few recordings (effective number " in inference.why_no_interval(edition)
+    assert "too few recordings (effective number " in verdicts.why_no_interval(edition)
 
 
 def test_what_stands_on_the_board_is_what_a_loop_finds_in_the_files(
@@ -81,7 +75,7 @@ def test_what_stands_on_the_board_is_what_a_loop_finds_in_the_files(
     edition = opened(kitti, by_track(kitti, tmp_path), settings)
     sent = send(kitti, owner)
     builders.infer_all()
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     n_bags = truth.manifest.n_recordings
     assert n_bags > 100
     errors = {}
@@ -90,7 +84,7 @@ def test_what_stands_on_the_board_is_what_a_loop_finds_in_the_files(
         assert len(json.loads(data)) == truth.n_sequences
         report = evaluate(read_predictions(data, manifest=truth.manifest), truth, keep_sequences=True)
         assert report.sequences is not None
-        errors[name] = report.sequences.mid
+        errors[name] = report.sequences["mid"]
     weights = uncertainty.generator_of(truth.digest, purpose="weights").standard_exponential(
         (10_000, n_bags), dtype=np.float32
     )
@@ -134,12 +128,4 @@ def compare(sent: dict[str, Submission], errors: dict[str, np.ndarray], recordin
         found = pair.differences["mid"]
         assert found.difference == published(pair.first.scores["mid"] - pair.second.scores["mid"])
         assert found.low <= found.difference <= found.high
-        expected = stats.permutation_test(
-            (gaps,),
-            lambda x, axis: x.sum(axis=axis),
-            permutation_type="samples",
-            n_resamples=1_999,
-            vectorized=True,
-            rng=np.random.default_rng(0),
-        ).pvalue
-        assert found.p == pytest.approx(expected, abs=0.04)
+        assert found.p == pytest.approx(permutation_p(gaps, n_resamples=1_999), abs=0.04)

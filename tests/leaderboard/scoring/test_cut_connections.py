@@ -8,13 +8,15 @@ from contextlib import contextmanager
 import pytest
 from django.db import Error, connection
 
-from leaderboard import files, lifecycle, outages, scoring
-from leaderboard.lifecycle import Lease
+from leaderboard.errors import outages
 from leaderboard.models import AuditEvent, Edition, Evaluation, Status, Submission, User
+from leaderboard.scoring import lifecycle, worker
+from leaderboard.scoring.lifecycle import Lease
+from leaderboard.storage import files
 from tests import builders
-from tests.leaderboard import queue_rows
-from tests.leaderboard.cutting_proxy import Cut, CuttingProxy
-from tests.leaderboard.queue_rows import LEASE_S, SCORED, WALL_S
+from tests.leaderboard.scoring.cutting_proxy import Cut, CuttingProxy
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
 
 pytestmark = [
     pytest.mark.slow,
@@ -125,7 +127,7 @@ def test_a_run_is_decided_once_wherever_it_is_cut(
     proxy: CuttingProxy, edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # The cut server is back at once, so there is no reason to wait for it.
-    monkeypatch.setattr(scoring.time, "sleep", lambda seconds: None)
+    monkeypatch.setattr(worker.time, "sleep", lambda seconds: None)
     data = builders.predictions(edition)
     numbers = itertools.count()
     leases: list[Lease] = []
@@ -136,7 +138,7 @@ def test_a_run_is_decided_once_wherever_it_is_cut(
 
     n_kept = 0
     for came_to_its_end in every_cut(
-        proxy, lambda: scoring.run(leases[0], rng=random.Random(0)), prepare=prepare
+        proxy, lambda: worker.run(leases[0], rng=random.Random(0)), prepare=prepare
     ):
         evaluation = queue_rows.row(leases[0])
         if came_to_its_end:
@@ -146,7 +148,7 @@ def test_a_run_is_decided_once_wherever_it_is_cut(
             queue_rows.expire(leases[0])
             queue_rows.release_expired()
             queue_rows.make_due()
-            assert scoring.run_next(rng=random.Random(0))
+            assert worker.run_next(rng=random.Random(0))
             evaluation.refresh_from_db()
         assert (evaluation.status, evaluation.attempt) == (Status.SCORED, 1 if came_to_its_end else 2)
         assert evaluation.finished_attempt == evaluation.attempt
@@ -158,7 +160,7 @@ def test_a_run_is_decided_once_wherever_it_is_cut(
 def test_claim_whose_answer_is_lost_is_not_left_to_its_lease(
     proxy: CuttingProxy, edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(scoring.time, "sleep", lambda seconds: None)
+    monkeypatch.setattr(worker.time, "sleep", lambda seconds: None)
     data = builders.predictions(edition)
     numbers = itertools.count()
     submissions: list[Submission] = []
@@ -167,7 +169,7 @@ def test_claim_whose_answer_is_lost_is_not_left_to_its_lease(
         submissions.append(builders.submit(owner, data, method=f"Method {next(numbers)}"))
 
     def work() -> None:
-        scoring.run_next(rng=random.Random(0))
+        worker.run_next(rng=random.Random(0))
 
     for came_to_its_end in every_cut(proxy, work, prepare=prepare):
         assert came_to_its_end, "the server was back at once"
@@ -175,7 +177,7 @@ def test_claim_whose_answer_is_lost_is_not_left_to_its_lease(
         assert (row.status, row.attempt) in [(Status.SCORED, 1), (Status.QUEUED, 0)]
         # What the cut connection had locked is free once the server has noticed: this waits for it.
         queue_rows.make_due()
-        while row.status == Status.QUEUED and scoring.run_next(rng=random.Random(0)):
+        while row.status == Status.QUEUED and worker.run_next(rng=random.Random(0)):
             row.refresh_from_db()
         assert (row.status, row.attempt, row.n_infrastructure_strikes) == (Status.SCORED, 1, 0)
 
@@ -185,7 +187,7 @@ VERBS: dict[str, Callable[[Lease], object]] = {
     "heartbeat": lambda lease: lifecycle.heartbeat(lease, lease_s=LEASE_S),
     "finalise": lambda lease: lifecycle.finalise(lease, SCORED),
     "give back": queue_rows.give_back,
-    "hand back": lambda lease: lifecycle.hand_back([lease]),
+    "hand back": lambda lease: lifecycle.release([lease]),
     "release": lambda _: queue_rows.release_expired(),
 }
 
@@ -200,7 +202,7 @@ def test_cut_verb_leaves_a_state_from_which_the_work_goes_on(
         evaluation = queue_rows.queued(edition, owner)
         leases[:] = [queue_rows.claim()]
         if name == "claim":
-            lifecycle.hand_back(leases)
+            lifecycle.release(leases)
         if name == "release":
             queue_rows.expire(leases[0])
         assert evaluation.pk == leases[0].evaluation_id

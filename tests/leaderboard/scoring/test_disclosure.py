@@ -8,10 +8,13 @@ from django.db import transaction
 from django.test import Client
 
 from evaluator import SCORE_NAMES, Difference
-from leaderboard import boards, comparisons, disclosure
+from leaderboard import versions
 from leaderboard.models import Comparison, Edition, Score, Split, Submission, User, Visibility
+from leaderboard.scoring import comparisons, disclosure
 from tests import builders
-from tests.leaderboard.test_comparisons import ask, known, set_visibility
+from tests.leaderboard.scoring.test_comparisons import ask, known, set_visibility
+
+pytestmark = pytest.mark.slow
 
 Rival = Callable[[float], Submission]
 
@@ -131,9 +134,9 @@ def test_two_methods_of_one_team_are_not_compared_on_a_hidden_split(
         assert answer.is_complete
         plain(answer.pairs[0])
         assert answer.pairs[0].withheld == (
-            "No confidence interval and no p: both methods are of one team, and the ground truth of test is "
-            "hidden. There, only public methods of different teams are compared; compare these two on a "
-            "split with open ground truth, or their files offline with tsttc compare."
+            "No confidence interval and no p-value: both methods are of one team, and the ground truth of "
+            "test is hidden. There, only public methods of different teams are compared; compare these two "
+            "on a split with open ground truth, or their files offline with tsttc compare."
         )
 
 
@@ -159,14 +162,14 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
     plain(pair)
     assert pair.second.method in pair.withheld
     assert pair.second.method.startswith("Anonymous")
-    assert "They follow once it is public." in pair.sentence()
+    assert "They appear once the method is public." in pair.sentence()
     # Its own team may, where the values are open.
     (pair,) = ask(entries[0], other, viewer=stranger).pairs
     assert bool(pair.withheld) == is_hidden
 
     set_visibility(other, Visibility.PUBLIC)
     with transaction.atomic():
-        boards.changed("test")
+        versions.changed("test")
     (pair,) = ask(entries[0], other, viewer=owner).pairs
     assert pair.withheld == ""
 

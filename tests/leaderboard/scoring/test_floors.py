@@ -3,8 +3,8 @@
 from django.test import Client
 
 from evaluator import SCORE_NAMES, write_predictions
-from leaderboard import ground_truth
 from leaderboard.models import BoardVersion, Edition, Score, User
+from leaderboard.storage import truth_values
 from tests import builders, pages
 
 
@@ -18,7 +18,7 @@ def floor_of(edition: Edition) -> dict[str, float | None]:
 def test_the_floor_is_what_a_file_of_the_ground_truth_itself_scores(edition: Edition, owner: User) -> None:
     assert edition.floor is None
     floor = floor_of(edition)
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     builders.submit(owner, write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s), method="Oracle")
     builders.score_all()
     rows = Score.objects.values_list("metric", "interval", "value")
@@ -54,5 +54,5 @@ def test_readers_see_the_floor_beside_the_rows_and_never_as_one(
     assert len(root.one("table", class_="board").one("tbody").all("tr")) == len(rows)
     assert (
         f"Floor: the ground truth itself, submitted as predictions, scores MiD {floor['mid']:.1f}, RTE"
-        in (root.one("div", class_="legend").text)
+        in (root.one("details", class_="legend").text)
     )

@@ -1,6 +1,5 @@
-"""`leaderboard.lifecycle`: every verb, one step at a time."""
+"""`leaderboard.scoring.lifecycle`: every verb, one step at a time."""
 
-import uuid
 from dataclasses import replace
 from datetime import timedelta
 
@@ -9,16 +8,12 @@ from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
 from pytest_django import DjangoCaptureOnCommitCallbacks
 
-from leaderboard import broker, lifecycle
-from leaderboard.lifecycle import (
-    MAX_POISON_STRIKES,
-    LostRace,
-    Outcome,
-    Strike,
-)
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
-from tests.leaderboard import queue_rows
-from tests.leaderboard.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
+from leaderboard.ops import broker
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import MAX_POISON_STRIKES, Lease, LostRace, Outcome, Strike
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
 
 # --- enqueue ---------------------------------------------------------------------------------------------
 
@@ -43,17 +38,17 @@ def test_nudge_is_sent_after_the_commit_and_its_failure_is_nobodys_problem(
     monkeypatch: pytest.MonkeyPatch,
     django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks,
 ) -> None:
-    sent: list[uuid.UUID] = []
+    sent: list[bool] = []
 
-    def broken_nudge(evaluation_id: uuid.UUID) -> None:
-        sent.append(evaluation_id)
+    def broken_nudge() -> None:
+        sent.append(True)
         raise RuntimeError("the broker's client has a fault of its own")
 
     monkeypatch.setattr(broker, "nudge", broken_nudge)
     with django_capture_on_commit_callbacks(execute=True):
-        evaluation = queue_rows.queued(edition, owner)
+        queue_rows.queued(edition, owner)
         assert not sent
-    assert sent == [evaluation.pk]
+    assert sent == [True]
 
 
 # --- claim -----------------------------------------------------------------------------------------------
@@ -81,7 +76,7 @@ def test_most_urgent_then_oldest_goes_first(edition: Edition, owner: User) -> No
     older, newer = queue_rows.queued(edition, owner), queue_rows.queued(edition, owner)
     Evaluation.objects.filter(pk=rescored.pk).update(queued_at=Now() - timedelta(days=2))
     Evaluation.objects.filter(pk=older.pk).update(queued_at=Now() - timedelta(days=1))
-    assert lifecycle.waiting_ids(limit=10) == [older.pk, newer.pk, rescored.pk]
+    assert list(Evaluation.objects.due()) == [older, newer, rescored]
     assert [queue_rows.claim().evaluation_id for _ in range(3)] == [older.pk, newer.pk, rescored.pk]
 
 
@@ -90,13 +85,13 @@ def test_claim_takes_no_more_than_its_limit_and_each_has_its_own_lease(edition: 
         queue_rows.queued(edition, owner)
     leases = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=2)
     assert len({lease.evaluation_id for lease in leases}) == 2
-    assert len(lifecycle.waiting_ids(limit=10)) == 1
+    assert Evaluation.objects.due().count() == 1
 
 
 def test_what_is_not_due_yet_is_left_alone(edition: Edition, owner: User) -> None:
     queue_rows.queued(edition, owner)
     Evaluation.objects.update(due_at=Now() + timedelta(seconds=30))
-    assert lifecycle.waiting_ids(limit=10) == []
+    assert list(Evaluation.objects.due()) == []
     assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
 
 
@@ -109,9 +104,7 @@ def test_the_database_refuses_to_run_without_a_lease(edition: Edition, owner: Us
 # --- heartbeat -------------------------------------------------------------------------------------------
 
 
-def test_heartbeat_renews_the_lease(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_heartbeat_renews_the_lease(lease: Lease) -> None:
     Evaluation.objects.update(leased_until=Now())
     before = queue_rows.row(lease).leased_until
     assert before is not None
@@ -121,28 +114,20 @@ def test_heartbeat_renews_the_lease(edition: Edition, owner: User) -> None:
     assert after - before >= timedelta(seconds=LEASE_S)
 
 
-def test_heartbeat_never_renews_beyond_the_deadline(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_heartbeat_never_renews_beyond_the_deadline(lease: Lease) -> None:
     Evaluation.objects.update(deadline_at=Now() + timedelta(seconds=5))
     assert lifecycle.heartbeat(lease, lease_s=LEASE_S)
     row = queue_rows.row(lease)
     assert row.leased_until == row.deadline_at
 
 
-def test_heartbeat_after_the_deadline_says_stop(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_heartbeat_after_the_deadline_says_stop(lease: Lease) -> None:
     queue_rows.expire(lease, overran=True)
     assert not lifecycle.heartbeat(lease, lease_s=LEASE_S)
 
 
 @pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(
-    edition: Edition, owner: User, what: str
-) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(lease: Lease, what: str) -> None:
     before = queue_rows.row(lease).leased_until
     assert not lifecycle.heartbeat(queue_rows.stale(lease)[what], lease_s=10 * LEASE_S)
     assert queue_rows.row(lease).leased_until == before
@@ -151,9 +136,7 @@ def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(
 # --- finalise --------------------------------------------------------------------------------------------
 
 
-def test_scores_report_status_and_audit_are_written_together(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_scores_report_status_and_audit_are_written_together(lease: Lease) -> None:
     assert lifecycle.finalise(lease, SCORED)
     row = queue_rows.row(lease)
     assert (row.status, row.finished_attempt, row.report) == (Status.SCORED, 1, SCORED.report)
@@ -164,9 +147,7 @@ def test_scores_report_status_and_audit_are_written_together(edition: Edition, o
     )
 
 
-def test_rejection_keeps_its_problems_and_has_no_scores(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_rejection_keeps_its_problems_and_has_no_scores(lease: Lease) -> None:
     assert lifecycle.finalise(lease, REJECTED)
     row = queue_rows.row(lease)
     assert (row.status, row.problems, row.n_problems) == (Status.REJECTED, list(REJECTED.problems), 1)
@@ -174,9 +155,7 @@ def test_rejection_keeps_its_problems_and_has_no_scores(edition: Edition, owner:
 
 
 @pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_result_of_a_stale_lease_is_discarded(edition: Edition, owner: User, what: str) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_result_of_a_stale_lease_is_discarded(lease: Lease, what: str) -> None:
     with pytest.raises(LostRace):
         lifecycle.finalise(queue_rows.stale(lease)[what], SCORED)
     assert queue_rows.row(lease).status == Status.RUNNING
@@ -184,9 +163,7 @@ def test_result_of_a_stale_lease_is_discarded(edition: Edition, owner: User, wha
     assert lifecycle.finalise(lease, SCORED)
 
 
-def test_finalise_again_recognises_its_own_commit_and_writes_nothing(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_finalise_again_recognises_its_own_commit_and_writes_nothing(lease: Lease) -> None:
     assert lifecycle.finalise(lease, SCORED)
     before = queue_rows.row(lease).finished_at
     assert not lifecycle.finalise(lease, SCORED)
@@ -195,9 +172,7 @@ def test_finalise_again_recognises_its_own_commit_and_writes_nothing(edition: Ed
     assert AuditEvent.objects.filter(noun_id=lease.evaluation_id).count() == 1
 
 
-def test_a_decided_evaluation_is_not_decided_otherwise(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_a_decided_evaluation_is_not_decided_otherwise(lease: Lease) -> None:
     lifecycle.finalise(lease, SCORED)
     with pytest.raises(LostRace):
         lifecycle.finalise(lease, REJECTED)
@@ -223,9 +198,7 @@ def test_zombie_is_fenced_after_another_worker_took_over(edition: Edition, owner
     assert queue_rows.row(successor).finished_attempt == 2
 
 
-def test_a_score_that_cannot_be_kept_leaves_the_evaluation_undecided(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_a_score_that_cannot_be_kept_leaves_the_evaluation_undecided(lease: Lease) -> None:
     with pytest.raises(IntegrityError), transaction.atomic():
         lifecycle.finalise(lease, replace(SCORED, scores={("mid", "overall"): -1.0}))
     assert queue_rows.row(lease).status == Status.RUNNING
@@ -233,9 +206,7 @@ def test_a_score_that_cannot_be_kept_leaves_the_evaluation_undecided(edition: Ed
 
 
 @pytest.mark.parametrize("status", [Status.QUEUED, Status.RUNNING, Status.SYSTEM_ERROR, Status.CANCELLED])
-def test_a_run_ends_as_scored_or_rejected_only(edition: Edition, owner: User, status: Status) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_a_run_ends_as_scored_or_rejected_only(lease: Lease, status: Status) -> None:
     with pytest.raises(ValueError, match="SCORED or REJECTED"):
         lifecycle.finalise(lease, Outcome(status=status, scores={}))
     assert queue_rows.row(lease).status == Status.RUNNING

@@ -11,12 +11,12 @@ from typing import TypeVar
 import pytest
 from django.db import connection, connections
 
-from leaderboard import lifecycle
-from leaderboard.lifecycle import Lease, LostRace
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, Submission, User
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import Lease, LostRace
 from tests import builders
-from tests.leaderboard import queue_rows
-from tests.leaderboard.queue_rows import LEASE_S, SCORED, WALL_S
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
 
 T = TypeVar("T")
 

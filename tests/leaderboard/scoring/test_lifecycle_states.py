@@ -25,8 +25,9 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 
-from leaderboard import lifecycle
-from leaderboard.lifecycle import (
+from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import (
     MAX_INFRASTRUCTURE_STRIKES,
     MAX_POISON_STRIKES,
     Lease,
@@ -34,9 +35,10 @@ from leaderboard.lifecycle import (
     Outcome,
     Strike,
 )
-from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
-from tests.leaderboard import queue_rows
-from tests.leaderboard.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
+
+pytestmark = pytest.mark.slow
 
 LIMITS = {Strike.POISON: MAX_POISON_STRIKES, Strike.INFRASTRUCTURE: MAX_INFRASTRUCTURE_STRIKES}
 OUTCOMES = st.sampled_from([SCORED, REJECTED])
@@ -152,16 +154,16 @@ class Life(RuleBasedStateMachine):
     def give_back(self, lease: Lease, strike: Strike) -> None:
         expected = self.model[lease.evaluation_id]
         if expected.holds(lease):
-            status = lifecycle.give_back(lease, strike=strike, reason="x", rng=random.Random(0))
+            status = lifecycle.fail_attempt(lease, strike=strike, reason="x", rng=random.Random(0))
             assert status == expected.struck(strike)
         else:
             with pytest.raises(LostRace):
-                lifecycle.give_back(lease, strike=strike, reason="x", rng=random.Random(0))
+                lifecycle.fail_attempt(lease, strike=strike, reason="x", rng=random.Random(0))
 
     @rule(some=st.lists(leases, max_size=4, unique_by=lambda lease: lease.evaluation_id))
     def hand_back(self, some: list[Lease]) -> None:
         held = [lease for lease in some if self.model[lease.evaluation_id].holds(lease)]
-        assert lifecycle.hand_back(some) == len(held)
+        assert lifecycle.release(some) == len(held)
         for lease in held:
             self.model[lease.evaluation_id].status = Status.QUEUED
 
@@ -221,7 +223,7 @@ class Life(RuleBasedStateMachine):
             assert lease.evaluation_id == pk
             expected.attempt += 1
             expected.lease = lease
-            status = lifecycle.give_back(lease, strike=strike, reason="x", rng=random.Random(0))
+            status = lifecycle.fail_attempt(lease, strike=strike, reason="x", rng=random.Random(0))
             assert status == expected.struck(strike)
 
     # --- what always holds -------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""`leaderboard.lifecycle`: what happens to a run that came to nothing."""
+"""`leaderboard.scoring.lifecycle`: what happens to a run that came to nothing."""
 
 from datetime import timedelta
 
@@ -6,11 +6,17 @@ import pytest
 from django.db.models.functions import Now
 from pytest_django import Settings
 
-from leaderboard import lifecycle
-from leaderboard.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES, LostRace, Strike
 from leaderboard.models import AuditEvent, Edition, Evaluation, Status, User
-from tests.leaderboard import queue_rows
-from tests.leaderboard.queue_rows import LEASE_S, SCORED, WALL_S
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import (
+    MAX_INFRASTRUCTURE_STRIKES,
+    MAX_POISON_STRIKES,
+    Lease,
+    LostRace,
+    Strike,
+)
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
 
 # --- strikes ---------------------------------------------------------------------------------------------
 
@@ -55,9 +61,7 @@ def test_exhausted_strikes_are_a_system_error_without_scores(
 
 
 @pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_giving_back_a_stale_lease_counts_no_strike(edition: Edition, owner: User, what: str) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_giving_back_a_stale_lease_counts_no_strike(lease: Lease, what: str) -> None:
     with pytest.raises(LostRace):
         queue_rows.give_back(queue_rows.stale(lease)[what])
     row = queue_rows.row(lease)
@@ -69,7 +73,7 @@ def test_what_was_never_begun_is_handed_back_without_a_strike(edition: Edition, 
         queue_rows.queued(edition, owner)
     begun, *waiting = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)
     lifecycle.finalise(begun, SCORED)
-    assert lifecycle.hand_back([begun, *waiting]) == 2
+    assert lifecycle.release([begun, *waiting]) == 2
     assert queue_rows.row(begun).status == Status.SCORED
     for lease in waiting:
         row = queue_rows.row(lease)
@@ -82,9 +86,7 @@ def test_what_was_never_begun_is_handed_back_without_a_strike(edition: Edition, 
 # --- the sweep -------------------------------------------------------------------------------------------
 
 
-def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(lease: Lease) -> None:
     queue_rows.expire(lease)
     assert (queue_rows.release_expired(), queue_rows.release_expired()) == (1, 0)
     row = queue_rows.row(lease)
@@ -92,16 +94,12 @@ def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(edition: E
     assert row.last_error == "the worker stopped answering"
 
 
-def test_a_valid_lease_is_not_taken_back(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_a_valid_lease_is_not_taken_back(lease: Lease) -> None:
     assert queue_rows.release_expired() == 0
     assert queue_rows.row(lease).status == Status.RUNNING
 
 
-def test_a_run_that_held_on_until_its_deadline_is_poison(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
+def test_a_run_that_held_on_until_its_deadline_is_poison(lease: Lease) -> None:
     queue_rows.expire(lease, overran=True)
     assert queue_rows.release_expired() == 1
     row = queue_rows.row(lease)
@@ -110,10 +108,8 @@ def test_a_run_that_held_on_until_its_deadline_is_poison(edition: Edition, owner
 
 
 def test_a_sweep_that_comes_after_the_deadline_does_not_blame_the_file_for_a_dead_worker(
-    edition: Edition, owner: User
+    lease: Lease,
 ) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
     Evaluation.objects.update(
         leased_until=Now() - timedelta(seconds=400), deadline_at=Now() - timedelta(seconds=160)
     )

@@ -9,13 +9,15 @@ from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import questions, upkeep
 from leaderboard.models import Comparison, Edition, Evaluation, Question, Submission, User
-from leaderboard.questions import Asker, TooManyWaiting
+from leaderboard.scoring import questions
+from leaderboard.scoring.questions import Asker, TooManyWaiting
+from leaderboard.storage import truth_values
+from leaderboard.workers import upkeep
 from tests import builders
-from tests.leaderboard import queue_rows
+from tests.leaderboard.web.maintain import queue_rows
 
-pytestmark = pytest.mark.usefixtures("open_values")
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
 Pairs = list[tuple[Any, Any]]
 ANYBODY = AnonymousUser()
 
@@ -44,7 +46,7 @@ def ask(edition: Edition, asker: Asker, *pairs: tuple[Any, Any], ago_s: float = 
 
 def upcoming() -> tuple[Any, Any]:
     """The pair whose turn it is, which has had it with that."""
-    row = questions.waiting()[0]
+    row = questions.waiting(held=truth_values.readable_digests())[0]
     questions.begin(row, now=timezone.now())
     Comparison.objects.filter(pk=row.pk).update(computed_at=timezone.now(), differences={})
     questions.end(row)

@@ -1,4 +1,4 @@
-"""`leaderboard.quarantine`: what a file can do to the process that reads it, and to nothing else.
+"""`leaderboard.scoring.sandbox`: what a file can do to the process that reads it, and to nothing else.
 
 The child is the real one. Where a test needs it in the middle of its file, the file is a pipe that is still
 open, and the heartbeat is the moment to look.
@@ -22,12 +22,22 @@ from pytest_django import Settings
 
 from evaluator import Manifest, Rejected, read_predictions, read_truth, write_predictions
 from evaluator.limits import READY
-from evaluator.predictions import Predictions
-from leaderboard import quarantine
-from leaderboard.quarantine import ChildDied, ChildNotReady, LeaseLost
+from evaluator.predictions.predictions import Predictions
+from leaderboard.scoring import sandbox
+from leaderboard.scoring.sandbox import ChildDied, ChildNotReady, LeaseLost
 from tests import builders
+from tests.chaos.processes import REPOSITORY
 from tests.chaos.uploads import bomb_file, reader_memory_bytes
-from tests.leaderboard.child_processes import children, ignores, is_reading, kernel_says, limits
+from tests.leaderboard.scoring.child_processes import (
+    children,
+    fork_servers,
+    ignores,
+    is_reading,
+    kernel_says,
+    limits,
+)
+
+pytestmark = pytest.mark.slow
 
 MAX_BEATS = 5000
 FAULTY = b'{"0": "x", "nope": 1}'
@@ -46,7 +56,7 @@ def manifest(truth_path: Path) -> Manifest:
 
 @pytest.fixture
 def read(tmp_path: Path, manifest: Manifest) -> Read:
-    """Read a file in quarantine."""
+    """Read a file in the sandbox."""
     kept = tmp_path / "kept.npz"
     manifest.save(kept)
 
@@ -57,7 +67,7 @@ def read(tmp_path: Path, manifest: Manifest) -> Read:
         heartbeat_s: float = 5.0,
         manifest_path: Path = kept,
     ) -> Predictions:
-        return quarantine.read_predictions(
+        return sandbox.read_predictions(
             source,
             manifest=manifest,
             manifest_path=manifest_path,
@@ -140,24 +150,93 @@ def test_signals_that_stop_a_service_do_not_end_the_reading(read: Read) -> None:
 
 
 def test_hung_child_is_ended_when_the_lease_is(read: Read) -> None:
-    beats: list[set[int]] = []
+    hung: set[int] = set()
+    beats = itertools.count()
 
     def hang_then_lose() -> bool:
-        beats.append(children())
-        for pid in children():
+        assert next(beats) < MAX_BEATS, "the child does not begin to read"
+        for pid in filter(is_reading, children()):
             os.kill(pid, signal.SIGSTOP)
-        return len(beats) < 3
+            hung.add(pid)
+        return not hung
 
-    with opened(FAULTY) as source, pytest.raises(LeaseLost):
+    reading, writing = os.pipe()
+    with os.fdopen(reading, "rb") as source, os.fdopen(writing, "wb"), pytest.raises(LeaseLost):
         read(source, heartbeat=hang_then_lose, heartbeat_s=0.02)
-    assert all(beats)
+    assert hung
     assert not children()
+
+
+def test_each_file_has_a_child_of_its_own_and_all_have_one_server(read: Read) -> None:
+    seen: list[tuple[int, set[int]]] = []
+    for _ in range(3):
+        with pytest.raises(Rejected):
+            read_slowly(read, FAULTY, lambda pid: seen.append((pid, fork_servers())))
+    readers, servers = zip(*seen, strict=True)
+    assert len(set(readers)) == 3
+    assert len(servers[0]) == 1
+    assert servers == (servers[0],) * 3
+
+
+def test_server_that_has_ended_is_replaced_without_a_word(read: Read) -> None:
+    with opened(FAULTY) as source, pytest.raises(Rejected):
+        read(source)
+    [before] = fork_servers()
+    os.kill(before, signal.SIGKILL)
+    with opened(FAULTY) as source, pytest.raises(Rejected):
+        read(source)
+    assert before not in fork_servers()
+
+
+def test_server_that_ends_while_a_child_reads_takes_it_along_and_blames_no_file(read: Read) -> None:
+    readers: list[int] = []
+
+    def end_the_server(pid: int) -> None:
+        readers.append(os.pidfd_open(pid))
+        for server in fork_servers():
+            os.kill(server, signal.SIGKILL)
+
+    with pytest.raises(ChildNotReady, match="the process that starts reading processes ended"):
+        read_slowly(read, FAULTY, end_the_server)
+    ended, _, _ = select.select(readers, [], [], 60)
+    os.close(readers[0])
+    assert ended
+    assert not fork_servers()
+
+
+def test_server_has_no_descriptor_but_a_socket_and_no_credentials(
+    read: Read, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TSTTC_DATABASE_URL", "postgres://somebody:secret@db/tsttc")
+    sandbox.fork_server.server_of_this_thread(python_path=REPOSITORY).close()
+    with opened(FAULTY) as source, tempfile.TemporaryFile() as left_open:
+        os.set_inheritable(left_open.fileno(), True)
+        with pytest.raises(Rejected):
+            read(source)
+    [server] = fork_servers()
+    targets = {path.name: str(path.readlink()) for path in Path(f"/proc/{server}/fd").iterdir()}
+    assert targets.pop("0").startswith("socket:")
+    assert set(targets) == {"1", "2"}
+    assert "secret" not in kernel_says(server, "environ")
+
+
+def test_where_fork_is_not_to_be_trusted_a_process_is_started_for_each_file(
+    read: Read, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sandbox.fork_server, "AVAILABLE", False)
+    before = fork_servers()
+    commands: list[str] = []
+    with pytest.raises(Rejected):
+        read_slowly(read, FAULTY, lambda pid: commands.append(kernel_says(pid, "cmdline")))
+    [command] = commands
+    assert "evaluator.predictions.sandbox" in command
+    assert fork_servers() == before
 
 
 def test_child_that_cannot_begin_does_not_blame_the_file(read: Read, tmp_path: Path) -> None:
     with (
         opened(FAULTY) as source,
-        pytest.raises(ChildNotReady, match="did not start: ended with exit code 1"),
+        pytest.raises(ChildNotReady, match="did not start: FileNotFoundError"),
     ):
         read(source, manifest_path=tmp_path / "absent.npz")
 
@@ -196,7 +275,7 @@ def test_child_ends_with_a_parent_that_was_killed(tmp_path: Path, manifest: Mani
     """A worker that is killed leaves nothing behind that burns a processor."""
     manifest_path = tmp_path / "manifest.npz"
     manifest.save(manifest_path)
-    command = [sys.executable, "-m", "evaluator.quarantine", str(manifest_path), "4000000000", "60"]
+    command = [sys.executable, "-m", "evaluator.predictions.sandbox", str(manifest_path), "4000000000", "60"]
     parent = subprocess.Popen(
         # The shell, which the child's end of the pipe outlives, is the worker that is killed.
         ["sh", "-c", 'exec 3<&0; "$@" <&3 & echo $!; wait', "sh", *command],

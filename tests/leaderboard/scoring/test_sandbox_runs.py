@@ -12,21 +12,31 @@ from django.db import InterfaceError, OperationalError
 from pytest_django import Settings
 
 import evaluator
-from leaderboard import files, ground_truth, lifecycle, scoring, submissions
-from leaderboard.lifecycle import MAX_POISON_STRIKES, Lease
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
-from leaderboard.scoring import Pulse
+from leaderboard.scoring import fork_server, lifecycle, worker
+from leaderboard.scoring.lifecycle import MAX_POISON_STRIKES, Lease
+from leaderboard.scoring.worker import Pulse
+from leaderboard.storage import files, truth_values
+from leaderboard.submissions import submissions
 from tests import builders
+from tests.chaos.processes import REPOSITORY
 from tests.chaos.uploads import bomb_file, reader_memory_bytes
-from tests.leaderboard import queue_rows
-from tests.leaderboard.child_processes import children
-from tests.leaderboard.queue_rows import LEASE_S, WALL_S
+from tests.leaderboard.scoring.child_processes import children
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, WALL_S
+
+pytestmark = pytest.mark.slow
 
 
 def run_next() -> bool:
     """What is due now, whatever its backoff."""
     queue_rows.make_due()
-    return scoring.run_next(rng=random.Random(0))
+    return worker.run_next(rng=random.Random(0))
+
+
+def hang_the_reading() -> None:
+    """Stop the process that forks readers: the next file is not read before its run ends."""
+    os.kill(fork_server.server_of_this_thread(python_path=REPOSITORY).pid, signal.SIGSTOP)
 
 
 def evaluation_of(submission: Submission) -> Evaluation:
@@ -42,7 +52,7 @@ def strikes(submission: Submission) -> tuple[int, int]:
 def test_file_that_kills_its_reader_is_given_up_after_three_runs_and_the_next_is_scored(
     edition: Edition, owner: User, settings: Settings, tmp_path: Path
 ) -> None:
-    truth = ground_truth.load(edition.ground_truth_id)
+    truth = truth_values.load(edition.ground_truth_id)
     settings.CHILD_MEMORY_BYTES = reader_memory_bytes(truth, directory=tmp_path)
     bomb = builders.submit(owner, bomb_file(0), method="Bomb")
     healthy = builders.submit(owner, builders.predictions(edition), method="Healthy")
@@ -57,18 +67,11 @@ def test_file_that_kills_its_reader_is_given_up_after_three_runs_and_the_next_is
 
 
 def test_run_that_takes_too_long_is_ended_and_held_against_the_file(
-    edition: Edition, owner: User, settings: Settings, monkeypatch: pytest.MonkeyPatch
+    edition: Edition, owner: User, settings: Settings
 ) -> None:
     settings.WALL_S, settings.LEASE_S, settings.HEARTBEAT_S = 0.3, 0.1, 0.02
     submission = builders.submit(owner, builders.predictions(edition))
-    real = lifecycle.heartbeat
-
-    def hang_then_beat(lease: Lease, *, lease_s: float) -> bool:
-        for pid in children():
-            os.kill(pid, signal.SIGSTOP)
-        return real(lease, lease_s=lease_s)
-
-    monkeypatch.setattr(lifecycle, "heartbeat", hang_then_beat)
+    hang_the_reading()
     assert run_next()
     assert not children()
     assert strikes(submission) == (1, 0)
@@ -85,19 +88,19 @@ def test_file_that_the_store_has_lost_is_not_blamed(edition: Edition, owner: Use
 
 def test_damaged_ground_truth_is_not_held_against_the_file(edition: Edition, owner: User) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
-    ground_truth.load.cache_clear()
-    ground_truth.values_path(edition.ground_truth_id).write_bytes(b"no archive")
+    truth_values.load.cache_clear()
+    truth_values.values_path(edition.ground_truth_id).write_bytes(b"no archive")
     try:
         assert run_next()
     finally:
-        ground_truth.load.cache_clear()
+        truth_values.load.cache_clear()
     assert strikes(submission) == (0, 1)
     assert "cannot be used" in evaluation_of(submission).last_error
 
 
 def test_reader_that_cannot_start_is_not_held_against_the_file(edition: Edition, owner: User) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
-    ground_truth.manifest_path(edition.ground_truth_id).unlink()
+    truth_values.manifest_path(edition.ground_truth_id).unlink()
     assert run_next()
     assert strikes(submission) == (0, 1)
     assert "did not start" in evaluation_of(submission).last_error
@@ -120,7 +123,7 @@ def test_outcome_that_the_database_refuses_is_a_strike_and_leaves_nothing(
     edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
-    monkeypatch.setattr(scoring, "published", lambda value, *, decimals: -1.0)
+    monkeypatch.setattr(worker, "published", lambda value, *, decimals: -1.0)
     assert run_next()
     assert strikes(submission) == (1, 0)
     assert evaluation_of(submission).scores.count() == 0
@@ -135,12 +138,11 @@ def test_cancelled_run_is_dropped_without_a_strike(
     real = lifecycle.heartbeat
 
     def cancel_then_beat(lease: Lease, *, lease_s: float) -> bool:
-        for pid in children():
-            os.kill(pid, signal.SIGSTOP)
         lifecycle.cancel(submission=submission, actor=owner)
         return real(lease, lease_s=lease_s)
 
     monkeypatch.setattr(lifecycle, "heartbeat", cancel_then_beat)
+    hang_the_reading()
     assert run_next()
     assert strikes(submission) == (0, 0)
     assert evaluation_of(submission).status == Status.CANCELLED
@@ -157,7 +159,7 @@ def test_claim_whose_answer_was_lost_is_found_by_its_token(
         raise OperationalError("server closed the connection unexpectedly")
 
     monkeypatch.setattr(lifecycle, "claim", claim_and_hear_nothing)
-    monkeypatch.setattr(scoring.connection, "close", lambda: None)
+    monkeypatch.setattr(worker.connection, "close", lambda: None)
     assert run_next()
     assert evaluation_of(submission).attempt == 1
     assert submissions.progress(submission).state == Status.SCORED
@@ -183,7 +185,7 @@ def test_database_that_is_away_ends_no_run(
 
     pulse = Pulse(leases[0], waiting=deque(), lease_s=LEASE_S, wall_s=WALL_S)
     monkeypatch.setattr(lifecycle, "heartbeat", away)
-    monkeypatch.setattr(scoring.connection, "close", lambda: None)
+    monkeypatch.setattr(worker.connection, "close", lambda: None)
     assert pulse()
 
 

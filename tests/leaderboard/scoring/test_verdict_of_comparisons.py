@@ -5,9 +5,9 @@ from typing import Any, cast
 
 import pytest
 
-from leaderboard.comparisons import Compared, Difference, Pair
-from leaderboard.entries import Entry
-from leaderboard.web import compare_tables
+from leaderboard.boards.rows import Entry
+from leaderboard.scoring.comparisons import Compared, Difference, Pair
+from leaderboard.web.boards import compare_tables
 
 A, B, C = (
     Entry(kind="submission", method=name, team="T", scores={"mid": value})
@@ -41,4 +41,4 @@ def test_the_best_of_three_is_named_with_those_that_it_is_significantly_better_t
 
 def test_with_too_few_recordings_nothing_is_claimed() -> None:
     sentence = compare_tables.verdict(compared(0.001, 0.001, reason="There are 12 recordings."))
-    assert sentence.endswith("There are too few recordings to say what the differences mean.")
+    assert sentence.endswith("There are too few recordings for confidence intervals and p-values.")

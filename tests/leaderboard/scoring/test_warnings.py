@@ -9,11 +9,15 @@ from django.test import Client
 from django.utils import timezone
 
 import evaluator
-from evaluator.scale import Floats
-from leaderboard import ground_truth, rescoring, submissions
+from evaluator.metrics.scale import Floats
+from leaderboard.editions import corrections, ground_truth
 from leaderboard.models import Edition, Evaluation, Split, Status, Submission, User
+from leaderboard.storage import truth_values
+from leaderboard.submissions import submissions
 from tests import builders, pages
 from tests.evaluator.toolkit_folders import driving_folder
+
+pytestmark = pytest.mark.slow
 
 
 @pytest.fixture
@@ -26,7 +30,7 @@ def driven(benchmark: None, tmp_path: Path) -> Edition:
 
 @pytest.fixture
 def truth(driven: Edition) -> evaluator.GroundTruth:
-    return ground_truth.load(driven.ground_truth_id)
+    return truth_values.load(driven.ground_truth_id)
 
 
 @pytest.fixture
@@ -76,7 +80,7 @@ def test_warnings_are_the_same_whatever_the_hidden_values_are(
     table.ttc_s = np.random.default_rng(4).permutation(truth.ttc_s).tolist()
     corrected = tmp_path / "corrected.csv"
     corrected.write_bytes(evaluator.GroundTruth.from_table(table).to_csv())
-    rescoring.open_edition(split_name="test", path=corrected, now=timezone.now(), actor=None)
+    corrections.open_edition(split_name="test", path=corrected, now=timezone.now(), actor=None)
     builders.score_all()
     for submission, codes in ((mirrored, []), (shuffled, ["shuffled-values"])):
         reports = [row.report for row in Evaluation.objects.filter(submission=submission) if row.report]

@@ -8,20 +8,20 @@ import pytest
 from django.test import Client
 from pytest_django import Settings
 
-from leaderboard import ground_truth, queue, scoring
 from leaderboard.models import Edition, Evaluation, Submission, User
-from leaderboard.web import health as doors
+from leaderboard.scoring import worker
+from leaderboard.storage import truth_values
+from leaderboard.web import monitoring
+from leaderboard.workers import queue
 from tests import builders
 
 RNG = random.Random(0)
 
 
 @pytest.fixture
-def waiting(edition: Edition, owner: User, settings: Settings, tmp_path: Path) -> Submission:
-    """A submission that waits, and a broker that nobody else uses."""
-    settings.CELERY_BROKER_URL = "filesystem://"
-    settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"data_folder_out": str(tmp_path)}
-    doors.readiness.forget()
+def waiting(edition: Edition, owner: User) -> Submission:
+    """A submission that waits."""
+    monitoring.readiness.forget()
     return builders.submit(owner, builders.predictions(edition))
 
 
@@ -29,7 +29,7 @@ def take_away(settings: Settings) -> Path:
     """The private directory, somewhere else now."""
     aside = Path(settings.GROUND_TRUTH_DIR).with_name("elsewhere")
     shutil.move(settings.GROUND_TRUTH_DIR, aside)
-    ground_truth.load.cache_clear()
+    truth_values.load.cache_clear()
     return aside
 
 
@@ -43,10 +43,10 @@ def test_a_worker_without_ground_truth_claims_nothing_and_nobody_is_struck(
 ) -> None:
     aside = take_away(settings)
     for _ in range(20):
-        assert not scoring.run_next(rng=RNG)
+        assert not worker.run_next(rng=RNG)
     assert state(waiting) == ("QUEUED", 0, 0, 0)
     shutil.move(aside, settings.GROUND_TRUTH_DIR)
-    assert scoring.run_next(rng=RNG)
+    assert worker.run_next(rng=RNG)
     assert state(waiting) == ("SCORED", 1, 0, 0)
 
 
@@ -55,15 +55,15 @@ def test_a_worker_with_another_ground_truth_does_what_it_can(
 ) -> None:
     other = builders.import_truth(tmp_path, split="val", seed=1)
     builders.submit(owner, builders.predictions(other), split="val")
-    ground_truth.values_path(waiting.split.published_edition.ground_truth_id).unlink()
+    truth_values.values_path(waiting.split.published_edition.ground_truth_id).unlink()
     assert builders.score_all() == 1
     assert state(waiting) == ("QUEUED", 0, 0, 0)
 
 
 def test_what_a_process_holds_is_what_it_can_read(edition: Edition, settings: Settings) -> None:
-    assert ground_truth.held() == {edition.ground_truth_id}
+    assert truth_values.readable_digests() == {edition.ground_truth_id}
     take_away(settings)
-    assert ground_truth.held() == frozenset()
+    assert truth_values.readable_digests() == frozenset()
 
 
 @pytest.mark.django_db(transaction=True)
@@ -80,6 +80,6 @@ def test_the_sweep_says_so_in_the_log_and_readyz_to_whoever_watches(
 
 
 def readiness() -> tuple[int, bool]:
-    doors.readiness.forget()
+    monitoring.readiness.forget()
     response = Client().get("/readyz")
     return response.status_code, response.json()["checks"]["ground truth"]["ok"]

@@ -20,9 +20,12 @@ from django.utils import timezone
 from moto.server import ThreadedMotoServer
 from pytest_django import Settings
 
-from leaderboard import cleaning, files, s3, scoring
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from leaderboard.scoring import worker
+from leaderboard.storage import files, orphans, s3
 from tests import builders
+
+pytestmark = pytest.mark.slow
 
 BUCKET = "tsttc-test"
 
@@ -49,14 +52,16 @@ def bucket(server: str, monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     made.delete()
 
 
+def at(endpoint: str) -> dict[str, Any]:
+    """The setting of a store at this address."""
+    url = f"s3://{BUCKET}/files?endpoint={endpoint}"
+    return {"files": {"BACKEND": "leaderboard.storage.s3.S3FileStore", "OPTIONS": {"url": url}}}
+
+
 @pytest.fixture
 def stored(bucket: Any, server: str, settings: Settings) -> s3.S3FileStore:
     """The store that the application uses in this test."""
-    url = f"s3://{BUCKET}/files?endpoint={server}"
-    settings.STORAGES = {
-        **settings.STORAGES,
-        "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": url}},
-    }
+    settings.STORAGES = {**settings.STORAGES, **at(server)}
     found = files.store()
     assert isinstance(found, s3.S3FileStore)
     return found
@@ -66,11 +71,7 @@ def stored(bucket: Any, server: str, settings: Settings) -> s3.S3FileStore:
 def nobody_answers(stored: s3.S3FileStore, settings: Settings, monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on, nothing listens where the store should be."""
     monkeypatch.setattr(s3, "CONNECT_TIMEOUT_S", 0.2)
-    url = f"s3://{BUCKET}/files?endpoint=http://127.0.0.1:1"
-    settings.STORAGES = {
-        **settings.STORAGES,
-        "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": url}},
-    }
+    settings.STORAGES = {**settings.STORAGES, **at("http://127.0.0.1:1")}
 
 
 def _names(bucket: Any) -> list[str]:
@@ -112,8 +113,8 @@ def test_submission_is_scored_and_the_manifest_served_without_any_local_file(
 
 def test_same_bytes_are_one_object(stored: s3.S3FileStore, bucket: Any) -> None:
     upload = ContentFile(b'{"0": 1.5}', name="p.json")
-    first = files.keep_predictions(upload, now=timezone.now())
-    assert files.keep_predictions(upload, now=timezone.now()) == first
+    first = files.save_predictions(upload, now=timezone.now())
+    assert files.save_predictions(upload, now=timezone.now()) == first
     assert _names(bucket) == [f"files/{files.predictions_name(first.digest)}"]
     with files.opened_predictions(first.digest) as kept:
         assert kept.read() == b'{"0": 1.5}'
@@ -121,7 +122,7 @@ def test_same_bytes_are_one_object(stored: s3.S3FileStore, bucket: Any) -> None:
 
 def test_object_is_named_by_the_digest_of_what_it_holds(stored: s3.S3FileStore, bucket: Any) -> None:
     data = random.Random(1).randbytes(9_000_001)
-    kept = files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
+    kept = files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
     [entry] = bucket.objects.all()
     body = entry.get()["Body"].read()
     assert kept.size_bytes == len(body)
@@ -130,7 +131,7 @@ def test_object_is_named_by_the_digest_of_what_it_holds(stored: s3.S3FileStore, 
 
 def test_opened_file_has_a_descriptor_that_a_child_process_can_read(stored: s3.S3FileStore) -> None:
     data = b'{"0": 1.5}' * 1000
-    kept = files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
+    kept = files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
     with files.opened_predictions(kept.digest) as source:
         assert os.pread(source.fileno(), len(data) + 1, 0) == data
         assert os.lseek(source.fileno(), 0, os.SEEK_CUR) == 0, "a child reads from the start"
@@ -139,7 +140,7 @@ def test_opened_file_has_a_descriptor_that_a_child_process_can_read(stored: s3.S
 def test_many_threads_may_use_the_store_at_once(stored: s3.S3FileStore) -> None:
     def there_and_back(number: int) -> bool:
         data = f'{{"{number}": 1.5}}'.encode()
-        kept = files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
+        kept = files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
         with files.opened_predictions(kept.digest) as source:
             return source.read() == data
 
@@ -173,7 +174,7 @@ def test_upload_while_the_store_is_away_is_answered_503_and_leaves_no_row(
     response = _send(owner, b'{"0": 1.5}')
     assert response.status_code == 503
     assert response.json()["code"] == "store-unavailable"
-    assert "our fault" in response.json()["detail"]
+    assert "error on our side" in response.json()["detail"]
     assert int(response.headers["Retry-After"]) > 0
     assert "127.0.0.1:1/" not in response.text  # where the store is, is nobody's business
     assert not Submission.objects.exists()
@@ -208,7 +209,7 @@ def test_worker_without_its_store_blames_the_machine_and_tries_again(
     there = settings.STORAGES
     request.getfixturevalue("nobody_answers")
     settings.BACKOFF_S = 0.0
-    assert scoring.run_next(rng=random.Random(0))
+    assert worker.run_next(rng=random.Random(0))
     evaluation = Evaluation.objects.get()
     assert (evaluation.status, evaluation.n_infrastructure_strikes, evaluation.n_poison_strikes) == (
         Status.QUEUED,
@@ -266,13 +267,13 @@ def test_key_in_the_url_is_refused_and_not_repeated() -> None:
 
 
 def test_orphan_in_the_bucket_is_found_and_removed(stored: s3.S3FileStore, bucket: Any, db: None) -> None:
-    kept = files.keep_predictions(ContentFile(b'{"0": 1.5}', name="p.json"), now=timezone.now())
-    assert list(cleaning.orphans(now=timezone.now())) == []
+    kept = files.save_predictions(ContentFile(b'{"0": 1.5}', name="p.json"), now=timezone.now())
+    assert list(orphans.orphans(now=timezone.now())) == []
     in_two_days = timezone.now() + timedelta(days=2)
-    [orphan] = cleaning.orphans(now=in_two_days)
+    [orphan] = orphans.orphans(now=in_two_days)
     assert (orphan.digest, orphan.size_bytes) == (kept.digest, 10)
-    assert not cleaning.remove(orphan, now=timezone.now()), "written within the day"
-    assert cleaning.remove(orphan, now=in_two_days)
+    assert not orphans.remove(orphan, now=timezone.now()), "written within the day"
+    assert orphans.remove(orphan, now=in_two_days)
     assert _names(bucket) == []
 
 
@@ -281,5 +282,5 @@ def test_old_object_that_comes_again_is_written_again(stored: s3.S3FileStore, bu
     n_puts: list[int] = []
     stored._client.meta.events.register("before-call.s3.PutObject", lambda **_: n_puts.append(1))
     for later in (timedelta(0), timedelta(hours=1), timedelta(hours=13)):
-        files.keep_predictions(upload, now=timezone.now() + later)
+        files.save_predictions(upload, now=timezone.now() + later)
     assert len(n_puts) == 2

@@ -2,6 +2,8 @@
 
 import io
 import os
+import random
+import threading
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -13,9 +15,13 @@ from django.utils import timezone
 from pytest_django import Settings
 from structlog.testing import capture_logs
 
-from leaderboard import cleaning, files, health, metrics, tasks, upkeep
 from leaderboard.models import AuditEvent, Edition, IdempotencyKey, Submission, User
+from leaderboard.ops import prometheus
+from leaderboard.storage import files, orphans
+from leaderboard.workers import queue, upkeep
 from tests import builders
+
+pytestmark = pytest.mark.slow
 
 
 def clean(*arguments: str) -> str:
@@ -26,7 +32,7 @@ def clean(*arguments: str) -> str:
 
 
 def keep(data: bytes) -> files.StoredFile:
-    return files.keep_predictions(ContentFile(data, name="p.json"), now=timezone.now())
+    return files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
 
 
 def path_of(digest: str, settings: Settings) -> Path:
@@ -129,10 +135,10 @@ def test_row_that_came_meanwhile_saves_its_file(edition: Edition, owner: User, s
     path = path_of(keep(data).digest, settings)
     age(path, hours=48)
     now = timezone.now()
-    [found] = cleaning.orphans(now=now)
+    [found] = orphans.orphans(now=now)
     builders.submit(owner, data)
     age(path, hours=48)
-    assert not cleaning.remove(found, now=now)
+    assert not orphans.remove(found, now=now)
     assert path.exists()
 
 
@@ -160,7 +166,7 @@ def test_store_that_does_not_answer_is_said_in_a_sentence(db: None, settings: Se
     url = "s3://bucket?endpoint=http://127.0.0.1:1"
     settings.STORAGES = {
         **settings.STORAGES,
-        "files": {"BACKEND": "leaderboard.s3.S3FileStore", "OPTIONS": {"url": url}},
+        "files": {"BACKEND": "leaderboard.storage.s3.S3FileStore", "OPTIONS": {"url": url}},
     }
     with pytest.raises(CommandError, match="The file store does not answer: the file store does not answer"):
         clean()
@@ -170,21 +176,19 @@ def test_store_that_does_not_answer_is_said_in_a_sentence(db: None, settings: Se
 
 
 def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path, settings: Settings) -> None:
-    assert settings.CELERY_BEAT_SCHEDULE["clean"]["task"] == tasks.clean.name
-    health.record_sweep()
     incoming = Path(settings.FILES_DIR) / files.INCOMING
     incoming.mkdir(exist_ok=True)
     half = incoming / "tmpold"
     half.write_bytes(b'{"0": 1')
     age(half, hours=2)
     with capture_logs() as lines:
-        tasks.clean()
+        queue.clean_if_due(rng=random.Random(0), stopping=threading.Event())
     [line] = [line for line in lines if line["event"] == "cleaned"]
     assert (line["n_files"], line["n_bytes"], line["n_leftovers"], line["n_keys"]) == (1, 10, 1, 0)
     assert not orphan.exists()
     assert not half.exists()
     assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1
-    printed = metrics.exposition().decode()
+    printed = prometheus.exposition().decode()
     assert "tsttc_unnamed_files_removed_total 1.0" in printed
     assert "tsttc_unnamed_bytes_removed_total 10.0" in printed
     assert "tsttc_last_clean_age_seconds NaN" not in printed
@@ -192,8 +196,8 @@ def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path,
 
 def test_two_that_clean_at_once_remove_a_file_once(orphan: Path) -> None:
     now = timezone.now()
-    found = [list(cleaning.orphans(now=now)) for _ in range(2)]
-    assert [[cleaning.remove(row, now=now) for row in rows] for rows in found] == [[True], [False]]
+    found = [list(orphans.orphans(now=now)) for _ in range(2)]
+    assert [[orphans.remove(row, now=now) for row in rows] for rows in found] == [[True], [False]]
     assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1
 
 

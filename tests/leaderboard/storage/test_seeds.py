@@ -8,8 +8,9 @@ from pathlib import Path
 import pytest
 from django.core.management import call_command
 
-from leaderboard import inference, seeds
 from leaderboard.models import Comparison, Edition, Score, Split, Submission
+from leaderboard.scoring import confidence
+from leaderboard.storage import seeds
 from tests import builders
 
 
@@ -80,7 +81,7 @@ def test_the_secret_is_in_no_row_and_in_no_log(
     builders.infer_all()
     told = repr(list(Edition.objects.values())) + repr(list(Score.objects.values()))
     told += repr(list(Comparison.objects.values())) + "".join(capfd.readouterr())
-    for secret in (seeds.path().read_text().strip(), inference.seed_of(edition)):
+    for secret in (seeds.path().read_text().strip(), confidence.seed_of(edition)):
         assert secret not in told
 
 

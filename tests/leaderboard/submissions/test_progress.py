@@ -7,54 +7,53 @@ import pytest
 from django.db.models import F
 from django.utils import timezone
 
-from leaderboard import estimates, health, lifecycle, submissions
-from leaderboard.estimates import Evidence, Run
-from leaderboard.lifecycle import Strike
 from leaderboard.models import Edition, Evaluation, Status, SweepBeat, User
-from leaderboard.submissions import Progress
-from tests.leaderboard import queue_rows
+from leaderboard.ops import health
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import Strike
+from leaderboard.submissions import estimates, submissions
+from leaderboard.submissions.estimates import Evidence, RecentRun
+from leaderboard.submissions.submissions import Progress
+from tests.leaderboard.web.maintain import queue_rows
 
 NOW = datetime(2026, 11, 21, 12, 0, tzinfo=UTC)
 RNG = random.Random(0)
 
 
-def run(*, queued: float, started: float, finished: float) -> Run:
+def run(*, started: float, finished: float) -> RecentRun:
     """A run by seconds before now."""
-    return Run(*(NOW - timedelta(seconds=seconds) for seconds in (queued, started, finished)))
+    return RecentRun(*(NOW - timedelta(seconds=seconds) for seconds in (started, finished)))
 
 
-def alone(n: int, *, took_s: float, waited_s: float = 0.0) -> list[Run]:
-    """Runs that met nobody: each is queued long after the one before has ended."""
+def alone(n: int, *, took_s: float) -> list[RecentRun]:
+    """Runs that met nobody: each begins long after the one before has ended."""
     ends = [100.0 * (i + 1) for i in range(n)]
-    return [run(queued=end + took_s + waited_s, started=end + took_s, finished=end) for end in ends]
+    return [run(started=end + took_s, finished=end) for end in ends]
 
 
-def side_by_side(n_rounds: int, *, n_workers: int, took_s: float) -> list[Run]:
-    """Runs in rounds, as many at once as there are workers, all queued at the beginning."""
+def side_by_side(n_rounds: int, *, n_workers: int, took_s: float) -> list[RecentRun]:
+    """Runs in rounds, as many at once as there are workers."""
     begin = n_rounds * took_s
     return [
-        run(queued=begin, started=begin - i * took_s, finished=begin - (i + 1) * took_s)
+        run(started=begin - i * took_s, finished=begin - (i + 1) * took_s)
         for i in range(n_rounds)
         for _ in range(n_workers)
     ]
 
 
-def evidence(runs: list[Run], *, n_running: int = 0, is_alive: bool = True) -> Evidence:
+def evidence(runs: list[RecentRun], *, n_running: int = 0, is_alive: bool = True) -> Evidence:
     return Evidence(now=NOW, runs=runs, n_running=n_running, is_alive=is_alive)
 
 
 @pytest.mark.parametrize(
     ("runs", "n_running", "n_ahead", "expected_s"),
     [
-        # A free worker: only the claim and one's own run.
+        # A free worker: only one's own run.
         (alone(5, took_s=2.0), 0, 0, 2.0),
-        (alone(5, took_s=2.0, waited_s=0.5), 0, 0, 2.5),
         # One worker: those before it, one after the other.
         (alone(5, took_s=2.0), 1, 0, 4.0),
         (alone(5, took_s=2.0), 0, 3, 8.0),
         (alone(5, took_s=2.0), 1, 3, 10.0),
-        # A claim takes no time of its own where a worker just became free.
-        (alone(5, took_s=2.0, waited_s=0.5), 1, 3, 10.0),
         # Four workers seen at once: four times as quick, and nothing to wait for while one of them is free.
         (side_by_side(5, n_workers=4, took_s=2.0), 3, 0, 2.0),
         (side_by_side(5, n_workers=4, took_s=2.0), 4, 0, 2.5),
@@ -64,7 +63,7 @@ def evidence(runs: list[Run], *, n_running: int = 0, is_alive: bool = True) -> E
     ],
 )
 def test_estimate_follows_from_what_the_last_runs_show(
-    runs: list[Run], n_running: int, n_ahead: int, expected_s: float
+    runs: list[RecentRun], n_running: int, n_ahead: int, expected_s: float
 ) -> None:
     found_s = estimates.wait_s(evidence(runs, n_running=n_running), n_ahead=n_ahead)
     assert found_s == pytest.approx(expected_s)
@@ -83,18 +82,11 @@ def test_next_try_is_not_promised_before_it_is_due() -> None:
     assert estimates.wait_s(evidence(alone(5, took_s=2.0)), n_ahead=0, due_in_s=30.0) == pytest.approx(32.0)
 
 
-def test_wait_for_a_claim_is_told_by_those_who_met_a_free_worker() -> None:
-    # With the broker away workers look every few seconds; behind others it is the queue that is waited for.
-    free = alone(3, took_s=1.0, waited_s=4.0)
-    queued_together = [run(queued=9, started=9 - i, finished=8 - i) for i in range(8)]
-    assert estimates.claim_s([*free, *queued_together], n_workers=1) == pytest.approx(4.0, abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("elapsed_s", "left_s"), [(0.0, 4.0), (1.5, 2.5), (5.0, 1.0), (6.0, None), (60.0, None)]
 )
 def test_rest_of_a_run_is_what_longer_runs_took_beyond(elapsed_s: float, left_s: float | None) -> None:
-    runs = [run(queued=took_s, started=took_s, finished=0) for took_s in (2.0, 4.0, 6.0)]
+    runs = [run(started=took_s, finished=0) for took_s in (2.0, 4.0, 6.0)]
     assert estimates.left_s(evidence(runs), elapsed_s=elapsed_s) == (left_s and pytest.approx(left_s))
 
 
@@ -131,7 +123,7 @@ def test_one_that_waits_for_another_try_is_in_nobodys_way(edition: Edition, owne
     queue_rows.queued(edition, owner)
     second = queue_rows.queued(edition, owner)
     assert progress(second).n_ahead == 1
-    lifecycle.give_back(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
+    lifecycle.fail_attempt(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
     assert progress(second).n_ahead == 0
 
 
@@ -217,7 +209,7 @@ def test_rejected_is_the_files_fault(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.REJECTED)
     rejected = progress(row)
-    assert rejected.sentence == "The file is at fault: it has a problem, so nothing of it was scored."
+    assert rejected.sentence == "The file is at fault: it has a problem, so it was not scored."
     assert not rejected.fault_is_ours
 
 
@@ -232,11 +224,11 @@ def test_system_error_is_our_fault(edition: Edition, owner: User, strike: Strike
     row = queue_rows.queued(edition, owner)
     for _ in range(n_tries):
         queue_rows.make_due()
-        lifecycle.give_back(queue_rows.claim(), strike=strike, reason="secret detail", rng=RNG)
+        lifecycle.fail_attempt(queue_rows.claim(), strike=strike, reason="secret detail", rng=RNG)
     failed = progress(row)
     assert failed.state == Status.SYSTEM_ERROR
     assert failed.sentence.startswith(
-        f"The fault is ours, not the file's: scoring it failed {n_tries} times."
+        f"Scoring failed {n_tries} times because of a system error; the file is not at fault."
     )
     assert "secret detail" not in failed.sentence
     assert failed.fault_is_ours
@@ -245,12 +237,12 @@ def test_system_error_is_our_fault(edition: Edition, owner: User, strike: Strike
 def test_cancelled_was_its_teams_wish(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.cancel(submission=row.submission, actor=owner)
-    assert progress(row).sentence == "Its team cancelled it before it was scored."
+    assert progress(row).sentence == "The team cancelled the submission before it was scored."
 
 
 def test_try_that_failed_says_nothing_about_the_file(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
-    lifecycle.give_back(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
+    lifecycle.fail_attempt(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
     again = progress(row)
-    assert again.sentence.startswith("One try ended without a result. That says nothing of the file")
+    assert again.sentence.startswith("One try ended without a result; the file may be fine.")
     assert not again.fault_is_ours

@@ -1,5 +1,6 @@
 """A refused upload leaves no file, and takes nobody else's away: equal bytes are one file."""
 
+import os
 import random
 from collections.abc import Callable, Iterator
 from datetime import timedelta
@@ -12,50 +13,43 @@ from django.core.files.base import ContentFile
 from django.db import connection
 from django.utils import timezone
 
-from leaderboard import cleaning, files, quotas, submissions, teams
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Split, Submission, User
-from leaderboard.texts import Refused
+from leaderboard.people import teams
+from leaderboard.quotas import quotas
+from leaderboard.storage import files, orphans
 from tests import builders
 from tests.interlocking import Meeting
-from tests.leaderboard.test_races import at_once
-from tests.services import crowd_on_postgres
+from tests.leaderboard.db.test_races import at_once
+from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
 DATA = b'{"0": 1.5}'
-on_postgresql = [
-    pytest.mark.services,
-    pytest.mark.skipif(
-        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
-    ),
-]
 
 
 class Meanwhile(ContentFile):  # type: ignore[type-arg]  # of bytes
-    """An upload during which something else happens: once it is read, and before anything is locked."""
+    """An upload during which something else happens: once it is admitted, and before anything is locked."""
 
     def __init__(self, data: bytes, deed: Callable[[], object]) -> None:
         super().__init__(data, name="p.json")
-        self._deeds = [deed]
+        # It is read twice: to be hashed, and to be stored.
+        self._deeds = [deed, lambda: None]
 
     def chunks(self, chunk_size: int | None = None) -> Iterator[Any]:
         """The bytes, after the deed."""
-        while self._deeds:
+        if self._deeds:
             self._deeds.pop()()
         return super().chunks(chunk_size)
 
 
-def send(user: User, upload: "ContentFile[Any]", *, method: str = "Foo") -> submissions.Submitted:
-    return submissions.submit(
-        user=user,
-        split_name="test",
-        method_name=method,
-        upload=upload,
-        via=Submission.Via.API,
-        now=timezone.now(),
-    )
-
-
 def file_of(data: bytes) -> ContentFile:  # type: ignore[type-arg]  # of bytes
     return ContentFile(data, name="p.json")
+
+
+def age(data: bytes) -> None:
+    """Make the file, if it is stored, so old that whoever sends it writes it again."""
+    path = Path(files.store().path(files.predictions_name(files.measure(file_of(data)).digest)))
+    if path.exists():
+        os.utime(path, (0, 0))
 
 
 def stored(tmp_path: Path) -> list[str]:
@@ -71,9 +65,9 @@ def test_a_file_whose_slot_was_taken_meanwhile_is_not_kept(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
     one_slot()
-    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first")))
+    upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first")))
     with pytest.raises(quotas.QuotaExceeded):
-        send(owner, upload)
+        builders.send(owner, upload)
     [first] = Submission.objects.all()
     assert stored(tmp_path) == [first.digest]
 
@@ -81,9 +75,9 @@ def test_a_file_whose_slot_was_taken_meanwhile_is_not_kept(
 def test_a_file_whose_name_was_taken_meanwhile_is_not_kept(
     edition: Edition, owner: User, tmp_path: Path
 ) -> None:
-    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first"), method="Foo"))
+    upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first"), method="Foo"))
     with pytest.raises(Refused, match="looks like"):
-        send(owner, upload, method="F0o")
+        builders.send(owner, upload, method="F0o")
     [first] = Submission.objects.all()
     assert stored(tmp_path) == [first.digest]
 
@@ -92,10 +86,11 @@ def test_a_refused_file_that_a_submission_names_stays(
     edition: Edition, owner: User, stranger: User, tmp_path: Path
 ) -> None:
     one_slot()
-    theirs = send(stranger, file_of(DATA)).submission
-    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first")))
+    theirs = builders.send(stranger, file_of(DATA)).submission
+    age(DATA)
+    upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first")))
     with pytest.raises(quotas.QuotaExceeded):
-        send(owner, upload)
+        builders.send(owner, upload)
     assert theirs.digest in stored(tmp_path)
 
 
@@ -113,7 +108,7 @@ def test_a_file_that_is_removed_before_its_row_is_written_is_kept_again(
 
     removed: list[bytes] = []
     with connection.execute_wrapper(remove):
-        sent = send(owner, file_of(DATA)).submission
+        sent = builders.send(owner, file_of(DATA)).submission
     assert removed
     assert stored(tmp_path) == [sent.digest]
 
@@ -122,25 +117,24 @@ def test_a_store_that_does_not_answer_does_not_hide_the_refusal(
     edition: Edition, owner: User, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     one_slot()
-    upload = Meanwhile(DATA, lambda: send(owner, file_of(b"first")))
+    upload = Meanwhile(DATA, lambda: builders.send(owner, file_of(b"first")))
 
     def fail(self: object, name: str) -> None:
         raise files.StoreAway("away")
 
     monkeypatch.setattr(files.DurableFileSystemStorage, "delete", fail)
     with pytest.raises(quotas.QuotaExceeded):
-        send(owner, upload)
+        builders.send(owner, upload)
     assert len(stored(tmp_path)) == 2, "the cleaning finds it in a day"
 
 
 # --- at the same moment ----------------------------------------------------------------------------------
 
 
-@pytest.mark.django_db(transaction=True)
 class TestAtOnce:
     """On PostgreSQL, where several write at once."""
 
-    pytestmark = on_postgresql
+    pytestmark = ON_POSTGRESQL
 
     def test_of_a_burst_the_one_that_was_taken_leaves_a_file(
         self, edition: Edition, owner: User, tmp_path: Path
@@ -150,7 +144,7 @@ class TestAtOnce:
 
         def sent(number: int) -> bool:
             try:
-                return send(owner, file_of(random.Random(number).randbytes(1000))).is_new
+                return builders.send(owner, file_of(random.Random(number).randbytes(1000))).is_new
             except quotas.QuotaExceeded:
                 return False
 
@@ -173,7 +167,7 @@ class TestAtOnce:
                 data = b"%d" % number
                 deeds: dict[str, Callable[[], object]] = {
                     "refused": partial(refused, owner, data),
-                    "accepted": partial(send, stranger, file_of(data)),
+                    "accepted": partial(builders.send, stranger, file_of(data)),
                 }
                 first, second = deeds.pop(held), *deeds.values()
                 outcome = meeting.of(first, second, at=partial(is_number, number))
@@ -191,15 +185,16 @@ def is_number(wanted: int, found: int, sql: str) -> bool:
 
 def refused(user: User, data: bytes) -> None:
     """Send a file that is refused once it is stored, since its method's name looks like another one."""
+    age(data)
     name = f"Bar {data.decode()}"
-    meanwhile = Meanwhile(data, lambda: send(user, file_of(b"other" + data), method=name))
+    meanwhile = Meanwhile(data, lambda: builders.send(user, file_of(b"other" + data), method=name))
     with pytest.raises(Refused, match="looks like"):
-        send(user, meanwhile, method=name.replace("a", "а"))
+        builders.send(user, meanwhile, method=name.replace("a", "а"))
 
 
 def test_old_files_are_cleaned_by_the_same_rule(edition: Edition, owner: User, tmp_path: Path) -> None:
     """What `cleaning.remove` does is proved in test_clean_files.py; that it takes the same lock, here."""
-    kept = files.keep_predictions(file_of(DATA), now=timezone.now())
-    orphan = cleaning.Orphan(files.predictions_name(kept.digest), kept.digest, 10, timezone.now())
-    assert cleaning.remove(orphan, now=timezone.now() + timedelta(days=2))
+    kept = files.save_predictions(file_of(DATA), now=timezone.now())
+    orphan = orphans.Orphan(files.predictions_name(kept.digest), kept.digest, 10, timezone.now())
+    assert orphans.remove(orphan, now=timezone.now() + timedelta(days=2))
     assert stored(tmp_path) == []

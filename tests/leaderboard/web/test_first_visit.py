@@ -4,11 +4,14 @@ import gzip
 import re
 from pathlib import Path
 
+import pytest
 from django.contrib.staticfiles import finders
 from django.test import Client
 
 from leaderboard.models import Edition, User
 from tests import board_rows
+
+pytestmark = pytest.mark.slow
 
 MAX_BYTES = 100_000
 

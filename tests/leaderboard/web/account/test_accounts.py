@@ -1,13 +1,10 @@
 """What strangers can learn from, send in the name of, or do to the accounts of others."""
 
 import re
-from collections.abc import Iterator
 from typing import Any, ClassVar
 
-import pytest
 from django.contrib.auth.hashers import MD5PasswordHasher
 from django.core import mail
-from django.core.cache import cache
 from django.test import Client
 from pytest_django import Settings
 
@@ -15,14 +12,6 @@ from leaderboard.models import User
 
 OLD_PASSWORD, PASSWORD = "correct horse", "kestrel-altimeter-9"
 ATTACKER, HOME, ELSEWHERE = "203.0.113.9", "198.51.100.7", "192.0.2.3"
-
-
-@pytest.fixture(autouse=True)
-def forgiven(db: None) -> Iterator[None]:
-    """Nobody is remembered for what other tests tried."""
-    cache.clear()
-    yield
-    cache.clear()
 
 
 def sign_in(user: User, password: str, *, address: str) -> bool:

@@ -3,29 +3,23 @@
 from pathlib import Path
 
 import pytest
-from django.db import connection
 from django.test import Client
-from django.test.utils import CaptureQueriesContext
 from django.urls import reverse
 
-from leaderboard import teams
-from leaderboard.models import Edition, Method, PublishedResult, Split, User, Visibility
-from leaderboard.web.kept import memory
+from leaderboard.models import Edition, PublishedResult, Split, User
+from leaderboard.people import teams
 from tests import builders, pages
+from tests.pages import get
 
-RANK, METHOD, TEAM, DATE, MID = range(5)
-N_COLUMNS = 15
+pytestmark = pytest.mark.slow
+
+RANK, METHOD, MID = range(3)
+N_COLUMNS = 12
 ISSUE_COLUMNS = [
-    *("Rank", "Method", "Team", "Date"),
-    *("MiD", "MiDc", "MiDs", "MiDl", "MiDn"),
-    *("RTE", "RTEc", "RTEs", "RTEl", "RTEn"),
+    *("Rank", "Method"),
+    *("MiD", "0–3 s", "3–6 s", "6–20 s", "−20–0 s"),
+    *("RTE", "0–3 s", "3–6 s", "6–20 s", "−20–0 s"),
 ]
-
-
-def get(client: Client, address: str = "/board/test/") -> pages.Element:
-    response = client.get(address)
-    assert response.status_code == 200
-    return pages.page(response)
 
 
 def row_of(root: pages.Element, name: str) -> pages.Element:
@@ -34,11 +28,13 @@ def row_of(root: pages.Element, name: str) -> pages.Element:
 
 
 def test_columns_are_the_papers_in_its_order(client: Client, benchmark: None) -> None:
-    *heads, attempts = get(client).one("thead").all("tr")[1].all("th")
-    assert attempts.text == "Attempts"
-    assert [head.one("a").children[0].text if head.one("a").children else head.text for head in heads] == (
-        ISSUE_COLUMNS
-    )
+    heads = [head.all("a") for head in get(client).one("thead").all("tr")[1].all("th")]
+    named = [link.children[0].text if link.children else link.text for link, *_ in heads]
+    assert named == ISSUE_COLUMNS
+    assert [link.text for link in heads[METHOD]] == ["Method", "Team", "Date"]
+    assert [link.one("span", class_="caption").text for (link,) in heads[MID:]] == 2 * [
+        *("overall", "crucial", "small", "large", "negative")
+    ]
 
 
 def test_home_is_the_test_board(client: Client, benchmark: None) -> None:
@@ -49,8 +45,8 @@ def test_published_numbers_stand_as_printed(client: Client, benchmark: None) -> 
     first = pages.board_rows(get(client))[0]
     assert first[RANK] == "1"
     assert first[METHOD].startswith("Deep Scale")
-    assert first[TEAM:MID] == ["Shi et al.", "2023"]
-    assert first[MID:-1] == ["14.8", "27.6", "15.6", "11.5", "13.7", "12.3", "6.5", "8.8", "13.1", "15.0"]
+    assert "Shi et al. 2023" in first[METHOD]
+    assert first[MID:] == ["14.8", "27.6", "15.6", "11.5", "13.7", "12.3", "6.5", "8.8", "13.1", "15.0"]
 
 
 def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, benchmark: None) -> None:
@@ -87,20 +83,13 @@ def test_submitted_values_have_the_decimals_of_their_edition(
     Split.objects.filter(pk="test").update(decimals=decimals)
     builders.submit(owner, builders.predictions(builders.import_truth(tmp_path)), method="Foo")
     builders.score_all()
-    cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:-1]
+    cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:]
     assert all(len(cell.partition(".")[2]) == decimals for cell in cells), cells
 
 
 def test_values_of_fewer_decimals_keep_the_room_of_the_missing_one(client: Client, benchmark: None) -> None:
-    cells = row_of(get(client), "SOT").all("td")[3:-1]
+    cells = row_of(get(client), "SOT").all("td")[1:]
     assert all("d1" in cell.classes for cell in cells)
-
-
-def test_equal_values_share_a_rank(client: Client, edition: Edition, owner: User, stranger: User) -> None:
-    for user in (owner, stranger):
-        builders.submit(user, builders.predictions(edition, factor=1.01), method=f"Of {user.name}")
-    builders.score_all()
-    assert pages.column(get(client), RANK)[:3] == ["1", "1", "3"]
 
 
 def test_best_and_second_are_marked_for_eye_and_ear(client: Client, benchmark: None) -> None:
@@ -116,18 +105,6 @@ def test_best_and_second_are_marked_for_eye_and_ear(client: Client, benchmark: N
     first = row_of(root, "Deep Scale")
     assert first.all("td", class_="primary")[0].text == "14.8 best"
     assert row_of(root, "Deep Scale (NeRF)").all("td", class_="primary")[0].text == "14.9 second"
-
-
-@pytest.mark.parametrize("name", ["mid", "mid_crucial", "rte", "rte_negative"])
-def test_every_number_sorts_both_ways(client: Client, benchmark: None, name: str) -> None:
-    index = MID + ["mid", "mid_crucial", "mid_small", "mid_large", "mid_negative", "rte"].index("rte") * (
-        name.startswith("rte")
-    )
-    index += {"": 0, "crucial": 1, "negative": 4}[name.partition("_")[2]]
-    up = [float(value) for value in pages.column(get(client, f"/?sort={name}"), index)]
-    down = [float(value) for value in pages.column(get(client, f"/?sort=-{name}"), index)]
-    assert up == sorted(up)
-    assert down == sorted(down, reverse=True)
 
 
 def test_sorting_keeps_the_ranks(client: Client, benchmark: None) -> None:
@@ -147,8 +124,8 @@ def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) 
 
 
 def test_the_newest_come_first_when_sorting_by_date(client: Client, benchmark: None) -> None:
-    date = get(client).one("thead").one("th", class_="date")
-    assert date.one("a").attributes["href"] == "?sort=-date"
+    (date,) = [link for link in get(client).one("thead").all("a") if link.text == "Date"]
+    assert date.attributes["href"] == "?sort=-date"
 
 
 @pytest.mark.parametrize("sort", ["nothing", "mid;drop", "--mid", "-", "<script>alert(1)</script>"])
@@ -161,10 +138,6 @@ def test_sorting_by_no_column_is_a_clear_400(client: Client, benchmark: None, so
     assert b"<script>alert" not in response.content
 
 
-def test_unknown_split_is_a_404(client: Client, benchmark: None) -> None:
-    assert client.get("/board/nowhere/").status_code == 404
-
-
 def test_split_without_ground_truth_says_that_it_is_not_open(client: Client, benchmark: None) -> None:
     root = get(client, "/board/val/")
     assert "not open yet" in root.one("main").text
@@ -173,7 +146,7 @@ def test_split_without_ground_truth_says_that_it_is_not_open(client: Client, ben
 
 def test_open_split_without_submissions_says_how_to_be_the_first(client: Client, edition: Edition) -> None:
     notice = get(client).one("p", class_="notice")
-    assert "Nobody has submitted to test yet" in notice.text
+    assert "test has no submissions yet" in notice.text
     assert notice.one("a").attributes["href"] == "/submit/?split=test"
 
 
@@ -186,48 +159,39 @@ def test_board_without_any_row_has_no_empty_table(client: Client, benchmark: Non
 
 def test_demo_says_that_its_truth_is_simulated(client: Client, tmp_path: Path, benchmark: None) -> None:
     builders.import_truth(tmp_path, split="demo")
-    assert "Simulated ground truth" in get(client, "/board/demo/").one("main").text
+    assert "Simulated data" in get(client, "/board/demo/").one("main").text
     assert "Simulated" not in get(client, "/board/test/").one("main").text
 
 
 def test_head_line_names_sequences_edition_digest_and_protocol(client: Client, edition: Edition) -> None:
     facts = get(client).one("p", class_="facts")
     assert f"{builders.N_SEQUENCES} sequences" in facts.text
-    assert f"edition 1 ({edition.ground_truth.short_digest})" in facts.text
-    assert "tsttc-1" in facts.text
+    assert f"edition 1 ground truth {edition.ground_truth.short_digest}" in facts.text
+    assert "protocol tsttc-1" in facts.text
     assert "updated" in facts.text
     assert reverse("manifest", args=["test"]) in [a.attributes["href"] for a in facts.all("a")]
 
 
 def test_split_tabs_mark_the_current_one(client: Client, benchmark: None) -> None:
     tabs = get(client, "/board/val/").one("nav", class_="splits").all("a")
-    assert [tab.text for tab in tabs] == ["test", "val", "demo"]
-    assert [tab.text for tab in tabs if "aria-current" in tab.attributes] == ["val"]
+    assert [tab.text for tab in tabs] == ["Test", "Validation", "Demo"]
+    assert [tab.text for tab in tabs if "aria-current" in tab.attributes] == ["Validation"]
 
 
-def test_my_teams_rows_are_marked_for_my_team_alone(
+def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_alone(
     client: Client, edition: Edition, owner: User, teammate: User, stranger: User
 ) -> None:
-    builders.submit(owner, builders.predictions(edition), method="Foo")
+    for name, factor, visibility in (("Foo", 1.1, "PUBLIC"), ("Secret", 1.2, "PRIVATE")):
+        data = builders.predictions(edition, factor=factor)
+        builders.submit(owner, data, method=name, visibility=visibility)
     builders.score_all()
-    marked = {}
+    assert b"Secret" not in client.get("/").content
+    seen = {}
     for user in (owner, teammate, stranger):
         client.force_login(user)
-        marked[user.name] = "mine" in row_of(get(client), "Foo").classes
-    assert marked == {"Owls": True, "Mate": True, "Strangers": False}
-
-
-def test_private_method_stands_on_its_own_teams_board_only(
-    client: Client, edition: Edition, owner: User, stranger: User
-) -> None:
-    builders.submit(owner, builders.predictions(edition), method="Secret")
-    builders.score_all()
-    Method.objects.update(visibility=Visibility.PRIVATE)
-    assert b"Secret" not in client.get("/").content
-    client.force_login(stranger)
-    assert b"Secret" not in client.get("/").content
-    client.force_login(owner)
-    assert "private" in row_of(get(client, "/"), "Secret").text
+        root = get(client)
+        seen[user.name] = "mine" in row_of(root, "Foo").classes, "private" in root.one("tbody").text
+    assert seen == {"Owls": (True, True), "Mate": (True, True), "Strangers": (False, False)}
 
 
 def test_names_are_text_never_markup(client: Client, edition: Edition, owner: User) -> None:
@@ -257,23 +221,11 @@ def test_interval_without_sequences_has_a_dash(client: Client, benchmark: None) 
     assert pages.board_rows(get(client))[3][MID + 1] == "–"
 
 
-def test_number_of_queries_does_not_grow_with_the_board(
-    client: Client, edition: Edition, owner: User
-) -> None:
-    counts = []
-    for i in range(3):
-        builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10), method=f"Foo {i}")
-        builders.score_all()
-        client.get("/")  # whoever finds a changed board draws it, for all who follow
-        memory.clear()
-        with CaptureQueriesContext(connection) as captured:
-            client.get("/")
-        counts.append(len(captured))
-    assert len(set(counts)) == 1, counts
-    assert counts[0] <= 3
-
-
 def test_splits_are_listed_in_their_order(client: Client, benchmark: None) -> None:
     Split.objects.filter(pk="demo").update(position=0)
     Split.objects.filter(pk="test").update(position=9)
-    assert [a.text for a in get(client).one("nav", class_="splits").all("a")] == ["demo", "val", "test"]
+    assert [a.text for a in get(client).one("nav", class_="splits").all("a")] == [
+        "Demo",
+        "Validation",
+        "Test",
+    ]

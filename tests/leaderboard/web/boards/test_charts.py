@@ -1,48 +1,97 @@
-"""The page of a board's charts, and the closer look at a submission to an open split."""
+"""The page of a board's charts, and the charts of an error analysis."""
 
+import json
+import re
 from datetime import timedelta
 from pathlib import Path
+from typing import Any
 
 import pytest
 from django.test import Client
 
-from leaderboard.models import Edition, Method, Split, Submission, User
+from leaderboard.models import Comparison, Edition, Method, Split, Submission, User
 from tests import builders, pages
+from tests.pages import get
+
+pytestmark = pytest.mark.slow
 
 
-def get(client: Client, address: str, status: int = 200) -> pages.Element:
-    response = client.get(address)
-    assert response.status_code == status
-    return pages.page(response)
+def rows(client: Client, chart: str) -> list[list[str]]:
+    """The table behind a chart of the test board, as texts."""
+    figure = get(client, "/board/test/charts/").one("figure", **{"data-chart": chart})
+    return [[cell.text for cell in row.all("td")] for row in figure.one("tbody").all("tr")]
 
 
-def test_every_chart_has_its_drawing_and_the_table_behind_it(
+def options_of(figure: pages.Element) -> Any:
+    """What the script draws, as ECharts takes it."""
+    return json.loads(figure.one("script").raw_text)["baseOption"]
+
+
+def test_every_chart_has_its_options_and_the_table_with_the_same_numbers(
     client: Client, entries: list[Submission]
 ) -> None:
     builders.infer_all()
     root = get(client, "/board/test/charts/")
-    for figure in root.all("figure"):
-        assert figure.one("div", class_="panels").all("svg")
-        for drawing in figure.one("div", class_="panels").all("svg"):
-            assert drawing.attributes["role"] == "img"
-            assert "the table below says the same" in drawing.attributes["aria-label"]
-        assert figure.one("tbody").all("tr")
     assert [figure.attributes["data-chart"] for figure in root.all("figure")] == [
         "progress",
         "latency",
         "profile",
+        "significance",
     ]
+    for figure in root.all("figure"):
+        assert figure.one("div", class_="drawing").attributes["role"] == "img"
+        assert figure.one("div", class_="drawing").attributes["aria-label"].endswith(".")
+        told = read_numbers(options_of(figure))
+        assert told
+        shown = {number for cell in figure.all("td") for number in NUMBER.findall(cell.text)}
+        assert told <= shown, figure.attributes["data-chart"]
+
+
+NUMBER = re.compile(r"\d+\.\d+")
+
+
+def read_numbers(options: Any) -> set[str]:
+    """Every number with a point that a reader of the marks is told."""
+    lines = [
+        line
+        for series in options["series"]
+        for mark in series["data"]
+        if "read" in mark
+        for line in mark["read"]
+    ]
+    return {number for line in lines for number in NUMBER.findall(line)}
+
+
+def test_no_option_is_finer_than_the_values_of_the_edition(
+    client: Client, edition: Edition, entries: list[Submission]
+) -> None:
+    builders.infer_all()
+    for figure in get(client, "/board/test/charts/").all("figure"):
+        for series in options_of(figure)["series"]:
+            for item in series["data"]:
+                for value in item["value"][1:] if isinstance(item, dict) else item[1:]:
+                    assert round(value, edition.decimals) == value
 
 
 def test_the_best_so_far_only_falls(client: Client, entries: list[Submission]) -> None:
-    rows = (
-        get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"}).one("tbody").all("tr")
-    )
-    values = [float(row.attributes["data-y"]) for row in rows]
-    marked = [value for value, row in zip(values, rows, strict=True) if "data-marked" in row.attributes]
+    found = rows(client, "progress")
+    marked = [float(row[3]) for row in found if row[4] == "yes"]
     assert marked == sorted(set(marked), reverse=True)
-    assert marked[-1] == min(values)
-    assert [row.attributes["data-x"] for row in rows] == sorted(row.attributes["data-x"] for row in rows)
+    assert marked[-1] == min(float(row[3]) for row in found)
+    assert [row[0][:4] for row in found] == sorted(row[0][:4] for row in found)
+
+
+def test_the_options_of_the_progress_are_those_of_the_page(client: Client, entries: list[Submission]) -> None:
+    figure = get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"})
+    assert client.get("/board/test/charts/progress.json").json()["baseOption"] == options_of(figure)
+    assert client.get("/board/nowhere/charts/progress.json").status_code == 404
+
+
+def test_marks_lead_to_their_methods(client: Client, entries: list[Submission]) -> None:
+    figure = get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"})
+    marks = [mark for series in options_of(figure)["series"] for mark in series["data"] if "read" in mark]
+    links = {mark["href"] for mark in marks if "href" in mark}
+    assert links == {f"/methods/{entry.method_id}/" for entry in entries}
 
 
 def test_every_attempt_has_its_own_day_in_the_table(
@@ -53,10 +102,7 @@ def test_every_attempt_has_its_own_day_in_the_table(
     first.save(update_fields=["submitted_at"])
     later = builders.submit(owner, builders.predictions(edition, factor=1.9), method=method.name)
     builders.score_all()
-    rows = (
-        get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"}).one("tbody").all("tr")
-    )
-    days = [row.all("td")[0].text for row in rows if row.all("td")[1].text == method.name]
+    days = [row[0] for row in rows(client, "progress") if row[1] == method.name]
     assert days == [f"{attempt.submitted_at:%Y-%m-%d}" for attempt in (first, later)]
 
 
@@ -64,18 +110,16 @@ def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[S
     for latency_ms, entry in zip((40.0, 3.0, 12.0, 1.0), entries, strict=True):
         Method.objects.filter(pk=entry.method_id).update(latency_ms=latency_ms, hardware="one GPU")
     builders.board_changed("test")
-    rows = (
-        get(client, "/board/test/charts/").one("figure", **{"data-chart": "latency"}).one("tbody").all("tr")
-    )
-    points = [(float(row.attributes["data-x"]), float(row.attributes["data-y"])) for row in rows]
-    front = [p for p, row in zip(points, rows, strict=True) if "data-marked" in row.attributes]
+    found = rows(client, "latency")
+    points = [(float(row[2]), float(row[4])) for row in found]
+    front = [point for point, row in zip(points, found, strict=True) if row[5] == "yes"]
     assert front == [p for p in points if not any(q != p and q[0] <= p[0] and q[1] <= p[1] for q in points)]
 
 
 def test_a_board_with_nothing_to_draw_says_so_and_has_no_empty_chart(client: Client, benchmark: None) -> None:
     root = get(client, "/board/demo/charts/")
     assert root.all("figure") == []
-    assert "There is nothing to draw yet" in root.one("main").text
+    assert "There are no results on demo yet." in root.one("main").text
     assert client.get("/board/nowhere/charts/").status_code == 404
 
 
@@ -88,6 +132,48 @@ def test_private_methods_are_in_no_chart_not_even_their_teams(
     assert b"Secret" not in before
     client.force_login(owner)
     assert b"Secret" not in client.get("/board/test/charts/").content
+
+
+# --- significance ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def compared(entries: list[Submission]) -> list[Submission]:
+    """Entries that may be compared though they are of one team: the labels of their split are open."""
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    builders.infer_all()
+    return entries
+
+
+def test_first_rows_are_compared_once_somebody_looks(client: Client, compared: list[Submission]) -> None:
+    assert Comparison.objects.count() == 0
+    assert {row[2] for row in rows(client, "significance")} == {"being computed"}
+    n_pairs = len(compared) * (len(compared) - 1) // 2
+    assert Comparison.objects.filter(computed_at=None).count() == n_pairs
+    builders.infer_all()
+    found = rows(client, "significance")
+    assert len(found) == n_pairs
+    assert all(float(row[2].replace("−", "-")) <= 0 for row in found)
+    client.get("/board/test/charts/")
+    assert Comparison.objects.count() == n_pairs
+
+
+def test_page_of_unfinished_comparisons_is_not_kept(client: Client, compared: list[Submission]) -> None:
+    before = client.get("/board/test/charts/")
+    builders.infer_all()
+    assert client.get("/board/test/charts/").content != before.content
+
+
+def test_pairs_that_are_withheld_show_their_published_difference_alone(
+    client: Client, edition: Edition, compared: list[Submission], owner: User
+) -> None:
+    builders.submit(owner, builders.predictions(edition, factor=1.02), method="X", visibility="ANONYMOUS")
+    builders.score_all()
+    client.get("/board/test/charts/")
+    builders.infer_all()
+    hidden = [row for row in rows(client, "significance") if "Anonymous" in f"{row[0]} {row[1]}"]
+    assert len(hidden) == len(compared)
+    assert {(row[3], row[4]) for row in hidden} == {("", "not compared")}
 
 
 # --- the closer look -------------------------------------------------------------------------------------
@@ -107,7 +193,7 @@ def test_team_looks_closer_at_what_it_sent_to_an_open_split(
 ) -> None:
     address = f"/submissions/{open_split.pk}/analysis/"
     client.force_login(teammate)
-    assert "is being made" in get(client, address).one("main").text
+    assert "is being computed" in get(client, address).one("main").text
     builders.infer_all()
     root = get(client, address)
     assert [figure.attributes["data-chart"] for figure in root.all("figure")] == [

@@ -1,18 +1,39 @@
-"""The API's reference."""
+"""The API reference."""
+
+import json
+import re
+from collections.abc import Iterator
 
 from django.test import Client
 from django.urls import reverse
 
 from evaluator.problems import PROBLEM_CODES
 from leaderboard.api import schema_views
-from leaderboard.problem_codes import API_CODES
-from tests import pages
+from leaderboard.errors.problem_codes import API_CODES
+from tests import openapi, pages
+
+
+def described() -> Iterator[tuple[str, dict[str, str]]]:
+    """Every object and operation of the recorded schema, and what its fields or parameters mean."""
+    schema = json.loads(openapi.GOLDEN.read_text(encoding="utf-8"))
+    for name, node in schema["components"]["schemas"].items():
+        fields = node.get("properties", {})
+        if not fields:
+            continue
+        yield f"shape-{name}", {field: words(fields[field]) for field in fields}
+    for methods in schema["paths"].values():
+        for operation in methods.values():
+            yield operation["operationId"], {p["name"]: words(p) for p in operation.get("parameters", [])}
+
+
+def words(node: dict[str, str]) -> str:
+    """A description as the page shows it: no backticks, and no choices that repeat their names."""
+    about = re.sub(r"^\* `([^`]+)` - \1$", "", node["description"], flags=re.MULTILINE)
+    return " ".join(about.replace("`", "").split())
 
 
 def get(client: Client) -> pages.Element:
-    response = client.get("/docs/api/")
-    assert response.status_code == 200
-    return pages.page(response)
+    return pages.get(client, "/docs/api/")
 
 
 def test_every_operation_of_the_schema_is_described(client: Client, benchmark: None) -> None:
@@ -21,6 +42,21 @@ def test_every_operation_of_the_schema_is_described(client: Client, benchmark: N
     assert described == {
         f"{method.upper()} {path}" for path, methods in schema["paths"].items() for method in methods
     }
+
+
+def test_every_field_and_parameter_is_on_the_page_with_its_description(
+    client: Client, benchmark: None
+) -> None:
+    root = get(client)
+    undescribed = []
+    for section, fields in described():
+        shown = {
+            cells[0].text: cells[2].text
+            for row in root.one("section", **{"aria-labelledby": section}).all("tr")
+            if (cells := row.all("td"))
+        }
+        undescribed += [f"{section}: {name}" for name, about in fields.items() if shown.get(name) != about]
+    assert undescribed == []
 
 
 def test_schema_comes_as_yaml_or_json_and_is_described_once(client: Client, benchmark: None) -> None:
@@ -36,7 +72,7 @@ def test_schema_comes_as_yaml_or_json_and_is_described_once(client: Client, benc
     assert schema_views._written.cache_info().misses == n_made
 
 
-def test_links_between_shapes_lead_somewhere(client: Client, benchmark: None) -> None:
+def test_links_between_objects_lead_somewhere(client: Client, benchmark: None) -> None:
     root = get(client)
     ids = {e.attributes["id"] for e in root.everything() if "id" in e.attributes}
     wanted = {a.attributes["href"][1:] for a in root.all("a") if a.attributes["href"].startswith("#")}

@@ -4,7 +4,7 @@ from django.test import Client
 
 from leaderboard.models import Split
 from tests import pages
-from tests.leaderboard.test_pages_everywhere import assert_sound
+from tests.leaderboard.web.test_every_page import assert_sound
 
 HUB, OPEN = "/maintain/", "/maintain/test/open/"
 FIRST, SECOND = "/maintain/test/editions/1/", "/maintain/test/editions/2/"

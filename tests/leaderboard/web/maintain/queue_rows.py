@@ -9,9 +9,10 @@ from django.db.models import F
 from django.db.models.functions import Now
 from django.utils import timezone
 
-from leaderboard import lifecycle, teams
-from leaderboard.lifecycle import Lease, Outcome, Strike
 from leaderboard.models import Edition, Evaluation, Method, Score, Status, Submission, User
+from leaderboard.people import teams
+from leaderboard.scoring import lifecycle
+from leaderboard.scoring.lifecycle import Lease, Outcome, Strike
 
 LEASE_S = 60.0
 WALL_S = 300.0
@@ -79,9 +80,18 @@ def row(lease: Lease) -> Evaluation:
     return Evaluation.objects.get(pk=lease.evaluation_id)
 
 
-def give_back(lease: Lease, strike: Strike = Strike.INFRASTRUCTURE) -> Status:
+def give_back(
+    lease: Lease, strike: Strike = Strike.INFRASTRUCTURE, *, reason: str = "the disk failed"
+) -> Status:
     """End a run without a result; the state it left."""
-    return lifecycle.give_back(lease, strike=strike, reason="the disk failed", rng=random.Random(0))
+    return lifecycle.fail_attempt(lease, strike=strike, reason=reason, rng=random.Random(0))
+
+
+def strike_out(*, reason: str = "signal 9") -> None:
+    """Let what is the next in line stop its reader until it is a system error."""
+    for _ in range(lifecycle.MAX_POISON_STRIKES):
+        make_due()
+        give_back(claim(), Strike.POISON, reason=reason)
 
 
 def stale(lease: Lease) -> dict[str, Lease]:

@@ -1,6 +1,5 @@
 """The queue as maintainers see it: what failed by our fault, what runs, what waits, and retrying."""
 
-import random
 from datetime import timedelta
 from uuid import UUID, uuid4
 
@@ -10,8 +9,6 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
-from leaderboard import health, lifecycle
-from leaderboard.lifecycle import Strike
 from leaderboard.models import (
     AuditEvent,
     Edition,
@@ -24,21 +21,22 @@ from leaderboard.models import (
     User,
     Visibility,
 )
-from leaderboard.web import queue_tables
-from tests import builders, pages
-from tests.leaderboard import queue_rows
-from tests.leaderboard.desk import get, said
-from tests.leaderboard.test_pages_everywhere import assert_sound
+from leaderboard.ops import health
+from leaderboard.web.maintain import queue_tables
+from tests import pages
+from tests.leaderboard.web.maintain import queue_rows
+from tests.leaderboard.web.maintain.desk import get, said
+from tests.leaderboard.web.test_every_page import assert_sound
+
+pytestmark = pytest.mark.slow
 
 QUEUE, STATE, RETRY = "/maintain/queue/", "/maintain/queue/state/", "/maintain/queue/retry/"
 REASON = 'signal 9 at <script>alert("x")</script>'
 
 
-def fail(evaluation: Evaluation, *, reason: str = REASON) -> Evaluation:
+def fail(evaluation: Evaluation) -> Evaluation:
     """Let an evaluation that is the next in line strike out."""
-    for _ in range(lifecycle.MAX_POISON_STRIKES):
-        queue_rows.make_due()
-        lifecycle.give_back(queue_rows.claim(), strike=Strike.POISON, reason=reason, rng=random.Random(0))
+    queue_rows.strike_out(reason=REASON)
     evaluation.refresh_from_db()
     assert evaluation.status == Status.SYSTEM_ERROR
     return evaluation
@@ -80,12 +78,12 @@ def retry(client: Client, *evaluations: Evaluation | UUID, query: str = "") -> H
 def test_empty_queue_has_a_sentence_for_each_list(keeper: Client, edition: Edition) -> None:
     root = get(keeper, QUEUE)
     assert counts(root) == ["0", "0", "0", "–"]
-    for sentence in ("Nothing failed by our fault.", "Nothing runs.", "Nothing waits."):
+    for sentence in ("No system errors.", "No running evaluations.", "No waiting evaluations."):
         assert sentence in root.one("main").text
 
 
 def test_what_failed_says_why_when_and_after_how_many_tries(keeper: Client, failed: Evaluation) -> None:
-    [row] = rows(get(keeper, QUEUE), "Failed by our fault")
+    [row] = rows(get(keeper, QUEUE), "System errors")
     assert failed.finished_at is not None
     assert row[0] == f"{failed.finished_at:%Y-%m-%d %H:%M} UTC"
     expected = ["Foo private", "Owls", "owner@example.org", "test", "1", "live", "3", "poison 3 of 3", REASON]
@@ -101,7 +99,7 @@ def test_what_runs_says_who_holds_it_and_until_when(keeper: Client, edition: Edi
     assert row[-2:] == [str(lease.token)[:8], f"{running.leased_until:%H:%M:%S}"]
     queue_rows.expire(lease)
     [row] = rows(get(keeper, QUEUE), "Running")
-    assert row[-1] == "ran out"
+    assert row[-1] == "expired"
 
 
 def test_no_page_tells_a_whole_lease(keeper: Client, edition: Edition, owner: User) -> None:
@@ -143,10 +141,10 @@ def test_what_waits_after_a_strike_says_when_it_is_due_and_what_ended_it(
 
 def test_rows_say_what_makes_them_matter_less(keeper: Client, failed: Evaluation) -> None:
     Method.objects.update(visibility=Visibility.PUBLIC, shown_at=timezone.now())
-    assert rows(get(keeper, QUEUE), "Failed by our fault")[0][1] == "Foo"
+    assert rows(get(keeper, QUEUE), "System errors")[0][1] == "Foo"
     Submission.objects.update(withdrawn_at=timezone.now())
     Edition.objects.update(published_at=None, discarded_at=timezone.now())
-    assert rows(get(keeper, QUEUE), "Failed by our fault")[0][1] == "Foo withdrawn, edition given up"
+    assert rows(get(keeper, QUEUE), "System errors")[0][1] == "Foo withdrawn, edition discarded"
 
 
 def test_peoples_texts_are_texts_and_no_markup(keeper: Client, failed: Evaluation) -> None:
@@ -159,12 +157,12 @@ def test_peoples_texts_are_texts_and_no_markup(keeper: Client, failed: Evaluatio
 
 
 def test_page_says_that_nobody_looks_after_the_queue(keeper: Client, edition: Edition) -> None:
-    gone = "There was no sweep in the last 60 s: beat or every worker is gone."
+    gone = "There was no sweep in the last 60 s: every worker is gone."
     assert gone in said(keeper, QUEUE)
     health.record_sweep(n_out_of_reach=2)
     found = said(keeper, QUEUE)
     assert gone not in found
-    assert "2 of what waits needed a ground truth that the worker which swept cannot read" in found
+    assert "2 waiting evaluations need a ground truth that the worker of the last sweep" in found
     SweepBeat.objects.update(swept_at=timezone.now() - timedelta(seconds=61))
     assert gone in said(keeper, QUEUE)
 
@@ -214,7 +212,7 @@ def test_what_cannot_be_asked_for_is_said_at_its_field(keeper: Client, edition: 
 
 @pytest.mark.parametrize("page", ["0", "-1", "999999", "x", "%00"])
 def test_any_page_number_is_answered(keeper: Client, failed: Evaluation, page: str) -> None:
-    assert len(rows(get(keeper, f"{QUEUE}?state=failed&page={page}"), "Failed")) == 1
+    assert len(rows(get(keeper, f"{QUEUE}?state=failed&page={page}"), "System errors")) == 1
 
 
 # --- it moves by itself ----------------------------------------------------------------------------------
@@ -262,15 +260,6 @@ def test_retried_evaluation_waits_again_with_a_clean_slate_and_on_the_record(
     assert event.details == {"reason": "from the queue"}
 
 
-def test_retried_file_is_scored(keeper: Client, edition: Edition, owner: User) -> None:
-    sent = builders.submit(owner, builders.predictions(edition))
-    found = fail(sent.evaluations.get())
-    retry(keeper, found)
-    assert builders.score_all() == 1
-    found.refresh_from_db()
-    assert found.status == Status.SCORED
-
-
 def test_buttons_send_what_they_stand_beside_and_come_back_to_the_same_list(
     keeper: Client, edition: Edition, owner: User
 ) -> None:
@@ -294,20 +283,10 @@ def test_what_was_retried_meanwhile_is_said_and_not_retried_twice(keeper: Client
     assert AuditEvent.objects.filter(verb="retried").count() == 1
 
 
-@pytest.mark.parametrize("status", [Status.SCORED, Status.REJECTED])
-def test_what_is_decided_stays_decided(keeper: Client, edition: Edition, owner: User, status: Status) -> None:
-    found = queue_rows.queued(edition, owner)
-    outcome = queue_rows.SCORED if status == Status.SCORED else queue_rows.REJECTED
-    lifecycle.finalise(queue_rows.claim(), outcome)
-    retry(keeper, found)
-    found.refresh_from_db()
-    assert found.status == status
-
-
 @pytest.mark.parametrize(
     ("chosen", "sentence"),
     [
-        ([], "Nothing was chosen"),
+        ([], "No evaluation was chosen"),
         (["nonsense"], "“nonsense” is not a valid UUID"),
         ([str(uuid4())], "There is no evaluation"),
     ],
@@ -322,35 +301,12 @@ def test_retrying_nothing_says_so_and_changes_nothing(
     assert failed.status == Status.SYSTEM_ERROR
 
 
-@pytest.mark.parametrize("who", ["nobody", "owner", "stranger"])
-def test_to_others_the_queue_does_not_exist(
-    failed: Evaluation, who: str, request: pytest.FixtureRequest
-) -> None:
-    client = Client()
-    if who != "nobody":
-        client.force_login(request.getfixturevalue(who))
-    for address in (QUEUE, STATE, RETRY):
-        assert client.get(address).status_code == 404
-        assert client.post(address, {"evaluation": str(failed.pk)}).status_code == 404
-    failed.refresh_from_db()
-    assert failed.status == Status.SYSTEM_ERROR
-
-
-def test_retrying_needs_a_form_of_ours(failed: Evaluation, maintainer: User) -> None:
-    client = Client(enforce_csrf_checks=True)
-    client.force_login(maintainer)
-    assert client.post(RETRY, {"evaluation": str(failed.pk)}).status_code == 403
-    assert client.get(RETRY).status_code == 405
-    failed.refresh_from_db()
-    assert failed.status == Status.SYSTEM_ERROR
-
-
 # --- the hub and the price -------------------------------------------------------------------------------
 
 
 def test_desk_says_what_the_queue_holds_and_leads_to_it(keeper: Client, all_three: object) -> None:
     root = get(keeper, "/maintain/")
-    assert "1 failed by our fault, 1 running, 1 waiting, the oldest for " in root.one("main").text
+    assert "1 with system errors, 1 running, 1 waiting, the oldest for " in root.one("main").text
     assert QUEUE in [a.attributes["href"] for a in root.one("main").all("a")]
 
 

@@ -1,12 +1,17 @@
 """What an address may add to what is remembered: nothing but what its view reads, spelt in one way."""
 
+from datetime import timedelta
+
 import pytest
 from django.test import Client
+from django.utils import timezone
 
 from leaderboard.models import Edition, Method, User
-from leaderboard.web import kept
-from leaderboard.web.kept import memory
+from leaderboard.web.middleware import page_cache
+from leaderboard.web.middleware.page_cache import memory
 from tests import board_rows
+
+pytestmark = pytest.mark.slow
 
 API = "/api/v1/splits/test/board"
 PAGES = ("/", "/board/test/", API, "/board/test.csv", "/board/test/editions/", "/compare/")
@@ -75,6 +80,24 @@ def test_what_anybody_can_make_up_is_answered_and_not_remembered(
     assert (found, n_remembered()) == ([status] * 3, 0)
 
 
+def test_remembered_of_all_times_are_days_that_are_over(filled: list[Method], client: Client) -> None:
+    now = timezone.now()
+    over, today, tomorrow = (f"{now + timedelta(days=n):%Y-%m-%d}" for n in (-1, 0, 1))
+    for address in ("/board/test/", API, "/board/test.csv"):
+        memory.clear()
+        first = client.get(f"{address}?at={over}")
+        assert n_remembered() == 1
+        again = client.get(f"{address}?at={over}", headers={"If-None-Match": first["ETag"]})
+        assert (again.status_code, again["ETag"]) == (304, first["ETag"])
+        for at in (today, tomorrow, f"{over}T12:00", f"{over[:-2]}99", f"{over[:-2]}٠١"):
+            client.get(address, {"at": at})
+        assert n_remembered() == 1
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(timezone, "now", lambda: now + timedelta(days=1))
+        assert client.get(f"/board/test/?at={today}").text.count("The board as of") == 1
+        assert n_remembered() == 2
+
+
 def test_the_api_answers_a_query_alike_with_and_without_memory(filled: list[Method], client: Client) -> None:
     assert client.get(API).status_code == 200
     # An empty order is a mistake here, whatever is remembered of the board without one.
@@ -88,8 +111,8 @@ def test_the_api_answers_a_query_alike_with_and_without_memory(filled: list[Meth
 def test_answers_to_queries_push_out_no_plain_page(
     filled: list[Method], client: Client, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    small = kept.Memory(plain_bytes=kept.MAX_PLAIN_BYTES, queries_bytes=100_000)
-    monkeypatch.setattr(kept, "memory", small)
+    small = page_cache.ResponseCache(plain_bytes=page_cache.MAX_PLAIN_BYTES, queries_bytes=100_000)
+    monkeypatch.setattr(page_cache, "memory", small)
     for page in PAGES:
         client.get(page)
     for sort in ("mid", "-mid", "rte", "-rte", "date", "-date", "team", "-team"):

@@ -4,11 +4,11 @@ import pytest
 from django.test import Client
 from pytest_django import DjangoAssertNumQueries, Settings
 
-from leaderboard import teams
 from leaderboard.models import Edition, Team, User
-from leaderboard.web.limits import RateLimitMiddleware
+from leaderboard.people import teams
+from leaderboard.web.middleware.request_limits import RateLimitMiddleware
 from tests import pages
-from tests.leaderboard.test_api_submissions import client_of
+from tests.leaderboard.api.test_submissions import client_of
 
 ATTACKER, ELSEWHERE = "203.0.113.9", "192.0.2.3"
 
@@ -17,7 +17,7 @@ ATTACKER, ELSEWHERE = "203.0.113.9", "192.0.2.3"
 def rates(settings: Settings, benchmark: None) -> None:
     """Three of everything, counted from nothing: the next comes after longer than any test takes."""
     RateLimitMiddleware.drawn.forget()
-    settings.PAGE_RATES = {"send": "3/hour", "draw": "3/hour"}
+    settings.PAGE_RATES = {"send": "3/hour", "draw": "3/hour", "as_of": "1/hour"}
 
 
 def signed_in(user: User) -> Client:
@@ -29,6 +29,7 @@ def signed_in(user: User) -> Client:
 def test_one_page_too_many_is_refused_in_words_with_a_time_and_a_way_back(
     owner: User, settings: Settings
 ) -> None:
+    settings.SITE_URL = "http://testserver"
     client = signed_in(owner)
     found = [client.post("/tokens/", {"name": f"token {n}", "scope": "read"}).status_code for n in range(3)]
     assert 429 not in found
@@ -36,16 +37,18 @@ def test_one_page_too_many_is_refused_in_words_with_a_time_and_a_way_back(
     assert refused.status_code == 429
     assert 1 <= int(refused.headers["Retry-After"]) <= 1200
     main = pages.page(refused).one("main")
-    assert main.text.startswith("Too many tries")
+    assert main.text.startswith("Too many requests")
     assert "Too many requests in a short time; the next one is answered in " in main.text
     assert "Nothing was changed" in main.text
     assert [link.attributes["href"] for link in main.all("a")] == ["/tokens/?a=b", "/"]
 
 
-def test_a_way_back_leads_to_no_other_site(owner: User) -> None:
+@pytest.mark.parametrize("address", ["https://evil.example/", "http://testserver//evil.example/"])
+def test_a_way_back_leads_to_no_other_site(owner: User, settings: Settings, address: str) -> None:
+    settings.SITE_URL = "http://testserver"
     client = signed_in(owner)
     for _ in range(4):
-        refused = client.post("/tokens/", {}, HTTP_REFERER="https://evil.example/")
+        refused = client.post("/tokens/", {}, HTTP_REFERER=address)
     assert refused.status_code == 429
     assert b"evil.example" not in refused.content
 
@@ -88,6 +91,15 @@ def test_boards_answered_from_memory_are_not_counted_and_others_are(edition: Edi
     assert Client(REMOTE_ADDR=ELSEWHERE).get("/board/test/?q=1").status_code == 200
     # What is remembered goes on being answered.
     assert visitor.get("/board/test/").status_code == 200
+
+
+def test_boards_as_of_a_time_have_a_rate_of_their_own_unless_answered_from_memory(edition: Edition) -> None:
+    visitor = Client(REMOTE_ADDR=ATTACKER)
+    moment, day = "/board/test/?at=2026-01-02T12:00:00Z", "/board/test/?at=2026-01-02"
+    assert [visitor.get(moment).status_code for _ in range(2)] == [200, 429]
+    assert visitor.get("/board/test/?q=1").status_code == 200
+    assert [Client(REMOTE_ADDR=ELSEWHERE).get(day).status_code for _ in range(3)] == [200] * 3
+    assert visitor.get(day).status_code == 200
 
 
 def test_monitoring_and_the_api_are_not_counted_as_pages(owner: User) -> None:

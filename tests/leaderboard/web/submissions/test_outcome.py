@@ -9,19 +9,15 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
-from leaderboard import submissions
 from leaderboard.models import Edition, Method, PublishedResult, QuotaOverride, Score, Split, Submission, User
+from leaderboard.submissions import submissions
 from tests import board_rows, builders, pages
 from tests.editions import board_now, corrected, open_edition, publish
 
+pytestmark = pytest.mark.slow
+
 PAGE = "/submissions/{}/"
 STATE = "/submissions/{}/state/"
-
-
-@pytest.fixture
-def signed_in(client: Client, owner: User) -> Client:
-    client.force_login(owner)
-    return client
 
 
 @pytest.fixture
@@ -60,7 +56,7 @@ def test_rank_is_the_boards_with_its_range(signed_in: Client, inferred: list[Sub
     ends = {found.rank_low, found.rank_high}
     within = "–".join(str(end) for end in sorted(end for end in ends if end is not None))
     assert standing(look(signed_in, inferred[1])).startswith(
-        f"Rank {row.rank} ({within}) of {n_ranked} on test. In brackets: where it may stand at 95 %."
+        f"Rank {row.rank} ({within}) of {n_ranked} on test. In brackets: 95 % confidence range of the rank."
     )
 
 
@@ -73,9 +69,7 @@ def test_private_one_is_told_the_rank_that_it_would_have(
     )
     builders.score_all()
     builders.infer_all()
-    assert (
-        standing(look(signed_in, sent)) == f"Shown to everybody it would be rank 1 of {n_ranked + 1} on test."
-    )
+    assert standing(look(signed_in, sent)) == f"If published: rank 1 of {n_ranked + 1} on test."
 
 
 def test_maintainer_reads_the_same_rank_of_a_private_one(
@@ -83,7 +77,7 @@ def test_maintainer_reads_the_same_rank_of_a_private_one(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition, factor=1.01), visibility="PRIVATE")
     builders.score_all()
-    assert "it would be rank 1 of" in standing(look(keeper, sent))
+    assert "If published: rank 1 of" in standing(look(keeper, sent))
 
 
 @pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
@@ -95,7 +89,7 @@ def test_what_another_submission_of_the_method_surpasses_has_no_rank(
         for factor in (1.2, 1.1)
     )
     builders.score_all()
-    assert standing(look(signed_in, worse)).startswith("Another submission of Foo is better")
+    assert standing(look(signed_in, worse)).startswith("Not the best: the board shows another")
     assert "rank" in standing(look(signed_in, better)).lower()
 
 
@@ -126,7 +120,7 @@ def test_what_may_be_the_best_is_marked_as_on_the_board(
         root = pages.page(signed_in.get(address))
         cell = root.one("div", class_="result").all("tr")[1].all("td")[0]
         assert "with-best" in cell.classes
-        assert cell.text.endswith(", may be the best of its column at 95 %")
+        assert cell.text.endswith(", possibly best in its column (95 % confidence)")
         assert "≈ and tinted" in root.one("main").text
 
 
@@ -150,11 +144,11 @@ def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
     nearest = min(printed, key=lambda row: abs((row.scores["mid"] or 0) - mid(inferred[1])))
     root = look(signed_in, inferred[1])
     own, published = beside(root)
-    assert own[0].startswith("M1.05 your team’s best other, 20")
+    assert own[0].startswith("M1.05 your team’s best other method, 20")
     gap = round(mid(inferred[1]) - mid(inferred[0]), 1)
     assert gap > 0
     assert own[1:3] == [f"{mid(inferred[0]):.1f}", f"+{gap:.1f}"]
-    assert published[0].startswith(f"{nearest.method} nearest published, Shi et al.")
+    assert published[0].startswith(f"{nearest.method} nearest row from a paper, Shi et al.")
     assert nearest.scores["mid"] is not None
     gap = round(mid(inferred[1]) - nearest.scores["mid"], 1)
     assert published[2] == (f"+{gap:.1f}" if gap > 0 else f"−{-gap:.1f}")
@@ -206,7 +200,7 @@ def test_nothing_of_another_team_and_nothing_withdrawn_is_beside_it(
     submissions.withdraw(submission=gone, actor=owner, now=timezone.now())
     rows = beside(look(signed_in, sent))
     assert len(rows) == 1
-    assert "nearest published" in rows[0][0]
+    assert "nearest row from a paper" in rows[0][0]
 
 
 def test_without_anything_beside_it_nothing_is_said_of_that(
@@ -223,7 +217,7 @@ def test_without_anything_beside_it_nothing_is_said_of_that(
 
 
 def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list[Submission]) -> None:
-    row = look(signed_in, inferred[1]).one("details", class_="take-along").one("pre").raw_text
+    row = look(signed_in, inferred[1]).one("div", class_="copyable").one("pre").raw_text
     board = signed_in.get("/board/test.tex").content.decode()
     assert row in board.splitlines()
     assert " & M1.1 & Owls & " in row
@@ -232,7 +226,7 @@ def test_latex_row_is_that_of_the_boards_table(signed_in: Client, inferred: list
 def test_hostile_name_stays_text_in_the_latex_row(signed_in: Client, edition: Edition, owner: User) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method=r"<b>\input{x} & 50%")
     builders.score_all()
-    pre = look(signed_in, sent).one("details", class_="take-along").one("pre")
+    pre = look(signed_in, sent).one("div", class_="copyable").one("pre")
     assert pre.all("b") == []
     assert r"\input" not in pre.raw_text
     assert r"\& 50\%" in pre.raw_text
@@ -241,25 +235,19 @@ def test_hostile_name_stays_text_in_the_latex_row(signed_in: Client, edition: Ed
 # --- what a rejected file costs --------------------------------------------------------------------------
 
 
-def test_rejected_file_costs_no_slot_and_page_says_how_many_more_are_taken(
-    signed_in: Client, edition: Edition, owner: User
+@pytest.mark.parametrize(
+    ("limit", "left"), [(20, " (19 of 20 rejections left within 24 hours)."), (None, ".")]
+)
+def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
+    signed_in: Client, edition: Edition, owner: User, limit: int | None, left: str
 ) -> None:
-    Split.objects.filter(pk="test").update(quota_rejected_limit=20)
+    Split.objects.filter(pk="test").update(quota_rejected_limit=limit)
     sent = builders.submit(owner, b"[]")
     builders.score_all()
-    said = look(signed_in, sent).one("main").text
-    assert "It costs no slot of the quota." in said
-    assert "Of 20 rejected or cancelled files that are taken in 24 hours, 19 are left." in said
-
-
-def test_without_a_limit_of_rejected_files_none_is_named(
-    signed_in: Client, edition: Edition, owner: User
-) -> None:
-    sent = builders.submit(owner, b"[]")
-    builders.score_all()
-    said = look(signed_in, sent).one("main").text
-    assert "It costs no slot of the quota." in said
-    assert "24 hours" not in said
+    assert (
+        f"Rejected: not scored. Your quota is not used{left} Correct"
+        in look(signed_in, sent).one("main").text
+    )
 
 
 def test_maintainer_reads_what_the_team_has_left(keeper: Client, edition: Edition, owner: User) -> None:
@@ -274,16 +262,14 @@ def test_maintainer_reads_what_the_team_has_left(keeper: Client, edition: Editio
         quota_rejected_limit=2,
         reason="A test.",
     )
-    assert "1 is left." in look(keeper, sent).one("main").text
+    assert "1 of 2 rejections left" in look(keeper, sent).one("main").text
 
 
 # --- cost ------------------------------------------------------------------------------------------------
 
 
 def n_queries(client: Client, address: str, **query: str) -> int:
-    with CaptureQueriesContext(
-        connection,
-    ) as queries:
+    with CaptureQueriesContext(connection) as queries:
         client.get(address, query)
     return len(queries)
 

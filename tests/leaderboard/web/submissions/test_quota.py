@@ -8,13 +8,7 @@ from django.utils import timezone
 
 from leaderboard.models import Edition, Split, Submission, User
 from tests import builders, pages
-from tests.leaderboard.test_pages_submit import error_at, send
-
-
-@pytest.fixture
-def signed_in(client: Client, owner: User) -> Client:
-    client.force_login(owner)
-    return client
+from tests.leaderboard.web.submissions.test_submit import error_at, send
 
 
 def choice(client: Client, split: str) -> pages.Element:
@@ -45,7 +39,7 @@ def test_an_exhausted_quota_stands_at_the_split_in_the_same_words(
     Split.objects.filter(pk="test").update(quota_limit=1)
     builders.submit(owner, builders.predictions(edition))
     response = send(signed_in, builders.predictions(edition, factor=1.2))
-    assert error_at(response, "split").startswith("Your team has spent the 1 submission to test")
+    assert error_at(response, "split").startswith("Your team has used 1 submission to test")
     assert Submission.objects.count() == 1
 
 
@@ -57,6 +51,13 @@ def test_a_split_outside_its_time_cannot_be_chosen_and_says_why(
 ) -> None:
     at = timezone.now() + timedelta(days=days)
     Split.objects.filter(pk="test").update(**{column: at})
-    label = choice(signed_in, "test")
-    assert "disabled" in label.one("input").attributes
-    assert f"Submissions to test {said} {at:%Y-%m-%d %H:%M} UTC." in label.text
+    root = pages.page(signed_in.get("/submit/"))
+    assert "test" not in [each.attributes["value"] for each in root.all("input", type="radio", name="split")]
+    [reason] = [
+        each.text
+        for each in root.one("ul", class_="closed-splits").all("li")
+        if each.one("strong").text == "test"
+    ]
+    assert reason.startswith(f"test: Submissions to test {said} {at:%Y-%m-%d %H:%M} UTC.")
+    refused = send(signed_in, builders.predictions(edition))
+    assert (refused.status_code, Submission.objects.count()) == (422, 0)

@@ -1,27 +1,24 @@
 """A submission's page: its line of state, its result, its problems, and who may see it."""
 
 import random
+from datetime import timedelta
 from pathlib import Path
-from uuid import uuid4
 
 import pytest
 from django.db.models import F
 from django.test import Client
 from django.utils import timezone
-from pytest_django import DjangoAssertNumQueries
 
-from leaderboard import lifecycle, outcomes, submissions
 from leaderboard.models import Edition, Evaluation, Submission, User
+from leaderboard.scoring import lifecycle
+from leaderboard.submissions import outcomes, submissions
 from tests import builders, pages
+from tests.editions import corrected, open_edition, publish
+
+pytestmark = pytest.mark.slow
 
 STATE = "/submissions/{}/state/"
 PAGE = "/submissions/{}/"
-
-
-@pytest.fixture
-def signed_in(client: Client, owner: User) -> Client:
-    client.force_login(owner)
-    return client
 
 
 @pytest.fixture
@@ -49,7 +46,7 @@ def strike_out(submission: Submission) -> None:
     """Let the worker die on it until it is given up."""
     for _ in range(lifecycle.MAX_POISON_STRIKES):
         Evaluation.objects.update(due_at=submission.submitted_at)
-        lifecycle.give_back(
+        lifecycle.fail_attempt(
             claim(), strike=lifecycle.Strike.POISON, reason="the process died", rng=random.Random(0)
         )
 
@@ -99,11 +96,11 @@ def test_polling_goes_on_from_the_result_to_its_intervals_and_stops_there(
     assert scored.status_code == 200
     fragment = pages.page(scored)
     assert current_step(fragment).startswith("Scored")
-    assert current_step(fragment).endswith("intervals follow")
+    assert current_step(fragment).endswith("confidence intervals follow")
     outcome = fragment.one("div", id="outcome")
     assert outcome.attributes["hx-swap-oob"] == "innerHTML"
     assert len(outcome.one("div", class_="result").all("table")) == 2
-    assert "Intervals are being computed." in outcome.text
+    assert "The confidence intervals are being computed." in outcome.text
     seen = fragment.one("input", name="seen").attributes["value"]
     assert signed_in.get(STATE.format(submission.pk), {"seen": seen}).status_code == 204
     builders.infer_all()
@@ -126,7 +123,7 @@ def test_page_of_a_result_without_intervals_yet_keeps_asking(
     builders.score_all()
     root = get(signed_in, PAGE, submission)
     assert root.one("div", id="state").attributes["hx-get"] == STATE.format(submission.pk)
-    assert root.one("noscript").one("a").text == "look again"
+    assert root.one("noscript").one("a").text == "reload the page"
     assert "moving" in root.one("li", **{"aria-current": "step"}).classes
 
 
@@ -135,7 +132,7 @@ def stops(client: Client, submission: Submission) -> str:
     assert client.get(STATE.format(submission.pk), {"seen": "SCORED"}).status_code == 286
     root = get(client, PAGE, submission)
     assert "hx-get" not in root.one("div", id="state").attributes
-    assert root.all("script") == []
+    assert root.one("main").all("script") == []
     return root.one("main").text
 
 
@@ -152,7 +149,7 @@ def test_polling_ends_though_no_worker_ever_makes_intervals(
     seen = get(signed_in, PAGE, submission).one("input", name="seen").attributes["value"]
     Evaluation.objects.update(finished_at=F("finished_at") - outcomes.AWAITED_FOR)
     assert signed_in.get(STATE.format(submission.pk), {"seen": seen}).status_code == 286
-    assert "There are no intervals yet" in stops(signed_in, submission)
+    assert "There are no confidence intervals yet" in stops(signed_in, submission)
 
 
 def test_polling_ends_at_once_where_there_are_too_few_recordings(
@@ -188,7 +185,7 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     mid, rte = root.one("div", class_="result").all("table")
     for half, symbol in ((mid, "MiD"), (rte, "RTE")):
         heads = [head.all("span")[0].text for head in half.one("thead").all("th")]
-        assert heads == [symbol, *(f"{symbol}{letter}" for letter in "csln")]
+        assert heads == [symbol, "0–3 s", "3–6 s", "6–20 s", "−20–0 s"]
     scores = {f"{s.metric}-{s.interval}": f"{s.value:.1f}" for s in submission.evaluations.get().scores.all()}
     values, counts = ([cell.text for cell in row.all("td")] for row in mid.one("tbody").all("tr"))
     names = ("overall", "crucial", "small", "large", "negative")
@@ -196,7 +193,7 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     assert [value.split()[0] for value in values] == [scores[f"mid-{i}"] for i in names]
     assert counts[0] == str(builders.N_SEQUENCES)
     assert "truncated" in root.one("main").text
-    assert "1 sequence with |τ| > 20 s counts in the overall means only" in root.one("main").text
+    assert "1 sequence in no TTC range counts in the overall scores only" in root.one("main").text
 
 
 def test_problems_are_numbered_with_place_and_total(signed_in: Client, edition: Edition, owner: User) -> None:
@@ -237,16 +234,16 @@ def test_problems_quote_hostile_keys_as_text(signed_in: Client, edition: Edition
     builders.score_all()
     root = get(signed_in, PAGE, bad)
     assert "<script>" in root.one("ol", class_="problems").text
-    assert root.all("script") == []
+    assert root.one("main").all("script") == []
 
 
 def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submission) -> None:
     strike_out(submission)
     root = get(signed_in, PAGE, submission)
-    assert "by our fault" in current_step(root)
-    assert "It was our fault" in root.one("main").text
-    assert "You need not send it again" in root.one("main").text
-    assert "this run costs no quota" in root.one("main").text
+    assert "System error" in current_step(root)
+    assert "error on our side" in root.one("main").text
+    assert "You do not need to submit it again" in root.one("main").text
+    assert "your quota is not used" in root.one("main").text
 
 
 def test_cancelled_submission_says_so(signed_in: Client, submission: Submission, owner: User) -> None:
@@ -256,95 +253,57 @@ def test_cancelled_submission_says_so(signed_in: Client, submission: Submission,
     assert "cancelled before it was scored" in root.one("main").text
 
 
-def test_without_script_the_page_offers_to_look_again(signed_in: Client, submission: Submission) -> None:
-    link = get(signed_in, PAGE, submission).one("noscript").one("a")
-    assert link.attributes["href"] == PAGE.format(submission.pk)
-
-
-@pytest.mark.parametrize("address", [PAGE, STATE])
-def test_strangers_cannot_tell_it_from_nothing(
-    client: Client, submission: Submission, stranger: User, address: str
+def test_one_that_waits_far_too_long_is_told_so_and_that_nothing_is_lost(
+    signed_in: Client, submission: Submission
 ) -> None:
-    client.force_login(stranger)
-    there, nowhere = (client.get(address.format(pk)) for pk in (submission.pk, uuid4()))
-    assert there.status_code == nowhere.status_code == 404
-    assert without_tokens(there.content) == without_tokens(nowhere.content)
+    before = get(signed_in, PAGE, submission).one("input", name="seen").attributes["value"]
+    late = F("queued_at") - timedelta(minutes=5)
+    Evaluation.objects.update(queued_at=late)
+    answer = signed_in.get(STATE.format(submission.pk), {"seen": before})
+    assert current_step(pages.page(answer)).endswith("Taking longer than usual; nothing is lost.")
+    claim()
+    assert "nothing is lost" in current_step(get(signed_in, PAGE, submission))
 
 
-def without_tokens(content: bytes) -> list[bytes]:
-    """The page without its form's token, which is masked anew for every answer."""
-    return [line for line in content.splitlines() if b"csrfmiddlewaretoken" not in line]
-
-
-@pytest.mark.parametrize("address", [PAGE, STATE])
-def test_visitors_are_asked_to_sign_in(client: Client, submission: Submission, address: str) -> None:
-    response = client.get(address.format(submission.pk))
-    assert response.status_code == 302
-    assert response.headers["Location"].startswith("/accounts/login/?next=/submissions/")
-
-
-@pytest.mark.parametrize("who", ["teammate", "maintainer"])
-def test_teammates_and_maintainers_see_it(
-    client: Client, submission: Submission, who: str, request: pytest.FixtureRequest
+def test_of_a_re_scored_submission_both_runs_are_told_with_their_dates(
+    signed_in: Client, submission: Submission, tmp_path: Path
 ) -> None:
-    client.force_login(request.getfixturevalue(who))
-    assert client.get(PAGE.format(submission.pk)).status_code == 200
-
-
-def test_page_is_never_stored_by_caches(signed_in: Client, submission: Submission) -> None:
-    response = signed_in.get(PAGE.format(submission.pk))
-    assert {"no-store", "private"} <= set(response.headers["Cache-Control"].split(", "))
-
-
-def test_list_has_my_teams_submissions_with_state_and_errors(
-    signed_in: Client, edition: Edition, owner: User, teammate: User, stranger: User
-) -> None:
-    scored = builders.submit(owner, builders.predictions(edition), method="Scored one")
-    builders.submit(teammate, b"[]", method="Bad one")
-    builders.submit(stranger, builders.predictions(edition), method="Foreign one")
     builders.score_all()
-    builders.submit(owner, builders.predictions(edition, factor=1.3), method="Waiting one")
-    rows = [
-        [cell.text for cell in row.all("td")]
-        for row in pages.page(signed_in.get("/submissions/")).one("tbody").all("tr")
-    ]
-    assert [row[1] for row in rows] == ["Waiting one", "Bad one", "Scored one"]
-    assert [row[3] for row in rows] == ["queued", "rejected", "scored"]
-    mid = scored.evaluations.get().scores.get(metric="mid", interval="overall").value
-    assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
-
-
-def test_maintainers_list_is_their_own_teams(
-    client: Client, submission: Submission, maintainer: User
-) -> None:
-    client.force_login(maintainer)
-    assert "Nothing has been submitted yet" in pages.page(client.get("/submissions/")).one("main").text
-
-
-def test_empty_list_says_what_to_do(signed_in: Client, benchmark: None) -> None:
-    main = pages.page(signed_in.get("/submissions/")).one("main")
-    assert "Nothing has been submitted yet" in main.text
-    assert "/submit/" in [a.attributes["href"] for a in main.all("a")]
-
-
-def test_number_of_queries_does_not_grow_with_the_list(
-    signed_in: Client, edition: Edition, owner: User, django_assert_max_num_queries: DjangoAssertNumQueries
-) -> None:
-    for i in range(5):
-        builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10))
+    long_ago = timezone.now() - timedelta(days=100)
+    Submission.objects.update(submitted_at=long_ago)
+    Evaluation.objects.update(finished_at=long_ago)
+    second = open_edition(corrected(tmp_path, factor=1.3))
     builders.score_all()
-    with django_assert_max_num_queries(9):
-        signed_in.get("/submissions/")
+    publish(second)
+    steps = get(signed_in, PAGE, submission).one("ol", class_="steps").all("li")
+    day, today = f"{long_ago:%Y-%m-%d}", f"{timezone.now():%Y-%m-%d}"
+    assert [step.one("span", class_="label").text for step in steps] == ["Received", "Scored", "Re-scored"]
+    assert [step.one("time").text[:10] for step in steps] == [day, day, today]
+    assert all(step.one("time").text.endswith(" UTC") for step in steps)
+    assert steps[1].text.endswith("edition 1")
+    assert "edition 2" in steps[2].text
 
 
-def test_long_lists_come_in_pages(
-    signed_in: Client, edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
+def test_after_the_score_the_next_steps_are_buttons(signed_in: Client, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
+    builders.score_all()
+    main = get(signed_in, PAGE, sent).one("main")
+    assert [a.text for a in main.one("p", class_="next").all("a")] == ["Publish…", "Signed receipt"]
+    assert main.one("code", id="latex-row").text
+    copied = {button.attributes["data-copy"] for button in main.all("button", class_="copy")}
+    assert copied == {"latex-row", "digest"}
+
+
+def test_there_is_nothing_to_withdraw_of_a_rejected_or_cancelled_file(
+    signed_in: Client, edition: Edition, owner: User
 ) -> None:
-    monkeypatch.setattr("leaderboard.web.views.PER_PAGE", 2)
-    for i in range(3):
-        builders.submit(owner, builders.predictions(edition, factor=1.1 + i / 10))
-    root = pages.page(signed_in.get("/submissions/"))
-    assert len(root.one("tbody").all("tr")) == 2
-    assert root.one("nav", class_="pages").one("a").attributes["href"] == "?page=2"
-    assert len(pages.page(signed_in.get("/submissions/?page=2")).one("tbody").all("tr")) == 1
-    assert signed_in.get("/submissions/?page=nonsense").status_code == 200
+    bad = builders.submit(owner, b"[]")
+    builders.score_all()
+    waiting = builders.submit(owner, builders.predictions(edition))
+    assert "Cancel this submission…" in get(signed_in, PAGE, waiting).one("main").text
+    signed_in.post(f"/submissions/{waiting.pk}/withdraw/")
+    for sent in (bad, waiting):
+        said = get(signed_in, PAGE, sent).one("main").text
+        assert "this submission…" not in said
+        assert "no longer show its values" not in said
+        assert signed_in.get(f"/submissions/{sent.pk}/withdraw/").status_code == 302

@@ -1,0 +1,1 @@
+"""The HTTP client of the leaderboard's API, for the command line."""

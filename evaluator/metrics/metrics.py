@@ -1,0 +1,120 @@
+"""Metrics: errors of single sequences, arrays in, arrays out, and what to call them wherever they are shown.
+
+To add one, define it here and name it in a protocol of `protocol.py`; everything else asks there. Nothing
+here imports numpy before an error is taken, so that `tsttc --help` need not load it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+if TYPE_CHECKING:
+    from numpy.typing import ArrayLike
+
+    from evaluator.metrics.scale import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What errors are made of: float64 arrays of one shape, one item for each sequence.
+
+    `true_log_scale_ratio` is ln α₁₀(τ) by `scale.exact_log`; a `GroundTruth` keeps it. Predictions are taken
+    as they are: truncation is the protocol's business.
+    """
+
+    predicted_ttc_s: Floats
+    true_ttc_s: Floats
+    predicted_scale_ratio: Floats  # α₁₀
+    true_log_scale_ratio: Floats
+
+    @classmethod
+    def of(cls, predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> Terms:
+        """The terms of these times to contact, whose shapes broadcast."""
+        import numpy as np  # noqa: PLC0415 -- as the docstring above says
+
+        from evaluator.metrics.scale import exact_log, scale_ratio_10hz  # noqa: PLC0415 -- loads numpy
+
+        predicted, true = np.broadcast_arrays(
+            np.asarray(predicted_ttc_s, dtype=np.float64), np.asarray(true_ttc_s, dtype=np.float64)
+        )
+        return cls(predicted, true, scale_ratio_10hz(predicted), exact_log(scale_ratio_10hz(true)))
+
+
+@dataclass(frozen=True, slots=True)
+class Metric:
+    """An error of a prediction: 0 or more and finite, lower is better; a score is its mean.
+
+    `name` (lower-case letters and digits) is what scores carry, `symbol` what tables show, `unit` as it
+    stands in brackets behind the symbol. `decimals` are those that are shown where no edition says otherwise.
+    """
+
+    name: str
+    symbol: str
+    unit: str
+    title: str
+    decimals: int
+    function: Callable[[Terms], Floats]
+
+    def errors(self, predicted_ttc_s: ArrayLike, true_ttc_s: ArrayLike) -> Floats:
+        """The errors of these predictions, whose shapes broadcast; NaN where they are undefined.
+
+        >>> round(float(MID.errors(5.0, 4.0)), 6), float(RTE.errors(5.0, 4.0))
+        (48.899805, 25.0)
+        """
+        return self.function(Terms.of(predicted_ttc_s, true_ttc_s))
+
+    @property
+    def heading(self) -> str:
+        """Symbol and unit, as over a column.
+
+        >>> MID.heading, RTE.heading
+        ('MiD ×10⁻⁴', 'RTE %')
+        """
+        return f"{self.symbol} {self.unit}".rstrip()
+
+    @property
+    def unit_of_value(self) -> str:
+        """What stands behind a value in a sentence, with its space; nothing for a power of ten.
+
+        >>> MID.unit_of_value, RTE.unit_of_value
+        ('', ' %')
+        """
+        return "" if self.unit.startswith("×") or not self.unit else f" {self.unit}"
+
+    @property
+    def unit_of_difference(self) -> str:
+        """The same behind the difference of two values."""
+        return " percentage points" if self.unit == "%" else self.unit_of_value
+
+
+def _motion_in_depth_error(terms: Terms) -> Floats:
+    """MiD = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴; NaN where α₁₀ is not positive.
+
+    numpy's logarithm is fast, but on some processors the last bit differs from the C library's. Where the two
+    logarithms nearly cancel that bit would show, so there the C library's is taken.
+    """
+    import numpy as np  # noqa: PLC0415 -- as the docstring above says
+
+    from evaluator.metrics.scale import exact_log  # noqa: PLC0415 -- loads numpy
+
+    true_log, ratio = terms.true_log_scale_ratio, terms.predicted_scale_ratio
+    with np.errstate(divide="ignore", invalid="ignore"):
+        error = np.asarray(np.abs(true_log - np.log(ratio)))
+        close = error < 1e-3 * np.abs(true_log)
+    if close.any():
+        error[close] = np.abs(true_log[close] - exact_log(ratio[close]))
+    return np.asarray(error * 1e4)
+
+
+def _relative_ttc_error(terms: Terms) -> Floats:
+    """RTE = |(τ̂ − τ) / τ| · 100 %."""
+    import numpy as np  # noqa: PLC0415 -- as the docstring above says
+
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        return np.asarray(np.abs((terms.predicted_ttc_s - terms.true_ttc_s) / terms.true_ttc_s) * 100.0)
+
+
+MID: Final = Metric("mid", "MiD", "×10⁻⁴", "Motion-in-depth error", 2, _motion_in_depth_error)
+RTE: Final = Metric("rte", "RTE", "%", "Relative TTC error", 2, _relative_ttc_error)

@@ -1,0 +1,216 @@
+"""Protocols: the frozen, named rule sets by which predictions become numbers, and the names of these numbers.
+
+A change of any rule is a new protocol name; an existing one never changes. Whatever shows an edition asks
+the edition's protocol which metrics and TTC ranges there are, and here what they are called.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Final
+
+from evaluator.metrics.metrics import MID, RTE, Metric
+
+OVERALL: Final = "overall"
+"""The name of the mean over all sequences, which is in no range."""
+
+PRIMARY: Final = "mid"
+"""The score that boards rank by: every protocol has it first."""
+
+_NAME: Final = re.compile(r"[a-z][a-z0-9]*")
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A TTC range: true times to contact in seconds, closed at both ends as in the dataset's toolkit."""
+
+    name: str
+    low_s: float
+    high_s: float
+
+    @property
+    def letter(self) -> str:
+        """The subscript of its columns."""
+        return self.name[0]
+
+    @property
+    def ends(self) -> str:
+        """Its ends, without their unit.
+
+        >>> [interval.ends for interval in INTERVALS]
+        ['0–3', '3–6', '6–20', '−20–0']
+        """
+        return f"{self.low_s:g}–{self.high_s:g}".replace("-", "−")
+
+    @property
+    def seconds(self) -> str:
+        """Its ends as a text, such as "0–3 s"."""
+        return f"{self.ends} s"
+
+
+INTERVALS: Final = (
+    Interval("crucial", 0.0, 3.0),
+    Interval("small", 3.0, 6.0),
+    Interval("large", 6.0, 20.0),
+    Interval("negative", -20.0, 0.0),
+)
+"""The paper's TTC ranges, in its order."""
+
+
+def score_name(metric: str, interval: str) -> str:
+    """The name of a score: a metric's alone is that of the overall one.
+
+    >>> score_name("mid", "overall"), score_name("mid", "crucial")
+    ('mid', 'mid_crucial')
+    """
+    return metric if interval == OVERALL else f"{metric}_{interval}"
+
+
+def split_name(name: str) -> tuple[str, str]:
+    """The names of the metric and the TTC range of a score: the inverse of `score_name`.
+
+    >>> split_name("mid"), split_name("mid_crucial")
+    (('mid', 'overall'), ('mid', 'crucial'))
+    """
+    metric, _, interval = name.partition("_")
+    return metric, interval or OVERALL
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """How a predicted time to contact is prepared before its errors are taken, and what is made of these.
+
+    Predictions outside [−limit_s, limit_s] are truncated to its ends. With `near_zero_s = (low, high)`,
+    predictions in (low, 0) become `low` and those in (0, high) become `high`; with None they stay, and those
+    for which MiD is undefined are rejected. NaN and 0 are always rejected.
+
+    There is a score for each of `metrics`, overall and in each of `intervals`. A name of either means the
+    same in every protocol. The first metric is MiD, which boards rank by.
+    """
+
+    name: str
+    limit_s: float
+    near_zero_s: tuple[float, float] | None
+    intervals: tuple[Interval, ...] = INTERVALS
+    metrics: tuple[Metric, ...] = (MID, RTE)
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` for names that scores cannot have, and where MiD is not the first metric."""
+        names = [*self.overall_names, *(interval.name for interval in self.intervals)]
+        if not all(map(_NAME.fullmatch, names)) or len({*names, OVERALL}) <= len(names):
+            raise ValueError(f"Names of metrics and TTC ranges are words, each once; found {names}.")
+        if names[0] != PRIMARY:
+            raise ValueError(f"The first metric is {names[0]!r}; expected {PRIMARY!r}, which boards rank by.")
+
+    @property
+    def boundaries(self) -> dict[str, float]:
+        """The values that truncation can produce, ascending, under the names that reports use."""
+        values = (-self.limit_s, *(self.near_zero_s or ()), self.limit_s)
+        return {f"{value:g}": value for value in values}
+
+    @cached_property
+    def interval_names(self) -> tuple[str, ...]:
+        """`overall`, then the TTC ranges in the protocol's order."""
+        return (OVERALL, *(interval.name for interval in self.intervals))
+
+    @cached_property
+    def score_names(self) -> tuple[str, ...]:
+        """The numbers of a result in the order of their columns: `mid`, `mid_crucial`, …, `rte_negative`."""
+        return tuple(score_name(m.name, interval) for m in self.metrics for interval in self.interval_names)
+
+    def names_of(self, metric: str) -> tuple[str, ...]:
+        """The scores of one metric; all of them where there is no metric of this name."""
+        return tuple(name for name in self.score_names if split_name(name)[0] == metric) or self.score_names
+
+    @property
+    def overall_names(self) -> tuple[str, ...]:
+        """The scores over all sequences, one for each metric."""
+        return tuple(metric.name for metric in self.metrics)
+
+    @property
+    def decimals(self) -> int:
+        """With how many decimals its numbers are shown where no edition says otherwise."""
+        return max(metric.decimals for metric in self.metrics)
+
+
+PROTOCOLS: Final[dict[str, Protocol]] = {
+    protocol.name: protocol
+    for protocol in (
+        Protocol(name="tsttc-1", limit_s=20.0, near_zero_s=(-0.15, 0.05)),
+        Protocol(name="toolkit", limit_s=20.0, near_zero_s=None),
+    )
+}
+
+DEFAULT_PROTOCOL: Final = "tsttc-1"
+
+SCORE_NAMES: Final = PROTOCOLS[DEFAULT_PROTOCOL].score_names
+"""The ten numbers of the default protocol; of an edition, ask its own."""
+
+
+def get_protocol(name: str) -> Protocol:
+    """The protocol called `name`; raises `ValueError` naming those that exist.
+
+    >>> get_protocol("tsttc-1").boundaries
+    {'-20': -20.0, '-0.15': -0.15, '0.05': 0.05, '20': 20.0}
+    """
+    try:
+        return PROTOCOLS[name]
+    except KeyError:
+        raise ValueError(f"Unknown protocol {name!r}; expected one of {', '.join(PROTOCOLS)}.") from None
+
+
+# --- what names mean --------------------------------------------------------------------------------------
+
+
+def metric_of(name: str) -> Metric:
+    """The metric of a score. One that only a newer server knows has its name for a symbol, and no unit."""
+    wanted, _ = split_name(name)
+    return known_metrics().get(wanted) or Metric(wanted, wanted, "", wanted, 2, MID.function)
+
+
+def column_words(name: str) -> str:
+    """A score in a sentence.
+
+    >>> column_words("mid"), column_words("rte_crucial")
+    ('MiD', 'RTE on crucial')
+    """
+    symbol, interval = metric_of(name).symbol, split_name(name)[1]
+    return symbol if interval == OVERALL else f"{symbol} on {interval}"
+
+
+def interval_of(name: str) -> Interval | None:
+    """The TTC range of a score; None for an overall one, and for one that only a newer server knows."""
+    return known_intervals().get(split_name(name)[1])
+
+
+def known_intervals() -> dict[str, Interval]:
+    """The TTC ranges of all protocols by their names."""
+    return {interval.name: interval for protocol in PROTOCOLS.values() for interval in protocol.intervals}
+
+
+def known_metrics() -> dict[str, Metric]:
+    """The metrics of all protocols by their names."""
+    return {metric.name: metric for protocol in PROTOCOLS.values() for metric in protocol.metrics}
+
+
+def known_names() -> tuple[str, ...]:
+    """The names of the scores of all protocols, in an order that is each one's own as well."""
+    there = {name for protocol in PROTOCOLS.values() for name in protocol.score_names}
+    intervals = (OVERALL, *known_intervals())
+    named = (score_name(metric, interval) for metric in known_metrics() for interval in intervals)
+    return tuple(name for name in named if name in there)
+
+
+def grouped_names(names: Iterable[str]) -> dict[Metric, list[str]]:
+    """Names of scores by their metrics, both in the order in which they come.
+
+    >>> {metric.symbol: names for metric, names in grouped_names(["mid", "mid_small", "rte"]).items()}
+    {'MiD': ['mid', 'mid_small'], 'RTE': ['rte']}
+    """
+    found: dict[Metric, list[str]] = {}
+    for name in names:
+        found.setdefault(metric_of(name), []).append(name)
+    return found

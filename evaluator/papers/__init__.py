@@ -1,0 +1,1 @@
+"""Tables that papers have printed, as data for commands and pages; imports nothing else here."""

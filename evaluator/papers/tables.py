@@ -1,0 +1,77 @@
+"""All tables of the paper of 2023: main results, ablations, cameras, scripts, as printed.
+
+    table = published_tables().table("ablation-frame-gap")
+    table.value(method="pixel-mse", setting=5, column="mid")  # 41.0
+
+Values are those that the paper prints; where it contradicts itself, the notes of the table say so.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import msgspec
+
+Setting = bool | int | float | str | None
+
+
+class PublishedRow(msgspec.Struct, frozen=True):
+    """One row: `values` go with the table's columns. An ablation's row is of a `method` at a `setting`."""
+
+    key: str | int | float
+    values: tuple[Any, ...]
+    method: str | None = None
+    split: str | None = None
+    setting: Setting = None
+    is_default: bool = False
+    printed_as: str | None = None
+
+
+class PublishedTable(msgspec.Struct, frozen=True):
+    """One table. `units` are by column, `section` and `caption` the paper's; `is_result` marks the tables of
+    measured numbers. An ablation varies `parameter`.
+    """
+
+    name: str
+    section: str
+    caption: str
+    columns: tuple[str, ...]
+    units: dict[str, str]
+    rows: tuple[PublishedRow, ...]
+    is_result: bool
+    parameter: str | None = None
+    notes: tuple[str, ...] = ()
+
+    def value(self, *, method: str, setting: Setting, column: str, split: str = "val") -> float | None:
+        """The number of a method at a setting; None where the paper has none.
+
+        Raises `KeyError` for a column that the table lacks.
+        """
+        if column not in self.columns:
+            raise KeyError(column)
+        for row in self.rows:
+            if (row.method, row.setting, row.split) == (method, setting, split):
+                return float(row.values[self.columns.index(column)])
+        return None
+
+
+class PublishedTables(msgspec.Struct, frozen=True):
+    """The tables of one paper: `source` says which, `metrics` has units, `methods` the printed names."""
+
+    source: dict[str, Any]
+    metrics: dict[str, str]
+    methods: dict[str, str]
+    tables: tuple[PublishedTable, ...]
+
+    def table(self, name: str) -> PublishedTable:
+        """The table of that name; raises `KeyError`."""
+        return {table.name: table for table in self.tables}[name]
+
+
+@cache
+def published_tables() -> PublishedTables:
+    """The tables of "TSTTC: A Large-Scale Dataset for Time-to-Contact Estimation in Driving Scenarios"."""
+    data = files(__package__).joinpath("tables-2023.json").read_bytes()
+    return msgspec.json.decode(data, type=PublishedTables)

@@ -1,0 +1,1 @@
+"""Scores of predictions, their confidence intervals, and the significance of differences."""

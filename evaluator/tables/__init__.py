@@ -1,0 +1,1 @@
+"""Boards as text: LaTeX, Markdown, CSV, and sentences about differences."""

@@ -1,0 +1,92 @@
+"""The formats in which a board is exported: the site and `tsttc board` offer what `FORMATS` has.
+
+To add one, write a function that makes a text of an `Export`, and its row below.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from evaluator.tables.escaping import csv_line
+from evaluator.tables.layouts import Export, as_latex, as_markdown
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format:
+    """One way to export a board.
+
+    The site leads to the API where a format is the API's own document, which holds the rows of whoever asks.
+    """
+
+    name: str
+    """What the command calls it."""
+    title: str
+    """What a page calls it."""
+    suffix: str
+    """The end of its address and of its file."""
+    media_type: str
+    write: Callable[[Export], str]
+    has_values: bool = True
+    """Whether it can have confidence intervals."""
+    is_api_document: bool = False
+    is_pasted: bool = False
+    """Whether people paste it into a text of theirs: then a page offers to copy it as well."""
+    on_site: bool = True
+    on_command_line: bool = True
+
+
+def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
+    """Rows as CSV with a header (RFC 4180), for tables that are too long to be held.
+
+    Texts are guarded and quoted, numbers stay, None is empty.
+    """
+    yield ",".join(columns) + "\r\n"
+    for row in rows:
+        yield csv_line(row.get(name) for name in columns)
+
+
+def _csv(export: Export) -> str:
+    return "".join(csv_lines(export.records, columns=export.columns))
+
+
+FORMATS: Final = (
+    Format(name="csv", title="CSV", suffix="csv", media_type="text/csv", write=_csv),
+    Format(
+        name="json",
+        title="JSON",
+        suffix="json",
+        media_type="application/json",
+        write=lambda export: json.dumps(export.document, ensure_ascii=False, indent=2) + "\n",
+        is_api_document=True,
+    ),
+    Format(
+        name="latex",
+        title="LaTeX",
+        suffix="tex",
+        media_type="application/x-tex",
+        write=as_latex,
+        is_pasted=True,
+    ),
+    Format(
+        name="markdown",
+        title="Markdown",
+        suffix="md",
+        media_type="text/markdown",
+        write=as_markdown,
+        is_pasted=True,
+    ),
+    Format(
+        name="bibtex",
+        title="BibTeX",
+        suffix="bib",
+        media_type="application/x-bibtex",
+        write=lambda export: "\n".join(export.references),
+        has_values=False,
+        is_pasted=True,
+        on_command_line=False,
+    ),
+)
+"""In the order in which they are offered."""

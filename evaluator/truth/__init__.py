@@ -1,0 +1,1 @@
+"""Ground truth and manifests: tables, annotation files, sequence numbers."""

@@ -1,0 +1,195 @@
+"""Reading a pickle that names nothing but data.
+
+Python's own unpickler does the work; what a pickle asks for by name is answered here. It gets containers of
+Python's, whose types nothing can change, and classes of this module in place of attribute-dicts and of
+numpy's types. Nothing is imported for it, no call that it can make has an effect, and nothing that outlives
+it can be changed by it: each class here has a `__setstate__`, so that an unpickler sets no attributes.
+
+What a pickle costs is **not** bounded here. A few bytes may ask for all memory, compute for hours, or nest
+deeper than the interpreter's stack: `annotation_child` reads files within the limits of its process.
+"""
+
+from __future__ import annotations
+
+import io
+import pickle
+import re
+import sys
+from typing import Any, Final, NoReturn
+
+import numpy as np
+
+from evaluator.problems import Rejected, quoted, reject
+
+_MAX_NAME: Final = 200
+_MAX_BYTES: Final = 64
+_N_STATES: Final = 5
+_DICT_LIKE_NAMES: Final = ("dict", "munch", "bunch", "box", "namespace")
+_NUMERIC: Final = re.compile(r"[<>=|]?(?:b1|[iu][1248]|f[248]|c8|c16)")
+
+
+def load_plain(data: bytes, *, where: str) -> object:
+    """The value that the pickle in `data` describes; raises `Rejected`, at `where`, for anything beyond plain
+    data, and MemoryError.
+
+    Attribute-dicts come back as `Attributes`, numpy scalars as Python numbers, ordered and default dicts as
+    dicts, and arrays as `FewNumbers`.
+    """
+    try:
+        # A buffered reader can be peeked into, so that the unpickler does not ask for each few bytes.
+        return _Unpickler(io.BufferedReader(io.BytesIO(data)), encoding="latin-1").load()
+    except Rejected as rejected:
+        problem = rejected.problems[0]
+        raise reject(problem.code, problem.message, where) from None
+    except MemoryError:
+        raise
+    except Exception as error:  # noqa: BLE001 -- "including, but not necessarily limited to", says the manual
+        fault = str(error)[:200]
+        raise reject("bad-annotations", f"The file is no intact pickle ({fault}).", where) from None
+
+
+class Attributes(dict[Any, Any]):
+    """An attribute-dict of whatever class, as plain data."""
+
+    __slots__ = ()
+
+    def __setstate__(self, state: Any) -> None:
+        """Make items of what the foreign class has kept as attributes, where it has no such items."""
+        for part in state if isinstance(state, tuple) else (state,):
+            for name, value in dict(part or {}).items():
+                self.setdefault(name, value)
+
+
+class FewNumbers:
+    """An array of numbers; those of a short one, a box, are kept, and nobody asks for those of others."""
+
+    __slots__ = ("_dtype", "_raw")
+    _raw: bytes
+    _dtype: _Dtype | None
+
+    def __new__(cls, *arguments: object) -> FewNumbers:
+        self = super().__new__(cls)
+        self._keep(*arguments[:2])  # bytes and dtype of `_frombuffer`
+        return self
+
+    def __setstate__(self, state: Any) -> None:
+        if isinstance(state, tuple) and len(state) == _N_STATES:
+            self._keep(state[4], state[2])  # of (version, shape, dtype, order of the axes, bytes)
+
+    def _keep(self, raw: object = None, dtype: object = None) -> None:
+        self._raw, self._dtype = b"", None
+        if isinstance(raw, bytes | bytearray) and len(raw) <= _MAX_BYTES and isinstance(dtype, _Dtype):
+            self._raw, self._dtype = bytes(raw), dtype
+
+    @property
+    def numbers(self) -> list[float] | None:
+        """The numbers as they stand in memory, whatever the shape; None for an array of many."""
+        if self._dtype is None:
+            return None
+        try:
+            return [float(number) for number in np.frombuffer(self._raw, self._dtype.kind).tolist()]
+        except (ValueError, TypeError):  # a part of a number, or a complex one
+            return None
+
+
+class _Dtype:
+    """The type of a number; not numpy's, which all arrays of a program share."""
+
+    __slots__ = ("kind",)
+    kind: np.dtype[Any]
+
+    def __new__(cls, name: str, *_flags: object) -> _Dtype:
+        if not _NUMERIC.fullmatch(name):
+            message = f"The pickle has an array of type {quoted(name)}; expected numbers."
+            raise reject("forbidden-pickle", message)
+        self = super().__new__(cls)
+        self.kind = np.dtype(name)
+        return self
+
+    def __setstate__(self, state: Any) -> None:
+        order = state[1]
+        if order not in ("<", ">", "|", "="):  # a tuple: nothing is hashed
+            raise ValueError("a dtype of unknown construction")
+        self.kind = self.kind.newbyteorder(order)
+
+
+class _Made:
+    """What makes other things than itself. No state is set, neither of one nor of the class."""
+
+    __slots__ = ()
+
+    def __setstate__(self, _state: object) -> None: ...
+
+
+class _Scalar(_Made):
+    def __new__(cls, dtype: _Dtype, raw: bytes) -> Any:
+        [number] = np.frombuffer(raw, dtype.kind).tolist()
+        return number
+
+
+class _DefaultDict(_Made):
+    def __new__(cls, *_factory: object) -> Any:
+        return {}
+
+
+class _Encoded(_Made):
+    """How old pickles write bytes: a text to be encoded as Latin-1, or nothing."""
+
+    def __new__(cls, text: str = "", _encoding: object = None) -> Any:
+        return str.encode(text, "latin-1")
+
+
+class _Reconstructed(_Made):
+    """How old pickles make an object: its class, the base of its class, and the base's content."""
+
+    def __new__(cls, made: Any, *base_and_content: Any) -> Any:
+        return made(*(content for content in base_and_content[1:] if content is not None))
+
+
+_ALIASES: Final = {
+    "__builtin__": "builtins",
+    "copy_reg": "copyreg",
+    "numpy.core.multiarray": "numpy._core.multiarray",
+    "numpy.core.numeric": "numpy._core.numeric",
+}
+
+_ALLOWED: Final[dict[tuple[str, str], type]] = {
+    ("builtins", "dict"): dict,
+    ("builtins", "list"): list,
+    ("builtins", "set"): set,
+    ("builtins", "frozenset"): frozenset,
+    ("builtins", "object"): object,
+    ("builtins", "int"): object,  # mentioned as the factory of a default dict, and never called
+    ("builtins", "float"): object,
+    ("builtins", "bytes"): _Encoded,
+    ("_codecs", "encode"): _Encoded,
+    ("collections", "OrderedDict"): dict,
+    ("collections", "defaultdict"): _DefaultDict,
+    ("copyreg", "_reconstructor"): _Reconstructed,
+    ("copyreg", "__newobj__"): _Reconstructed,  # which has a class and no base; __new__ needs no more
+    ("numpy", "dtype"): _Dtype,
+    ("numpy", "ndarray"): object,
+    ("numpy._core.multiarray", "_reconstruct"): FewNumbers,
+    ("numpy._core.multiarray", "scalar"): _Scalar,
+    ("numpy._core.numeric", "_frombuffer"): FewNumbers,
+}
+
+
+class _Unpickler(pickle.Unpickler):
+    def find_class(self, module: str, name: str) -> type:
+        """What a name stands for; raises `Rejected` for anything that is not data."""
+        allowed = _ALLOWED.get((_ALIASES.get(module, module), name))
+        if allowed is not None:
+            return allowed
+        if max(len(module), len(name)) > _MAX_NAME:
+            raise ValueError(f"a name of more than {_MAX_NAME} characters")
+        is_dict_like = name.lower().endswith(_DICT_LIKE_NAMES)
+        if is_dict_like and module.partition(".")[0] not in sys.stdlib_module_names and "." not in name:
+            return Attributes
+        asked = quoted(f"{module}.{name}")
+        message = f"The pickle asks for {asked}; expected plain containers, numbers and attribute-dicts."
+        raise reject("forbidden-pickle", message)
+
+    def persistent_load(self, _pid: object) -> NoReturn:
+        message = "The pickle asks for an object that is kept elsewhere; expected plain data."
+        raise reject("forbidden-pickle", message)

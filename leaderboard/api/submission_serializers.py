@@ -1,0 +1,165 @@
+"""Serializers of submissions. A field once here stays."""
+
+from dataclasses import asdict
+from typing import Any
+
+from rest_framework import serializers
+
+from leaderboard.api.serializers import (
+    EDITION,
+    SPLIT,
+    CountsSerializer,
+    ProblemSerializer,
+    ScoresSerializer,
+    SlotsSerializer,
+    UncertaintySerializer,
+    WarningSerializer,
+    absolute,
+)
+from leaderboard.methods.visibility import notice_of
+from leaderboard.models import Status, Visibility
+from leaderboard.submissions.outcomes import SubmissionResult
+
+
+class QueueSerializer(serializers.Serializer[Any]):
+    """Position in the queue, and an estimate from recent runs."""
+
+    ahead = serializers.IntegerField(help_text="Submissions to be scored before this one.")
+    estimate_s = serializers.FloatField(
+        allow_null=True, help_text="Estimated seconds until it is scored; null: unknown."
+    )
+
+
+class NewSubmissionSerializer(serializers.Serializer[Any]):
+    """A new submission (multipart)."""
+
+    split = serializers.CharField(help_text=SPLIT)
+    method = serializers.CharField(help_text="Name or id of your method; a new name creates a method.")
+    file = serializers.FileField(help_text="The prediction file (JSON).")
+    description = serializers.CharField(
+        required=False, help_text="Description of the method; replaces the former one."
+    )
+    paper_url = serializers.CharField(required=False, help_text="URL of the paper (http or https).")
+    code_url = serializers.CharField(required=False, help_text="URL of the code (http or https).")
+    note = serializers.CharField(required=False, help_text="Note for your team; not visible to others.")
+    commit = serializers.CharField(required=False, help_text="Commit of the code that made the file.")
+
+
+class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
+    """A submission as its team sees it."""
+
+    id = serializers.UUIDField(help_text="Permanent id of the submission.")
+    state = serializers.ChoiceField(
+        choices=Status.choices, help_text="Final: SCORED, REJECTED, SYSTEM_ERROR (our fault), CANCELLED."
+    )
+    split = serializers.CharField(help_text=SPLIT)
+    edition = serializers.IntegerField(allow_null=True, help_text=EDITION)
+    method = serializers.CharField(help_text="Name of the method.")
+    method_id = serializers.UUIDField(help_text="Id of the method.")
+    team = serializers.CharField(help_text="Name of the team.")
+    visibility = serializers.ChoiceField(
+        choices=Visibility.choices, help_text="Who sees the method, and so this result on the board."
+    )
+    notice = serializers.CharField(
+        allow_blank=True, help_text="Who sees the method's results, in a sentence; empty if it is private."
+    )
+    url = serializers.URLField(help_text="URL of the submission's page.")
+    api_url = serializers.URLField(help_text="URL of the submission in this API.")
+    submitted_at = serializers.DateTimeField(help_text="When it was safely stored.")
+    started_at = serializers.DateTimeField(allow_null=True, help_text="When scoring began; null: not yet.")
+    finished_at = serializers.DateTimeField(allow_null=True, help_text="When it became final; null: not yet.")
+    is_final = serializers.BooleanField(help_text="Whether the state will not change any more.")
+    fault_is_ours = serializers.BooleanField(help_text="Whether scoring failed on our side, not by the file.")
+    digest = serializers.CharField(help_text="Digest of the file's bytes.")
+    size_bytes = serializers.IntegerField(help_text="Size of the file.")
+    note = serializers.CharField(allow_blank=True, help_text="The team's own note.")
+    commit = serializers.CharField(allow_blank=True, help_text="Commit of the code that made the file.")
+    queue = QueueSerializer(allow_null=True, help_text="Position in the queue; null: not waiting.")
+    scores = ScoresSerializer(allow_null=True, help_text="The ten published scores; null: not scored yet.")
+    decimals = serializers.IntegerField(help_text="Decimals of the scores and confidence intervals.")
+    intervals = serializers.DictField(
+        child=UncertaintySerializer(),
+        help_text="Confidence intervals by score name, as on boards; empty until computed. A private "
+        "method has no rank range, nor has a submission that another one of its method surpasses.",
+    )
+    awaits_intervals = serializers.BooleanField(
+        help_text="Whether the confidence intervals are being computed: they follow the scores within "
+        "seconds. False also where there will be none, for example with too few recordings."
+    )
+    rank = serializers.IntegerField(
+        allow_null=True,
+        help_text="Rank of the method on the current board if this submission is its row there, else null; "
+        "of a private method the rank it would have. Its rank range is that of `intervals.mid`.",
+    )
+    counts = CountsSerializer(
+        allow_null=True, help_text="Number of sequences behind each mean; null: not scored yet."
+    )
+    n_out_of_range = serializers.IntegerField(
+        allow_null=True,
+        help_text="Sequences in no TTC range (|τ| > 20 s), which only the overall means include.",
+    )
+    truncated = serializers.DictField(
+        child=serializers.IntegerField(), help_text="Number of predictions truncated to each boundary."
+    )
+    warnings = WarningSerializer(
+        many=True, help_text="Probable mistakes in a scored file, found from the file and the manifest alone."
+    )
+    problems = ProblemSerializer(many=True, help_text="Problems of a rejected file, the first of each kind.")
+    n_problems = serializers.IntegerField(help_text="Number of problems, listed or not.")
+
+    def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
+        """The submission with its progress, and its rank if it has one."""
+        submission, progress, place = instance.submission, instance.progress, instance.place
+        method = submission.method
+        is_waiting = progress.n_ahead is not None
+        return {
+            "id": str(submission.pk),
+            "state": progress.state,
+            "split": submission.split_id,
+            "edition": progress.edition_number,
+            "method": method.name,
+            "method_id": str(method.pk),
+            "team": method.team.name,
+            "visibility": method.visibility,
+            "notice": notice_of(method),
+            "url": absolute("submission", submission.pk),
+            "api_url": absolute("api-submission", submission.pk),
+            "submitted_at": submission.submitted_at,
+            "started_at": progress.started_at,
+            "finished_at": progress.finished_at,
+            "is_final": progress.is_final,
+            "fault_is_ours": progress.fault_is_ours,
+            "digest": submission.digest,
+            "size_bytes": submission.size_bytes,
+            "note": submission.note,
+            "commit": submission.commit,
+            "queue": {"ahead": progress.n_ahead, "estimate_s": progress.estimate_s} if is_waiting else None,
+            "scores": progress.scores,
+            "decimals": progress.decimals,
+            "intervals": {
+                name: asdict(instance.intervals[name])
+                for name in progress.scores or ()
+                if name in instance.intervals
+            },
+            "awaits_intervals": instance.awaits_intervals,
+            "rank": place.rank if place else None,
+            "counts": progress.counts or None,
+            "n_out_of_range": progress.n_out_of_range,
+            "truncated": progress.truncated,
+            "warnings": progress.warnings,
+            "problems": progress.problems,
+            "n_problems": progress.n_problems,
+        }
+
+
+class SubmittedSerializer(SubmissionSerializer):
+    """A new submission and the team's remaining quota."""
+
+    quota = SlotsSerializer(help_text="The team's remaining quota after this submission.")
+
+    def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
+        """The submission, and the `quota` of the context."""
+        return {
+            **super().to_representation(instance),
+            "quota": SlotsSerializer(self.context["quota"]).data,
+        }

@@ -1,0 +1,88 @@
+"""Filters of a board: which rows to show, by what they state. Ranks stay those of the whole board."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from leaderboard.boards.rows import Entry
+from leaderboard.http import ANYTHING, Parameters, one_of
+from leaderboard.methods.details import DETAILS, MAX_FILTER_TEXT, YES_NO, Detail, Kind, free_text
+
+
+class BadFilter(ValueError):
+    """A filter has a value that it does not take. `field` is its name."""
+
+    def __init__(self, field: str, found: str, expected: str) -> None:
+        super().__init__(f"The filter '{field}' is {found[:60]!r}; expected {expected}.")
+        self.field = field
+
+
+@dataclass(frozen=True)
+class Filter:
+    """One filter: its kind, what pages call it, an example, and the value that a row states."""
+
+    kind: Kind
+    label: str
+    stated: Callable[[Entry], Any]
+    example: str = ""
+
+    def parse(self, name: str, text: str) -> Any:
+        """The value that a text asks for. Raises `BadFilter`."""
+        if self.kind.is_free_text and len(text) > MAX_FILTER_TEXT:
+            expected = f"at most {MAX_FILTER_TEXT} characters, found {len(text)}"
+            raise BadFilter(name, text, expected)
+        try:
+            return self.kind.wanted(text)
+        except ValueError:
+            raise BadFilter(name, text, self.kind.takes) from None
+
+
+def _of(detail: Detail) -> Filter:
+    example = detail.filter_example or str(detail.example)
+    return Filter(detail.kind, detail.filter_label, lambda entry: entry.details[detail.name], example)
+
+
+FILTERS: Mapping[str, Filter] = {
+    **{each.filter: _of(each) for each in DETAILS if each.kind.options},
+    "code": Filter(YES_NO, "Has code", lambda entry: bool(entry.code_url)),
+    "paper": Filter(YES_NO, "Has paper", lambda entry: bool(entry.paper_url)),
+    **{each.filter: _of(each) for each in DETAILS if not each.kind.options},
+    "q": Filter(free_text(MAX_FILTER_TEXT), "Method or team contains", lambda e: f"{e.method}\n{e.team}"),
+}
+"""By the names in addresses, in the order of pages: first those to choose from, then those to type."""
+
+PARAMETERS: Parameters = {
+    name: one_of("", *(option.text.lower() for option in each.kind.options))
+    if each.kind.options
+    else ANYTHING
+    for name, each in FILTERS.items()
+}
+"""Which of their values are worth remembering a board for: choices are few, texts and limits are not."""
+
+
+@dataclass(frozen=True)
+class Filters:
+    """What a row has to state to be shown, by the names of filters. An empty one admits every row."""
+
+    wanted: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def is_set(self) -> bool:
+        """Whether anything is asked for."""
+        return bool(self.wanted)
+
+    def admits(self, entry: Entry) -> bool:
+        """Whether the row is to be shown. It is asked for what it states, so a masked row betrays nothing."""
+        return all(
+            FILTERS[name].kind.admits(value, FILTERS[name].stated(entry))
+            for name, value in self.wanted.items()
+        )
+
+
+def parse(query: Mapping[str, str]) -> Filters:
+    """The filters that an address names; empty values are none, and other names are not looked at.
+
+    Raises `BadFilter`.
+    """
+    given = {name: query[name].strip() for name in FILTERS if query.get(name, "").strip()}
+    return Filters({name: FILTERS[name].parse(name, text) for name, text in given.items()})

@@ -1,0 +1,59 @@
+"""How far ranks have moved in a month, on boards of one edition.
+
+The board of a month ago is that of the end of a day. It changes no more, so each process reads it once a day
+and keeps no more of it than ranks.
+"""
+
+from collections.abc import Mapping
+from datetime import UTC, datetime, time, timedelta
+from typing import Final
+from uuid import UUID
+
+from leaderboard.boards import boards
+from leaderboard.boards.boards import Board
+from leaderboard.boards.snapshot_store import BoundedCache
+
+MONTH: Final = timedelta(days=30)
+
+_ranks = BoundedCache[dict[UUID, int]](8)
+
+
+def since(*, now: datetime) -> datetime:
+    """The end of the day that ranks are compared with."""
+    return datetime.combine((now - MONTH).astimezone(UTC).date(), time.max, tzinfo=UTC)
+
+
+def moved(board: Board, *, now: datetime) -> Mapping[UUID, int]:
+    """By method how many ranks it has risen in a month (fallen: below 0), if it was ranked then and is now.
+
+    Nothing for a board of the past or of a former edition, and none of a method that only its team sees.
+    Ranks of different editions are not compared.
+    """
+    edition = board.edition
+    if board.at is not None or edition is None or edition.pk != board.split.published_edition_id:
+        return {}
+    before = _ranks_before(board, at=since(now=now))
+    return {
+        entry.method_id: before[entry.method_id] - entry.rank
+        for entry in board.entries
+        if entry.method_id in before and entry.rank is not None and entry.is_visible_to_all
+    }
+
+
+def _ranks_before(board: Board, *, at: datetime) -> dict[UUID, int]:
+    split, edition = board.split, board.edition
+    if edition is None or edition.published_at is None or edition.published_at > at:
+        return {}
+    key = f"{split.pk} {edition.pk} {at.isoformat()}"
+    found = _ranks.get(key)
+    if found is not None:
+        return found
+    if boards.edition_at(split, at) != edition:
+        return _ranks.put(key, {})
+    rows = boards.public_rows(split=split, edition=edition, at=at)
+    return _ranks.put(key, {row.method_id: row.rank for row in rows if row.method_id and row.rank})
+
+
+def forget() -> None:
+    """Forget what was read."""
+    _ranks.clear()

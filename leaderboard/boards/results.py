@@ -1,0 +1,67 @@
+"""Results of one method: its row on the board of each split, and the submissions behind it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from django.contrib.auth.models import AnonymousUser
+
+from evaluator.metrics.protocol import PRIMARY
+from leaderboard.boards import boards, current, snapshots
+from leaderboard.boards.current import Attempt
+from leaderboard.boards.rows import Entry, Profile, profile_of
+from leaderboard.models import Edition, Method, Split, User
+
+
+def profile(*, method: Method, viewer: User | AnonymousUser) -> Profile:
+    """What this reader is told of a method that is visible to them: of an anonymous one little."""
+    return profile_of(method, is_masked=not method.is_named_for(viewer))
+
+
+@dataclass(frozen=True)
+class Result:
+    """What a method achieved on one split: its row of the published board, and what was tried."""
+
+    split: Split
+    edition: Edition
+    entry: Entry
+    n_ranked: int
+    attempts: tuple[Attempt, ...]  # its standing, scored submissions, the newest first
+    neighbours: tuple[Entry, ...]  # of the rows that everybody sees, up to two of the nearest rank
+
+
+def results(
+    *, method: Method, viewer: User | AnonymousUser, splits: Sequence[Split] | None = None
+) -> tuple[Result, ...]:
+    """A result for each split on whose published board the viewer sees the method, in the splits' order.
+
+    `splits` are those of `snapshots.splits()`, where they are at hand.
+    """
+    found = []
+    for split, drawn in snapshots.shown_on(splits if splits is not None else snapshots.splits()):
+        edition = split.published_edition
+        entries = boards.with_own(drawn.entries, split=split, edition=edition, viewer=viewer)
+        entry = next((entry for entry in entries if entry.method_id == method.pk), None)
+        if entry is None or edition is None:
+            continue
+        is_shown = entry.is_visible_to_all
+        # One that is private is counted where it would stand.
+        ranked = drawn.entries if is_shown else (*drawn.entries, entry)
+        n_ranked = sum(other.rank is not None for other in ranked)
+        # What is private no snapshot has, because nobody else sees it.
+        own = current.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
+        attempts = own or tuple(each for each in drawn.attempts if each.method_id == method.pk)
+        neighbours = _neighbours(entry, drawn.entries)
+        found.append(Result(split, edition, entry, n_ranked, attempts, neighbours))
+    return tuple(found)
+
+
+def _neighbours(entry: Entry, rows: Sequence[Entry]) -> tuple[Entry, ...]:
+    """The row before and the row after; at an end of the board the two next to it."""
+    value = entry.scores[PRIMARY]
+    others = [row for row in rows if row.method_id != entry.method_id and row.scores[PRIMARY] is not None]
+    if value is None:
+        return ()
+    others.sort(key=lambda row: row.scores[PRIMARY] or 0.0)
+    place = sum((row.scores[PRIMARY] or 0.0) < value for row in others)
+    first = min(max(place - 1, 0), max(len(others) - 2, 0))
+    return tuple(others[first : first + 2])

@@ -1,0 +1,103 @@
+"""Serialization of snapshots, and the cache of those that a process has read."""
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cache
+from typing import Generic, TypeVar
+
+import msgspec
+
+from leaderboard.boards.current import Attempt, CurrentBoard
+from leaderboard.boards.rows import Entry, Interval
+from leaderboard.methods.details import DETAILS
+
+T = TypeVar("T")
+# Sets and mappings in one order, so that what says the same has the same digest in every process. What is
+# kept has scores in the order of their protocol, which readers see.
+_SORTED = msgspec.json.Encoder(order="deterministic")
+_PARTS = (CurrentBoard, Attempt, Entry, Interval)
+
+
+@dataclass(frozen=True)
+class StoredSnapshot:
+    """A snapshot as it is kept: what it says, and the digest of that."""
+
+    version: int
+    etag: str
+    body: bytes
+
+
+class _Envelope(msgspec.Struct):
+    shape: str
+    drawn: msgspec.Raw
+
+
+def encode(drawn: CurrentBoard, *, version: int) -> StoredSnapshot:
+    """What was drawn, as it is kept."""
+    envelope = {"shape": _shape(), "drawn": drawn}
+    etag = _digest(_SORTED.encode(envelope))
+    return StoredSnapshot(version=version, etag=etag, body=msgspec.json.encode(envelope))
+
+
+def decode(body: bytes) -> CurrentBoard | None:
+    """What the bytes say; None if another version of this program wrote them."""
+    try:
+        envelope = msgspec.json.decode(body, type=_Envelope)
+        return msgspec.json.decode(envelope.drawn, type=CurrentBoard) if envelope.shape == _shape() else None
+    except msgspec.DecodeError:
+        return None
+
+
+@cache
+def _shape() -> str:
+    """Names what is said: of a program that knows other things, no snapshot is read."""
+    known = [f"{kind.__name__}.{part.name}: {part.type}" for kind in _PARTS for part in fields(kind)]
+    return _digest("\n".join([*known, *(detail.name for detail in DETAILS)]).encode())
+
+
+def _digest(body: bytes) -> str:
+    return hashlib.sha256(body).hexdigest()[:32]
+
+
+class BoundedCache(Generic[T]):
+    """What this process remembers by key, up to a total cost; what was not asked for longest is forgotten."""
+
+    def __init__(self, limit: int, *, cost: Callable[[str, T], int] = lambda _key, _value: 1) -> None:
+        self._limit, self._cost = limit, cost
+        self._lock = threading.Lock()
+        self._values: OrderedDict[str, T] = OrderedDict()
+        self._total = 0
+
+    def __len__(self) -> int:
+        """How many values it holds."""
+        return len(self._values)
+
+    def get(self, key: str) -> T | None:
+        """The value of this key, if it is known."""
+        with self._lock:
+            if key in self._values:
+                self._values.move_to_end(key)
+            return self._values.get(key)
+
+    def put(self, key: str, value: T) -> T:
+        """Remember a value, and return it."""
+        with self._lock:
+            self._forget(key)
+            self._values[key] = value
+            self._total += self._cost(key, value)
+            while self._total > self._limit:
+                self._forget(next(iter(self._values)))
+        return value
+
+    def clear(self) -> None:
+        """Forget everything."""
+        with self._lock:
+            self._values.clear()
+            self._total = 0
+
+    def _forget(self, key: str) -> None:
+        if key in self._values:
+            self._total -= self._cost(key, self._values.pop(key))

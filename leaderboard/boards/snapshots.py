@@ -1,0 +1,240 @@
+"""Snapshots: the public rows of a board, drawn once for all readers.
+
+A snapshot is stamped with the version of its split (`leaderboard/versions.py`) as of which it was drawn; with
+another version it is drawn again: by a worker that was told of the change, or by the first reader to find it.
+Nobody is ever answered from an old one. Every snapshot is read from the database as of one moment, so none
+mixes two; its `etag` is the digest of what it says, so that a change which nobody can see changes nothing.
+
+A board as of a time is read in the same way for whoever asks, and remembered by this process alone: there are
+more times than can be kept.
+"""
+
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from functools import partial
+from typing import Any
+
+import structlog
+from django.db import connection, transaction
+from django.db.models import F, QuerySet
+from django.http import HttpRequest
+from django.utils import timezone
+
+from leaderboard import versions
+from leaderboard.boards import boards, current
+from leaderboard.boards.current import CurrentBoard
+from leaderboard.boards.rows import Entry
+from leaderboard.boards.snapshot_store import BoundedCache, StoredSnapshot, decode, encode
+from leaderboard.models import Edition, Snapshot, Split
+
+log = structlog.get_logger(__name__)
+
+# Many changes in a row are drawn once, by whoever reads next, instead of after each of them.
+REDRAW_AFTER = timedelta(seconds=1)
+# The sweep holds a few of the snapshots against what the database says, each after so long.
+CHECK_AFTER = timedelta(minutes=2)
+MAX_CHECKS = 3
+
+# By the digest of its content: never wrong, at worst forgotten.
+snapshot_cache = BoundedCache[CurrentBoard](12)
+# By split, edition, number and time.
+as_of_cache = BoundedCache[tuple[Entry, ...]](4)
+# One thread of this process draws, the others wait for it; who asks for one of the two never for the other.
+_drawing, _drawing_as_of = threading.Lock(), threading.Lock()
+
+
+# --- finding out what holds: one statement ---------------------------------------------------------------
+
+
+def splits() -> list[Split]:
+    """Every split with its published edition, and with what is kept of it: a whole page's first statement."""
+    rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
+    return list(_stamped(rows, to_edition="published_edition__"))
+
+
+def splits_of(request: HttpRequest) -> list[Split]:
+    """The same, read once a request."""
+    found: list[Split] | None = getattr(request, "splits", None)
+    if found is None:
+        found = splits()
+        request.splits = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
+    return found
+
+
+def editions() -> "QuerySet[Edition]":
+    """Published editions with what is kept of them, to be filtered further."""
+    rows = Edition.objects.exclude(published_at=None).select_related(
+        "split__published_edition__ground_truth", "ground_truth"
+    )
+    return _stamped(rows, to_split="split__")
+
+
+def _stamped(rows: "QuerySet[Any]", *, to_edition: str = "", to_split: str = "") -> "QuerySet[Any]":
+    return rows.annotate(
+        kept_version=F(f"{to_edition}snapshot__version"),
+        kept_etag=F(f"{to_edition}snapshot__etag"),
+        board_number=F(f"{to_split}board_version__number"),
+    )
+
+
+def _etag(split: Split, edition: Edition) -> str:
+    """The etag of what is kept of the edition, if it holds; else nothing. Asks only if it was not yet."""
+    row: Any = edition
+    if not hasattr(row, "kept_etag") and split.published_edition_id == edition.pk:
+        row = split
+    if not hasattr(row, "kept_etag"):
+        row = editions().filter(pk=edition.pk).first()
+    holds = row is not None and row.kept_version == (row.board_number or 0)
+    return str(row.kept_etag) if holds else ""
+
+
+# --- reading ---------------------------------------------------------------------------------------------
+
+
+def _public_rows(*, split: Split, edition: Edition | None, at: datetime | None) -> tuple[Entry, ...]:
+    if at is not None:
+        return _as_of(split, edition, at)
+    if edition is None:
+        return boards.public_rows(split=split, edition=None)
+    return shown(split=split, edition=edition).entries
+
+
+board = partial(boards.board, read=_public_rows)
+"""The same as `boards.board`, from what is kept; `split` is of `splits()` or `editions()`."""
+
+
+def _as_of(split: Any, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
+    """What everybody saw at that time, read once as long as no board of the split changes."""
+    key = f"{split.pk} {edition and edition.pk} {split.board_number} {at.isoformat()}"
+    found = as_of_cache.get(key)
+    if found is not None:
+        return found
+    with _drawing_as_of:
+        found = as_of_cache.get(key)
+        if found is None:
+            with _repeatable_read():
+                found = as_of_cache.put(key, boards.public_rows(split=split, edition=edition, at=at))
+    return found
+
+
+def shown(*, split: Split, edition: Edition) -> CurrentBoard:
+    """What everybody sees of an edition that is or was the board, as of now."""
+    etag = _etag(split, edition)
+    found = snapshot_cache.get(etag)
+    if found is None and etag:
+        found = _read([edition.pk]).get(edition.pk)
+    return found or _drawn_by_one(edition)
+
+
+def shown_on(rows: Sequence[Split]) -> list[tuple[Split, CurrentBoard]]:
+    """What everybody sees of each of these splits' boards, where there is one; `rows` are of `splits()`."""
+    with_board = [(split, split.published_edition) for split in rows if split.published_edition is not None]
+    etags = {edition.pk: _etag(split, edition) for split, edition in with_board}
+    found = {pk: snapshot_cache.get(etag) for pk, etag in etags.items()}
+    unread = [pk for pk, etag in etags.items() if etag and found[pk] is None]
+    if unread:
+        found.update(_read(unread))
+    return [(split, found[edition.pk] or _drawn_by_one(edition)) for split, edition in with_board]
+
+
+def _read(edition_ids: Sequence[int]) -> dict[int, CurrentBoard | None]:
+    """What is kept of these editions; None where another version of this program wrote it."""
+    rows = Snapshot.objects.filter(edition__in=edition_ids)
+    found = {}
+    for pk, etag, body in rows.values_list("edition", "etag", "body"):
+        drawn = decode(bytes(body))
+        found[pk] = None if drawn is None else snapshot_cache.put(etag, drawn)
+    return found
+
+
+def _drawn_by_one(edition: Edition) -> CurrentBoard:
+    """Draw it, or wait for the thread of this process that does."""
+    with _drawing:
+        stamped = editions().get(pk=edition.pk)
+        return snapshot_cache.get(_etag(stamped.split, stamped)) or draw(edition)
+
+
+# --- drawing ---------------------------------------------------------------------------------------------
+
+
+def draw(edition: Edition) -> CurrentBoard:
+    """Draw an edition as everybody sees it now, and keep it."""
+    kept, drawn = _as_of_now(edition)
+    save(edition=edition, kept=kept)
+    return snapshot_cache.put(kept.etag, drawn)
+
+
+def _as_of_now(edition: Edition) -> tuple[StoredSnapshot, CurrentBoard]:
+    with _repeatable_read():
+        rows = Edition.objects.select_related("split__published_edition", "ground_truth")
+        row = rows.get(pk=edition.pk)
+        version = versions.number(row.split_id)
+        drawn = current.read(row)
+    return encode(drawn, version=version), drawn
+
+
+@contextmanager
+def _repeatable_read() -> Iterator[None]:
+    """Everything that is read within is of the same moment, whatever is committed meanwhile."""
+    is_outermost = not connection.in_atomic_block
+    with transaction.atomic():
+        if is_outermost and connection.vendor == "postgresql":
+            with connection.cursor() as cursor:
+                cursor.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
+        # SQLite: a transaction that begins IMMEDIATE is the only writer.
+        yield
+
+
+def save(*, edition: Edition, kept: StoredSnapshot) -> None:
+    """Keep what was drawn of an edition, unless something newer is kept already."""
+    values = {"version": kept.version, "body": kept.body, "etag": kept.etag, "made_at": timezone.now()}
+    if not Snapshot.objects.filter(edition=edition, version__lte=kept.version).update(**values):
+        Snapshot.objects.bulk_create([Snapshot(edition=edition, **values)], ignore_conflicts=True)
+
+
+# --- by workers, unasked ---------------------------------------------------------------------------------
+
+
+def redraw(*, now: datetime) -> int:
+    """Draw the boards that changed and that nobody has drawn since. Returns how many that were.
+
+    One that was drawn a moment ago is left to its next reader: where changes come by the hundred, drawing
+    each would be all that the workers do.
+    """
+    return sum(_redraw(split, now=now) for split in splits())
+
+
+def _redraw(split: Split, *, now: datetime) -> bool:
+    if split.published_edition is None:
+        return False
+    recent = Snapshot.objects.filter(edition=split.published_edition, made_at__gt=now - REDRAW_AFTER)
+    if _etag(split, split.published_edition) or recent.exists():
+        return False
+    draw(split.published_edition)
+    return True
+
+
+def check(*, now: datetime) -> int:
+    """Draw the boards that changed, and hold some snapshots against the database. Returns how many differed.
+
+    None should: a verb that changes what everybody sees says so. One that was changed by other means, such
+    as by hand, is found here within minutes.
+    """
+    redraw(now=now)
+    old = Snapshot.objects.filter(made_at__lt=now - CHECK_AFTER).order_by("made_at")
+    return sum(_differed(row) for row in old.select_related("edition").defer("body")[:MAX_CHECKS])
+
+
+def _differed(row: Snapshot) -> bool:
+    """Draw it anew. Returns whether it said something else, though nobody had said that it changed."""
+    kept, _ = _as_of_now(row.edition)
+    has_differed = kept.version == row.version and kept.etag != row.etag
+    if has_differed:
+        log.warning("snapshot_differed", split=row.edition.split_id, edition=row.edition.number)
+        with transaction.atomic():
+            versions.changed(row.edition.split_id)
+        kept, _ = _as_of_now(row.edition)
+    save(edition=row.edition, kept=kept)
+    return has_differed

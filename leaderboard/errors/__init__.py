@@ -1,0 +1,4 @@
+"""Errors: one refusal for everything that people may do wrong, problem codes, outages.
+
+Every room may import this one.
+"""

@@ -1,0 +1,122 @@
+"""Problem documents (RFC 9457) and every problem code of the API.
+
+A code is stable: programs may rely on it. Those of prediction files are `evaluator.problems.PROBLEM_CODES`.
+A test checks that every code in the source stands here and in docs/api.md.
+"""
+
+from collections.abc import Mapping
+from http import HTTPStatus
+from typing import Any, Final
+
+from django.conf import settings
+from django.http import JsonResponse
+
+MEDIA_TYPE: Final = "application/problem+json"
+
+API_CODES: Final[dict[str, str]] = {
+    # the request itself
+    "bad-request": "The request is malformed or incomplete.",
+    "parse-error": "The body is not what its Content-Type says.",
+    "invalid": "A field of the request has an invalid value.",
+    "bad-idempotency-key": "The Idempotency-Key header is malformed or too long.",
+    "idempotency-key-reused": "The Idempotency-Key was used before with another file or other fields.",
+    "bad-wait": "`wait` is not a whole number of seconds from 0 to 60.",
+    "bad-limit": "`limit` is not a number of rows that a page may have.",
+    "bad-cursor": "`after` names no row of this list.",
+    "bad-edition": "`edition` is not the number of an edition.",
+    "bad-moment": "`at` is not a date or time.",
+    "bad-visibility": "`as` is neither ANONYMOUS nor PUBLIC.",
+    "bad-filter": "A filter of the board has an invalid value.",
+    "unknown-column": "The board has no such column to sort by.",
+    "not-found": "There is nothing at this address that you may see.",
+    "method-not-allowed": "The path does not support this HTTP method; `Allow` lists those it does.",
+    "not-acceptable": "`Accept` asks for a format that this path does not offer.",
+    "unsupported-media-type": "The Content-Type of the body is not accepted here.",
+    # authentication and permission
+    "not-authenticated": "The path needs an account, and the request has no credentials.",
+    "authentication-failed": "The credentials are invalid.",
+    "token-malformed": "The bearer token is not a token of this leaderboard.",
+    "token-unknown": "There is no such token.",
+    "token-expired": "The token has expired.",
+    "token-revoked": "The token was revoked.",
+    "account-closed": "The account that the token belongs to is closed.",
+    "token-scope": "The token does not have the scope for this.",
+    "token-split": "The token is valid for one split only, and the request affects another or all.",
+    "permission-denied": "The account may not do this.",
+    "not-maintainer": "Only maintainers may do this.",
+    "not-yours": "Only the team that sent a submission may do this.",
+    # rates and quotas
+    "throttled": "Too many requests in a short time; repeat after `Retry-After` seconds.",
+    "quota-exceeded": "The team's quota of submissions or bytes is used up; `Retry-After` says for how long.",
+    # submitting
+    "no-file": "No prediction file was sent.",
+    "too-large": "The file is larger than the limit.",
+    "missing-field": "A required field is empty.",
+    "text-too-long": "A field has too many characters.",
+    "bad-character": "A field has a character that cannot be displayed.",
+    "bad-address": "A field is not an http or https URL.",
+    "unknown-split": "There is no such split.",
+    "unknown-method": "There is no such method, or it belongs to another team.",
+    "split-not-open": "The split is not open for submissions yet.",
+    "not-admitted": "Only admitted teams may submit to the split, and the team is not one of them.",
+    "split-closed": "The split is closed for submissions.",
+    # comparing
+    "bad-comparison": "The request names too few or too many methods to compare, or one of them twice.",
+    "not-on-the-board": "The split has no board, or the method has no scored submission on it.",
+    # methods and teams
+    "bad-value": "A field has an invalid value.",
+    "bad-name": "The name has an invisible character, or no letter or digit.",
+    "reserved-name": "The name looks like those given to anonymous methods and teams.",
+    "name-taken": "Another name looks the same.",
+    "renamed-lately": "The name was changed recently; the message says when it can be changed again.",
+    "public-name": "The name of a public method cannot be changed.",
+    "shown-for-good": "A public method cannot be made anonymous or private.",
+    "not-confirmed": "An action that cannot be undone was not confirmed.",
+    "not-empty": "Only a private method without a scored or waiting submission can be deleted.",
+    "in-a-team": "The person is already in a team.",
+    "in-no-team": "The person is in no team.",
+    "not-a-member": "The person is not in the team.",
+    "not-the-owner": "Only the team's owner may do this.",
+    "not-your-team": "The team is no longer the person's own.",
+    "not-yourself": "Owners cannot do this to themselves.",
+    "hand-over-first": "An owner must hand the team over before leaving it.",
+    "no-invitation": "There is no such invitation, or it was used or revoked or has expired.",
+    "cannot-join": "The person's own team prevents joining.",
+    "too-many-invitations": "The team has reached its limit of unused invitations.",
+    "changed-meanwhile": "Somebody changed the team at the same moment; try again.",
+    # receipts
+    "not-scored": "The submission has no score to sign.",
+    "withdrawn": "The submission is withdrawn.",
+    "edition-unknown": "The submission has no score in a published edition of that number.",
+    # maintainers
+    "edition-refused": "The edition cannot be opened, published, rolled back or discarded now.",
+    # our side
+    "database-unavailable": "The database does not answer at the moment.",
+    "store-unavailable": "The file store does not answer at the moment.",
+    "storage-full": "There is no space left to store a file.",
+    "server-error": "Something failed on our side; it is in our logs.",
+}
+
+
+def document(*, status: int, code: str, detail: str, where: str = "") -> dict[str, Any]:
+    """The problem document of one problem. `type` is the URL of its code in the API reference."""
+    return {
+        "type": f"{settings.SITE_URL}/docs/api/#problem-{code}",
+        "title": HTTPStatus(status).phrase,
+        "status": status,
+        "code": code,
+        "detail": detail,
+        "problems": [{"code": code, "message": detail, "where": where}],
+    }
+
+
+def response(
+    *, status: int, code: str, detail: str, where: str = "", headers: Mapping[str, str] | None = None
+) -> JsonResponse:
+    """The same as an answer, where no view of the API makes it."""
+    return JsonResponse(
+        document(status=status, code=code, detail=detail, where=where),
+        status=status,
+        headers=headers,
+        content_type=MEDIA_TYPE,
+    )

@@ -1,0 +1,374 @@
+"""The registry of method details: what a team states of a method in fields of its own, one row each.
+
+The field of the form, the filter of boards, the fields of the API, the columns of exports and the words on
+pages follow from the row. To add a detail: a field of `Method`, its migration, and a row in `DETAILS`.
+
+What others see of an anonymous method's details is decided by their kind: never a free text.
+"""
+
+import math
+import unicodedata
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar, Final, NamedTuple
+
+from django.db.models import TextChoices
+
+from leaderboard.errors.refusals import Refused, clean_text
+from leaderboard.methods.quantities import count_of, measure_of
+from leaderboard.models import BoxSource, Cameras, Method
+
+MAX_MEASURED: Final = 1e9
+MAX_FILTER_TEXT: Final = 80
+_IN_MS: Final = {"ms": 1.0, "millisecond": 1.0, "milliseconds": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3}
+
+Details = Mapping[str, Any]
+"""A method's details by name: each of the registry, an empty text or None where it is not specified."""
+
+
+def bad_value(name: str, found: object, expected: str, *, advice: str = "") -> Refused:
+    """The refusal of what a field cannot be."""
+    message = f"The field '{name}' is {str(found)[:60]!r}; expected {expected}."
+    return Refused("bad-value", message, field=name, advice=advice)
+
+
+def text_of(name: str, value: object) -> str:
+    """A text as it was sent; None is an empty one. Raises `Refused`."""
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        raise bad_value(name, value, "a text")
+    return value
+
+
+# --- kinds of values -------------------------------------------------------------------------------------
+
+
+class Option(NamedTuple):
+    """A value to choose: as forms and addresses have it, as it is stored, and in words."""
+
+    text: str
+    value: object
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Kind:
+    """Which values a detail can have, and which of them a filter admits."""
+
+    is_free_text: ClassVar[bool] = True  # unless a kind denies it: then others see it of an anonymous method
+    filter_label: ClassVar[str] = "{}"  # around the detail's own
+    type: type
+    expected: str = ""  # of a value, in words
+    advice: str = ""  # the same for whoever fills in a form
+    takes: str  # of a filter's value, in words
+    options: tuple[Option, ...] = ()  # none where the value is typed
+    limits: Mapping[str, Any] = field(default_factory=dict)  # by the names that a serializer's field has
+
+    @property
+    def empty(self) -> str | None:
+        """The value of a detail that is not specified."""
+        return "" if self.type is str else None
+
+    def clean(self, name: str, value: object) -> Any:
+        """The value that a text or a JSON value means; `name` is the field's. Raises `Refused`."""
+        if value is None or value == "":
+            return self.empty
+        try:
+            return self.read(value)
+        except (ValueError, OverflowError):
+            raise bad_value(name, value, self.expected, advice=self.advice) from None
+
+    def read(self, value: object) -> Any:
+        """The same of what is not empty. Raises `ValueError`."""
+        raise NotImplementedError
+
+    def words(self, value: Any) -> str:
+        """A value as a page shows it."""
+        return str(value)
+
+    def wanted(self, text: str) -> Any:
+        """The value that a filter asks for. Raises `ValueError`."""
+        raise NotImplementedError
+
+    def admits(self, wanted: Any, stated: Any) -> bool:
+        """Whether a row that states this passes the filter; one that states nothing passes none."""
+        return bool(wanted == stated)
+
+
+class Listed(Kind):
+    """One of a few values; a filter asks for one of them."""
+
+    is_free_text = False
+
+    def read(self, value: object) -> Any:
+        for option in self.options:
+            if value == option.text or (value == option.value and type(value) is self.type):
+                return option.value
+        raise ValueError(value)
+
+    def words(self, value: Any) -> str:
+        return next(option.words for option in self.options if option.value == value)
+
+    def wanted(self, text: str) -> Any:
+        return self.read(next((each.text for each in self.options if each.text.lower() == text.lower()), ""))
+
+
+class Number(Kind):
+    """A number; a filter asks for at most so much."""
+
+    is_free_text = False
+    filter_label = "Max {}"
+
+    def admits(self, wanted: Any, stated: Any) -> bool:
+        return stated is not None and stated <= wanted
+
+
+class Whole(Number):
+    """A whole number, as 25000000 or as 25M."""
+
+    def read(self, value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, str | int):
+            raise ValueError(value)
+        number = count_of(value) if isinstance(value, str) else value
+        if number != int(number) or not self.limits["min_value"] <= number <= self.limits["max_value"]:
+            raise ValueError(value)
+        return int(number)
+
+    def words(self, value: Any) -> str:
+        return f"{value:,}"
+
+    def wanted(self, text: str) -> int:
+        value = int(count_of(text))
+        if not value:
+            raise ValueError(text)
+        return value
+
+
+@dataclass(frozen=True, kw_only=True)
+class Measured(Number):
+    """A finite number above 0; a text may name one of the units, each of so many of the detail's own."""
+
+    units: Mapping[str, float] = field(default_factory=dict)
+
+    def read(self, value: object) -> float:
+        number = self.wanted(value)
+        if number > MAX_MEASURED:
+            raise ValueError(value)
+        return number
+
+    def words(self, value: Any) -> str:
+        return f"{value:g}"
+
+    def wanted(self, text: object) -> float:
+        if isinstance(text, bool) or not isinstance(text, str | int | float):
+            raise ValueError(text)
+        number = measure_of(text, self.units) if isinstance(text, str) else float(text)
+        if not math.isfinite(number) or number <= 0:
+            raise ValueError(text)
+        return number
+
+
+class FreeText(Kind):
+    """Words of the team's own; a filter asks for a part of them, whatever their case."""
+
+    filter_label = "{} contains"
+
+    def clean(self, name: str, value: object) -> str:
+        return clean_text(name, text_of(name, value), limit=self.limits["max_length"], required=False)
+
+    def wanted(self, text: str) -> str:
+        return _folded(text)
+
+    def admits(self, wanted: Any, stated: Any) -> bool:
+        return wanted in _folded(stated)
+
+
+def _folded(text: str) -> str:
+    return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", text).casefold())
+
+
+def _listed(type_: type, options: Iterable[Option], *, expected: str, **limits: Any) -> Listed:
+    listed = tuple(options)
+    takes = f"one of {', '.join(option.text.lower() for option in listed)}"
+    return Listed(type=type_, options=listed, expected=f"{expected} or nothing", takes=takes, limits=limits)
+
+
+def choice(choices: type[TextChoices]) -> Listed:
+    """One of the choices of a field of the model."""
+    options = (Option(str(each.value), str(each.value), str(each.label)) for each in choices)
+    return _listed(str, options, expected=f"one of {', '.join(choices.values)},", choices=choices.choices)
+
+
+def few(low: int, high: int) -> Listed:
+    """One of a few whole numbers."""
+    options = (Option(str(n), n, str(n)) for n in range(low, high + 1))
+    expected = f"a whole number from {low} to {high},"
+    return _listed(int, options, expected=expected, min_value=low, max_value=high)
+
+
+YES_NO: Final = _listed(bool, (Option("yes", True, "yes"), Option("no", False, "no")), expected="yes, no")
+
+
+def whole(low: int, high: int) -> Whole:
+    """A whole number of many."""
+    return Whole(
+        type=int,
+        limits={"min_value": low, "max_value": high},
+        expected=f"a whole number from {low:,} to {high:,}, such as 25000000 or 25M, or nothing",
+        advice="Enter a whole number, e.g. 25,000,000 or 25M.",
+        takes="a number above 0, such as 25M (million), 400k or 25000000",
+    )
+
+
+def measured(unit: str, units: Mapping[str, float]) -> Measured:
+    """A number of some unit, named in the plural; texts may name one of `units`."""
+    return Measured(
+        type=float,
+        units=units,
+        expected=f"{unit} above 0, or nothing",
+        advice=f"Enter a number of {unit} above 0, e.g. 12.5 or 50 ms.",
+        takes=f"a number of {unit} above 0",
+    )
+
+
+def free_text(limit: int) -> FreeText:
+    """A text of at most so many characters."""
+    takes = f"a text of at most {MAX_FILTER_TEXT} characters, whatever the case"
+    return FreeText(type=str, limits={"max_length": limit}, takes=takes)
+
+
+# --- the registry ----------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, kw_only=True)
+class Detail:
+    """One detail: `name` is that of the field of `Method` and of the API, `filter` that in addresses."""
+
+    name: str
+    kind: Kind
+    label: str
+    help: str  # for whoever fills it in, and for whoever reads it in a program
+    filter: str
+    example: Any
+    filter_example: str = ""
+
+    @property
+    def filter_label(self) -> str:
+        """What the filter is called on pages: "Max latency (ms)"."""
+        around = self.kind.filter_label
+        return around.format(self.label if around.startswith("{") else self.label.lower())
+
+    @property
+    def meaning(self) -> str:
+        """What the field of the API means, and its empty value."""
+        values = [value for value, _ in self.kind.limits.get("choices", ())]
+        one_of = f" One of {', '.join(values)}." if values else ""
+        empty = "Null" if self.kind.empty is None else "Empty"
+        masked = ", or the method is anonymous" if self.kind.is_free_text else ""
+        return f"{self.help}{one_of} {empty}: not specified{masked}."
+
+
+DETAILS: tuple[Detail, ...] = (
+    Detail(
+        name="n_frames",
+        kind=few(2, 6),
+        label="Frames used",
+        help="Number of frames used.",
+        filter="frames",
+        example=6,
+    ),
+    Detail(
+        name="cameras",
+        kind=choice(Cameras),
+        label="Cameras",
+        help="Camera views used.",
+        filter="cameras",
+        example="ONE",
+    ),
+    Detail(
+        name="box_source",
+        kind=choice(BoxSource),
+        label="Bounding boxes",
+        help="Source of the object's bounding box.",
+        filter="boxes",
+        example="GIVEN",
+    ),
+    Detail(
+        name="uses_nerf",
+        kind=YES_NO,
+        label="NeRF-augmented data",
+        help="Whether trained with the NeRF-rendered sequences.",
+        filter="nerf",
+        example=False,
+    ),
+    Detail(
+        name="uses_extra_data",
+        kind=YES_NO,
+        label="External training data",
+        help="Whether trained with data from elsewhere.",
+        filter="extra",
+        example=False,
+    ),
+    Detail(
+        name="pretraining",
+        kind=free_text(200),
+        label="Pretraining",
+        help="What the weights were trained on before, such as “ImageNet-1k”.",
+        filter="pretraining",
+        example="ImageNet",
+    ),
+    Detail(
+        name="n_parameters",
+        kind=whole(1, 10**15),
+        label="Parameters",
+        help="Number of model parameters.",
+        filter="parameters",
+        example=25_000_000,
+        filter_example="25M",
+    ),
+    Detail(
+        name="latency_ms",
+        kind=measured("milliseconds", _IN_MS),
+        label="Latency (ms)",
+        help="Milliseconds per prediction, above 0; needs the hardware.",
+        filter="latency",
+        example=12.5,
+    ),
+    Detail(
+        name="hardware",
+        kind=free_text(120),
+        label="Hardware",
+        help="Hardware on which the latency was measured.",
+        filter="hardware",
+        example="one RTX 4090",
+    ),
+)
+
+
+def stated(**values: Any) -> Details:
+    """The details of whoever states these and no others.
+
+    >>> {name: value for name, value in stated(n_frames=6).items() if value}
+    {'n_frames': 6}
+    """
+    return {detail.name: values.get(detail.name, detail.kind.empty) for detail in DETAILS}
+
+
+def details_of(method: Method, *, is_masked: bool = False) -> Details:
+    """The details of a method; masked: without free texts."""
+    shown = (each.name for each in DETAILS if not (is_masked and each.kind.is_free_text))
+    return stated(**{name: getattr(method, name) for name in shown})
+
+
+def words(details: Details) -> tuple[tuple[str, str], ...]:
+    """The details that are specified, each with its label.
+
+    >>> words(stated(n_frames=6, uses_nerf=False, latency_ms=41.5, hardware="one GPU"))
+    (('Frames used', '6'), ('NeRF-augmented data', 'no'), ('Latency (ms)', '41.5'), ('Hardware', 'one GPU'))
+    """
+    return tuple(
+        (each.label, each.kind.words(details[each.name]))
+        for each in DETAILS
+        if details[each.name] != each.kind.empty
+    )

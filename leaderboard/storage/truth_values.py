@@ -1,0 +1,67 @@
+"""Ground-truth values: in a private directory, written by maintainers' commands and read by workers only.
+
+They are nowhere else: the database has their digest and counts, the file store the public manifest.
+"""
+
+import os
+from functools import lru_cache
+from pathlib import Path
+
+from django.conf import settings
+
+import evaluator
+from leaderboard.storage import files, seeds
+
+
+def values_path(digest: str) -> Path:
+    """Where the worker finds the values of this digest."""
+    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.npz"
+
+
+def manifest_path(digest: str) -> Path:
+    """Where the worker finds the manifest of the ground truth of this digest, without the values."""
+    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.manifest.npz"
+
+
+def is_marked_hidden(digest: str) -> bool:
+    """Whether the values of this digest were imported as hidden ones, whatever the database says today.
+
+    Who can write into the database could call a split open; the private directory tells workers otherwise.
+    """
+    return _mark_path(digest).exists()
+
+
+def _mark_path(digest: str) -> Path:
+    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.hidden"
+
+
+def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
+    """Write values and manifest to the private directory: whole or not at all, readable by its owner only.
+
+    Hidden ones are marked as such, before they can be read.
+    """
+    directory = Path(settings.GROUND_TRUTH_DIR)
+    directory.mkdir(parents=True, exist_ok=True, mode=0o700)
+    if is_hidden:
+        _mark_path(truth.digest).touch(mode=0o600)
+    for part, target in ((truth, values_path(truth.digest)), (truth.manifest, manifest_path(truth.digest))):
+        if not target.exists():
+            with files.replacing(target) as path:
+                part.save(path)
+    seeds.ensure()
+
+
+def readable_digests() -> frozenset[str]:
+    """The digests whose values this process can read: what it may take on. Empty without any access."""
+    try:
+        found = list(Path(settings.GROUND_TRUTH_DIR).iterdir())
+    except OSError:
+        return frozenset()
+    values = (path for path in found if path.suffix == ".npz" and not path.stem.endswith(".manifest"))
+    return frozenset(f"sha256:{path.stem}" for path in values if os.access(path, os.R_OK))
+
+
+@lru_cache(maxsize=2)
+def load(digest: str) -> evaluator.GroundTruth:
+    """The values of this digest, for a worker. Raises `OSError` if this process has no access to them."""
+    return evaluator.GroundTruth.load(values_path(digest))

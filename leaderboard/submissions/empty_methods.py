@@ -1,0 +1,44 @@
+"""Deletion of a method of which nothing was ever scored, as one that a rejected file or a typing slip made.
+
+Its files stay, since submissions are kept for ever and rejected ones count; they are withdrawn, so that no
+later edition scores them. The method is in no list any more, and its name is free.
+"""
+
+from datetime import datetime
+
+from django.db import transaction
+
+from leaderboard import audit
+from leaderboard.errors.refusals import Refused
+from leaderboard.methods.methods import require_team
+from leaderboard.models import Evaluation, Method, Status, Submission, User, Visibility
+from leaderboard.people import teams
+from leaderboard.submissions import submissions
+
+
+def can_be_deleted(method: Method) -> bool:
+    """Whether nobody else has seen the method, nothing of it was scored, and nothing can be."""
+    if method.visibility != Visibility.PRIVATE or method.deleted_at is not None:
+        return False
+    others = Evaluation.objects.exclude(status__in=[Status.REJECTED, Status.CANCELLED])
+    return not others.filter(submission__method=method).exists()
+
+
+def delete(*, method: Method, actor: User, now: datetime) -> None:
+    """Delete an empty method for its team. Raises `Refused` for any other method or person."""
+    with transaction.atomic():
+        # Whoever submits holds the team as well, so that no file comes in between.
+        teams.locked(method.team)
+        row = Method.objects.select_for_update(no_key=True).select_related(None).get(pk=method.pk)
+        require_team(row, actor)
+        if not can_be_deleted(row):
+            raise Refused(
+                "not-empty",
+                f"The method {row.name!r} cannot be deleted; expected a private method without a scored or "
+                "waiting submission.",
+            )
+        for sent in Submission.objects.standing().filter(method=row).select_related("method__team"):
+            submissions.withdraw(submission=sent, actor=actor, now=now)
+        row.deleted_at = now
+        row.save(update_fields=["deleted_at"])
+        audit.record(verb="deleted", noun="Method", noun_id=row.pk, actor=actor, details={"name": row.name})

@@ -1,0 +1,1 @@
+"""Pages of boards: tables, filters, charts, comparisons, editions, exports, badges and feeds."""

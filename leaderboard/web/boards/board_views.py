@@ -1,0 +1,86 @@
+"""The page of a board, now or as of a time."""
+
+from dataclasses import replace
+from typing import Any
+
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.utils import timezone
+from django.utils.functional import SimpleLazyObject
+from django.views.decorators.http import require_safe
+
+from leaderboard.boards import movement, snapshots
+from leaderboard.boards.boards import Board, UnknownColumn
+from leaderboard.models import Edition, Split
+from leaderboard.web.boards import board_query, edition_tables, export_views, tables
+from leaderboard.web.boards.board_query import BoardQuery
+from leaderboard.web.boards.board_tools import tools
+from leaderboard.web.context_processors import split_or_404
+
+HOME_SPLIT = "test"
+
+
+@require_safe
+def home(request: HttpRequest) -> HttpResponse:
+    """The board that papers quote."""
+    return board(request, HOME_SPLIT)
+
+
+@require_safe
+def board(request: HttpRequest, split: str) -> HttpResponse:
+    """A split's board, in the order that `?sort=` asks for, now or as it stood `?at=` a time."""
+    found = split_or_404(request, split)
+    # Asked for only by a page that tells it: a board of the past does not.
+    news = SimpleLazyObject(lambda: edition_tables.news(found))
+    return draw_board(request, "boards/board.html", split=found, news=news)
+
+
+def draw_board(
+    request: HttpRequest, template: str, *, split: Split, edition: Edition | None = None, **more: Any
+) -> HttpResponse:
+    """A board as its address asks for it; an edition's has no other time.
+
+    What the address gets wrong is left out and said, at its field where it has one: nothing else is lost.
+    """
+    now = timezone.now()
+    query, faults = board_query.forgiving(request.GET, now=now, has_time=edition is None)
+    shown, query = _shown(request, split, edition, query, faults)
+    news = tables.BoardNews(
+        today=now.date(), since=movement.since(now=now).date(), moved=movement.moved(shown, now=now)
+    )
+    table = edition_tables.with_reasons(tables.board_table(shown, query=query, news=news), shown)
+    context = {
+        "board": shown,
+        "table": table,
+        "tools": tools(
+            shown,
+            query,
+            asked=request.GET,
+            faults=faults,
+            latest_day=now.date() if edition is None and split.published_edition else None,
+        ),
+        "exports": export_views.offers(shown, edition, query),
+    }
+    # Who types into the form is no program that got its request wrong: the answer stands at the field.
+    status = 400 if faults and not request.headers.get("HX-Request") else 200
+    return render(request, template, context | more, status=status)
+
+
+def _shown(
+    request: HttpRequest, split: Split, edition: Edition | None, query: BoardQuery, faults: dict[str, str]
+) -> tuple[Board, BoardQuery]:
+    """The board, in the order of its ranks where its protocol lacks the column that was asked for."""
+    try:
+        board = snapshots.board(
+            split=split,
+            edition=edition,
+            viewer=request.user,
+            sort=query.sort,
+            at=query.at,
+            filters=query.filters,
+        )
+    except UnknownColumn as fault:
+        faults[fault.field] = str(fault)
+        given = {name: text for name, text in query.given.items() if name != fault.field}
+        return _shown(request, split, edition, replace(query, sort="rank", given=given), faults)
+    return board, query

@@ -1,0 +1,54 @@
+"""The page of a board's charts, and the options of one of them for other pages."""
+
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import render
+from django.utils import timezone
+from django.views.decorators.http import require_safe
+
+from leaderboard.boards import snapshots
+from leaderboard.boards.boards import Board
+from leaderboard.http import cacheable
+from leaderboard.scoring import comparisons
+from leaderboard.scoring.comparisons import Pair
+from leaderboard.web.boards import charts, profile_chart, significance_chart
+from leaderboard.web.boards.chart_options import Chart
+from leaderboard.web.context_processors import split_or_404
+
+N_PROFILES = 5
+
+
+@require_safe
+def board_charts(request: HttpRequest, split: str) -> HttpResponse:
+    """Progress over time, accuracy against latency, errors by TTC range, significance of the first rows."""
+    board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
+    pairs = comparisons.of_first(board=board, now=timezone.now())
+    # What is being computed changes by itself.
+    draw = cacheable(_drawn) if all(pair.differences is not None for pair in pairs) else _drawn
+    return draw(request, board, pairs)
+
+
+def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpResponse:
+    shown = [entry for entry in board.entries if entry.is_visible_to_all]
+    context = {
+        "board": board,
+        "progress": _progress(board),
+        "latency": charts.latency(shown),
+        "profile": profile_chart.profile(shown[:N_PROFILES]),
+        "n_profiles": N_PROFILES,
+        "significance": significance_chart.significance(pairs, split=board.split.pk),
+        "n_first": comparisons.N_FIRST,
+    }
+    return render(request, "boards/charts.html", context)
+
+
+@require_safe
+def progress_options(request: HttpRequest, split: str) -> HttpResponse:
+    """The progress of a split as options for ECharts: pages fetch it once the chart comes into view."""
+    board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
+    return JsonResponse(_progress(board).options)
+
+
+def _progress(board: Board) -> Chart:
+    shown = [entry for entry in board.entries if entry.is_visible_to_all]
+    attempts = snapshots.shown(split=board.split, edition=board.edition).attempts if board.edition else ()
+    return charts.progress(shown, attempts)

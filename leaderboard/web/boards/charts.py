@@ -1,0 +1,293 @@
+"""Charts of a board with a front: progress over time, accuracy against latency.
+
+They are made of the public rows, and each has a table with the same numbers. Hidden splits show nothing here
+that their board does not: values over whole TTC ranges, with the decimals of the split.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from django.utils.html import format_html
+from django.utils.safestring import SafeString
+
+from evaluator.metrics.metrics import MID
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.scoring.report import format_published
+from leaderboard.boards.boards import Entry
+from leaderboard.boards.current import Attempt
+from leaderboard.models import Visibility
+from leaderboard.web.boards.chart_options import (
+    Chart,
+    Frame,
+    Mark,
+    Option,
+    empty,
+    error_axis,
+    error_text,
+    log_axis,
+    method_href,
+    team_of,
+    x_axis,
+)
+from leaderboard.web.boards.chart_series import (
+    Look,
+    marks,
+    named_marks,
+    staircase,
+)
+
+# Below the front, where its names are.
+_ROOM: Final = 0.75
+SUBMITTED, QUOTED = "Submissions", "Published results"
+
+
+# --- a front and what lies behind it ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """An entry's MiD at a place of the level axis: a time, or a latency."""
+
+    x: float
+    y: float
+    entry: Entry
+    place: str  # in words
+    is_front: bool = False
+
+    def mark(self, praise: str) -> Mark:
+        """What is drawn of it, and told."""
+        value = error_text(MID, self.y, decimals=self.entry.decimals)
+        read = [self.entry.method, team_of(self.entry), f"{value} {MID.unit}, {self.place}"]
+        return Mark(
+            self.x, self.y, (*read, praise) if self.is_front else tuple(read), method_href(self.entry)
+        )
+
+
+def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Placed]:
+    """In the order of their places; on the front is what is better than everything before it."""
+    best, found = math.inf, []
+    for x, y, entry, place in sorted(placed, key=lambda each: each[:2]):
+        found.append(_Placed(x, y, entry, place, is_front=y < best))
+        best = min(best, y)
+    return found
+
+
+def _front_series(
+    found: Sequence[_Placed], *, line: str, praise: str, end: float
+) -> tuple[list[Option], list[str]]:
+    """The marks of submissions and of rows from papers, the front with its names; and the legend's names."""
+    front = [each for each in found if each.is_front]
+    series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
+    names = [line]
+    for kind, name, symbol in (("submission", SUBMITTED, "circle"), ("published", QUOTED, "diamond")):
+        of_kind = [each for each in found if each.entry.kind == kind]
+        if not of_kind:
+            continue
+        names.append(name)
+        behind = [each.mark("") for each in of_kind if not each.is_front]
+        series.append(marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True)))
+        ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]
+        drawn = [each.mark(praise) for each in front]
+        series.append(named_marks(name, drawn, ahead, Look("--accent", symbol, 11.0)))
+    return series, names
+
+
+def _value_cells(found: Sequence[_Placed]) -> list[SafeString]:
+    """Their MiD for a table, as if all had the most decimals: the others keep the room of the missing one."""
+    most = max(each.entry.decimals for each in found)
+    return [
+        format_html(
+            '<span class="{}">{}</span>',
+            decimals_css(each.entry, most).strip(),
+            format_published(each.y, decimals=each.entry.decimals),
+        )
+        for each in found
+    ]
+
+
+def decimals_css(entry: Entry, most: int) -> str:
+    """The class of a number with fewer decimals than the most: it keeps the room of the missing ones."""
+    return "" if entry.decimals == most else f" d{entry.decimals}"
+
+
+# --- progress over time ----------------------------------------------------------------------------------
+
+# Where all of it happened within so long, the time of day is told as well.
+_SHORT: Final = timedelta(days=3)
+
+
+def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Chart:
+    """MiD of every submission by time, with the lowest MiD so far, and rows quoted from papers.
+
+    Papers say a year and no day: their rows stand in its middle.
+    """
+    by_method = {entry.method_id: entry for entry in entries if entry.method_id is not None}
+    quoted = [
+        (entry, value, entry.year)
+        for entry in entries
+        if entry.kind == "published" and entry.year and (value := entry.scores[PRIMARY]) is not None
+    ]
+    sent = [
+        (by_method[attempt.method_id], value, attempt.at.astimezone(UTC))
+        for attempt in attempts
+        if attempt.method_id in by_method and (value := attempt.scores[PRIMARY]) is not None
+    ]
+    if not quoted and not sent:
+        return empty("progress")
+    moments = [at for _, _, at in sent]
+    is_short = not quoted and max(moments) - min(moments) < _SHORT
+    told = _minute if is_short else _day
+    placed = [
+        (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
+    ]
+    placed += [
+        (_ms(told(at)), value, entry, _time_words(entry, at, is_short=is_short)) for entry, value, at in sent
+    ]
+    found = _with_front(placed)
+    first, last = _time_range([told(at) for at in moments], [year for *_, year in quoted])
+    series, names = _front_series(found, line="Best so far", praise="the best when it came", end=_ms(last))
+    frame = Frame(
+        x_axes=[x_axis(_time_title(first, last), _time_axis(first, last))],
+        y_axes=[error_axis(MID, [each.y for each in found], room=_ROOM)],
+        series=series,
+        names=names,
+        more=ZOOMABLE,
+    )
+    return Chart(
+        kind="progress",
+        label=f"MiD of each method by date, with the lowest MiD so far: {_front_words(found)}.",
+        options=frame.options(),
+        columns=("Date", "Method", "Team", MID.heading, "Best so far"),
+        rows=tuple(
+            (each.place, each.entry.method, team_of(each.entry), value, "yes" if each.is_front else "")
+            for each, value in zip(found, _value_cells(found), strict=True)
+        ),
+        numbers=(3,),
+        is_zoomable=True,
+    )
+
+
+# Dragging over a chart looks closer at a stretch of its level axis; the script turns it on.
+ZOOMABLE: Final = {
+    "toolbox": {
+        "itemSize": 0,
+        "showTitle": False,
+        "feature": {
+            "dataZoom": {
+                "yAxisIndex": "none",
+                "filterMode": "none",
+                "brushStyle": {"color": "--accent", "opacity": 0.15},
+            }
+        },
+    }
+}
+
+
+def _front_words(found: Sequence[_Placed]) -> str:
+    """The ends of a front in a sentence."""
+    front = [each for each in found if each.is_front]
+    texts = [f"{each.entry.method} {error_text(MID, each.y, decimals=each.entry.decimals)}" for each in front]
+    return texts[0] if len(texts) == 1 else f"from {texts[0]} to {texts[-1]}"
+
+
+def _ms(at: datetime) -> float:
+    return at.timestamp() * 1000
+
+
+def _day(at: datetime) -> datetime:
+    return at.replace(hour=0, minute=0, second=0, microsecond=0)
+
+
+def _minute(at: datetime) -> datetime:
+    return at.replace(second=0, microsecond=0)
+
+
+def _time_words(entry: Entry, at: datetime, *, is_short: bool) -> str:
+    """When it came: the day; within a short span the minute as well, but of anonymous methods."""
+    is_exact = is_short and entry.visibility != Visibility.ANONYMOUS
+    return f"{at:%Y-%m-%d %H:%M} UTC" if is_exact else f"{at:%Y-%m-%d}"
+
+
+def _time_range(moments: Sequence[datetime], years: Sequence[int]) -> tuple[datetime, datetime]:
+    """From where to where the axis goes: whole years around papers, a margin around submissions."""
+    ends = [datetime(year, 1, 1, tzinfo=UTC) for year in years]
+    ends += [datetime(year + 1, 1, 1, tzinfo=UTC) for year in years]
+    span = max([*ends, *moments]) - min([*ends, *moments])
+    margin = max(0.04 * span, timedelta(hours=1))
+    ends += [at - margin for at in moments] + [at + margin for at in moments]
+    return min(ends), max(ends)
+
+
+def _time_axis(first: datetime, last: datetime) -> Option:
+    """An axis of time with years, months, days or hours, whatever its span asks for."""
+    label = {
+        "year": "{yyyy}",
+        "month": "{MMM} {yyyy}",
+        "day": "{d} {MMM}",
+        "hour": "{HH}:{mm}",
+        "minute": "{HH}:{mm}",
+    }
+    return {
+        "type": "time",
+        "min": _ms(first),
+        "max": _ms(last),
+        "axisLabel": {
+            "formatter": label,
+            "showMinLabel": first.month == first.day == 1,
+            "showMaxLabel": False,
+        },
+        "splitNumber": 5,
+    }
+
+
+def _time_title(first: datetime, last: datetime) -> str:
+    """What the axis says; the year where its labels say days."""
+    if last - first > timedelta(days=60):
+        return "Date"
+    years = sorted({f"{first:%Y}", f"{last:%Y}"})
+    return f"Date in {' and '.join(years)} (UTC)"
+
+
+# --- accuracy against latency ----------------------------------------------------------------------------
+
+
+def latency(entries: Sequence[Entry]) -> Chart:
+    """MiD against latency, of the methods that state one; the front is what nothing beats in both."""
+    found = _with_front(
+        (latency_ms, value, entry, f"{latency_ms:g} ms")
+        for entry in entries
+        if entry.is_visible_to_all
+        and (latency_ms := entry.details["latency_ms"]) is not None
+        and (value := entry.scores[PRIMARY]) is not None
+    )
+    if not found:
+        return empty("latency")
+    axis = log_axis(each.x for each in found)
+    series, names = _front_series(found, line="Pareto front", praise="on the Pareto front", end=axis["max"])
+    frame = Frame(
+        x_axes=[x_axis("Latency in ms (log scale)", axis)],
+        y_axes=[error_axis(MID, [each.y for each in found], room=_ROOM)],
+        series=series,
+        names=names,
+    )
+    return Chart(
+        kind="latency",
+        label=f"MiD of each method against its latency, with the Pareto front: {_front_words(found)}.",
+        options=frame.options(),
+        columns=("Method", "Team", "Latency in ms", "Hardware", MID.heading, "On the Pareto front"),
+        rows=tuple(
+            (
+                each.entry.method,
+                team_of(each.entry),
+                f"{each.x:g}",
+                each.entry.details["hardware"] or "not specified",
+                value,
+                "yes" if each.is_front else "",
+            )
+            for each, value in zip(found, _value_cells(found), strict=True)
+        ),
+        numbers=(2, 4),
+    )

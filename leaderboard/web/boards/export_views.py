@@ -1,0 +1,181 @@
+"""Exports of a board: the view of its page as CSV, LaTeX, Markdown and BibTeX.
+
+They hold what everybody sees, whoever takes them, since they end up in papers. `mine=1` adds the rows of
+one's own that others do not see, or not under their name, each marked.
+"""
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+from urllib.parse import urlencode
+
+from django.conf import settings
+from django.contrib.auth.models import AnonymousUser
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.urls import reverse
+from django.urls.converters import StringConverter
+from django.utils import timezone
+from django.views.decorators.http import require_safe
+
+from evaluator.tables import formats
+from evaluator.tables.formats import Format
+from leaderboard.boards import snapshots
+from leaderboard.boards.boards import Board
+from leaderboard.boards.results import Result
+from leaderboard.exports import bibtex, tables
+from leaderboard.models import Edition, Split
+from leaderboard.web.boards import board_query
+from leaderboard.web.boards.board_query import BoardQuery
+from leaderboard.web.context_processors import split_or_404
+
+# What of a page's address changes what is taken along; a page of it is no table of its own.
+_NOT_OURS: Final = ("page",)
+PARAMETERS: Final = {**board_query.PARAMETERS, "intervals": tables.YES_OR_NO, "mine": tables.YES_OR_NO}
+NOBODYS: Final = (
+    "The address asks for your own rows as well (mine=1), and nobody is signed in; expected a session, or "
+    "the address without it."
+)
+
+
+class ExportLink(NamedTuple):
+    """One way to export this view: its address, what it is in words, and the name of its file."""
+
+    format: Format
+    href: str
+    about: str
+    file_name: str
+
+
+# What stands before some of them, and these.
+LabelledLinks = tuple[str, list[ExportLink]]
+
+
+class FormatConverter(StringConverter):
+    """The end of an address that names a format."""
+
+    regex = "[a-z]+"
+
+    def to_python(self, value: str) -> Format:  # type: ignore[override]  # Django takes any type
+        """The format of this suffix; ValueError, for Django, where there is none."""
+        found = next((each for each in formats.FORMATS if each.on_site and each.suffix == value), None)
+        if found is None:
+            raise ValueError(value)
+        return found
+
+
+@require_safe
+def board(request: HttpRequest, split: str, chosen: Format) -> HttpResponse:
+    """The board of a split, as its page would show all of its rows."""
+    if chosen.is_api_document:
+        return _api_document(request, "api-board", split)
+    return _answer(request, chosen, split=split_or_404(request, split))
+
+
+@require_safe
+def edition(request: HttpRequest, split: str, number: int, chosen: Format) -> HttpResponse:
+    """The board of an edition, for ever."""
+    if chosen.is_api_document:
+        return _api_document(request, "api-edition-board", split, number)
+    found = get_object_or_404(snapshots.editions(), split=split, number=number)
+    return _answer(request, chosen, split=found.split, edition=found)
+
+
+def _api_document(request: HttpRequest, name: str, *of: object) -> HttpResponse:
+    query = request.META["QUERY_STRING"]
+    return redirect(reverse(name, args=of) + (f"?{query}" if query else ""))
+
+
+def _answer(
+    request: HttpRequest, chosen: Format, *, split: Split, edition: Edition | None = None
+) -> HttpResponse:
+    try:
+        query = board_query.parse(request.GET, now=timezone.now(), has_time=edition is None)
+        has_intervals = tables.is_asked_for("intervals", request.GET.get("intervals", ""))
+        is_mine = tables.is_asked_for("mine", request.GET.get("mine", ""))
+        if is_mine and not request.user.is_authenticated:
+            # Without them it would look like what was asked for.
+            raise board_query.BadView("mine", NOBODYS)
+        shown = snapshots.board(
+            split=split,
+            edition=edition,
+            viewer=request.user if is_mine else AnonymousUser(),
+            sort=query.sort,
+            at=query.at,
+            filters=query.filters,
+        )
+    except board_query.FAULTS as fault:
+        return render(request, "400.html", {"sentence": str(fault)}, status=400)
+    export = tables.export(
+        shown, address=address(shown, query), metric=query.columns, has_intervals=has_intervals
+    )
+    name = f"tsttc-{split.pk}{f'-edition-{shown.edition.number}' if shown.edition else ''}"
+    name += f"{'-with-own' if is_mine else ''}.{chosen.suffix}"
+    return HttpResponse(
+        chosen.write(export),
+        content_type=f"{chosen.media_type}; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="{name}"'},
+    )
+
+
+def address(board: Board, query: BoardQuery) -> str:
+    """Where this very table can be found again: at its edition's page, or as of its time."""
+    if board.edition is None or query.at is not None:
+        path = reverse("board", args=[board.split.pk])
+    else:
+        path = reverse("edition", args=[board.split.pk, board.edition.number])
+    return f"{settings.SITE_URL}{path}{_asked(query)}"
+
+
+def _asked(query: BoardQuery, **more: str) -> str:
+    """The end of an address that asks for the same view, and for `more`."""
+    given = {name: value for name, value in query.given.items() if name not in _NOT_OURS} | more
+    return f"?{urlencode(given)}" if given else ""
+
+
+def of_method(results: Sequence[Result]) -> dict[str, str]:
+    """How a method is cited, and the split that its badge is about: the first on which it has a rank."""
+    first = next((result for result in results if result.entry.rank is not None), None)
+    if first is None:
+        return {}
+    page = settings.SITE_URL + reverse("method", args=[first.entry.method_id])
+    return {"bibtex": bibtex.of_entry(first.entry, page=page), "badge_split": first.split.pk}
+
+
+def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, list[LabelledLinks]]:
+    """What a board's page offers to take along: what everybody sees, and for a team its own rows as well.
+
+    All are of the same view. `board` is it as the reader sees it.
+    """
+    path = reverse("board", args=[board.split.pk])
+    if edition is not None:
+        path = reverse("edition", args=[edition.split_id, edition.number])
+    has_intervals = any(entry.intervals for entry in board.entries)
+    has_own = any(tables.mark_of(entry) for entry in board.entries)
+    on_site = [each for each in formats.FORMATS if each.on_site]
+
+    def offered(label: str, about: str, these: Sequence[Format], **more: str) -> LabelledLinks:
+        asked = _asked(query, **more)
+        return label, [
+            ExportLink(
+                each,
+                f"{path.rstrip('/')}.{each.suffix}{asked}",
+                f"{each.title}{about}",
+                f"tsttc-{board.split.pk}.{each.suffix}",
+            )
+            for each in these
+        ]
+
+    def variants(about: str, these: Sequence[Format], **more: str) -> list[LabelledLinks]:
+        plain = offered("", about, these, **more)
+        if not has_intervals:
+            return [plain]
+        label = "with confidence intervals"
+        with_values = [each for each in these if each.has_values]
+        return [plain, offered(label, f"{about}, {label}", with_values, **more, intervals="1")]
+
+    # The API's document has the rows of whoever asks, marked: for whom there are any, it is with those.
+    public = [each for each in on_site if not (has_own and each.is_api_document)]
+    return {
+        "public": variants("", public),
+        "with_own": variants(" including your private rows", on_site, mine="1") if has_own else [],
+    }

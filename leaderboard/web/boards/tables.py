@@ -1,0 +1,281 @@
+"""The table of a board: every number formatted, every mark decided, every link made, here in Python.
+
+Templates only place what they are given; a thousand rows of number filters would cost more than the query.
+"""
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from datetime import date, timedelta
+from typing import Final
+from uuid import UUID
+
+from django.core.paginator import Page, Paginator
+
+from evaluator.metrics.protocol import (
+    PRIMARY,
+    Protocol,
+    grouped_names,
+    interval_of,
+)
+from evaluator.metrics.protocol import Interval as TTCRange
+from evaluator.scoring.floors import floor_sentence
+from leaderboard.boards.boards import Board, Entry
+from leaderboard.boards.rows import Interval
+from leaderboard.exports.tables import short_authors
+from leaderboard.models import Visibility
+from leaderboard.scoring import verdicts
+from leaderboard.web.boards import whiskers
+from leaderboard.web.boards.board_query import PER_PAGE, BoardQuery
+from leaderboard.web.boards.score_columns import (
+    Cell,
+    Group,
+    Heading,
+    aria_sort_of,
+    ends_of,
+    place_of,
+    score_cells,
+    score_groups,
+    score_heading,
+    sort_href,
+)
+from leaderboard.web.boards.whiskers import WhiskerScale
+
+ABSENT: Final = "–"
+NEW_FOR: Final = timedelta(days=14)
+
+
+@dataclass(frozen=True)
+class BoardRow:
+    """One entry, ready to be placed."""
+
+    entry: Entry
+    rank: str
+    team: str
+    cells: tuple[Cell, ...]
+    rank_range: str = ""
+    source_number: int | None = None
+    note: str = ""  # why it stays in a former edition
+    attempts: str = ""
+    is_new: bool = False
+    moved: int = 0  # ranks risen in a month; fallen: below 0
+
+    @property
+    def n_moved(self) -> int:
+        """By how many ranks, whichever way."""
+        return abs(self.moved)
+
+    @property
+    def is_hypothetical(self) -> bool:
+        """Whether its rank is one that it would have, if others saw it."""
+        return self.entry.rank is not None and not self.entry.is_visible_to_all
+
+    @property
+    def css(self) -> str:
+        """The classes of the row: whose it is, whether others see it, whether it was withdrawn."""
+        entry = self.entry
+        classes = {
+            "mine": entry.is_mine,
+            "unpublished": not entry.is_visible_to_all,
+            "withdrawn": bool(entry.withdrawn_at),
+        }
+        return " ".join(name for name, holds in classes.items() if holds)
+
+    @property
+    def can_be_compared(self) -> bool:
+        """Whether there is something of it to be compared: papers print no values per recording."""
+        return self.entry.method_id is not None and self.entry.scores[PRIMARY] is not None
+
+
+@dataclass(frozen=True)
+class BoardNews:
+    """What a board tells of its rows as of a day: which are new, and how far ranks have moved since."""
+
+    today: date
+    since: date
+    moved: Mapping[UUID, int] = field(default_factory=dict)
+
+    def new_among(self, entries: Sequence[Entry]) -> frozenset[UUID]:
+        """The methods that are new; none where most rows are, of which it would say nothing."""
+        found = frozenset(each.method_id for each in entries if each.method_id and self._is_new(each))
+        return found if 2 * len(found) <= len(entries) else frozenset()
+
+    def _is_new(self, entry: Entry) -> bool:
+        if entry.listed_at is None or entry.withdrawn_at or not entry.is_visible_to_all:
+            return False
+        return self.today - entry.listed_at.date() < NEW_FOR
+
+
+@dataclass(frozen=True)
+class BoardTable:
+    """Everything that the board's template places."""
+
+    query: BoardQuery
+    text_headings: dict[str, Heading]
+    places: tuple[
+        tuple[str, str, bool], ...
+    ]  # the ranges that a narrow screen shows one of: class, label, chosen
+    groups: tuple[Group, ...]
+    score_headings: tuple[Heading, ...]
+    rows: tuple[BoardRow, ...]
+    moved_since: date | None  # None where no rank has moved
+    sources: list[tuple[str, str]]  # what published rows are quoted from: citation and address
+    intervals: list[tuple[TTCRange, int | None]]  # with the number of sequences in each
+    pages: "Page[Entry]"
+    has_intervals: bool
+    has_one_whisker: bool  # in a column of its own before all numbers
+    can_compare: bool
+    reason: str  # why there are no intervals; empty where there are
+    floor: str  # what the ground truth itself scores, in words; empty where that is not known
+
+    @property
+    def has_private_rows(self) -> bool:
+        """Whether the reader's own team has rows here that nobody else sees."""
+        return any(not row.entry.is_visible_to_all for row in self.rows)
+
+    @property
+    def n_scores(self) -> int:
+        """How many columns of numbers there are."""
+        return len(self.score_headings)
+
+    @property
+    def next_href(self) -> str:
+        """The next page's address; empty on the last."""
+        return self._page_href(self.pages.number + 1) if self.pages.has_next() else ""
+
+    @property
+    def previous_href(self) -> str:
+        """The page's before; empty on the first."""
+        return self._page_href(self.pages.number - 1) if self.pages.has_previous() else ""
+
+    def _page_href(self, number: int) -> str:
+        return self.query.href(page=str(number) if number > 1 else "")
+
+
+def board_table(board: Board, *, query: BoardQuery, news: BoardNews) -> BoardTable:
+    """The board, ready to be drawn; its links keep what else the address asks for."""
+    names = board.rules.names_of(query.columns)
+    is_of_one = len(grouped_names(names)) == 1
+    scales = _scales(board.entries, names if is_of_one else names[:1])
+    pages = Paginator(board.entries, PER_PAGE).get_page(query.page)
+    sources = _sources(pages.object_list)
+    numbers = {citation: i for i, (citation, _) in enumerate(sources, 1)}
+    counts = board.edition.ground_truth.counts if board.edition else {}
+    # Among all rows: no filter makes a row new, or old.
+    new = news.new_among(board.unfiltered) if not board.at else frozenset()
+    rows = tuple(
+        replace(
+            _row(entry, names, numbers, scales),
+            is_new=entry.method_id in new,
+            moved=news.moved.get(entry.method_id, 0) if entry.method_id else 0,
+        )
+        for entry in pages.object_list
+    )
+    return BoardTable(
+        query=query,
+        text_headings={name: _text_heading(name, query) for name in ("rank", "method", "team", "date")},
+        places=_places(names, query),
+        groups=score_groups(names, n_whiskers=len(scales) if is_of_one else 0),
+        has_one_whisker=bool(scales) and not is_of_one,
+        score_headings=tuple(score_heading(name, query, scales.get(name)) for name in names),
+        rows=rows,
+        moved_since=news.since if any(row.moved for row in rows) else None,
+        sources=sources,
+        intervals=counted_ranges(board.rules, counts),
+        pages=pages,
+        has_intervals=bool(scales),
+        can_compare=_is_present(board) and sum(row.can_be_compared for row in rows) > 1,
+        reason=_reason(board, has_intervals=bool(scales)),
+        floor=floor_sentence(board.edition.floor, decimals=board.edition.decimals) if board.edition else "",
+    )
+
+
+def _is_present(board: Board) -> bool:
+    return board.edition is not None and board.edition.pk == board.split.published_edition_id and not board.at
+
+
+def _is_scored(entry: Entry) -> bool:
+    return entry.kind == "submission" and entry.scores.get(PRIMARY) is not None
+
+
+def _reason(board: Board, *, has_intervals: bool) -> str:
+    """Why no value has an interval, where something was scored at all."""
+    if has_intervals or board.edition is None or not any(map(_is_scored, board.entries)):
+        return ""
+    return verdicts.why_no_interval(board.edition) or ("The confidence intervals are being computed.")
+
+
+def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, WhiskerScale]:
+    """One scale for each of these columns that has an interval, the same for all rows of all pages."""
+    found = {}
+    for name in names:
+        values = [(value, entry) for entry in entries if (value := entry.scores[name]) is not None]
+        known = [ends for _, entry in values if (ends := ends_of(entry, name)) is not None]
+        public = [(value, ends_of(entry, name)) for value, entry in values if entry.is_visible_to_all]
+        best = min(public, default=None, key=lambda each: each[0])
+        band = (best[1] or (best[0], best[0])) if best else None
+        scale = whiskers.scale_of([value for value, _ in values], known, best=band)
+        if scale is not None:
+            found[name] = scale
+    return found
+
+
+def _places(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:
+    """The TTC ranges of these columns; chosen is that of the column by which the board is sorted."""
+    sorted_by = query.sort.removeprefix("-")
+    chosen = place_of(sorted_by) if sorted_by in names else place_of(PRIMARY)
+    labels = {place_of(name): found.seconds if (found := interval_of(name)) else "Overall" for name in names}
+    return tuple((place, label, place == chosen) for place, label in labels.items())
+
+
+def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTCRange, int | None]]:
+    """The TTC ranges of a protocol, in its order, each with the number of sequences in it."""
+    return [(each, counts.get(each.name)) for each in rules.intervals]
+
+
+def rank_range(entry: Entry) -> str:
+    """Where an entry may stand at 95 %, behind its rank; empty where that is not known."""
+    found = entry.intervals.get(PRIMARY, Interval())
+    if found.rank_low is None or found.rank_high is None:
+        return ""
+    if found.rank_low == found.rank_high:
+        return f"({found.rank_low})"
+    return f"({found.rank_low}–{found.rank_high})"
+
+
+def _text_heading(name: str, query: BoardQuery) -> Heading:
+    label = {"rank": "Rank", "method": "Method", "team": "Team", "date": "Date"}[name]
+    return Heading(
+        name=name,
+        symbol=label,
+        href=sort_href(name, query),
+        aria_sort=aria_sort_of(name, query),
+        css=name,
+    )
+
+
+def _row(
+    entry: Entry, names: Sequence[str], source_numbers: Mapping[str, int], scales: Mapping[str, WhiskerScale]
+) -> BoardRow:
+    is_published = entry.kind == "published"
+    return BoardRow(
+        entry=entry,
+        rank=ABSENT if entry.rank is None else str(entry.rank),
+        rank_range=rank_range(entry),
+        team=short_authors(entry.team) if is_published else entry.team,
+        cells=score_cells(entry, names=names, scales=scales),
+        source_number=source_numbers.get(entry.source),
+        attempts=_attempts(entry),
+    )
+
+
+def _attempts(entry: Entry) -> str:
+    """How often was tried; a public row counts all that its team shows."""
+    if entry.n_attempts is None:
+        return ""
+    noun = "attempt" if entry.n_attempts == 1 else "attempts"
+    is_of_team = entry.visibility == Visibility.PUBLIC
+    return f"{entry.n_attempts:,} {'team ' if is_of_team else ''}{noun}"
+
+
+def _sources(entries: Iterable[Entry]) -> list[tuple[str, str]]:
+    return sorted({entry.source: entry.paper_url for entry in entries if entry.source}.items())

@@ -1,0 +1,143 @@
+"""The column of confidence intervals: each row's value and interval on one scale, over that of the best row.
+
+The drawings are as wide as their cell, in percent, so that the same bytes fit every screen. The cell says the
+numbers in words beside them.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from django.utils.html import format_html, format_html_join
+from django.utils.safestring import SafeString
+
+# Rows whose value lies beyond this share of all values need not be on the scale.
+_MOST: Final = 0.8
+_ROOM: Final = 1.25
+# A scale that spans more than this factor is logarithmic, so that the leading rows do not share one pixel.
+_LOG_FROM: Final = 2.5
+_MARGIN: Final = 4.0
+_BEYOND: Final = 86.0
+# Two labels of an axis stand at least so far apart.
+_LABEL_GAP: Final = 24.0
+_STEPS: Final = (1.0, 2.0, 5.0), (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0)
+
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class WhiskerScale:
+    """From values to percent of a cell's width. `best` is the interval of the column's best value."""
+
+    low: float
+    high: float
+    best: Ends | None = None
+
+    @property
+    def is_log(self) -> bool:
+        """Whether equal distances are equal ratios."""
+        return self.low > 0 and self.high > _LOG_FROM * self.low
+
+    def percent(self, value: float) -> float:
+        """Where a value stands; what lies beyond an end stands at that end.
+
+        >>> WhiskerScale(10.0, 20.0).percent(15.0), WhiskerScale(1.0, 100.0).percent(10.0)
+        (50.0, 50.0)
+        """
+        held = min(self.high, max(self.low, value))
+        if self.is_log:
+            share = math.log(held / self.low) / math.log(self.high / self.low)
+        else:
+            share = (held - self.low) / (self.high - self.low)
+        return round(_MARGIN + (100.0 - 2 * _MARGIN) * share, 1)
+
+    def labels(self) -> tuple[float, ...]:
+        """The round numbers of the scale that have room for their text.
+
+        >>> WhiskerScale(9.1, 84.0).labels(), WhiskerScale(11.2, 15.1).labels()
+        ((10.0, 20.0, 50.0), (12.0, 14.0))
+        """
+        found: list[float] = []
+        for value in self._round_numbers():
+            at = self.percent(value)
+            is_apart = not found or at - self.percent(found[-1]) >= _LABEL_GAP
+            if is_apart and 6.0 <= at <= 94.0:
+                found.append(value)
+        return tuple(found)
+
+    def _round_numbers(self) -> Sequence[float]:
+        if not self.is_log:
+            power = 10.0 ** math.floor(math.log10((self.high - self.low) / 2))
+            step = next(s * power for s in (1.0, 2.0, 5.0, 10.0) if (self.high - self.low) / (s * power) <= 4)
+            first = math.ceil(self.low / step)
+            return [round(i * step, 10) for i in range(first, math.floor(self.high / step) + 1)]
+        powers = range(math.floor(math.log10(self.low)), math.ceil(math.log10(self.high)) + 1)
+        coarse, fine = (
+            [value for power in powers for step in steps if self._holds(value := step * 10.0**power)]
+            for steps in _STEPS
+        )
+        return coarse if len(coarse) > 1 else fine
+
+    def _holds(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+
+def scale_of(values: Iterable[float], intervals: Iterable[Ends], *, best: Ends | None) -> WhiskerScale | None:
+    """A scale that shows most of these values; None where none of them has an interval.
+
+    >>> scale_of([10.0, 11.0, 12.0, 13.0, 900.0], [(9.5, 10.5)], best=(9.5, 10.5))
+    WhiskerScale(low=9.5, high=13.0, best=(9.5, 10.5))
+    """
+    found, ends = sorted(values), list(intervals)
+    if not found or not ends:
+        return None
+    # A little beyond the last of most: a row that ends close to it is shown as well.
+    limit = _ROOM * found[math.ceil(_MOST * len(found)) - 1]
+    low = min(found[0], *(low for low, _ in ends))
+    high = max(value for value in [*found, *(high for _, high in ends)] if value <= limit)
+    return WhiskerScale(low, max(high, low + 1e-9), best)
+
+
+def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
+    """A value as a dot on its interval, or as a ring where it has none; dashes where it is off the scale."""
+    parts = [_band(scale)]
+    if ends is not None and ends[0] <= scale.high:
+        left, right = map(scale.percent, ends)
+        parts.append(_line("span", left, right))
+    if value > scale.high:
+        parts.append(_line("beyond", _BEYOND, 100.0))
+    else:
+        css = "ring" if ends is None else "dot"
+        parts.append(
+            format_html('<circle class="{}" cx="{}%" cy="50%" r="2.6"/>', css, f"{scale.percent(value):g}")
+        )
+    return _svg("whisker", parts)
+
+
+def axis(scale: WhiskerScale) -> SafeString:
+    """The scale itself, for the head of a column: its round numbers over small marks."""
+    places = [(f"{scale.percent(value):g}", f"{value:g}") for value in scale.labels()]
+    marks = format_html_join("", '<line x1="{0}%" x2="{0}%" y1="13" y2="17"/>', ((at,) for at, _ in places))
+    texts = format_html_join("", '<text x="{}%" y="10" text-anchor="middle">{}</text>', places)
+    return _svg("axis", [marks, texts])
+
+
+def _band(scale: WhiskerScale) -> SafeString:
+    if scale.best is None:
+        return SafeString("")
+    left, right = map(scale.percent, scale.best)
+    return format_html(
+        '<rect class="band" x="{}%" width="{}%" height="100%"/>', f"{left:g}", f"{right - left:g}"
+    )
+
+
+def _line(css: str, left: float, right: float) -> SafeString:
+    return format_html(
+        '<line class="{}" x1="{}%" x2="{}%" y1="50%" y2="50%"/>', css, f"{left:g}", f"{right:g}"
+    )
+
+
+def _svg(css: str, parts: Iterable[SafeString]) -> SafeString:
+    drawn = format_html_join("", "{}", ((part,) for part in parts))
+    return format_html('<svg class="{}" aria-hidden="true">{}</svg>', css, drawn)

@@ -1,0 +1,1 @@
+"""Pages of documentation: the guide and the reference of the API."""

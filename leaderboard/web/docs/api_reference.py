@@ -1,0 +1,117 @@
+"""The API's reference: the schema that programs read, arranged for a template.
+
+The usual viewers of such schemas style themselves inline and load fonts from elsewhere; this site's policy
+forbids both.
+"""
+
+import re
+from functools import cache
+from typing import Any, Final
+
+from django.utils.html import format_html, format_html_join
+from drf_spectacular.generators import SchemaGenerator
+
+from evaluator.problems import PROBLEM_CODES
+from leaderboard.errors.problem_codes import API_CODES
+
+Node = dict[str, Any]
+# What drf-spectacular appends for a choice without a label of its own.
+_BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE)
+
+
+@cache
+def reference() -> Node:
+    """What `api_reference.html` shows; the schema cannot change while the process lives."""
+    schema = SchemaGenerator().get_schema(request=None, public=True)
+    named = schema["components"]["schemas"]
+    schemas = _inline_enums(named, named)
+    return {
+        "operations": [
+            _operation(method.upper(), path, node, schemas)
+            for path, methods in _inline_enums(schema["paths"], named).items()
+            for method, node in methods.items()
+        ],
+        "objects": [
+            {"name": name, "about": node.get("description", ""), "fields": _fields(node)}
+            for name, node in schemas.items()
+            if "properties" in node
+        ],
+        "codes": API_CODES.items(),
+        "file_codes": [(code, about) for code, about in PROBLEM_CODES.items() if code not in API_CODES],
+    }
+
+
+def _inline_enums(node: Any, named: Node) -> Any:
+    """The same tree, with every reference to something other than an object replaced by its target."""
+    if isinstance(node, list):
+        return [_inline_enums(each, named) for each in node]
+    if not isinstance(node, dict):
+        return node
+    target = named.get(str(node.get("$ref", "")).rpartition("/")[2])
+    if target is not None and "properties" not in target:
+        # The field's own description goes before the enumeration's.
+        return {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+    return {key: _inline_enums(value, named) for key, value in node.items()}
+
+
+def _operation(method: str, path: str, node: Node, schemas: Node) -> Node:
+    """One operation. Answers that every operation may give are references; the page names them once."""
+    parameters = sorted(node.get("parameters", []), key=lambda p: (p["in"] != "path", path.find(p["name"])))
+    content = node.get("requestBody", {}).get("content", {})
+    bodies = {media: schemas[_target(body["schema"])] for media, body in content.items()}
+    return {
+        "id": node["operationId"],
+        "name": f"{method} {path}",
+        "method": method,
+        "path": path,
+        "about": node["description"],
+        "needs_account": {} not in node.get("security", []),
+        "parameters": [_field(p["name"], {**p, **p["schema"]}, p.get("required", False)) for p in parameters],
+        "bodies": [(media, _fields(body)) for media, body in bodies.items()],
+        "answers": [
+            (status, _kind(schema), answer["description"])
+            for status, answer in sorted(node["responses"].items())
+            if "$ref" not in answer
+            for schema in [next(iter(answer.get("content", {"": {}}).values())).get("schema", {})]
+        ],
+    }
+
+
+def _fields(node: Node) -> list[Node]:
+    required = node.get("required", [])
+    return [_field(name, field, name in required) for name, field in node.get("properties", {}).items()]
+
+
+def _field(name: str, node: Node, is_required: bool) -> Node:
+    """A field or parameter. A list of choices that only repeats the names in its kind is left out."""
+    about = _BARE_CHOICE.sub("", node.get("description", "")).strip()
+    return {"name": name, "kind": _kind(node), "about": about, "is_required": is_required}
+
+
+def _target(node: Node) -> str:
+    """The name of the object that a reference names."""
+    return str(node["$ref"]).rpartition("/")[2]
+
+
+def _kind(node: Node) -> str:
+    """The type of a value as HTML; the name of an object links to its fields.
+
+    >>> _kind({"type": ["number", "null"]}), _kind({"type": "string", "format": "date-time"})
+    ('number or null', 'date-time')
+    >>> _kind({"type": "array", "items": {"$ref": "#/components/schemas/Entry"}})
+    'list of <a href="#shape-Entry">Entry</a>'
+    """
+    if "$ref" in node:
+        return format_html('<a href="#shape-{0}">{0}</a>', _target(node))
+    for several in ("oneOf", "anyOf", "allOf"):
+        if several in node:
+            return format_html_join(" or ", "{}", ((_kind(each),) for each in node[several]))
+    if "enum" in node:
+        return " | ".join("null" if value is None else str(value) for value in node["enum"])
+    types = node.get("type", "")
+    names = [types] if isinstance(types, str) else list(types)
+    if names[0] == "array":
+        return format_html("list of {}", _kind(node["items"]))
+    if node.get("format") in {"date-time", "uuid", "uri", "binary"}:
+        names[0] = {"uri": "address", "binary": "file"}.get(node["format"], node["format"])
+    return " or ".join(names)

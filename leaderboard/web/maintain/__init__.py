@@ -1,0 +1,1 @@
+"""Pages of maintainers: editions, queue, quotas, audit trail."""

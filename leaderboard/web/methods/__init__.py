@@ -1,0 +1,1 @@
+"""Pages of methods: results, details and visibility."""

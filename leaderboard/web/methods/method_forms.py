@@ -1,0 +1,147 @@
+"""Forms of a method: its details and its visibility. The domain function refuses wrong values."""
+
+from datetime import UTC, datetime
+from typing import Any, Final
+
+from django import forms
+from django.http import HttpRequest
+
+from leaderboard.errors.refusals import Refused
+from leaderboard.methods import methods, visibility
+from leaderboard.methods.details import DETAILS, Detail
+from leaderboard.models import Method, Visibility
+from leaderboard.web.forms import DescriptionForm, SiteForm
+
+_NOT_SPECIFIED: Final = ("", "not specified")
+
+
+class DetailsForm(DescriptionForm):
+    """The description of a method, its links, and every detail of the registry. Empty: not specified."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """With a field for each detail of the registry, which a subclass that lists them could not follow."""
+        super().__init__(*args, **options)
+        self.fields |= {detail.name: _field_of(detail) for detail in DETAILS}
+
+    @property
+    def described(self) -> list[forms.BoundField]:
+        """The fields of texts and links."""
+        return [self[name] for name in DescriptionForm.base_fields]
+
+    @property
+    def detailed(self) -> list[forms.BoundField]:
+        """The fields of the registry."""
+        return [self[detail.name] for detail in DETAILS]
+
+
+class MethodForm(DetailsForm):
+    """Everything that a team says of a method."""
+
+    name = forms.CharField(required=False, widget=forms.TextInput(attrs={"maxlength": 80}))
+    field_order = ["name"]
+
+    @classmethod
+    def of_method(cls, request: HttpRequest, *, method: Method) -> "MethodForm":
+        """The form with what was sent, or with what is stated now."""
+        return cls.asked(request, initial=_stated(method))
+
+    def changes(self) -> dict[str, object]:
+        """What was sent, under the domain function's names; a field that was not sent stays as it is."""
+        return {name: value for name, value in self.cleaned_data.items() if name in self.data}
+
+
+def _field_of(detail: Detail) -> forms.CharField:
+    """A text: what is wrong with it `methods.edit` says."""
+    kind = detail.kind
+    example = detail.filter_example or detail.example
+    typed = {"maxlength": kind.limits.get("max_length"), "placeholder": f"e.g. {example}"}
+    return forms.CharField(
+        label=detail.label,
+        required=False,
+        help_text=detail.help,
+        widget=forms.Select(choices=[_NOT_SPECIFIED, *((each.text, each.words) for each in kind.options)])
+        if kind.options
+        else forms.TextInput(attrs={name: value for name, value in typed.items() if value}),
+    )
+
+
+def _stated(method: Method) -> dict[str, Any]:
+    """The method's fields as the form has them."""
+    found = {name: getattr(method, name) for name in methods.FIELDS}
+    for detail in DETAILS:
+        texts = {option.value: option.text for option in detail.kind.options}
+        found[detail.name] = texts.get(found[detail.name], found[detail.name])
+    return found
+
+
+class ShowForm(SiteForm):
+    """Who is to see a method, and that its team knows what that means."""
+
+    visibility = forms.CharField(
+        required=False,
+        widget=forms.RadioSelect(choices=[(choice.value, choice.label) for choice in Visibility]),
+    )
+    reveal_on = forms.CharField(
+        label="Reveal on",
+        required=False,
+        help_text="Optional, for anonymous methods: the day (UTC) on which the method becomes public.",
+        widget=forms.DateInput(attrs={"type": "date"}),
+    )
+    confirm = forms.BooleanField(required=False, label="I know that this cannot be undone.")
+
+    @classmethod
+    def of_method(cls, request: HttpRequest, *, method: Method) -> "ShowForm":
+        """The form as it was sent, or as the address asks to look at it."""
+        if request.method == "POST":
+            return cls(request.POST)
+        chosen = request.GET.get("visibility", "")
+        if chosen not in visibility.choices(method):
+            return cls(initial={"visibility": method.visibility, "reveal_on": _day(method.reveal_at)})
+        return cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
+
+    def wanted(self, *, now: datetime) -> dict[str, Any]:
+        """What was chosen, under the domain function's names. Raises `Refused`."""
+        if not self.is_valid():
+            raise Refused("bad-value", "The form cannot be read.")
+        fields = self.cleaned_data
+        is_anonymous = fields["visibility"] == Visibility.ANONYMOUS
+        return {
+            "visibility": fields["visibility"],
+            "reveal_at": _moment(fields["reveal_on"]) if is_anonymous else None,
+        }
+
+    def refuse(self, refusal: Exception) -> None:
+        """Put the refusal's sentence at the field that it is about."""
+        if getattr(refusal, "field", "") == "reveal_at":
+            self.add_error("reveal_on", str(refusal))
+        else:
+            super().refuse(refusal)
+
+    def require_confirmation(self) -> None:
+        """Raise `Refused` for somebody who has not said that they know."""
+        if not self.cleaned_data["confirm"]:
+            raise Refused(
+                "not-confirmed",
+                "Confirm that this cannot be undone; expected a tick.",
+                field="confirm",
+                advice="Confirm that this cannot be undone: tick the box.",
+            )
+
+
+def _day(moment: datetime | None) -> str:
+    return f"{moment:%Y-%m-%d}" if moment else ""
+
+
+def _moment(text: str) -> datetime | None:
+    """The beginning of a day."""
+    if not text.strip():
+        return None
+    try:
+        return datetime.fromisoformat(text.strip()[:10]).replace(tzinfo=UTC)
+    except ValueError:
+        raise Refused(
+            "bad-value",
+            f"The field 'reveal_on' is {text[:60]!r}; expected a date such as 2027-03-01.",
+            field="reveal_on",
+            advice="Enter a date such as 2027-03-01.",
+        ) from None

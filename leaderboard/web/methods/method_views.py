@@ -1,0 +1,123 @@
+"""The pages of a method: its results for everybody, its details and visibility for its team."""
+
+from typing import cast
+from uuid import UUID
+
+from django.contrib import messages
+from django.contrib.auth.decorators import login_required
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from leaderboard.boards import results, visibility_preview
+from leaderboard.boards.snapshots import splits_of
+from leaderboard.errors.refusals import Refused
+from leaderboard.methods import details, methods, visibility
+from leaderboard.models import Method, User, Visibility
+from leaderboard.submissions import empty_methods
+from leaderboard.web.boards import export_views
+from leaderboard.web.methods.method_forms import MethodForm, ShowForm
+from leaderboard.web.methods.result_tables import edition_groups, method_result
+
+
+@require_safe
+def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
+    """A method: what it is, and what it achieved on each split."""
+    rows = Method.objects.visible_to(request.user).select_related("team")
+    found = get_object_or_404(rows, pk=method_id)
+    achieved = results.results(method=found, viewer=request.user, splits=splits_of(request))
+    profile = results.profile(method=found, viewer=request.user)
+    is_mine = Method.objects.of(request.user).filter(pk=found.pk).exists()
+    context = {
+        "profile": profile,
+        "details": details.words(profile.details),
+        "visibility": found.visibility,
+        "is_named": found.is_named_for(request.user),
+        "is_mine": is_mine,
+        "can_be_deleted": is_mine and empty_methods.can_be_deleted(found),
+        "method_id": found.pk,
+        "results": [method_result(result) for result in achieved],
+        "board_split": achieved[0].split.pk if achieved else "",
+        **export_views.of_method(achieved),
+    }
+    return render(request, "methods/method.html", context)
+
+
+def _own(request: HttpRequest, method_id: UUID) -> Method:
+    """One of the reader's own team's methods; any other is not there."""
+    return get_object_or_404(Method.objects.of(request.user).select_related("team"), pk=method_id)
+
+
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
+    """Say something else of a method."""
+    found = _own(request, method_id)
+    form = MethodForm.of_method(request, method=found)
+    if form.is_valid():
+        with form.refusals():
+            methods.edit(method=found, changes=form.changes(), actor=cast("User", request.user))
+            messages.success(request, "The details are saved.")
+            return redirect("method", found.pk)
+    return render(
+        request, "methods/edit.html", {"method": found, "form": form}, status=422 if form.errors else 200
+    )
+
+
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
+    """Say what deleting an empty method does, and do it; of any other say why it stays."""
+    found = _own(request, method_id)
+    refusal = None
+    if request.method == "POST":
+        try:
+            empty_methods.delete(method=found, actor=cast("User", request.user), now=timezone.now())
+        except Refused as fault:
+            refusal = fault
+        else:
+            messages.success(request, f"{found.name} is deleted.")
+            return redirect("submissions")
+    context = {"method": found, "refusal": refusal, "is_empty": empty_methods.can_be_deleted(found)}
+    return render(request, "methods/delete.html", context, status=422 if refusal else 200)
+
+
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
+    """Choose who sees a method, look at what they would see, and show it."""
+    found = _own(request, method_id)
+    now = timezone.now()
+    form = ShowForm.of_method(request, method=found)
+    preview = None
+    if form.is_bound:
+        with form.refusals():
+            wanted = form.wanted(now=now)
+            visibility.require_possible(found, now=now, **wanted)
+            preview = visibility_preview.preview(method=found, visibility=wanted["visibility"], now=now)
+            if request.method == "POST":
+                form.require_confirmation()
+                visibility.change(method=found, actor=cast("User", request.user), now=now, **wanted)
+                messages.success(request, _published_sentence(found.pk))
+                return redirect("method", found.pk)
+    context = {"method": found, "form": form}
+    if preview is not None:
+        context["preview"] = preview
+        context["preview_label"] = Visibility(preview.visibility).label
+        context["details"] = details.words(preview.profile.details)
+        context["sights"] = [(sight, edition_groups(sight.entry, sight.edition)) for sight in preview.sights]
+    return render(request, "methods/visibility.html", context, status=422 if form.errors else 200)
+
+
+def _published_sentence(method_id: UUID) -> str:
+    """What has just become of a method."""
+    method = Method.objects.get(pk=method_id)
+    if method.visibility == Visibility.PUBLIC:
+        return f"{method.name} is now public."
+    until = f", until {method.reveal_at:%Y-%m-%d %H:%M} UTC" if method.reveal_at else ""
+    return f"{method.name} is now visible to everyone as {method.pseudonym}{until}."

@@ -1,0 +1,128 @@
+"""Tables of results of methods and submissions: the numbers and the counts behind each."""
+
+import itertools
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+from urllib.parse import urlencode
+
+from django.urls import reverse
+from django.utils.text import Truncator
+
+from evaluator.metrics.protocol import OVERALL, PRIMARY
+from evaluator.scoring.report import format_published
+from leaderboard.boards.boards import Entry, flat_scores
+from leaderboard.boards.results import Result
+from leaderboard.models import Edition, Evaluation, Status, Submission
+from leaderboard.scoring.comparisons import MIN_METHODS
+from leaderboard.submissions.submissions import evaluation_of
+from leaderboard.templatetags.board import grouped
+from leaderboard.web.boards import profile_chart
+from leaderboard.web.boards.score_columns import (
+    Cell,
+    Group,
+    Heading,
+    cell_css,
+    score_cells,
+    score_groups,
+    score_heading,
+)
+from leaderboard.web.boards.tables import rank_range
+
+_MAX_REASON: Final = 110
+
+
+@dataclass(frozen=True)
+class ResultGroup:
+    """One of the metrics of one result, and its columns."""
+
+    group: Group
+    columns: tuple[tuple[Heading, Cell, str], ...]  # each with the number of sequences behind it
+
+    @property
+    def has_intervals(self) -> bool:
+        """Whether any of the values has one: else the row for them is left out."""
+        return any(cell.interval for _, cell, _ in self.columns)
+
+    @property
+    def has_with_best(self) -> bool:
+        """Whether any is marked as one that may be the best: else the mark needs no explanation."""
+        return any(cell.is_with_best for _, cell, _ in self.columns)
+
+
+def result_groups(entry: Entry, counts: Mapping[str, int]) -> tuple[ResultGroup, ...]:
+    """The numbers of one result, with the number of sequences behind each."""
+    headings = [score_heading(name) for name in entry.scores]
+    columns = iter(
+        (heading, cell, grouped(counts.get(heading.caption)))
+        for heading, cell in zip(headings, score_cells(entry), strict=True)
+    )
+    return tuple(
+        ResultGroup(group=group, columns=tuple(itertools.islice(columns, group.n_columns)))
+        for group in score_groups(entry.scores)
+    )
+
+
+def edition_groups(entry: Entry, edition: Edition) -> tuple[ResultGroup, ...]:
+    """The numbers of a row of an edition's board."""
+    truth = edition.ground_truth
+    return result_groups(entry, {OVERALL: truth.n_sequences, **truth.counts})
+
+
+def method_result(result: Result) -> dict[str, Any]:
+    """What a method achieved on a split, for its page; nothing to compare with: no `compare_href`."""
+    entry = result.entry
+    return {
+        "result": result,
+        "groups": edition_groups(entry, result.edition),
+        "rank_range": rank_range(entry),
+        "errors": result.edition.rules.metrics,
+        "attempts": [
+            (
+                attempt.at,
+                [format_published(value, decimals=entry.decimals) for value in attempt.scores.values()],
+                attempt.submission_id == entry.submission_id,
+                attempt.submission_id,
+            )
+            for attempt in result.attempts
+        ],
+        "profile": profile_chart.profile((entry, *result.neighbours)),
+        "compare_href": _compare_href(result),
+        "can_compare": entry.scores[PRIMARY] is not None,
+    }
+
+
+def _compare_href(result: Result) -> str:
+    ids = [entry.method_id for entry in (result.entry, *result.neighbours) if entry.method_id is not None]
+    if len(ids) < MIN_METHODS or result.entry.scores[PRIMARY] is None:
+        return ""
+    query = urlencode([("split", result.split.pk), *(("m", pk) for pk in ids)])
+    return f"{reverse('compare')}?{query}"
+
+
+def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
+    """A team's submissions with their evaluation, their overall errors once scored, and why not if never."""
+    evaluations = [(submission, evaluation_of(submission)) for submission in submissions]
+    errors = dict.fromkeys(metric for _, each in evaluations for metric in each.edition.rules.metrics)
+    names = {metric.name: metric.symbol for metric in errors}
+    rows = []
+    for submission, evaluation in evaluations:
+        values, decimals = flat_scores(evaluation), evaluation.edition.decimals
+        cells = [
+            (cell_css(name, value, decimals), format_published(value, decimals=decimals), symbol)
+            for name, symbol in names.items()
+            for value in [values.get(name)]
+        ]
+        rows.append((submission, evaluation, cells, _reason(evaluation)))
+    return {"errors": errors, "rows": rows}
+
+
+def _reason(evaluation: Evaluation) -> str:
+    """Why there is no score, in a sentence for a list; empty for what is scored or waits."""
+    if evaluation.status == Status.SYSTEM_ERROR:
+        return "An error on our side; a maintainer will retry it."
+    if evaluation.status != Status.REJECTED or not evaluation.problems:
+        return ""
+    # What was found says enough here; what was expected stands on the submission's page.
+    first = Truncator(evaluation.problems[0]["message"].partition("; expected")[0]).chars(_MAX_REASON)
+    return f"{evaluation.n_problems:,} problems: {first}" if evaluation.n_problems > 1 else first

@@ -1,0 +1,1 @@
+"""Middleware of all requests: logging, limits, sessions, uploads, response headers, the page cache."""

@@ -1,0 +1,1 @@
+"""Pages of submissions: the form, the state, the result, the error analysis, the receipt."""

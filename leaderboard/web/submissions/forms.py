@@ -1,0 +1,206 @@
+"""The form of a submission. The domain function refuses wrong values, in the same words everywhere."""
+
+from dataclasses import dataclass
+from datetime import datetime
+from functools import cached_property
+from typing import Any, Self
+from urllib.parse import urlencode
+from uuid import UUID
+
+from django import forms
+from django.conf import settings
+from django.http import HttpRequest
+from django.utils import timezone
+
+from evaluator.predictions.documents import EMPTY_MESSAGE
+from leaderboard.methods import visibility
+from leaderboard.methods.details import DETAILS
+from leaderboard.models import Method, Split, Submission, Team, User
+from leaderboard.people import teams
+from leaderboard.quotas import admissions, deadlines, quotas
+from leaderboard.submissions import search
+from leaderboard.web.methods.method_forms import DetailsForm
+
+
+@dataclass(frozen=True)
+class SplitChoice:
+    """A split to choose, and in a sentence what its team has left there, or why it takes nothing now."""
+
+    split: Split
+    is_open: bool
+    sentence: str
+
+
+def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
+    """Every split as this person finds it."""
+    team = teams.current_team_of(user=user)
+    return [
+        _offer(split, team=team, user=user, now=now)
+        for split in Split.objects.select_related("published_edition")
+    ]
+
+
+def _offer(split: Split, *, team: Team | None, user: User, now: datetime) -> SplitChoice:
+    refusal = deadlines.refusal_of(split, now=now) or admissions.refusal_of(team=team, split=split)
+    if refusal is not None:
+        return SplitChoice(split=split, is_open=False, sentence=str(refusal))
+    quota = quotas.state(team=team, user=user, split=split, now=now)
+    sentence = f"{quota.sentence} {deadlines.closing_of(split)}".strip()
+    return SplitChoice(split=split, is_open=True, sentence=sentence)
+
+
+class SubmissionForm(DetailsForm):
+    """A prediction file, the split it is for and the method that made it, with its details.
+
+    Only presence is checked here; the domain function refuses everything else, in its words.
+    """
+
+    split = forms.CharField(error_messages={"required": "No split was chosen; expected one of those listed."})
+    method = forms.CharField(
+        help_text="Name on the board: a new name, or the name of one of your team's methods.",
+        error_messages={"required": "No method was named; expected its name on the board."},
+        widget=forms.TextInput(attrs={"list": "methods", "maxlength": 80, "autocomplete": "off"}),
+    )
+    file = forms.FileField(
+        label="Prediction file",
+        error_messages={
+            "required": "No prediction file was sent; expected a JSON file.",
+            "empty": EMPTY_MESSAGE,
+        },
+        widget=forms.FileInput(
+            attrs={"accept": ".json,application/json", "aria-describedby": "id_file_helptext id_file_error"}
+        ),
+    )
+
+    note = forms.CharField(
+        required=False,
+        help_text="Only your team sees it, among its submissions.",
+        widget=forms.TextInput(attrs={"maxlength": 500, "autocomplete": "off"}),
+    )
+
+    def __init__(self, user: User, request: HttpRequest) -> None:
+        """The form as this person sees it, filled with what this request sends."""
+        sent = (request.POST, request.FILES) if request.method == "POST" else (None, None)
+        super().__init__(sent[0], sent[1], initial={"split": self._split_to_mark})
+        self._user = user
+        self._preferred = request.GET.get("split", "")
+        self.max_bytes = settings.MAX_PREDICTIONS_BYTES
+
+    # Asked for by whoever draws the form: a file that is taken is answered without any of it.
+    @cached_property
+    def offers(self) -> list[SplitChoice]:
+        """All splits there are, with what is left there at this moment."""
+        return offers_for(self._user, now=timezone.now())
+
+    @cached_property
+    def methods(self) -> list[Method]:
+        """The team's own, to choose from."""
+        return list(Method.objects.of(self._user).order_by("name"))
+
+    @property
+    def open_offers(self) -> list[SplitChoice]:
+        """The splits to choose from."""
+        return [offer for offer in self.offers if offer.is_open]
+
+    @property
+    def closed_offers(self) -> list[SplitChoice]:
+        """The splits that take nothing now, each with the reason."""
+        return [offer for offer in self.offers if not offer.is_open]
+
+    def _split_to_mark(self) -> str:
+        """The split that was asked for, else the only open one."""
+        open_names = [offer.split.name for offer in self.open_offers]
+        return self._preferred or (open_names[0] if len(open_names) == 1 else "")
+
+    @property
+    def notices(self) -> list[str]:
+        """Which of the team's methods others see, each in a sentence; of a chosen one that alone."""
+        chosen = [method for method in self.methods if method.name == self["method"].value()]
+        told = (visibility.notice_of(method) for method in chosen or self.methods)
+        return [sentence for sentence in told if sentence]
+
+    @property
+    def options(self) -> list[tuple[str, str]]:
+        """The names of the team's methods to choose from, and what is to be told of each."""
+        return [(method.name, visibility.notice_of(method)) for method in self.methods]
+
+    @property
+    def shows_details(self) -> bool:
+        """Whether the fields of details are open: for a first method, and where one has text or an error."""
+        told = (*self.described, *self.detailed)
+        return not self.methods or any(field.value() or field.errors for field in told)
+
+    def submission(self) -> dict[str, Any]:
+        """What was filled in, under the domain function's names."""
+        fields = self.cleaned_data
+        return {
+            "split_name": fields["split"],
+            "method_name": fields["method"],
+            "upload": fields["file"],
+            "filename": fields["file"].name or "",
+            "via": Submission.Via.WEB,
+            "description": fields["description"],
+            "paper_url": fields["paper_url"],
+            "code_url": fields["code_url"],
+            "method_details": {detail.name: fields[detail.name] for detail in DETAILS},
+            "note": fields["note"],
+        }
+
+
+def parse_uuid(text: str) -> UUID | None:
+    """The id that a text is, if it is one."""
+    try:
+        return UUID(text)
+    except ValueError:
+        return None
+
+
+def _splits() -> list[tuple[str, str]]:
+    return [("", "all"), *((name, name) for name in Split.objects.values_list("pk", flat=True))]
+
+
+class SearchForm(forms.Form):
+    """What to look for among one's own submissions; what cannot be understood is told, and asks nothing."""
+
+    q = forms.CharField(
+        label="Search",
+        required=False,
+        max_length=200,
+        widget=forms.TextInput(attrs={"placeholder": "method, file or note", "type": "search"}),
+    )
+    split = forms.ChoiceField(required=False, choices=_splits)
+    state = forms.ChoiceField(required=False, choices=[("", "all"), *search.STATES])
+
+    chosen_method: Method | None = None
+
+    @classmethod
+    def of(cls, request: HttpRequest) -> Self:
+        """The form as the address asks; a method of others is as good as none."""
+        form = cls(request.GET)
+        asked = parse_uuid(request.GET.get("method", ""))
+        form.chosen_method = Method.objects.of(request.user).filter(pk=asked).first() if asked else None
+        form.full_clean()
+        return form
+
+    def wanted(self) -> dict[str, Any]:
+        """What was understood, by the names of `search.matching`."""
+        found = self.cleaned_data
+        method = self.chosen_method.pk if self.chosen_method else None
+        return {
+            "text": found.get("q", ""),
+            "split": found.get("split", ""),
+            "state": found.get("state", ""),
+            "method": method,
+        }
+
+    @property
+    def is_asking(self) -> bool:
+        """Whether anything is looked for."""
+        return any(self.wanted().values()) or bool(self.errors)
+
+    @property
+    def address(self) -> str:
+        """The query that asks the same, to be followed by a page."""
+        names = {"text": "q"}
+        found = {names.get(name, name): value for name, value in self.wanted().items() if value}
+        return f"{urlencode(found)}&" if found else ""

@@ -1,0 +1,154 @@
+"""The board on every screen: it fits, its heads stay, it answers at once, and it keeps what is ticked."""
+
+import re
+
+import pytest
+from playwright.sync_api import Page, expect
+
+from tests.browser.chromium import NARROW, OVERFLOW_PX, WIDE, sign_in
+from tests.browser.conftest import NewPage
+from tests.browser.site import PASSWORD, open_split
+from tests.journeys.production import Site
+
+pytestmark = pytest.mark.browser
+
+BOARD = "/board/demo/"
+WIDTHS = (320, 360, 768, 960, 1024, 1280, 1366, 1440, 1920)
+N_ROWS = 66
+N_COMPARED = 5
+OWNER = "board-owner@example.org"
+UNBROKEN = "A" * 80
+FILL = f"""
+from allauth.account.models import EmailAddress
+from django.db import transaction
+from leaderboard import versions
+from leaderboard.models import Method, Split, User
+from leaderboard.people import teams
+from tests import board_rows
+user = User.objects.create_user({OWNER!r}, {PASSWORD!r}, name="Owners")
+EmailAddress.objects.create(user=user, email=user.email, verified=True, primary=True)
+methods = board_rows.fill(Split.objects.get(pk="demo").published_edition, n={N_ROWS}, user=user)
+Method.objects.filter(pk=methods[0].pk).update(name={UNBROKEN!r})
+own = Method.objects.filter(pk=methods[1].pk)
+own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))
+with transaction.atomic():
+    versions.changed("demo")
+"""
+# Cells whose text is wider than they are: it would lie over its neighbour. Italics lean into their padding.
+SPILLED = """() => [...document.querySelectorAll("table.board :is(td, th):not(.interval, .choose)")]
+  .filter(cell => cell.checkVisibility() && cell.scrollWidth > cell.clientWidth + 3)
+  .map(cell => `${cell.className}: ${cell.textContent.trim().slice(0, 40)}`)"""
+LOW_LINKS = """() => [...document.querySelectorAll("table.board thead a, .view-tools :is(a, summary), .chip")]
+  .filter(each => each.checkVisibility() && each.getBoundingClientRect().height < 24)
+  .map(each => each.textContent)"""
+HEAD_TOP_PX = """() => {
+  scrollTo(0, document.querySelector("table.board tbody tr:nth-child(40)").offsetTop);
+  return document.querySelector("table.board thead").getBoundingClientRect().top;
+}"""
+
+
+@pytest.fixture(scope="module")
+def full(site: Site) -> None:
+    """A board of 66 rows, two of them with names of 80 letters and no break, one of these private."""
+    open_split(site, "demo")
+    site.manage("shell", "-v0", "-c", FILL)
+
+
+def faults_at_every_width(page: Page) -> list[str]:
+    found = []
+    page.goto(BOARD)
+    for width in WIDTHS:
+        page.set_viewport_size({"width": width, "height": 800})
+        page.evaluate("scrollTo(0, 0)")
+        checks = {"overflow": OVERFLOW_PX, "low": LOW_LINKS, "spilled": SPILLED, "head": HEAD_TOP_PX}
+        for name, check in checks.items():
+            seen = page.evaluate(check)
+            if seen:
+                found.append(f"{width}: {name} {seen}")
+    return found
+
+
+def test_board_fits_every_screen_with_names_of_80_letters_and_its_heads_stay(
+    new_page: NewPage, full: None
+) -> None:
+    assert faults_at_every_width(new_page()) == []
+    page = new_page()
+    sign_in(page, OWNER)
+    assert faults_at_every_width(page) == []
+    expect(page.get_by_text("would be")).to_have_count(1)
+
+
+def test_phone_shows_one_range_and_the_visitor_chooses_which(new_page: NewPage, full: None) -> None:
+    page = new_page(viewport=NARROW)
+    page.goto(BOARD)
+    heads = page.locator("table.board thead tr").last.locator("th:visible")
+    expect(heads).to_have_count(5)
+    assert [re.split(r"\s", text.strip())[0] for text in heads.all_inner_texts()][-2:] == ["MiD", "RTE"]
+    page.get_by_label("0–3 s", exact=True).check()
+    assert [text.strip()[:5] for text in heads.all_inner_texts()][-2:] == ["0–3 s", "0–3 s"]
+    page.locator("table.board tbody input").first.check()
+    expect(page.get_by_role("complementary", name="Selected for comparison")).to_be_visible()
+
+
+def test_board_answers_while_one_types_and_says_at_the_field_what_is_wrong(page: Page, full: None) -> None:
+    page.goto(BOARD)
+    rows = page.locator("table.board tbody tr")
+    page.get_by_role("searchbox").press_sequentially("method 12 ")
+    expect(rows).to_have_count(1)
+    only_what_is_set = re.compile(re.escape(f"{BOARD}?q=method+12") + "$")
+    expect(page).to_have_url(only_what_is_set)
+    page.get_by_text("Filters", exact=True).click()
+    page.get_by_label("Max latency (ms)").fill("fast")
+    expect(page.locator("#fault-latency")).to_contain_text("expected a number of milliseconds")
+    expect(page.get_by_label("Max latency (ms)")).to_have_attribute("aria-invalid", "true")
+    expect(rows).to_have_count(1)
+    page.get_by_label("Max latency (ms)").fill("1")
+    expect(rows).to_have_count(0)
+    expect(page.locator("#fault-latency")).to_be_empty()
+    page.get_by_role("link", name="Remove filter Max latency (ms): 1").click()
+    expect(rows).to_have_count(1)
+    expect(page).to_have_url(only_what_is_set)
+
+
+def test_ticks_survive_sorting_and_searching_and_end_at_five(page: Page, full: None) -> None:
+    page.goto(BOARD)
+    boxes = page.locator("table.board tbody input[type=checkbox]")
+    tray = page.get_by_role("complementary", name="Selected for comparison")
+    expect(tray).to_be_hidden()
+    boxes.nth(1).check()
+    boxes.nth(4).check()
+    expect(tray).to_contain_text("2 of at most 5")
+    page.get_by_role("link", name="RTE, overall, %").click()
+    page.get_by_role("searchbox").fill("method 2")
+    expect(page.get_by_text(re.compile("^[0-9]+ of [0-9]+ results"))).to_be_visible()
+    expect(tray).to_contain_text("2 of at most 5")
+    page.goto(BOARD)
+    expect(boxes.nth(4)).to_be_checked()
+    for i in (7, 8, 9):
+        boxes.nth(i).check()
+    expect(tray).to_contain_text("the maximum")
+    expect(boxes.nth(0)).to_be_disabled()
+    href = tray.get_by_role("link", name="Compare").get_attribute("href") or ""
+    assert len(re.findall(r"[?&]m=", href)) == N_COMPARED
+    tray.get_by_role("button", name="Clear").click()
+    expect(tray).to_be_hidden()
+
+
+def test_menu_and_legend_open_and_close_by_keyboard_and_an_export_is_copied(
+    new_page: NewPage, full: None
+) -> None:
+    page = new_page(viewport=WIDE, permissions=["clipboard-read", "clipboard-write"])
+    page.goto(BOARD)
+    page.locator(".legend summary").press("Enter")
+    expect(page.get_by_text("The board is ranked by overall MiD.")).to_be_visible()
+    menu = page.locator("details.exports")
+    menu.locator("summary").press("Enter")
+    menu.get_by_role("button", name="Copy LaTeX", exact=True).click()
+    expect(menu.get_by_text("Copied")).to_be_visible()
+    assert r"\toprule" in page.evaluate("navigator.clipboard.readText()")
+    page.keyboard.press("Escape")
+    expect(menu.locator(".menu-body")).to_be_hidden()
+    with page.expect_download() as download:
+        menu.locator("summary").click()
+        menu.get_by_role("link", name="Download Markdown", exact=True).click()
+    assert download.value.suggested_filename == "tsttc-demo-edition-1.md"

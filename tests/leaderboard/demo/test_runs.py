@@ -1,0 +1,106 @@
+"""The demo's runs: kept estimates are those that the baselines make of rendered frames."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from numpy.typing import NDArray
+
+from evaluator.cli import main
+from evaluator.metrics.metrics import MID
+from evaluator.metrics.scale import scale_ratio_to_ttc
+from leaderboard.demo import seed, truth
+from leaderboard.demo.make_runs import AllRuns, RenderedFolder
+from leaderboard.demo.runs import FRAMES, N_SEQUENCES, RUNS, SEED, Run
+from tests.evaluator.worlds import REPOSITORY
+
+pytestmark = pytest.mark.slow
+
+N_DRAWN = 70
+TOLERANCE = 2e-4
+
+
+@pytest.fixture(scope="module")
+def drawn() -> NDArray[np.int64]:
+    """Sequences spread over the split; of each, every run is made anew."""
+    return np.sort(np.random.default_rng(20).choice(N_SEQUENCES, size=N_DRAWN, replace=False))
+
+
+def test_estimates_that_are_made_anew_are_those_that_are_kept(drawn: NDArray[np.int64]) -> None:
+    split = truth.demo_split()
+    worker = AllRuns(folder=RenderedFolder.of(split, seed=SEED, rows=drawn.tolist()), runs=RUNS)
+    made = np.array([worker(row)[1] for row in drawn.tolist()])
+    kept = np.stack([run.kept()[drawn] for run in RUNS], axis=1)
+    assert made.size >= 200
+    assert np.abs(made - kept).max() <= TOLERANCE
+
+
+def test_the_commands_of_the_description_make_the_kept_estimates(tmp_path: Path) -> None:
+    first, count = 14_000, 3
+    part = ["--first", str(first), "--count", str(count), "--jobs", "1"]
+    _call([*FRAMES.replace("frames/", str(tmp_path / "frames")).split(), *part])
+    for run in RUNS:
+        out = tmp_path / f"{run.name}.json"
+        words = run.command.replace("frames/", str(tmp_path / "frames")).split()
+        words[words.index("--out") + 1] = str(out)
+        _call([*words, "--jobs", "1"])
+        values = list(json.loads(out.read_text())["predictions"].values())
+        np.testing.assert_allclose(values, run.kept()[first : first + count], atol=TOLERANCE)
+
+
+def _call(words: list[str]) -> None:
+    result = CliRunner().invoke(main, words[1:], prog_name=words[0])
+    assert result.exit_code == 0, result.output
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.name)
+def test_every_sequence_has_an_estimate_that_can_be_submitted(run: Run) -> None:
+    kept = run.kept()
+    assert kept.shape == (N_SEQUENCES,)
+    assert (kept > 0).all()
+    assert (kept < 10).all()
+
+
+def test_methods_come_in_the_order_of_the_paper() -> None:
+    ttc_s = truth.demo_split().truth.ttc_s
+    errors = {
+        run.name: float(np.mean(MID.errors(scale_ratio_to_ttc(run.kept(), fps_hz=2), ttc_s))) for run in RUNS
+    }
+    assert errors["alignment"] < errors["pixel-mse"] < errors["detection-height"] < errors["detection-area"]
+
+
+def test_the_demo_needs_no_opencv() -> None:
+    program = """
+import sys; sys.modules["cv2"] = None
+import django; django.setup()
+from leaderboard.demo import seed
+from leaderboard.demo.truth import demo_split
+print(len(seed.predictions_file(seed.ENTRIES[0], truth=demo_split().truth)))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", program],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=REPOSITORY,
+        env={
+            "DJANGO_SETTINGS_MODULE": "leaderboard.settings",
+            "PATH": "/usr/bin:/bin",
+            "OPENBLAS_NUM_THREADS": "1",
+        },
+    )
+    assert done.returncode == 0, done.stderr
+    assert int(done.stdout) > 400_000
+
+
+def test_every_description_names_its_commands_and_that_frames_are_rendered() -> None:
+    for entry in seed.ENTRIES:
+        if entry.run is not None:
+            assert FRAMES in entry.full_description
+            assert entry.run.command in entry.full_description
+            assert "rendered, not filmed" in entry.full_description
+            assert len(entry.full_description) <= 2_000

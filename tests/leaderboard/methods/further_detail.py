@@ -1,0 +1,29 @@
+"""A plugin of pytest that adds a method detail as a developer would: a field of `Method`, and one row."""
+
+from django.apps import AppConfig
+from django.db import models
+
+from leaderboard.apps import LeaderboardConfig
+
+_import_models = AppConfig.import_models
+
+
+def import_models(config: AppConfig) -> None:
+    """Import the app's models, and add the detail before anything else is imported."""
+    _import_models(config)
+    from leaderboard.methods import details  # noqa: PLC0415 - needs the models
+    from leaderboard.models import Method  # noqa: PLC0415
+
+    Method.add_to_class("optimizer", models.CharField(max_length=40, blank=True))
+    row = details.Detail(
+        name="optimizer",
+        kind=details.free_text(40),
+        label="Optimizer",
+        help="What the weights were trained with.",
+        filter="optimizer",
+        example="AdamW",
+    )
+    details.DETAILS += (row,)
+
+
+LeaderboardConfig.import_models = import_models  # type: ignore[assignment]  # for a process of its own

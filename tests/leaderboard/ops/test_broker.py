@@ -1,0 +1,121 @@
+"""`leaderboard.ops.broker`: a nudge never fails and never keeps anybody waiting for long."""
+
+import socket
+from collections.abc import Iterator
+
+import pytest
+from django.db import transaction
+from kombu import Connection
+from pytest_django import DjangoCaptureOnCommitCallbacks
+
+from leaderboard import tasks, versions
+from leaderboard.models import Edition, User
+from leaderboard.ops import broker
+from leaderboard.ops.broker import CircuitBreaker
+from tests import builders
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture
+def listener(monkeypatch: pytest.MonkeyPatch) -> Iterator[socket.socket]:
+    """A server that lets clients connect and then says nothing; nudges go to it."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        url = f"redis://127.0.0.1:{server.getsockname()[1]}/0"
+        pool = Connection(url, transport_options=broker.FAIL_FAST).Pool(2)
+        monkeypatch.setattr(broker, "_connections", lambda: pool)
+        monkeypatch.setattr(broker, "_rest", CircuitBreaker(rest_s=60))
+        server.setblocking(False)
+        yield server
+        pool.force_close_all()
+
+
+def n_connected(listener: socket.socket) -> int:
+    """Connections since the last question."""
+    n = 0
+    while True:
+        try:
+            listener.accept()[0].close()
+        except BlockingIOError:
+            return n
+        n += 1
+
+
+def test_a_message_reaches_the_broker_and_bears_no_argument(monkeypatch: pytest.MonkeyPatch) -> None:
+    with Connection("memory://") as connection:
+        monkeypatch.setattr(broker, "_connections", lambda: connection.Pool(1))
+        assert broker.nudge()
+        message = connection.SimpleQueue("celery").get(timeout=1)
+    assert message.headers["task"] == tasks.nudge.name
+    assert message.payload[:2] == [[], {}]
+
+
+def test_without_a_broker_nothing_is_sent() -> None:
+    assert not broker.nudge()
+    assert not broker.work_off()
+
+
+def test_messages_of_a_former_version_are_understood(db: None) -> None:
+    tasks.nudge("9f0a6a1e-0000-0000-0000-000000000000")
+    tasks.work_off("test")
+
+
+def test_a_broker_that_is_down_is_no_fault(listener: socket.socket) -> None:
+    listener.close()
+    assert not broker.nudge()
+
+
+def test_a_broker_that_hangs_is_given_up_and_then_left_alone_for_a_while(listener: socket.socket) -> None:
+    assert not broker.nudge()
+    assert n_connected(listener) >= 1
+    assert not broker.nudge()
+    assert n_connected(listener) == 0
+
+
+def test_a_rest_ends(listener: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(broker, "_rest", CircuitBreaker(rest_s=0))
+    assert not broker.nudge()
+    n_connected(listener)
+    assert not broker.nudge()
+    assert n_connected(listener) >= 1
+
+
+# --- one message for each event ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The messages that were sent."""
+    told: list[str] = []
+
+    def send(task: str) -> bool:
+        told.append(task)
+        return True
+
+    monkeypatch.setattr(broker, "_sent", send)
+    return told
+
+
+@pytest.mark.parametrize("visibility", ["PUBLIC", "PRIVATE"])
+def test_a_file_sent_and_a_file_decided_are_one_message_each(
+    edition: Edition,
+    owner: User,
+    told: list[str],
+    visibility: str,
+    django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks,
+) -> None:
+    with django_capture_on_commit_callbacks(execute=True):
+        builders.submit(owner, builders.predictions(edition), visibility=visibility)
+    assert told.count("nudge") == 1
+    told.clear()
+    with django_capture_on_commit_callbacks(execute=True):
+        builders.score_all()
+    assert told == ["work_off"]
+
+
+def test_a_change_on_every_board_is_one_message(
+    benchmark: None, told: list[str], django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks
+) -> None:
+    with django_capture_on_commit_callbacks(execute=True), transaction.atomic():
+        versions.changed_everywhere()
+    assert told == ["work_off"]

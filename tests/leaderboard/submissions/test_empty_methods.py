@@ -1,0 +1,74 @@
+"""Deletion of methods of which nothing was ever scored."""
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard.errors.refusals import Refused
+from leaderboard.models import AuditEvent, Edition, Method, Submission, User
+from leaderboard.people import invitations, teams
+from leaderboard.quotas import quotas
+from leaderboard.submissions import empty_methods
+from tests import builders, pages
+
+
+@pytest.fixture
+def rejected(edition: Edition, owner: User) -> Submission:
+    """A broken upload of a method that it made."""
+    sent = builders.submit(owner, b"[]", method="Broken Net", visibility="PRIVATE")
+    builders.score_all()
+    return sent
+
+
+def test_the_method_of_a_broken_upload_is_deleted_its_file_stays_and_its_name_is_free(
+    signed_in: Client, edition: Edition, rejected: Submission, owner: User
+) -> None:
+    address = f"/methods/{rejected.method_id}/"
+    page = pages.page(signed_in.get(address)).one("main")
+    assert f"{address}delete/" in [a.attributes["href"] for a in page.all("a")]
+    assert signed_in.get(f"{address}delete/").status_code == 200
+    done = pages.page(signed_in.post(f"{address}delete/", follow=True)).one("main")
+    assert "Broken Net is deleted." in done.text
+    assert "deleted" in done.one("tbody").one("tr").text
+    assert signed_in.get(address).status_code == 404
+    assert not pages.page(signed_in.get("/submit/")).one("datalist").all("option")
+    event = AuditEvent.objects.get(verb="deleted")
+    assert (event.actor, event.noun_id, event.details) == (
+        owner,
+        str(rejected.method_id),
+        {"name": "Broken Net"},
+    )
+    again = builders.submit(owner, builders.predictions(edition), method="Broken-Net")
+    assert again.method_id != rejected.method_id
+    state = quotas.state(team=again.method.team, user=owner, split=edition.split, now=timezone.now())
+    assert state.n_rejected == 1, "a deletion gives no rejection back"
+
+
+def test_what_has_a_score_waits_or_was_shown_stays(
+    edition: Edition, rejected: Submission, owner: User, stranger: User, maintainer: User
+) -> None:
+    method, now = rejected.method, timezone.now()
+    for other in (stranger, maintainer):
+        with pytest.raises(Refused, match="Only the team"):
+            empty_methods.delete(method=method, actor=other, now=now)
+    builders.submit(owner, builders.predictions(edition), method="Broken Net", visibility="PRIVATE")
+    for _ in ("waiting", "scored"):
+        with pytest.raises(Refused, match="expected a private method without a scored or waiting submission"):
+            empty_methods.delete(method=method, actor=owner, now=now)
+        builders.score_all()
+    shown = builders.submit(owner, b"[]", method="Shown").method
+    builders.score_all()
+    assert not empty_methods.can_be_deleted(shown)
+    assert Method.objects.existing().count() == Method.objects.count() == 2
+
+
+def test_a_deleted_method_comes_along_to_another_team_and_takes_no_name(
+    edition: Edition, rejected: Submission, owner: User, stranger: User
+) -> None:
+    empty_methods.delete(method=rejected.method, actor=owner, now=timezone.now())
+    builders.submit(owner, builders.predictions(edition), method="Broken Net", visibility="PRIVATE")
+    theirs = teams.team_of(user=stranger)
+    _, secret = invitations.make(team=theirs, actor=stranger, now=timezone.now())
+    invitations.accept(secret=secret, user=owner, now=timezone.now())
+    assert set(Method.objects.values_list("name", "team")) == {("Broken Net", theirs.pk)}
+    assert [method.name for method in Method.objects.of(stranger)] == ["Broken Net"]
