@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 import evaluator
-from evaluator.scale import convert_rate, fps_of_gap, scale_ratio_to_ttc, ttc_to_scale_ratio
+from evaluator import convert_rate, fps_of_gap, scale_ratio_to_ttc, ttc_to_scale_ratio
 
 HERE = Path(__file__).parent
 truth = evaluator.read_truth(HERE / "truth.csv")

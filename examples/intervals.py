@@ -3,7 +3,7 @@
 import numpy as np
 
 import evaluator
-from evaluator.tables import Table
+from evaluator import Table
 
 # Ground truth of one's own: forty recordings of fifty sequences, as few recordings say little.
 rng = np.random.default_rng(7)

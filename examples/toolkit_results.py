@@ -11,8 +11,7 @@ import sys
 from pathlib import Path
 
 import evaluator
-from evaluator.conversion import convert
-from evaluator.numbering import read_numbering
+from evaluator import convert, read_numbering
 
 HERE = Path(__file__).parent
 

@@ -1,1 +1,1 @@
-"""The demo: simulated ground truth, invented submissions, and everything in one terminal."""
+"""The demo: simulated ground truth, runs of the baselines on rendered frames, all in one terminal."""

@@ -1,7 +1,8 @@
 """What the demo starts with: a split with simulated ground truth, three teams, and what they sent.
 
-Everything but the demo account's password comes from one fixed seed, and goes through the same verbs as the
-real thing: the files are checked and scored by whatever worker finds them in the queue.
+The files are those of the project's baselines on rendered frames. Everything but the demo account's password
+comes from one fixed seed, and goes through the same functions as the real thing: the files are checked and
+scored by whatever worker finds them in the queue.
 """
 
 import secrets
@@ -11,158 +12,158 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
-import numpy as np
 from allauth.account.models import EmailAddress
 from django.core.files.base import ContentFile
 from django.db import transaction
 
 import evaluator
-from evaluator.scale import ttc_to_scale_ratio
-from leaderboard import ground_truth, methods, submissions, visibility
-from leaderboard.demo.estimators import Estimator
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import FRAMES, Run, get_run
+from leaderboard.demo.truth import demo_split
+from leaderboard.editions import ground_truth
+from leaderboard.errors.refusals import Refused
+from leaderboard.methods import methods, visibility
 from leaderboard.models import Split, Submission, User, Visibility
+from leaderboard.submissions import submissions
 
-SEED = 20230904
 SPLIT = "demo"
 DEMO_EMAIL = "demo@example.org"
 
-
-class Occupied(Exception):
-    """The split `demo` has ground truth that the seed did not make."""
-
-
-@dataclass(frozen=True)
-class Login:
-    """The account that the demo's visitor signs in with."""
-
-    email: str
-    password: str
+_ON_PIXELS = "pixels@example.org"
+_ON_BOXES = "boxes@example.org"
+_PAPER = "https://arxiv.org/abs/2309.01539"
+_RENDERED = (
+    "The frames are rendered, not filmed. Rendered vehicles are flat: they do not turn, shine or bend, "
+    "which flatters methods that compare brightness."
+)
 
 
 @dataclass(frozen=True)
-class Entry:
-    """One submission of the demo. Without an estimator, the file is one that has faults."""
+class DemoEntry:
+    """One submission of the demo. Without a run, the file is one that has faults."""
 
     email: str
     team: str
     method: str
     description: str
-    estimator: Estimator | None
-    unit: str = "ttc"
+    run: Run | None
     visibility: str = Visibility.PUBLIC
     details: Mapping[str, object] = field(default_factory=dict)
 
+    @property
+    def full_description(self) -> str:
+        """What the method does, and the commands that made its file."""
+        if self.run is None:
+            return self.description
+        return f"{self.description} {_RENDERED}\n\nCommands:\n{FRAMES}\n{self.run.command}"
+
+
+_MEASURED = {
+    "cameras": "ONE",
+    "box_source": "GIVEN",
+    "uses_nerf": False,
+    "uses_extra_data": False,
+    "hardware": "one processor core, shared",
+}
 
 ENTRIES = (
-    Entry(
-        email="north@example.org",
-        team="Team North",
-        method="Dense scale matching",
-        description="Simulated: little noise on the scale ratio, a tenth of the sequences worse.",
-        estimator=Estimator(noise=9.0, recording_noise=3.0, outlier_share=0.1, outlier_factor=3.0),
-        unit="scale_ratio",
-        details={
-            "n_frames": 6,
-            "cameras": "ONE",
-            "box_source": "GIVEN",
-            "uses_nerf": False,
-            "uses_extra_data": True,
-            "pretraining": "ImageNet-1k",
-            "n_parameters": 31_000_000,
-            "latency_ms": 41.5,
-            "hardware": "one RTX 4090",
-            "paper_url": "https://example.org/dense-scale-matching",
-            "code_url": "https://example.org/dense-scale-matching/code",
-        },
+    DemoEntry(
+        email=_ON_BOXES,
+        team="Baselines on boxes",
+        method="Detection, box area",
+        description=(
+            "The ratio of the areas of the two boxes, taken as the scale ratio: the rule behind the "
+            "published row. Areas grow with the square of the scale, so times to contact are half as long."
+        ),
+        run=get_run("detection-area"),
+        details={**_MEASURED, "n_frames": 2, "latency_ms": 0.1, "paper_url": _PAPER},
     ),
-    Entry(
-        email="south@example.org",
-        team="Team South",
-        method="Feature pyramid, two frames",
-        description="Simulated: a little more noise than the best, and none of its outliers.",
-        estimator=Estimator(noise=12.0, recording_noise=5.0),
-        details={
-            "n_frames": 2,
-            "cameras": "ONE",
-            "box_source": "GIVEN",
-            "uses_nerf": False,
-            "uses_extra_data": False,
-            "n_parameters": 4_200_000,
-            "latency_ms": 6.8,
-            "hardware": "one Jetson Orin",
-            "code_url": "https://example.org/feature-pyramid",
-        },
+    DemoEntry(
+        email=_ON_BOXES,
+        team="Baselines on boxes",
+        method="Detection, root of the area",
+        description="The root of the ratio of the areas of the two boxes.",
+        run=get_run("detection-sqrt-area"),
+        visibility=Visibility.ANONYMOUS,
+        details={**_MEASURED, "n_frames": 2, "latency_ms": 0.1},
     ),
-    Entry(
+    DemoEntry(
         email=DEMO_EMAIL,
         team="Demo team",
-        method="Box height, smoothed",
-        description="Simulated: what the ratio of two smoothed box heights would give.",
-        estimator=Estimator(noise=28.0, recording_noise=8.0, outlier_share=0.02),
-        details={"n_frames": 6, "cameras": "ONE", "box_source": "DETECTED", "uses_nerf": False},
+        method="Detection, box height",
+        description="The ratio of the heights of the two boxes.",
+        run=get_run("detection-height"),
+        details={**_MEASURED, "n_frames": 2, "latency_ms": 0.1},
     ),
-    Entry(
-        email="south@example.org",
-        team="Team South",
-        method="Optical flow expansion",
-        description="Simulated: moderate noise, and now and then a match on the wrong object.",
-        estimator=Estimator(noise=36.0, recording_noise=12.0, outlier_share=0.05),
-        unit="scale_ratio",
-        visibility=Visibility.ANONYMOUS,
-        details={"n_frames": 3, "cameras": "SEVERAL", "box_source": "NONE", "uses_nerf": True},
+    DemoEntry(
+        email=_ON_PIXELS,
+        team="Baselines on pixels",
+        method="Pixel MSE",
+        description="The scale at which the reference frame looks most like the target, worded by the paper.",
+        run=get_run("pixel-mse"),
+        details={**_MEASURED, "n_frames": 2, "latency_ms": 5.7, "paper_url": _PAPER},
     ),
-    Entry(
-        email="north@example.org",
-        team="Team North",
-        method="Box height, raw",
-        description="Simulated: the ratio of two box heights as a detector gives them.",
-        estimator=Estimator(noise=75.0, recording_noise=10.0, outlier_share=0.02),
+    DemoEntry(
+        email=_ON_PIXELS,
+        team="Baselines on pixels",
+        method="SOT, median flow",
+        description=(
+            "The target box is followed back to the reference frame by median flow; the paper follows it "
+            "with OSTrack and takes the ratio of the areas."
+        ),
+        run=get_run("tracking"),
+        details={**_MEASURED, "n_frames": 6, "paper_url": _PAPER},
     ),
-    Entry(
+    DemoEntry(
+        email=_ON_PIXELS,
+        team="Baselines on pixels",
+        method="Photometric alignment",
+        description=(
+            "Scale, shift, gain and offset under which the reference frame shows the target: a baseline of "
+            "this project, not of the paper."
+        ),
+        run=get_run("alignment"),
+        details={**_MEASURED, "n_frames": 2, "latency_ms": 15.4},
+    ),
+    DemoEntry(
         email=DEMO_EMAIL,
         team="Demo team",
         method="First try",
-        description="Simulated: a file with the faults that first files have; see its page for the list.",
-        estimator=None,
+        description="A file with the faults that first files have; see its page for the list.",
+        run=None,
         visibility=Visibility.PRIVATE,
     ),
 )
 
 
-def seed(*, now: datetime, login_path: Path) -> Login:
-    """Make whatever of the demo is missing; what is there stays. Returns the demo account.
+def seed(*, now: datetime, password_path: Path) -> str:
+    """Make whatever of the demo is missing; what is there stays. Returns the password of `DEMO_EMAIL`.
 
-    `login_path` keeps the password, readable by its owner only, so that it can be printed again. Raises
-    `Occupied` where the split `demo` has other ground truth; nothing is submitted then.
+    `password_path` keeps it, readable by its owner only, so that it can be printed again. Raises
+    `Refused` where the split `demo` has other ground truth; nothing is submitted then.
     """
-    login = _login(login_path)
+    if not password_path.exists():
+        password_path.touch(mode=0o600)
+        password_path.write_text(secrets.token_urlsafe(9))
+    password = password_path.read_text().strip()
     users = {entry.email: _user(entry) for entry in ENTRIES}
-    _let_in(users[DEMO_EMAIL], password=login.password)
+    _create_account(users[DEMO_EMAIL], password=password)
     missing = [entry for entry in ENTRIES if not _has_submitted(entry)]
     if missing or not Split.objects.get(name=SPLIT).has_ground_truth:
-        truth = simulate(rng=np.random.default_rng(SEED))
+        truth = demo_split().truth
         _open_split(truth, now=now)
         for entry in missing:
             _submit(entry, user=users[entry.email], truth=truth, now=now)
-    return login
+    return password
 
 
-def _login(path: Path) -> Login:
-    if not path.exists():
-        path.touch(mode=0o600)
-        path.write_text(secrets.token_urlsafe(9))
-    return Login(email=DEMO_EMAIL, password=path.read_text().strip())
-
-
-def _user(entry: Entry) -> User:
+def _user(entry: DemoEntry) -> User:
     """The account of an entry; nobody has its password."""
     return User.objects.filter(email=entry.email).first() or User.objects.create_user(
         entry.email, name=entry.team
     )
 
 
-def _let_in(user: User, *, password: str) -> None:
+def _create_account(user: User, *, password: str) -> None:
     """Give the account this password and a proved address, once."""
     with transaction.atomic():
         EmailAddress.objects.get_or_create(
@@ -173,7 +174,7 @@ def _let_in(user: User, *, password: str) -> None:
             user.save(update_fields=["password"])
 
 
-def _has_submitted(entry: Entry) -> bool:
+def _has_submitted(entry: DemoEntry) -> bool:
     return Submission.objects.filter(
         split_id=SPLIT, method__name=entry.method, submitted_by__email=entry.email
     ).exists()
@@ -188,13 +189,15 @@ def _open_split(truth: evaluator.GroundTruth, *, now: datetime) -> None:
             path.write_bytes(truth.to_csv())
             ground_truth.import_truth(split_name=SPLIT, path=path, now=now)
     elif edition.ground_truth_id != truth.digest:
-        raise Occupied(
+        raise Refused(
+            "edition-refused",
             f"The split '{SPLIT}' has the ground truth {edition.ground_truth_id}; "
-            f"expected none, or the simulated one, {truth.digest}."
+            f"expected none, or the simulated one, {truth.digest}. "
+            "A demo of an earlier release has another one; move its folder var/ away to start anew.",
         )
 
 
-def _submit(entry: Entry, *, user: User, truth: evaluator.GroundTruth, now: datetime) -> None:
+def _submit(entry: DemoEntry, *, user: User, truth: evaluator.GroundTruth, now: datetime) -> None:
     """Send the entry's file, and say and show of its method what the demo does: all of it, or nothing."""
     data = predictions_file(entry, truth=truth)
     with transaction.atomic():
@@ -202,7 +205,7 @@ def _submit(entry: Entry, *, user: User, truth: evaluator.GroundTruth, now: date
             user=user,
             split_name=SPLIT,
             method_name=entry.method,
-            description=entry.description,
+            description=entry.full_description,
             upload=ContentFile(data),
             filename=f"{entry.method.lower().replace(',', '').replace(' ', '-')}.json",
             via=Submission.Via.WEB,
@@ -213,18 +216,17 @@ def _submit(entry: Entry, *, user: User, truth: evaluator.GroundTruth, now: date
             visibility.change(method=method, visibility=entry.visibility, actor=user, now=now)
 
 
-def predictions_file(entry: Entry, *, truth: evaluator.GroundTruth) -> bytes:
+def predictions_file(entry: DemoEntry, *, truth: evaluator.GroundTruth) -> bytes:
     """The file that the entry's team sends; the same for the same truth."""
     manifest = truth.manifest
-    if entry.estimator is None:
+    if entry.run is None:
         return _file_with_faults(manifest)
-    rng = np.random.default_rng([SEED, ENTRIES.index(entry)])
-    ttc_s = entry.estimator.predict(truth=truth, rng=rng)
-    if entry.unit == "ttc":
-        return evaluator.write_predictions(manifest=manifest, ttc_s=ttc_s)
-    alpha = np.round(ttc_to_scale_ratio(ttc_s, fps_hz=2), 9)
-    usable = np.where(alpha > 0, alpha, 1e-9)
-    return evaluator.write_predictions(keys=manifest.natural_keys, scale_ratio=usable, fps_hz=2)
+    return evaluator.write_predictions(
+        manifest=manifest,
+        scale_ratio=entry.run.kept(),
+        frame_gap=5,
+        meta={"method": entry.run.method, "parameters": dict(entry.run.parameters), "frames": FRAMES},
+    )
 
 
 def _file_with_faults(manifest: evaluator.Manifest) -> bytes:

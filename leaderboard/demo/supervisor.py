@@ -81,7 +81,7 @@ async def _end(child: asyncio.subprocess.Process) -> None:
             child.terminate()
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(child.wait(), timeout=PATIENCE_S)
-    # Its own children (a worker's beat) outlive a process that was killed.
+    # Its own children (a worker's readers) outlive a process that was killed.
     with contextlib.suppress(ProcessLookupError, PermissionError):
         os.killpg(child.pid, signal.SIGKILL)
     await child.wait()
@@ -112,9 +112,12 @@ async def _listening(host: str, port: int) -> None:
                 return
 
 
-async def _supervise(
-    processes: Sequence[Process], *, host: str, port: int, ready: Callable[[], None]
-) -> None:
+async def supervise(processes: Sequence[Process], *, host: str, port: int, ready: Callable[[], None]) -> None:
+    """Run the processes until SIGINT, SIGTERM or SIGHUP, then end them.
+
+    Calls `ready` once the port answers. Raises `StartFailed` when one of them does not stay up; the others
+    are ended then.
+    """
     stop = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
@@ -135,12 +138,3 @@ async def _supervise(
     for outcome in outcomes:
         if isinstance(outcome, BaseException):
             raise outcome
-
-
-def supervise(processes: Sequence[Process], *, host: str, port: int, ready: Callable[[], None]) -> None:
-    """Run the processes until SIGINT, SIGTERM or SIGHUP, then end them; `ready` is called once the port
-    answers.
-
-    Raises `StartFailed` when one of them does not stay up; the others are ended then.
-    """
-    asyncio.run(_supervise(processes, host=host, port=port, ready=ready))

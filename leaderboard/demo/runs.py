@@ -1,0 +1,76 @@
+"""The runs whose files the demo's teams submit: what ran, and its kept estimates.
+
+`python -m leaderboard.demo.make_runs` makes them anew from rendered frames; reading them needs numpy alone.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from baselines.methods import Value
+
+Floats = NDArray[np.float64]
+
+FOLDER = Path(__file__).parent / "estimates"
+DECIMALS = 6
+"""Of a kept scale ratio."""
+
+SEED = 20230904
+N_SEQUENCES = 28_600
+N_RECORDINGS = 700
+FRAMES = (
+    f"tsttc baseline render frames/ --like test --sequences {N_SEQUENCES} --recordings {N_RECORDINGS} "
+    f"--seed {SEED}"
+)
+"""The command that renders the frames of the demo's split."""
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A method with its parameters, at a frame gap of 5; `name` is that of its file."""
+
+    name: str
+    method: str
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+
+    @property
+    def command(self) -> str:
+        """The command that makes the file from the rendered frames."""
+        options = "".join(f" --{name.replace('_', '-')} {value}" for name, value in self.parameters.items())
+        return f"tsttc baseline run {self.method} frames/ --out {self.name}.json{options}"
+
+    @property
+    def path(self) -> Path:
+        """Where its estimates are kept."""
+        return FOLDER / f"{self.name}.npz"
+
+    def keep(self, scale_ratio: Floats) -> None:
+        """Write the estimates, (n,) in ascending anno_id."""
+        FOLDER.mkdir(exist_ok=True)
+        millionths = np.round(scale_ratio * 10**DECIMALS).astype(np.uint32)
+        with self.path.open("wb") as file:
+            np.savez_compressed(file, millionths=millionths)
+
+    def kept(self) -> Floats:
+        """The estimates, (n,) in ascending anno_id; raises `OSError` where none are kept."""
+        with self.path.open("rb") as file, np.load(file, allow_pickle=False) as store:
+            # A scale ratio of 0 cannot be submitted.
+            return np.maximum(np.asarray(store["millionths"], dtype=np.float64), 1) / 10**DECIMALS
+
+
+RUNS = (
+    Run("alignment", "alignment"),
+    Run("tracking", "tracking"),
+    Run("pixel-mse", "pixel-mse"),
+    Run("detection-height", "detection", {"measure": "height"}),
+    Run("detection-sqrt-area", "detection", {"measure": "sqrt-area"}),
+    Run("detection-area", "detection", {"measure": "area"}),
+)
+
+
+def get_run(name: str) -> Run:
+    """The run of that name; raises `KeyError`."""
+    return {run.name: run for run in RUNS}[name]

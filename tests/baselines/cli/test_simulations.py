@@ -1,0 +1,84 @@
+"""`tsttc baseline simulate` and `render`: the same options give the same split, and `run` takes it."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.evaluator.worlds import Tsttc
+
+SPLIT = ("--sequences", "12", "--recordings", "3", "--seed", "7")
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {str(p.relative_to(folder)): p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def test_a_rendered_folder_is_run_checked_and_scored(tsttc: Tsttc, tmp_path: Path) -> None:
+    folder, out = tmp_path / "frames", tmp_path / "p.json"
+    result = tsttc("baseline", "render", folder, *SPLIT, "--jobs", "1")
+    assert (result.exit_code, result.stdout) == (0, f"{folder}: 12 of 12 sequences.\n")
+    assert tsttc("baseline", "run", "detection", folder, "--out", out, "--strict").exit_code == 0
+    assert tsttc("check", out, "--manifest", folder / "manifest.csv").exit_code == 0
+    assert tsttc("score", out, "--truth", folder / "truth.csv").exit_code == 0
+
+
+@pytest.mark.slow
+def test_a_part_of_a_split_is_rendered_as_in_the_whole_by_any_number_of_processes(
+    tsttc: Tsttc, tmp_path: Path
+) -> None:
+    whole, part = tmp_path / "whole", tmp_path / "part"
+    assert tsttc("baseline", "render", whole, *SPLIT, "--jobs", "2").exit_code == 0
+    first_and_count = ("--first", "4", "--count", "2")
+    assert tsttc("baseline", "render", part, *SPLIT, *first_and_count, "--jobs", "1").exit_code == 0
+    images = {name: data for name, data in content(part).items() if name.endswith(".jpg")}
+    assert len(images) == 2 * 6
+    assert images.items() <= content(whole).items()
+    assert set((part / "boxes.csv").read_text().splitlines()) <= set(
+        (whole / "boxes.csv").read_text().splitlines()
+    )
+
+
+def test_simulate_and_render_draw_the_same_split(tsttc: Tsttc, tmp_path: Path) -> None:
+    folder, truth, tracks = tmp_path / "frames", tmp_path / "truth.csv", tmp_path / "tracks.csv"
+    assert tsttc("baseline", "simulate", truth, *SPLIT, "--tracks", tracks).exit_code == 0
+    part = ("--first", "11", "--jobs", "1")
+    assert tsttc("baseline", "render", folder, *SPLIT, *part).exit_code == 0
+    assert (folder / "truth.csv").read_text().splitlines()[1] == truth.read_text().splitlines()[12]
+    assert len(tracks.read_text().splitlines()) == 1 + 12 * 6
+
+
+def test_the_scripts_can_be_simulated_with_closed_and_half_open_triples(tsttc: Tsttc, tmp_path: Path) -> None:
+    counts = []
+    for triples in ((), ("--half-open",)):
+        result = tsttc("baseline", "simulate", tmp_path / "t.csv", "--like", "scripts", *triples, "--json")
+        counts.append(json.loads(result.stdout)["n_sequences"])
+    assert counts[0] > counts[1] > 1_000
+
+
+def test_a_folder_with_something_in_it_is_left_alone(tsttc: Tsttc, tmp_path: Path) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    result = tsttc("baseline", "render", tmp_path, *SPLIT)
+    assert result.exit_code == 2
+    assert "has notes.txt in it; expected a new or empty folder." in " ".join(result.stderr.split())
+    assert content(tmp_path) == {"notes.txt": b"mine"}
+
+
+def test_a_first_sequence_beyond_the_split_is_named(tsttc: Tsttc, tmp_path: Path) -> None:
+    result = tsttc("baseline", "render", tmp_path / "frames", *SPLIT, "--first", "12")
+    assert result.exit_code == 2
+    assert "12; expected an anno_id of the split, 0 to 11." in " ".join(result.stderr.split())
+    assert not (tmp_path / "frames").exists()
+
+
+def test_half_open_triples_belong_to_the_scripts(tsttc: Tsttc, tmp_path: Path) -> None:
+    result = tsttc("baseline", "simulate", tmp_path / "t.csv", "--half-open")
+    assert result.exit_code == 2
+    assert "--half-open is an option of --like scripts" in " ".join(result.stderr.split())
+    assert not (tmp_path / "t.csv").exists()
+
+
+def test_a_place_that_cannot_be_written_to_is_named(tsttc: Tsttc, tmp_path: Path) -> None:
+    result = tsttc("baseline", "simulate", tmp_path / "none" / "t.csv", *SPLIT)
+    assert result.exit_code == 2
+    assert "cannot be written: No such file or directory" in " ".join(result.stderr.split())

@@ -1,0 +1,50 @@
+"""Folders of real drives, for tests that need them."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+from hypothesis import settings
+
+from evaluator.cli import main
+from tests.baselines.real_folders import kitti_clip_folder, kitti_label_folder
+from tests.services import shared_data
+
+# How long an example takes says more about the machine than about the code.
+settings.register_profile("unhurried", deadline=None)
+settings.load_profile("unhurried")
+
+
+@pytest.fixture
+def tsttc() -> Callable[..., Result]:
+    """Run the command in this process."""
+
+    def run(*arguments: object) -> Result:
+        return CliRunner().invoke(main, list(map(str, arguments)), prog_name="tsttc")
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def kitti_clip() -> Path:
+    """The folder of the clip with lidar distances."""
+    shared = shared_data()
+    if shared is None or not (shared / "kitti-clip").is_dir():
+        pytest.skip("kitti-clip is not here: TSTTC_SHARED_DATA names no folder that has it")
+    return shared / "kitti-clip"
+
+
+@pytest.fixture(scope="session")
+def clip_folder(kitti_clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The clip as a folder of the convention, its images linked; not to be written to."""
+    return kitti_clip_folder(kitti_clip, tmp_path_factory.mktemp("kitti-clip"))
+
+
+@pytest.fixture(scope="session")
+def kitti_folder(kitti: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The drives of kitti-dev as a folder of the convention without images; not to be written to."""
+    labels = kitti.parent / "kitti-labels"
+    if not labels.is_dir():
+        pytest.skip("kitti-labels is not here: TSTTC_SHARED_DATA names no folder that has it")
+    return kitti_label_folder(kitti, labels, tmp_path_factory.mktemp("kitti-dev"))

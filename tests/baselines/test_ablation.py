@@ -1,0 +1,71 @@
+"""Ablations: the own scores of each setting, beside what the paper prints."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.ablation import ABLATIONS, get_ablation, scores_of_settings
+from baselines.folders import read_folder
+from baselines.rendering.folders import write_folder
+from baselines.simulation import split
+from evaluator import GroundTruth, Rejected, read_truth
+
+pytestmark = pytest.mark.slow
+
+N = 8
+
+
+@pytest.fixture(scope="module")
+def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of few rendered sequences, with its truth."""
+    folder = tmp_path_factory.mktemp("rendered")
+    drawn = split(rng=np.random.default_rng(1), n_sequences=N, n_recordings=2)
+    write_folder(drawn, seed=1, path=folder, rows=range(N))
+    return folder
+
+
+@pytest.fixture(scope="module")
+def truth(rendered: Path) -> GroundTruth:
+    return read_truth(rendered / "truth.csv")
+
+
+def test_a_row_has_own_scores_and_the_papers(rendered: Path, truth: GroundTruth) -> None:
+    told: list[int] = []
+    rows = scores_of_settings(
+        get_ablation("shift"), folder=read_folder(rendered), truth=truth, progress=told.append
+    )
+    assert [row.setting for row in rows] == [0, 1, 2, 3, 4]
+    assert [row.published["mid"] for row in rows] == [73.3, None, None, 41.0, None]
+    assert all(row.scores["mid"] is not None and row.n_fallback == 0 for row in rows)
+    assert told[-1] == 5 * N
+    assert told == sorted(told)
+
+
+def test_wider_gaps_have_smaller_errors(rendered: Path, truth: GroundTruth) -> None:
+    rows = scores_of_settings(get_ablation("frame-gap"), folder=read_folder(rendered), truth=truth)
+    assert rows[0].scores["mid"] > rows[-1].scores["mid"]
+    assert [row.published["rte"] for row in rows] == [95.7, 59.0, 42.8, 35.1, 29.9]
+
+
+def test_a_gap_without_boxes_has_no_scores(rendered: Path, truth: GroundTruth, tmp_path: Path) -> None:
+    for name in ("manifest.csv", "images"):
+        (tmp_path / name).symlink_to(rendered / name)
+    lines = (rendered / "boxes.csv").read_text().splitlines()
+    kept = [line for line in lines if line.split(",")[1] in {"frame", "0", "5"}]
+    (tmp_path / "boxes.csv").write_text("\n".join([*kept, ""]))
+    rows = scores_of_settings(get_ablation("frame-gap"), folder=read_folder(tmp_path), truth=truth)
+    assert [row.scores["mid"] is None for row in rows] == [True, True, True, True, False]
+    assert rows[0].n_fallback == N
+
+
+def test_a_truth_of_other_sequences_is_rejected(rendered: Path, truth: GroundTruth, tmp_path: Path) -> None:
+    other = tmp_path / "truth.csv"
+    other.write_text("\n".join((rendered / "truth.csv").read_text().splitlines()[:-1]) + "\n")
+    with pytest.raises(Rejected, match="1 sequences are only in the ground truth or only in the folder"):
+        scores_of_settings(get_ablation("bins"), folder=read_folder(rendered), truth=read_truth(other))
+
+
+def test_the_default_of_every_ablation_is_one_of_its_settings() -> None:
+    assert all(ablation.default in ablation.settings for ablation in ABLATIONS)
+    assert [ablation.name for ablation in ABLATIONS if ablation.table is None] == ["expansion"]

@@ -1,0 +1,39 @@
+"""Scale bins and the mean over the best of them."""
+
+import numpy as np
+import pytest
+
+from baselines import scales
+
+
+@pytest.mark.parametrize("frame_gap", [1, 2, 3, 4, 5])
+def test_bins_are_even_and_reach_both_ends_of_the_range(frame_gap: int) -> None:
+    bins = scales.scale_bins(frame_gap=frame_gap, n_bins=125)
+    assert (bins[0], bins[-1]) == scales.SCALE_RANGES[frame_gap]
+    np.testing.assert_allclose(np.diff(bins), np.ptp(bins) / 124)
+
+
+def test_a_wider_gap_has_a_wider_range() -> None:
+    lows, highs = zip(*(scales.SCALE_RANGES[gap] for gap in range(1, 6)), strict=True)
+    assert list(lows) == sorted(lows, reverse=True)
+    assert list(highs) == sorted(highs)
+
+
+@pytest.mark.parametrize(("frame_gap", "n_bins"), [(0, 125), (6, 125), (5, 1)])
+def test_gaps_and_counts_that_mean_nothing_are_refused(frame_gap: int, n_bins: int) -> None:
+    with pytest.raises(ValueError, match="expected"):
+        scales.scale_bins(frame_gap=frame_gap, n_bins=n_bins)
+
+
+def test_the_first_of_equal_errors_comes_first() -> None:
+    assert scales.best_of(np.array([2.0, 1.0, 1.0, 3.0]), n_top=2).tolist() == [1, 2]
+
+
+def test_a_perfect_match_takes_the_whole_weight() -> None:
+    assert scales.weighted_scale_ratio(np.array([0.8, 0.9, 1.0]), np.array([5.0, 0.0, 5.0])) == pytest.approx(
+        0.9
+    )
+
+
+def test_equal_errors_weigh_the_same() -> None:
+    assert scales.weighted_scale_ratio(np.array([0.8, 0.9]), np.array([7.0, 7.0])) == pytest.approx(0.85)

@@ -1,0 +1,115 @@
+"""Trackers follow the target box back to the reference frame; those that know no size are refused."""
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from baselines.clips import TARGET, Clip, Image
+from baselines.estimates import Unusable
+from baselines.tracking import TrackerRefused, Tracking, median_flow
+from tests.baselines.scenes import changed, kitti_clips, mean_mid, planted, swapped
+
+track = Tracking()
+
+
+def alpha(clip: Clip, frame_gap: int = TARGET) -> float:
+    return track(clip, frame_gap=frame_gap).scale_ratio
+
+
+@pytest.mark.parametrize("scale_ratio", [0.68, 0.85, 1.0, 1.15, 1.45])
+def test_median_flow_finds_a_planted_scale_ratio(scale_ratio: float) -> None:
+    assert alpha(planted(scale_ratio)) == pytest.approx(scale_ratio, rel=5e-3)
+
+
+@pytest.mark.parametrize("frame_gap", [1, 3])
+def test_the_box_is_followed_to_the_reference_frame(frame_gap: int) -> None:
+    assert alpha(planted(0.8), frame_gap) == pytest.approx(0.8 ** (frame_gap / 5), rel=5e-3)
+
+
+def test_the_followed_box_is_where_the_object_is() -> None:
+    clip = planted(0.8, shift=(9.0, -6.0))
+    frames = [clip.grey(frame) for frame in reversed(range(TARGET + 1))]
+    box, confidence = median_flow(frames, box=clip.boxes[TARGET])
+    assert box == pytest.approx(clip.boxes[0], abs=0.5)
+    assert 0 < confidence <= 1
+
+
+def test_only_the_target_box_is_needed() -> None:
+    clip = planted(0.9)
+    expected = alpha(clip)
+    clip.boxes[:TARGET] = np.nan
+    assert alpha(clip) == expected
+
+
+def test_the_area_is_the_square_of_the_scale_ratio() -> None:
+    clip = planted(0.9)
+    area = Tracking(measure="area")(clip, frame_gap=TARGET).scale_ratio
+    assert area == pytest.approx(alpha(clip) ** 2)
+
+
+def test_frames_in_reverse_order_give_the_reciprocal() -> None:
+    clip = planted(0.8)
+    assert alpha(clip) * alpha(swapped(clip)) == pytest.approx(1, rel=0.01)
+
+
+def test_a_scene_without_texture_is_unusable() -> None:
+    with pytest.raises(Unusable, match="too few points"):
+        alpha(changed(planted(0.9), lambda _, image: np.full_like(image, 100)))
+
+
+def test_an_object_that_vanishes_is_unusable() -> None:
+    def replace(frame: int, image: Image) -> Image:
+        noise = np.random.default_rng(frame).integers(0, 255, image.shape, dtype=np.uint8)
+        return image if frame == TARGET else noise
+
+    with pytest.raises(Unusable):
+        alpha(changed(planted(0.9), replace))
+
+
+def test_a_clip_without_a_target_box_is_unusable() -> None:
+    clip = planted(0.9)
+    clip.boxes[TARGET] = np.nan
+    with pytest.raises(Unusable, match="no box in the target frame"):
+        alpha(clip)
+
+
+@pytest.mark.parametrize("tracker", ["kcf", "mil"])
+def test_trackers_that_never_change_size_are_refused_in_words(tracker: str) -> None:
+    with pytest.raises(TrackerRefused, match=f"'{tracker}' never changes the size of its box.*median-flow"):
+        Tracking(tracker=tracker)
+
+
+def test_an_unknown_tracker_is_refused_in_words() -> None:
+    with pytest.raises(TrackerRefused, match="'sift' is unknown; use one of median-flow, csrt, nano"):
+        Tracking(tracker="sift")
+
+
+def test_csrt_runs_where_opencv_has_it_and_is_refused_in_words_elsewhere() -> None:
+    if hasattr(cv2, "TrackerCSRT_create"):
+        estimate = Tracking(tracker="csrt")(planted(0.8), frame_gap=TARGET)
+        assert estimate.scale_ratio == pytest.approx(0.8, abs=0.1)
+    else:
+        with pytest.raises(TrackerRefused, match="opencv-contrib-python-headless"):
+            Tracking(tracker="csrt")
+
+
+def test_nano_track_needs_both_models(tmp_path: Path) -> None:
+    with pytest.raises(TrackerRefused, match="two model files"):
+        Tracking(tracker="nano", backbone=tmp_path / "backbone.onnx")
+
+
+def test_models_that_are_absent_or_no_models_are_refused_in_words(tmp_path: Path) -> None:
+    backbone, head = tmp_path / "backbone.onnx", tmp_path / "head.onnx"
+    with pytest.raises(TrackerRefused, match=r"backbone\.onnx does not exist"):
+        Tracking(tracker="nano", backbone=backbone, head=head)
+    backbone.write_bytes(b"no model")
+    head.write_bytes(b"no model")
+    with pytest.raises(TrackerRefused, match="cannot read the models"):
+        Tracking(tracker="nano", backbone=backbone, head=head)
+
+
+def test_the_error_on_real_frames_is_at_most_13_mid() -> None:
+    clips, ttc_s = kitti_clips()
+    assert mean_mid([alpha(clip) for clip in clips], ttc_s) <= 13
