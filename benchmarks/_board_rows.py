@@ -7,8 +7,8 @@ from pathlib import Path
 
 def main() -> None:
     """Open the split with a made-up ground truth, and write the rows."""
-    from leaderboard import teams  # noqa: PLC0415 - Django is configured only now
     from leaderboard.models import User  # noqa: PLC0415
+    from leaderboard.people import teams  # noqa: PLC0415 - Django is configured only now
     from tests import board_rows, builders  # noqa: PLC0415
 
     with tempfile.TemporaryDirectory() as folder:

@@ -18,10 +18,13 @@ from django.utils import timezone
 
 import evaluator
 from benchmarks.evaluator import plain_loop
-from evaluator.scoring import Scorer
-from evaluator.tables import Table
-from leaderboard import files, ground_truth, lifecycle, rescoring, scoring, standings
+from evaluator.scoring.scoring import Scorer
+from evaluator.truth.csv_tables import Table
+from leaderboard.boards import boards
+from leaderboard.editions import corrections, ground_truth
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission
+from leaderboard.scoring import lifecycle, worker
+from leaderboard.storage import files, truth_values
 from tests import crowd
 
 POLL_S = 0.01
@@ -43,7 +46,7 @@ def open_split(*, split: str, truth: evaluator.GroundTruth, n: int, directory: P
     edition = ground_truth.import_truth(split_name=split, path=_written(truth, directory), now=timezone.now())
     crowd.join(split_name=split, truth=truth, n=n, n_files=0)
     _score_here()
-    assert rescoring.progress(edition).n_scored == n
+    assert corrections.progress(edition).n_scored == n
     return edition
 
 
@@ -69,9 +72,9 @@ def correct(*, split: str, truth: evaluator.GroundTruth, directory: Path) -> Cor
     """Open an edition with this ground truth beside the board, and wait until the workers have scored all."""
     path = _written(truth, directory)
     # The command that opens an edition begins in a new process, which has read nothing yet.
-    ground_truth.load.cache_clear()
+    truth_values.load.cache_clear()
     started_s = time.perf_counter()
-    edition = rescoring.open_edition(split_name=split, path=path, now=timezone.now(), actor=None)
+    edition = corrections.open_edition(split_name=split, path=path, now=timezone.now(), actor=None)
     open_s = time.perf_counter() - started_s
     undecided = Evaluation.objects.filter(edition=edition, status__in=[Status.QUEUED, Status.RUNNING])
     while undecided.exists():
@@ -93,7 +96,7 @@ def check(corrected: Corrected, *, first: evaluator.GroundTruth, n: int) -> None
             edition=corrected.edition, submission__method__name=crowd.method_name(number)
         )
         expected = plain_loop(crowd.contents(first, number), true_s)
-        for name, value in standings.flat_scores(found.scores.all()).items():
+        for name, value in boards.flat_scores(found.scores.all()).items():
             metric, _, interval = name.partition("_")
             mid, rte = expected[interval or "overall"]
             assert value == evaluator.published(mid if metric == "mid" else rte), (name, value)
@@ -105,13 +108,13 @@ def shares(*, split: str, truth: evaluator.GroundTruth, directory: Path) -> dict
     `queue` is claiming, `values` is reading what was kept of the files, `database` is storing the outcomes.
     """
     path = _written(truth, directory)
-    rescoring.open_edition(split_name=split, path=path, now=timezone.now(), actor=None)
-    ground_truth.load(truth.digest)
+    corrections.open_edition(split_name=split, path=path, now=timezone.now(), actor=None)
+    truth_values.load(truth.digest)
     parts: list[tuple[str, Any, str]] = [
         ("queue", lifecycle, "claim"),
         ("values", files, "load_aligned"),
         ("arithmetic", Scorer, "report"),
-        ("arithmetic", scoring, "scored"),
+        ("arithmetic", worker, "scored"),
         ("database", lifecycle, "finalise_many"),
     ]
     spent_s: defaultdict[str, float] = defaultdict(float)
@@ -140,7 +143,7 @@ def _timed(verb: Callable[..., Any], part: str, spent_s: defaultdict[str, float]
 
 
 def _score_here() -> None:
-    while scoring.run_next(rng=random.Random(0)):
+    while worker.run_next(rng=random.Random(0)):
         pass
 
 

@@ -24,9 +24,12 @@ from django.db.models.functions import Now
 from django.utils import timezone
 
 import evaluator
-from leaderboard import broker, clock, ground_truth, submissions
+from leaderboard.db import clock
 from leaderboard.demo.truth import simulate
+from leaderboard.editions import ground_truth
 from leaderboard.models import Evaluation, Status, User
+from leaderboard.ops import broker
+from leaderboard.submissions import submissions
 from tests.journeys.production import BIN, REPOSITORY, await_that
 
 N_WORKERS = (1, 2, 4)
@@ -85,8 +88,8 @@ def rate(ids: Sequence[UUID]) -> float:
     rows = Evaluation.objects.filter(pk__in=ids)
     began_at = clock.database_now()
     rows.update(due_at=Now())
-    for evaluation_id in ids:
-        broker.nudge(evaluation_id)
+    for _ in ids:
+        broker.nudge()
     undecided = rows.filter(status__in=[Status.QUEUED, Status.RUNNING])
     await_that(lambda: not undecided.exists(), what="all are decided", patience_s=PATIENCE_S)
     found = rows.aggregate(last=Max("finished_at"), n_attempts=Sum("attempt"))

@@ -22,7 +22,7 @@ import msgspec
 import numpy as np
 
 from evaluator import GroundTruth, Predictions, evaluate, evaluate_many, read_predictions, write_predictions
-from evaluator.tables import Table
+from evaluator.truth.csv_tables import Table
 
 SIZES = (28_600, 1_000_000)
 SEQUENCES_PER_RECORDING = 41

@@ -54,24 +54,25 @@ def measure(n: int) -> None:
     from django.utils import timezone  # noqa: PLC0415
 
     from benchmarks._correction import open_split  # noqa: PLC0415
-    from leaderboard import aligned, analyses, comparisons, ground_truth, inference  # noqa: PLC0415
     from leaderboard.demo.truth import simulate  # noqa: PLC0415
     from leaderboard.models import Comparison, Submission  # noqa: PLC0415
+    from leaderboard.scoring import aligned, analyses, comparisons, confidence  # noqa: PLC0415
+    from leaderboard.storage import truth_values  # noqa: PLC0415
 
     call_command("migrate", "--no-input", "--verbosity=0")
     truth = simulate(rng=np.random.default_rng(1))
     with tempfile.TemporaryDirectory() as folder:
         edition = open_split(split="test", truth=truth, n=n, directory=Path(folder))
-    held = ground_truth.held()
+    held = truth_values.readable_digests()
     pauses: list[float] = []
     rests = (hours * timedelta(hours=1) for hours in itertools.count(1))
 
     def infer() -> object:
         # After its rest, which a large board takes between two of these.
         now = timezone.now() + next(rests)
-        (stale,) = inference.stale(now=now, held=held)
+        (stale,) = confidence.stale(now=now, held=held)
         pauses.append(time.process_time())
-        return inference.infer(edition=stale, now=now, between=lambda: pauses.append(time.process_time()))
+        return confidence.infer(stale, now=now, between=lambda: pauses.append(time.process_time()))
 
     last = Submission.objects.order_by("pk").last()
     assert last is not None
@@ -80,8 +81,11 @@ def measure(n: int) -> None:
     Submission.objects.filter(pk=last.pk).update(withdrawn_at=None)
     figure("inference", n, "pause", float(np.diff(pauses).max()), "s")
     figure("inference", n, "one_more", _took_s(infer), "s")
-    assert not inference.stale(now=timezone.now() + next(rests), held=held)
-    looks = [_took_s(lambda: inference.stale(now=timezone.now() + next(rests), held=held)) for _ in range(10)]
+    assert not list(confidence.stale(now=timezone.now() + next(rests), held=held))
+    looks = [
+        _took_s(lambda: list(confidence.stale(now=timezone.now() + next(rests), held=held)))
+        for _ in range(10)
+    ]
     figure("inference", n, "look", min(looks) * 1e3, "ms")
     first, second = edition.evaluations.order_by("pk")[:2]
     rows = [Comparison.objects.create(edition=edition, first=first, second=second)]
@@ -93,7 +97,7 @@ def measure(n: int) -> None:
         "ms",
     )
     values = aligned.of(first.submission.sent_file, edition)
-    closer = _took_s(lambda: analyses.content_of(values, truth, protocol=edition.protocol))
+    closer = _took_s(lambda: analyses.content_of(values, truth, rules=edition.rules))
     figure("inference", n, "analysis", closer * 1e3, "ms")
 
 

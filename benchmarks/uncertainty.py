@@ -15,7 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from benchmarks.evaluator import best_s, figure
-from evaluator import differences, ranges, uncertainty
+from evaluator import SCORE_NAMES
+from evaluator.scoring import differences, ranges, uncertainty
 
 N_ENTRIES = 200
 N_COLUMNS = 10
@@ -55,7 +56,7 @@ def main(sizes: Sequence[int] = (100, 300, 700)) -> None:
 
         def pair(sums: np.ndarray = sums, counts: np.ndarray = counts) -> None:
             signs = uncertainty.generator_of(DIGEST, purpose="signs")
-            differences.difference(sums[0], sums[1], counts, signs=signs)
+            differences.difference(sums[0], sums[1], counts, names=SCORE_NAMES, signs=signs)
 
         figure("uncertainty", n_bags, "weights", best_s(weights) * 1e3, "ms")
         figure("uncertainty", n_bags, "intervals_of_200", best_s(intervals), "s")

@@ -110,14 +110,15 @@ def _populate(directory: Path) -> tuple[list[tuple[str, str]], str]:
     """
     from django.utils import timezone  # noqa: PLC0415 - needs Django, which is set up only now
 
-    from leaderboard import ground_truth, tokens  # noqa: PLC0415
     from leaderboard.models import Membership, Submission, Team, User  # noqa: PLC0415
+    from leaderboard.people import tokens  # noqa: PLC0415
+    from leaderboard.storage import truth_values  # noqa: PLC0415
     from tests import builders  # noqa: PLC0415
 
     for split, n in (("test", N_ROWS), ("val", N_WAITERS)):
         builders.score_all()
         edition = builders.import_truth(directory, split=split, seed=n)
-        truth = ground_truth.load(edition.ground_truth_id)
+        truth = truth_values.load(edition.ground_truth_id)
         crowd.join(split_name=split, truth=truth, n=n, n_files=0)
     now = timezone.now()
     token_of = {}
@@ -132,8 +133,8 @@ def _populate(directory: Path) -> tuple[list[tuple[str, str]], str]:
 
 def _cancel() -> float:
     """End what everybody waits for; when the last of it was final."""
-    from leaderboard import lifecycle  # noqa: PLC0415 - needs Django
     from leaderboard.models import Submission, User  # noqa: PLC0415
+    from leaderboard.scoring import lifecycle  # noqa: PLC0415 - needs Django
 
     actor = User.objects.get(email="reader@example.org")
     for submission in Submission.objects.filter(evaluations__status="QUEUED"):

@@ -1,31 +1,34 @@
-"""What the site needs beside the pages: the examples, to which pages link as files of the repository, and the
-API's reference, written from the schema as it is recorded.
+"""What the site needs in addition to the pages: the examples, to which pages link as files of the repository,
+and the API reference, from the same templates as the leaderboard's own page.
 """
 
-import html
-import json
-from collections.abc import Iterator, Sequence
+import os
+import re
 from pathlib import Path
 
+import django
+from django.template.loader import render_to_string
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
-
-from leaderboard.web.api_reference import Field, Kind, Operation, Reference, read
+from mkdocs.structure.toc import AnchorLink
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-SCHEMA = REPOSITORY / "tests" / "golden" / "openapi.json"
 API_REFERENCE = "api-reference.md"
+INTRODUCTION = """# API reference
+
+Every operation, parameter and field, from the schema that a leaderboard serves at `/api/v1/schema`.
+[The API](api.md) explains how to use them, and lists the problem codes.
+"""
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add every example under its own path, and the API's reference."""
+    """Add every example under its own path, and the API reference."""
     for path in sorted((REPOSITORY / "examples").rglob("*")):
         if path.is_file() and "__pycache__" not in path.parts:
             name = path.relative_to(REPOSITORY).as_posix()
             files.append(File.generated(config, name, abs_src_path=str(path)))
-    schema = json.loads(SCHEMA.read_text(encoding="utf-8"))
-    files.append(File.generated(config, API_REFERENCE, content="\n".join(_lines(read(schema)))))
+    files.append(File.generated(config, API_REFERENCE, content=INTRODUCTION))
     return files
 
 
@@ -36,53 +39,15 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return markdown.replace("](../examples/", "](examples/")
 
 
-# --- the API's reference -----------------------------------------------------------------------------------
+def on_page_content(html: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Draw the API reference below its introduction, and list its operations in the table of contents."""
+    if page.file.src_uri != API_REFERENCE:
+        return html
+    os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
+    django.setup()
+    from leaderboard.web.docs.api_reference import reference  # noqa: PLC0415 - needs the settings
 
-
-def _lines(reference: Reference) -> Iterator[str]:
-    """The page: operations with their parameters and answers, then every shape with its fields."""
-    yield "# API reference\n"
-    yield (
-        "Every operation, parameter and field, from the schema that a leaderboard has at `/api/v1/schema`. "
-        "[The API](api.md) says how they hang together, and lists the codes of errors.\n"
-    )
-    yield "## Operations\n"
-    for operation in reference.operations:
-        yield from _operation(operation)
-    yield "## Shapes\n"
-    for shape in reference.shapes:
-        yield f"### {shape.name}\n"
-        yield f"{_text(shape.about)}\n"
-        yield from _table("field", shape.fields)
-
-
-def _operation(operation: Operation) -> Iterator[str]:
-    yield f"### {operation.method} {operation.path}\n"
-    needs = " Needs an account." if operation.needs_account else ""
-    yield f"`{operation.name}`: {_text(operation.about)}{needs}\n"
-    yield from _table("parameter", operation.parameters)
-    yield from _table("field of the body", operation.body)
-    yield "| answer | holds | |\n|---|---|---|"
-    for answer in operation.answers:
-        yield f"| {answer.status} {answer.phrase} | {_kind(answer.kind)} | {_text(answer.about)} |"
-    yield ""
-
-
-def _table(title: str, fields: Sequence[Field]) -> Iterator[str]:
-    if fields:
-        yield f"| {title} | is | means |\n|---|---|---|"
-        for field in fields:
-            must = " (required)" if field.is_required and title != "field" else ""
-            yield f"| `{field.name}`{must} | {_kind(field.kind)} | {_text(field.about)} |"
-        yield ""
-
-
-def _kind(kind: Kind) -> str:
-    """What a value is, with a link to its shape."""
-    text = _text(kind.text)
-    return f"[{text}](#{kind.shape.lower()})" if kind.shape else text
-
-
-def _text(text: str) -> str:
-    """A text of the schema in a cell of a table: on one line, and no markup but its own backticks."""
-    return html.escape(" ".join(text.split()), quote=False).replace("|", "&#124;").replace("*", "&#42;")
+    api = reference()
+    page.toc.items[0].children = [AnchorLink(each["name"], each["id"], 2) for each in api["operations"]]
+    body = render_to_string("docs/api_operations.html", {"api": api})
+    return html + re.sub(' class="[^"]*"', "", body)  # the theme draws tables that have no class
