@@ -96,10 +96,12 @@ def check(corrected: Corrected, *, first: evaluator.GroundTruth, n: int) -> None
             edition=corrected.edition, submission__method__name=crowd.method_name(number)
         )
         expected = plain_loop(crowd.contents(first, number), true_s)
-        for name, value in boards.flat_scores(found.scores.all()).items():
+        for name, value in boards.flat_scores(found).items():
             metric, _, interval = name.partition("_")
             mid, rte = expected[interval or "overall"]
-            assert value == evaluator.published(mid if metric == "mid" else rte), (name, value)
+            assert value == evaluator.published(
+                mid if metric == "mid" else rte, decimals=corrected.edition.decimals
+            ), (name, value)
 
 
 def shares(*, split: str, truth: evaluator.GroundTruth, directory: Path) -> dict[str, float]:
