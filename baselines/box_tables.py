@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from baselines.clips import N_FRAMES
 from evaluator.problems import Findings, listed, quoted, reject
+from evaluator.truth.csv_tables import read_text
 from evaluator.truth.truth import Manifest
 
 COLUMNS: Final = ("anno_id", "frame", "x1", "y1", "x2", "y2")
@@ -68,13 +69,7 @@ _FRAMES: Final = {str(frame) for frame in range(N_FRAMES)}
 
 def _lines(path: Path) -> tuple[list[tuple[int, str]], bool]:
     """The lines that are no comments, with their numbers, and whether a comment says normalised."""
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise reject("unreadable", f"The file cannot be read: {error.strerror}.", path.name) from None
-    except UnicodeDecodeError as error:
-        raise reject("not-utf8", f"Byte {error.start:,} is not UTF-8.", path.name) from None
-    lines = list(enumerate(text.splitlines(), start=1))
+    lines = list(enumerate(read_text(path).splitlines(), start=1))
     units = {line.replace(" ", "") for _, line in lines if line.replace(" ", "").startswith("#unit=")}
     if units - {NORMALISED, PIXELS} or len(units) > 1:
         found = quoted(", ".join(sorted(units)))

@@ -97,17 +97,22 @@ def name_fault(text: str) -> str | None:
     return None
 
 
+def read_text(path: Path) -> str:
+    """The text of a UTF-8 file, with or without a byte order mark. Raises `Rejected`."""
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except OSError as error:
+        raise reject("unreadable", f"The file cannot be read: {error.strerror}.", path.name) from None
+    except UnicodeDecodeError as error:
+        raise reject("not-utf8", f"Byte {error.start:,} is not UTF-8.", path.name) from None
+
+
 def read_csv(path: Path, *, with_ttc: bool) -> Table:
     """Read `COLUMNS` from a CSV file with a header; more columns are ignored, their order is free.
 
     Raises `Rejected` for an unreadable file, missing columns and malformed fields, by line.
     """
-    try:
-        text = path.read_bytes().decode("utf-8-sig")
-    except OSError as error:
-        raise reject("unreadable", f"The file cannot be read: {error.strerror}.", path.name) from None
-    except UnicodeDecodeError as error:
-        raise reject("not-utf8", f"Byte {error.start:,} is not UTF-8.", path.name) from None
+    text = read_text(path)
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         return _read_rows(rows, COLUMNS if with_ttc else MANIFEST_COLUMNS)

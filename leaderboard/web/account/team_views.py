@@ -26,6 +26,12 @@ def _own_team(request: HttpRequest) -> Team:
     return get_object_or_404(Team, memberships__user=cast("User", request.user))
 
 
+def _member(request: HttpRequest, handle: UUID) -> tuple[Team, User]:
+    """The reader's team and one of its members."""
+    own = _own_team(request)
+    return own, get_object_or_404(User, membership__team=own, membership__handle=handle)
+
+
 def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpResponse:
     user = cast("User", request.user)
     page = team_page(user, now=timezone.now())
@@ -118,8 +124,7 @@ def leave(request: HttpRequest) -> HttpResponse:
 @require_POST
 def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Put a member out of the team."""
-    own = _own_team(request)
-    member = get_object_or_404(User, membership__team=own, membership__handle=handle)
+    own, member = _member(request, handle)
     return _done(
         request,
         lambda: teams.remove(team=own, member=member, actor=cast("User", request.user)),
@@ -132,8 +137,7 @@ def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
 @require_POST
 def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Let another member own the team."""
-    own = _own_team(request)
-    member = get_object_or_404(User, membership__team=own, membership__handle=handle)
+    own, member = _member(request, handle)
     return _done(
         request,
         lambda: teams.hand_over(team=own, to=member, actor=cast("User", request.user)),
