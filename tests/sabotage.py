@@ -16,10 +16,17 @@ from pathlib import Path
 from queue import Queue
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-LEFT_OUT = shutil.ignore_patterns(
-    ".git", ".venv*", "var", "staticfiles", "docs", "benchmarks", "build", "tmp", ".*_cache", "__pycache__"
+AT_THE_TOP = shutil.ignore_patterns(
+    ".git", ".venv*", "var", "staticfiles", "docs", "benchmarks", "build", "tmp"
 )
+EVERYWHERE = shutil.ignore_patterns(".*_cache", "__pycache__")
 TESTS_FAILED = 1  # pytest's exit code; anything else above 0 is not a test that went red
+
+
+def left_out(folder: str, names: list[str]) -> set[str]:
+    """What a tree does not need. A room of the code may be called as a folder at the top is."""
+    ignored = EVERYWHERE(folder, names)
+    return ignored | AT_THE_TOP(folder, names) if Path(folder) == REPOSITORY else ignored
 
 
 @dataclass(frozen=True)
@@ -346,7 +353,7 @@ def main() -> int:
     ):
         trees: Queue[Path] = Queue()
         for number in range(n_at_once):
-            trees.put(Path(shutil.copytree(REPOSITORY, Path(folder) / str(number), ignore=LEFT_OUT)))
+            trees.put(Path(shutil.copytree(REPOSITORY, Path(folder) / str(number), ignore=left_out)))
         untouched = run(sorted({sabotage.test for sabotage in SABOTAGES}), tree=Path(folder) / "0")
         if untouched.returncode != 0:
             tell(f"sabotage: the tests fail without any change:\n{untouched.stdout[-4000:]}\n")
