@@ -5,6 +5,7 @@ import uuid
 from dataclasses import replace
 from datetime import timedelta
 
+from django.db import transaction
 from django.db.models import F
 from django.db.models.functions import Now
 from django.utils import timezone
@@ -53,8 +54,15 @@ def claim() -> Lease:
 
 
 def make_due() -> None:
-    """End every backoff."""
-    Evaluation.objects.filter(status=Status.QUEUED).update(due_at=Now())
+    """End every backoff, once nobody holds a row of the queue any more.
+
+    The rows are locked in one order, as the product's verbs do: two of these at once would wait for each
+    other for ever, if each took the rows as it met them.
+    """
+    with transaction.atomic():
+        rows = Evaluation.objects.filter(status=Status.QUEUED).order_by("pk").select_for_update(no_key=True)
+        waiting = list(rows.values_list("pk", flat=True))
+        Evaluation.objects.filter(pk__in=waiting).update(due_at=Now())
 
 
 def expire(lease: Lease, *, overran: bool = False) -> None:
