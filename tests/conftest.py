@@ -3,6 +3,7 @@
 import os
 from pathlib import Path
 
+import hypothesis
 import pytest
 from django.core.cache import cache
 from django.db import connection
@@ -12,10 +13,33 @@ from pytest_django.fixtures import Settings
 from leaderboard.benchmark import splits
 from leaderboard.web.middleware.page_cache import memory
 from leaderboard.web.monitoring import readiness
-from tests.services import shared_data
+from tests import prepared, services
+
+# How long an example takes says more about the machine than about the code, and what is found by chance is
+# not found in the change that fails: `--hypothesis-profile=default` looks further.
+hypothesis.settings.register_profile(
+    "suite",
+    derandomize=True,
+    deadline=None,
+    suppress_health_check=[hypothesis.HealthCheck.too_slow],
+)
+hypothesis.settings.load_profile("suite")
 
 # Playwright's own loop makes Django's guard against blocking calls in async code misfire.
 os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
+
+
+def pytest_configure() -> None:
+    """What is made once is shared by all processes of the run: the first of them begins it."""
+    prepared.begin()
+
+
+@pytest.fixture(scope="session")
+def django_db_modify_db_settings(django_db_modify_db_settings: None) -> None:
+    """On the test server, the test database is a copy of the one that was migrated already."""
+    settings = connection.settings_dict
+    if connection.vendor == "postgresql" and services.is_on_test_server(settings):
+        settings["TEST"]["TEMPLATE"] = prepared.template()
 
 
 @pytest.fixture(scope="session")
@@ -29,7 +53,7 @@ def django_db_setup(django_db_setup: None, django_db_blocker: DjangoDbBlocker) -
 @pytest.fixture(scope="session")
 def kitti() -> Path:
     """The folder of real drives."""
-    shared = shared_data()
+    shared = services.shared_data()
     if shared is None or not (shared / "kitti-dev").is_dir():
         pytest.skip("kitti-dev is not here: TSTTC_SHARED_DATA names no folder that has it")
     return shared / "kitti-dev"

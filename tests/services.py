@@ -4,13 +4,15 @@ A test that needs one asks here. What is reachable is used; what is not skips th
 fails it where `TSTTC_REQUIRE_SERVICES=1` says that this machine is meant to have everything.
 """
 
+import atexit
 import os
 import secrets
 import shutil
-from collections.abc import Iterator
+import socket
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 from urllib.parse import urlsplit
 
 import psycopg
@@ -67,6 +69,12 @@ def check_postgres() -> None:
         raise ServiceMissing(
             f"PostgreSQL at {shown(POSTGRES_ADMIN_URL)} is not reachable: {reason}"
         ) from fault
+
+
+def is_on_test_server(settings: Mapping[str, Any]) -> bool:
+    """Whether these settings of a Django connection lead to the server where databases may be made."""
+    server = urlsplit(POSTGRES_ADMIN_URL)
+    return (settings["HOST"], str(settings["PORT"])) == (server.hostname, str(server.port))
 
 
 def database_url(name: str) -> str:
@@ -126,6 +134,18 @@ def throwaway_redis() -> Iterator[str]:
     raise ServiceMissing(f"Redis at {shown(REDIS_URL)} has no empty database among 0 … {highest}")
 
 
+def free_port() -> int:
+    """A port on loopback that nothing listens on, and that nobody else is given while this process lives.
+
+    Its address is taken here and shared: a server that reuses addresses, as they all do, may listen there.
+    """
+    reserved = socket.socket()
+    reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    reserved.bind(("127.0.0.1", 0))
+    atexit.register(reserved.close)
+    return int(reserved.getsockname()[1])
+
+
 def chromium() -> str:
     """The path of a Chromium or Chrome. Raises `ServiceMissing`."""
     for name in (os.environ.get("TSTTC_TEST_CHROMIUM", ""), "chromium", "chromium-browser", "google-chrome"):
@@ -149,16 +169,6 @@ def shared_data() -> Path | None:
         if candidate and (Path(candidate) / "README.md").is_file():
             return Path(candidate)
     return None
-
-
-@pytest.fixture(scope="module")
-def postgres_url() -> Iterator[str]:
-    """An empty PostgreSQL database of this module's own."""
-    try:
-        with throwaway_database() as url:
-            yield url
-    except ServiceMissing as missing:
-        skip_or_fail(missing)
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,7 @@ import numpy as np
 import evaluator
 from leaderboard.demo.truth import simulate
 from tests.journeys.production import BIN, Site, await_that, free_port, running
+from tests.prepared import put_sqlite, static_files
 
 PASSWORD = "kestrel-altimeter-9"
 WEB = (sys.executable, "-m", "waitress")
@@ -26,7 +27,7 @@ def environment(directory: Path, *, url: str, **settings: str) -> dict[str, str]
     inherited = {name: value for name, value in os.environ.items() if not name.startswith("TSTTC_")}
     return inherited | {
         "TSTTC_DATA_DIR": str(directory),
-        "TSTTC_STATIC_ROOT": str(directory / "static"),
+        "TSTTC_STATIC_ROOT": str(static_files()),
         "TSTTC_SITE_URL": url,
         "OPENBLAS_NUM_THREADS": "1",
         **settings,
@@ -38,8 +39,7 @@ def web_alone(directory: Path, **settings: str) -> Iterator[Site]:
     """A migrated site with its web process; nothing is scored until `worker` runs."""
     url = f"http://127.0.0.1:{free_port()}"
     site = Site(url=url, directory=directory, environment=environment(directory, url=url, **settings))
-    site.manage("migrate", "--no-input")
-    site.manage("collectstatic", "--no-input")
+    put_sqlite(directory / "leaderboard.sqlite3")
     listen = f"--listen={url.removeprefix('http://')}"
     with running(site, "web", *WEB, listen, "leaderboard.wsgi:application") as web:
         await_that(lambda: web.poll() is not None or _answers(url), what="the web server answers")

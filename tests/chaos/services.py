@@ -12,6 +12,7 @@ import redis
 
 from tests.chaos.processes import Process
 from tests.journeys.production import await_that, free_port
+from tests.prepared import dump
 from tests.services import ServiceMissing
 
 
@@ -82,12 +83,25 @@ class Postgres:
 
     def connect(self) -> "psycopg.Connection[tuple[object, ...]]":
         """A connection past the site."""
-        return psycopg.connect(self.url, autocommit=True, connect_timeout=3)
+        return psycopg.connect(self.url, autocommit=True, connect_timeout=60)
 
     def start(self) -> None:
         """Start it, and wait until it answers."""
         self._server.start()
         await_that(self._answers, what="PostgreSQL answers")
+
+    def fill(self) -> None:
+        """Make all tables. Raises `ServiceMissing`."""
+        command = [
+            "psql",
+            "--quiet",
+            "--set=ON_ERROR_STOP=1",
+            "--output=/dev/null",
+            "--file",
+            dump(),
+            self.url,
+        ]
+        subprocess.run(command, check=True)
 
     def stop(self, *, crash: bool = False) -> None:
         """Break all connections and end it; with `crash`, as if it had died, writing nothing down."""
@@ -119,7 +133,7 @@ class Redis:
         command = [redis_program(), "--port", str(self.port), "--bind", "127.0.0.1", "--save", ""]
         command += ["--appendonly", "no", "--dir", str(directory)]
         self.server = Process("redis", command, directory=directory, environment=os.environ)
-        self.client = redis.Redis(port=self.port, socket_timeout=2, socket_connect_timeout=2)
+        self.client = redis.Redis(port=self.port, socket_timeout=60, socket_connect_timeout=60)
 
     @property
     def url(self) -> str:

@@ -13,6 +13,7 @@ from tests.chaos.processes import REPOSITORY, Process
 from tests.chaos.services import Postgres, Redis
 from tests.chaos.uploads import reader_memory_bytes
 from tests.journeys.production import BIN, await_that, free_port, get, settings_for
+from tests.prepared import static_files
 
 # Seconds. Lease, heartbeat and wall are a tenth of the real ones, so that a run of minutes sees many of them.
 PACE = {
@@ -39,7 +40,7 @@ class Site:
         self.environment = settings_for(
             directory, url=self.url, postgres_url=self.postgres.url, redis_url=self.redis.url
         )
-        self.environment |= {**PACE, **changes}
+        self.environment |= {**PACE, "TSTTC_STATIC_ROOT": str(static_files()), **changes}
         gunicorn = [
             str(BIN / "gunicorn"),
             "--config",
@@ -74,9 +75,10 @@ class Site:
 
     def await_web(self) -> None:
         """Return once the web server answers."""
-        await_that(self._answers, what="the web server answers")
+        await_that(self.answers, what="the web server answers")
 
-    def _answers(self) -> bool:
+    def answers(self) -> bool:
+        """Whether a web process serves at the moment, and the database with it."""
         try:
             return get(f"{self.url}/api/v1/splits").status_code == 200
         except httpx.TransportError:
@@ -102,8 +104,7 @@ def running_site(
             ends.callback(process.kill_if_started)
         site.postgres.start()
         site.redis.start()
-        site.manage("migrate", "--no-input")
-        site.manage("collectstatic", "--no-input")
+        site.postgres.fill()
         table = directory / "truth.csv"
         table.write_bytes(truth.to_csv())
         site.manage("import_truth", SPLIT, str(table))

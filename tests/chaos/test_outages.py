@@ -19,7 +19,7 @@ import evaluator
 from tests.chaos.processes import Process
 from tests.chaos.site import SPLIT, Site
 from tests.chaos.uploads import Clients, Upload, bomb_file
-from tests.journeys.production import BIN, await_that, free_port
+from tests.journeys.production import BIN, PATIENCE_S, await_that, free_port
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -35,7 +35,7 @@ def token(site: Site) -> str:
 @pytest.fixture
 def http(site: Site, token: str) -> Iterator[httpx.Client]:
     headers = {"Authorization": f"Bearer {token}"}
-    with httpx.Client(base_url=site.url, headers=headers, timeout=60, trust_env=False) as client:
+    with httpx.Client(base_url=site.url, headers=headers, timeout=PATIENCE_S, trust_env=False) as client:
         yield client
 
 
@@ -261,7 +261,7 @@ def test_full_disk_is_a_507_and_leaves_no_row(
     too_much = new_file() + b" " * 3_000_000
     with (
         another_web(site, prefix=prefix, **{where: str(tmp_path)}) as url,
-        httpx.Client(base_url=url, timeout=60, trust_env=False) as http,
+        httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False) as http,
     ):
         http.headers["Authorization"] = f"Bearer {token}"
         # gunicorn ends a connection whose body was left unread, and does not say so in the answer: a request

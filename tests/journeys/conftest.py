@@ -11,7 +11,8 @@ import evaluator
 from leaderboard.demo.truth import simulate
 from tests.journeys.people import Program, Visitor
 from tests.journeys.production import Site, production_site
-from tests.services import postgres_url, redis_url
+from tests.prepared import postgres_url
+from tests.services import redis_url
 
 __all__ = ["postgres_url", "redis_url"]
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import httpx
 
-from tests.journeys.production import Site, await_that
+from tests.journeys.production import PATIENCE_S, Site, await_that
 
 FINAL = {"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"}
 PASSWORD = "journey-of-a-thousand-miles"
@@ -20,7 +20,9 @@ class Visitor:
     def __init__(self, site: Site) -> None:
         self.site = site
         # Loopback is never reached through a proxy that the environment names.
-        self.http = httpx.Client(base_url=site.url, follow_redirects=True, timeout=60, trust_env=False)
+        self.http = httpx.Client(
+            base_url=site.url, follow_redirects=True, timeout=PATIENCE_S, trust_env=False
+        )
 
     def get(self, path: str) -> httpx.Response:
         answer = self.http.get(path)
@@ -92,7 +94,7 @@ class Program:
         self.http = httpx.Client(
             base_url=site.url,
             headers={"Authorization": f"Bearer {token}"},
-            timeout=60,
+            timeout=PATIENCE_S,
             trust_env=False,
         )
 

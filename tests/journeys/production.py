@@ -2,7 +2,6 @@
 
 import os
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -13,7 +12,8 @@ from pathlib import Path
 
 import httpx
 
-from tests.services import environment_of_its_own
+from tests.prepared import static_files
+from tests.services import environment_of_its_own, free_port
 from tests.signals import default_signals
 
 REPOSITORY = Path(__file__).resolve().parents[2]
@@ -21,7 +21,6 @@ BIN = Path(sys.executable).parent
 # Of whoever waits for something that must come: a busy machine is no fault, so only a hung one ends it.
 PATIENCE_S = 180.0
 POLL_S = 0.05
-_RESERVED: list[socket.socket] = []
 
 
 class NeverHappened(AssertionError):
@@ -35,18 +34,6 @@ def await_that(condition: Callable[[], bool], *, what: str, patience_s: float = 
         if time.monotonic() > deadline_s:
             raise NeverHappened(f"{what}: not within {patience_s:g} s")
         time.sleep(POLL_S)
-
-
-def free_port() -> int:
-    """A port on loopback that nothing listens on, and that nobody else is given while this process lives.
-
-    Its address is taken here and shared: a server that reuses addresses, as they all do, may listen there.
-    """
-    reserved = socket.socket()
-    reserved.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-    reserved.bind(("127.0.0.1", 0))
-    _RESERVED.append(reserved)
-    return int(reserved.getsockname()[1])
 
 
 def get(url: str, **headers: str) -> httpx.Response:
@@ -152,13 +139,12 @@ def _answers(site: Site, name: str) -> bool:
 def production_site(
     directory: Path, *, postgres_url: str, redis_url: str, truth: Path, split: str, protocol: str = "tsttc-1"
 ) -> Iterator[Site]:
-    """Migrate, import the ground truth, start web and worker; all of it ends with the context."""
+    """On a database with all tables: import the ground truth, start web and worker, and end them."""
     url = f"http://127.0.0.1:{free_port()}"
     environment = settings_for(directory, url=url, postgres_url=postgres_url, redis_url=redis_url)
+    environment |= {"TSTTC_STATIC_ROOT": str(static_files())}
     site = Site(url=url, directory=directory, environment=environment)
     (directory / "mail").mkdir()
-    site.manage("migrate", "--no-input")
-    site.manage("collectstatic", "--no-input")
     site.manage("import_truth", split, str(truth), "--protocol", protocol)
     celery = str(BIN / "celery")
     worker = ("worker", "--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info")

@@ -14,7 +14,8 @@ import pytest
 
 import evaluator
 from tests.journeys.production import REPOSITORY, Site, await_that, settings_for
-from tests.services import ServiceMissing, skip_or_fail, throwaway_database, throwaway_redis
+from tests.prepared import migrated_database
+from tests.services import ServiceMissing, skip_or_fail, throwaway_redis
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -34,10 +35,9 @@ def site(tmp_path: Path, truth: evaluator.GroundTruth) -> Iterator[Site]:
     table.write_bytes(truth.to_csv())
     url = "http://127.0.0.1:9"  # nothing is served here
     try:
-        with throwaway_database() as postgres, throwaway_redis() as redis:
+        with migrated_database() as postgres, throwaway_redis() as redis:
             environment = settings_for(tmp_path, url=url, postgres_url=postgres, redis_url=redis)
             site = Site(url=url, directory=tmp_path, environment=environment)
-            site.manage("migrate", "--no-input")
             site.manage("import_truth", "test", str(table))
             command = [sys.executable, "-m", "tests.crowd", "test", str(N_SUBMISSIONS)]
             subprocess.run(command, cwd=REPOSITORY, env=environment, check=True)

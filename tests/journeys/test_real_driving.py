@@ -18,7 +18,8 @@ import pytest
 import evaluator
 from tests.journeys.people import Program, Visitor
 from tests.journeys.production import Site, production_site
-from tests.services import ServiceMissing, skip_or_fail, throwaway_database, throwaway_redis
+from tests.prepared import migrated_database
+from tests.services import ServiceMissing, skip_or_fail, throwaway_redis
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -38,7 +39,7 @@ def driving_site(tmp_path_factory: pytest.TempPathFactory, kitti: Path, protocol
     """A production site with this ground truth under this protocol, on a database of its own."""
     try:
         with (
-            throwaway_database() as postgres,
+            migrated_database() as postgres,
             throwaway_redis() as redis,
             production_site(
                 tmp_path_factory.mktemp("driving"),

@@ -16,10 +16,11 @@ import redis
 import evaluator
 from tests.journeys.people import Program, Visitor
 from tests.journeys.production import Site, await_that, production_site
+from tests.prepared import postgres_url
 from tests.security import canaries
 from tests.security.canaries import Search
 from tests.security.crawler import crawl
-from tests.services import postgres_url, redis_url
+from tests.services import redis_url
 
 __all__ = ["postgres_url", "redis_url"]
 pytestmark = [pytest.mark.slow, pytest.mark.services]

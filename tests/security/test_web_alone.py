@@ -12,7 +12,8 @@ import pytest
 
 import evaluator
 from tests import builders
-from tests.journeys.production import BIN, Site, await_that, free_port, running
+from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, free_port, running
+from tests.prepared import put_sqlite, static_files
 from tests.security.crawler import crawl
 from tests.security.hostile_files import corpus
 from tests.security.hostile_names import NAMES
@@ -26,9 +27,7 @@ SET_UP = """
 import json, sys
 from django.core.management import call_command
 from django.utils import timezone
-for command in (["migrate"], ["collectstatic"], ["import_truth", "test", {truth!r}]):
-    options = {{}} if command[0] == "import_truth" else {{"interactive": False, "verbosity": 0}}
-    call_command(*command, stdout=sys.stderr, **options)
+call_command("import_truth", "test", {truth!r}, stdout=sys.stderr)
 from leaderboard.models import User
 from leaderboard.people import teams, tokens
 user = User.objects.create_user("owner@example.org", "correct horse", name="Owls")
@@ -49,7 +48,7 @@ class Alone:
     def client(self) -> httpx.Client:
         """A program with a token."""
         headers = {"Authorization": f"Bearer {self.token}"}
-        return httpx.Client(base_url=self.site.url, headers=headers, timeout=60, trust_env=False)
+        return httpx.Client(base_url=self.site.url, headers=headers, timeout=PATIENCE_S, trust_env=False)
 
     def memory_mb(self, what: str) -> float:
         """`VmRSS`: what the process has in memory now; `VmHWM`: the most that it ever had."""
@@ -67,7 +66,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Alone]:
         "DJANGO_SETTINGS_MODULE": "leaderboard.settings",
         "TSTTC_DATA_DIR": str(directory / "data"),
         "TSTTC_GROUND_TRUTH_DIR": str(directory / "private"),
-        "TSTTC_STATIC_ROOT": str(directory / "static"),
+        "TSTTC_STATIC_ROOT": str(static_files()),
         "TSTTC_SITE_URL": url,
         "TSTTC_WEB_BIND": url.removeprefix("http://"),
         "TSTTC_LOG_LEVEL": "WARNING",
@@ -76,6 +75,8 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Alone]:
         "WEB_CONCURRENCY": "1",
     }
     keeper = Site(url=url, directory=directory, environment=maintainers)
+    (directory / "data").mkdir()
+    put_sqlite(directory / "data" / "leaderboard.sqlite3")
     builders.truth_csv(directory / "truth.csv")
     told = keeper.manage("shell", "-v0", "-c", SET_UP.format(truth=str(directory / "truth.csv")))
     token = json.loads(told.splitlines()[-1])
