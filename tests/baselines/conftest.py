@@ -5,15 +5,10 @@ from pathlib import Path
 
 import pytest
 from click.testing import CliRunner, Result
-from hypothesis import settings
 
 from evaluator.cli import main
 from tests.baselines.real_folders import kitti_clip_folder, kitti_label_folder
 from tests.services import shared_data
-
-# How long an example takes says more about the machine than about the code.
-settings.register_profile("unhurried", deadline=None)
-settings.load_profile("unhurried")
 
 
 @pytest.fixture

@@ -25,7 +25,7 @@ pytestmark = [
 ]
 
 N = 20
-MOST_S = 60
+MOST_S = 180
 
 
 @pytest.fixture

@@ -14,7 +14,7 @@ from tests.browser import world
 from tests.browser.addresses import addresses
 from tests.browser.chromium import NARROW, WIDE, sign_in
 from tests.browser.conftest import NewPage
-from tests.journeys.production import Site
+from tests.journeys.production import PATIENCE_S, Site
 
 pytestmark = pytest.mark.browser
 
@@ -48,7 +48,7 @@ def is_page(client: httpx.Client, address: str) -> bool:
 
 
 def public_pages(site: Site, known: dict[str, str]) -> list[str]:
-    with httpx.Client(base_url=site.url, trust_env=False) as visitor:
+    with httpx.Client(base_url=site.url, timeout=PATIENCE_S, trust_env=False) as visitor:
         found = [*addresses(known), *(view.format(**known) for view in VIEWS)]
         return [address for address in found if is_page(visitor, address)]
 
@@ -92,7 +92,9 @@ def test_no_page_of_the_signed_in_has_a_serious_fault(
     page = new_page(color_scheme="light")
     sign_in(page, world.OWNER)
     own = [f"/submissions/{known['rejected_id']}/", f"/methods/{known['private_method_id']}/", "/board/val/"]
-    with httpx.Client(base_url=site.url, trust_env=False, cookies=cookies_of(page)) as member:
+    with httpx.Client(
+        base_url=site.url, timeout=PATIENCE_S, trust_env=False, cookies=cookies_of(page)
+    ) as member:
         mine = [each for each in addresses(known) if is_page(member, each)]
     assert {"/submit/", "/submissions/", f"/submissions/{known['submission_id']}/"} <= set(mine)
     assert list(faults_of(page, [*sorted(set(mine) - set(public_pages(site, known))), *own])) == []
@@ -104,7 +106,9 @@ def test_no_page_of_maintainers_has_a_serious_fault(
 ) -> None:
     page = new_page(color_scheme=scheme)
     sign_in(page, world.MAINTAINER)
-    with httpx.Client(base_url=site.url, trust_env=False, cookies=cookies_of(page)) as keeper:
+    with httpx.Client(
+        base_url=site.url, timeout=PATIENCE_S, trust_env=False, cookies=cookies_of(page)
+    ) as keeper:
         asked = [each for each in addresses(known) if each.startswith("/maintain/")]
         asked = [each for each in asked if not each.endswith(PARTS)]
         desk = [each for each in asked if is_page(keeper, each)]

@@ -5,7 +5,7 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.chromium import NARROW, OVERFLOW_PX, WIDE, sign_in
+from tests.browser.chromium import NARROW, OVERFLOW_PX, WIDE, sign_in, timers_at_rest
 from tests.browser.conftest import NewPage
 from tests.browser.site import PASSWORD, open_split
 from tests.journeys.production import Site
@@ -143,8 +143,9 @@ def test_menu_and_legend_open_and_close_by_keyboard_and_an_export_is_copied(
     expect(page.get_by_text("The board is ranked by overall MiD.")).to_be_visible()
     menu = page.locator("details.exports")
     menu.locator("summary").press("Enter")
-    menu.get_by_role("button", name="Copy LaTeX", exact=True).click()
-    expect(menu.get_by_text("Copied")).to_be_visible()
+    with timers_at_rest(page):
+        menu.get_by_role("button", name="Copy LaTeX", exact=True).click()
+        expect(menu.get_by_text("Copied")).to_be_visible()
     assert r"\toprule" in page.evaluate("navigator.clipboard.readText()")
     page.keyboard.press("Escape")
     expect(menu.locator(".menu-body")).to_be_hidden()

@@ -9,7 +9,7 @@ from playwright.sync_api import Page, expect
 
 import evaluator
 from tests import services
-from tests.browser.chromium import NARROW, WIDE, sign_in
+from tests.browser.chromium import NARROW, WIDE, sign_in, timers_at_rest
 from tests.browser.conftest import NewPage, show, sign_up, submit
 from tests.browser.site import PASSWORD, open_split, predictions, web_alone, worker
 from tests.browser.test_looks import SCREENS, look_at
@@ -106,9 +106,10 @@ def test_from_opening_to_the_board_and_back(
 
     keeper.goto(DESK)
     keeper.get_by_role("link", name="Publish…").click()
-    decide(keeper, reason="Twelve boxes were wrong.", button="Publish edition 2")
-    # The cross closes the message.
-    expect(keeper.locator(".messages[role=status]")).to_have_text(f"Edition 2 is the board of {SPLIT}.×")
+    with timers_at_rest(keeper):
+        decide(keeper, reason="Twelve boxes were wrong.", button="Publish edition 2")
+        # The cross closes the message.
+        expect(keeper.locator(".messages[role=status]")).to_have_text(f"Edition 2 is the board of {SPLIT}.×")
     expect(keeper.locator(".facts")).to_contain_text("latest change: edition 2, 12 labels corrected")
     assert rows(keeper) != before
     team.goto(submission)

@@ -3,6 +3,8 @@
 import base64
 import json
 import re
+import sqlite3
+from contextlib import closing
 from pathlib import Path
 
 import pytest
@@ -205,7 +207,8 @@ def test_the_check_in_the_browser_has_the_codes_and_words_of_the_server(page: Pa
     csv = faulty_files.MANIFEST.to_csv()
     page.goto("/docs/")
     page.route("**/manifest-of-the-test", lambda route: route.fulfill(body=csv))
-    checker = json.loads((site.directory / "static" / "staticfiles.json").read_text())["paths"]["check.js"]
+    static = Path(site.environment["TSTTC_STATIC_ROOT"])
+    checker = json.loads((static / "staticfiles.json").read_text())["paths"]["check.js"]
     encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
     told = page.evaluate(CHECK, [f"/static/{checker}", "/manifest-of-the-test", encoded])
     assert told == {name: answer_of(data, faulty_files.MANIFEST) for name, data in files.items()}
@@ -238,9 +241,16 @@ def test_polling_ends_with_the_intervals(page: Page, site: Site, truth: evaluato
     assert asked == []
 
 
-def test_nothing_is_announced_while_nothing_moves(page: Page, truth: evaluator.GroundTruth) -> None:
+def test_nothing_is_announced_while_nothing_moves(
+    page: Page, site: Site, truth: evaluator.GroundTruth
+) -> None:
     sign_up(page, email="quiet@example.org", name="Quiet")
     submit(page, predictions(truth, factor=1.3), method="Quiet")
+    # It has waited for a day already: that it takes longer than usual is said at once, and not meanwhile.
+    with closing(sqlite3.connect(site.directory / "leaderboard.sqlite3", timeout=60)) as database, database:
+        database.execute("UPDATE leaderboard_evaluation SET queued_at = datetime(queued_at, '-1 day')")
+    page.reload()
+    expect(page.locator("[aria-current=step] .note")).to_contain_text("longer than usual")
     page.evaluate(
         """() => { window.nChanges = 0;
         new MutationObserver(() => window.nChanges++).observe(document.getElementById("state"),

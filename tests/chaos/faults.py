@@ -160,8 +160,9 @@ class Faults:
         self.counts["database_restarts"] += 1
 
     def _kill_a_web_process(self) -> None:
+        """One that may be at work: where none answers, the next kill would meet them all at their start."""
         processes = self._site.web.children()
-        if processes:
+        if processes and self._site.answers():
             with suppress(ProcessLookupError):
                 os.kill(self._rng.choice(processes), signal.SIGKILL)
             self.counts["web_kills"] += 1

@@ -132,7 +132,7 @@ class Clients:
         with httpx.Client(
             base_url=self.url,
             headers={"Authorization": f"Bearer {self.token}"},
-            timeout=30,
+            timeout=60,
             trust_env=False,
         ) as http:
             for upload in uploads:

@@ -9,17 +9,12 @@ from pathlib import Path
 import keyring
 import pytest
 from click.testing import CliRunner, Result
-from hypothesis import settings
 
 from evaluator.cli import main
 from evaluator.client.client import Client
 from tests.evaluator.cli.keyrings import NoKeyring
 from tests.evaluator.cli.recorded_site import RecordedSite
 from tests.evaluator.fake_time import FakeTime
-
-# How long an example takes says more about the machine than about the code.
-settings.register_profile("unhurried", deadline=None)
-settings.load_profile("unhurried")
 
 
 @pytest.fixture(autouse=True)

@@ -16,6 +16,29 @@ class Cut(Enum):
     BEFORE_THE_ANSWER = "when the server has done it, and before anybody hears so"
 
 
+class MovingNetwork(Proxy):
+    """One address for a server that is first here and then there."""
+
+    def __init__(self) -> None:
+        super().__init__(host="127.0.0.1", port=0)
+        self.url = f"http://127.0.0.1:{self.port}"
+
+    def lead_to(self, url: str) -> None:
+        """Where new connections go."""
+        self._target = ("127.0.0.1", int(url.rpartition(":")[2]))
+
+    def _pass_on(self, client: socket.socket) -> None:
+        with client, socket.create_connection(self._target) as server:
+            other = {client: server, server: client}
+            while True:
+                ready, _, _ = select.select([client, server], [], [])
+                for end in ready:
+                    said = end.recv(PIECE)
+                    if not said:
+                        return
+                    other[end].sendall(said)
+
+
 class CutNetwork(Proxy):
     """Passes on to a port of this machine; the next uploads are cut as `cuts` says, one after the other."""
 

@@ -20,7 +20,7 @@ import psycopg
 import pytest
 
 from tests.journeys import recipes
-from tests.journeys.cutting import Cut, CutNetwork
+from tests.journeys.cutting import Cut, CutNetwork, MovingNetwork
 from tests.journeys.production import Site, free_port, get, web_process
 from tests.journeys.programs import PATIENCE_S, Tsttc, command, environment
 
@@ -170,24 +170,33 @@ def test_upload_that_the_network_cuts_arrives_once(job: Job) -> None:
     assert len(job.submissions()) == 1
 
 
+def waiting_job(job: Job, url: str) -> subprocess.Popen[str]:
+    """`tsttc submit --wait` at that address, once it has heard that its file is queued."""
+    waiting = subprocess.Popen(
+        [
+            *(sys.executable, "-m", "evaluator", "submit", str(job.predictions(1.4))),
+            *("--split", "test", "--method", "Job", "--wait", "--json", "--fail-if", "mid > 0.01"),
+        ],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(url, job.token, home=job.home),
+    )
+    assert waiting.stderr is not None
+    assert waiting.stderr.readline().startswith("Submission ")
+    assert waiting.stderr.readline().startswith("QUEUED")
+    return waiting
+
+
 def test_job_outlives_a_restart_of_the_server(job: Job, paused_worker: Callable[[], None]) -> None:
-    there = at_port(job.site, free_port())
-    with web_process(there, "web-before"):
-        waiting = subprocess.Popen(
-            [
-                *(sys.executable, "-m", "evaluator", "submit", str(job.predictions(1.4))),
-                *("--split", "test", "--method", "Job", "--wait", "--json", "--fail-if", "mid > 0.01"),
-            ],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env=environment(there.url, job.token, home=job.home),
-        )
-        assert waiting.stderr is not None
-        assert waiting.stderr.readline().startswith("Submission ")
-        assert waiting.stderr.readline().startswith("QUEUED")
-    assert waiting.poll() is None, "the server is away, and the job still waits"
-    with web_process(there, "web-after"):
+    """It bears with one that is away for seconds, so the second server is up before the first one ends."""
+    before, after = (at_port(job.site, free_port()) for _ in range(2))
+    with MovingNetwork() as network, web_process(after, "web-after"):
+        with web_process(before, "web-before"):
+            network.lead_to(before.url)
+            waiting = waiting_job(job, network.url)
+        assert waiting.poll() is None, "the server is away, and the job still waits"
+        network.lead_to(after.url)
         paused_worker()
         stdout, stderr = waiting.communicate(timeout=PATIENCE_S)
     assert waiting.returncode == 6, stderr

@@ -158,7 +158,7 @@ class Readers:
         await_that(have_come, what=f"every reader has {n} more answers")
 
     def _read(self, reader: int) -> None:
-        with httpx.Client(base_url=self._site.url, timeout=60, trust_env=False) as http:
+        with httpx.Client(base_url=self._site.url, timeout=PATIENCE_S, trust_env=False) as http:
             while not self._stopping.is_set():
                 asked_s = time.monotonic()
                 response = http.get(BOARD)
@@ -203,7 +203,7 @@ class Uploader:
 
     def _send(self) -> None:
         headers = {"Authorization": f"Bearer {self._token}"}
-        with httpx.Client(base_url=self._url, headers=headers, timeout=60, trust_env=False) as http:
+        with httpx.Client(base_url=self._url, headers=headers, timeout=PATIENCE_S, trust_env=False) as http:
             while self.n_sent < MAX_UPLOADS and not self._stopping.wait(UPLOAD_EVERY_S):
                 number = N_SUBMISSIONS + self.n_sent
                 answer = http.post(
@@ -281,13 +281,13 @@ def test_readers_see_whole_boards_only_and_nothing_is_doubled(
             readers.await_answers(2, asked_after_s=time.monotonic())
         assert n_lost > 0, "the worker was killed with empty hands"
         await_that(lambda: n_undecided(site) == 0, what="everything is decided in both editions")
-        before = httpx.get(site.url + BOARD, trust_env=False, timeout=60).content
+        before = httpx.get(site.url + BOARD, trust_env=False, timeout=PATIENCE_S).content
 
         forward = timed(lambda: publish(site))
         readers.await_answers(3, asked_after_s=forward[1])
         back = timed(lambda: publish(site, "--roll-back"))
         readers.await_answers(3, asked_after_s=back[1])
-        after = httpx.get(site.url + BOARD, trust_env=False, timeout=60).content
+        after = httpx.get(site.url + BOARD, trust_env=False, timeout=PATIENCE_S).content
 
     assert (readers.failures, uploader.failures) == ([], [])
     assert uploader.n_sent > 0

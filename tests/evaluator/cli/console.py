@@ -99,7 +99,7 @@ def shell(tsttc: list[str], environment: Mapping[str, str]) -> Iterator[Run]:
                 check=False,
                 cwd=work,
                 env=surroundings,
-                timeout=60,
+                timeout=180,
             ).stdout
 
         yield run

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import socket
 import sys
 from functools import partial
 from typing import Any
@@ -22,6 +21,7 @@ from evaluator.metrics.protocol import SCORE_NAMES
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.fake_time import FakeTime
 from tests.evaluator.worlds import Tsttc, on_terminal
+from tests.services import free_port
 
 BOARD = "GET /api/v1/splits/test/board"
 
@@ -69,9 +69,7 @@ pytestmark = pytest.mark.usefixtures("at_site")
 def test_unreachable_server_is_told_with_its_address(
     tsttc: Tsttc, clock: FakeTime, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        url = f"http://127.0.0.1:{unused.getsockname()[1]}"
+    url = f"http://127.0.0.1:{free_port()}"
     monkeypatch.setenv("TSTTC_URL", url)
     monkeypatch.setattr("evaluator.client.client.Client", partial(Client, sleep=clock.sleep))
     result = tsttc("board")

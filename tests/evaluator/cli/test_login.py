@@ -157,7 +157,7 @@ def test_terminal_is_asked_and_does_not_show_the_token(site: RecordedSite, tmp_p
         screen.write(TOKEN.encode() + b"\n")
         while b"is valid" not in shown:
             shown += screen.read(1 << 16)
-        assert running.wait(30) == 0
+        assert running.wait(180) == 0
     assert b"the input is hidden" in shown
     assert TOKEN.encode() not in shown
     assert site.requests[0].headers["Authorization"] == f"Bearer {TOKEN}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import random
-import socket
 from contextlib import ExitStack
 
 import pytest
@@ -14,6 +13,7 @@ from evaluator.client.exchange import RetryPolicy
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply
 from tests.evaluator.client.test_client import ONE, QUEUED, SCORED, SUBMISSIONS, send
 from tests.evaluator.fake_time import FakeTime
+from tests.services import free_port
 
 pytestmark = pytest.mark.slow
 
@@ -133,15 +133,9 @@ def test_busy_server_is_asked_again_within_a_minute(
 # --- first contact ----------------------------------------------------------------------------------------
 
 
-def nothing_listens_at() -> str:
-    with socket.socket() as unused:
-        unused.bind(("127.0.0.1", 0))
-        return f"http://127.0.0.1:{unused.getsockname()[1]}"
-
-
 def test_server_that_starts_seconds_after_the_job_is_waited_for(clock: FakeTime) -> None:
     """A job and its server, or the network between them, often come up together."""
-    url = nothing_listens_at()
+    url = f"http://127.0.0.1:{free_port()}"
     with ExitStack() as running:
 
         def sleep(seconds: float) -> None:
@@ -159,7 +153,7 @@ def test_server_that_starts_seconds_after_the_job_is_waited_for(clock: FakeTime)
 def test_address_where_nothing_ever_listens_is_reported_within_a_quarter_of_a_minute(
     clock: FakeTime,
 ) -> None:
-    url = nothing_listens_at()
+    url = f"http://127.0.0.1:{free_port()}"
     with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
         client.board("test")
     assert (caught.value.url, caught.value.was_connected, caught.value.was_refused) == (url, False, True)

@@ -129,10 +129,11 @@ def test_who_finds_no_place_is_answered_at_once_and_the_later_the_more_there_are
 
 
 def test_a_watcher_does_not_ask_for_who_has_left(looks: Looks) -> None:
-    slow = long_poll.Watcher(look=looks, n_places=lambda: 3, every_s=2)
-    # Seen to be gone at the first look, and away well before the next one.
+    slow = long_poll.Watcher(look=looks, n_places=lambda: 3, every_s=WAIT_S)
+    # Seen to be gone at the first look, and away before the next one, which comes when all are let go.
     [waiter] = seated(slow, looks, 1, is_gone=lambda: True)
     assert waiter.has_come_back()
+    slow.close()
     ended()
     assert len(looks.asked) == 1
 

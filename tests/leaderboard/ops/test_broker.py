@@ -45,7 +45,7 @@ def test_a_message_reaches_the_broker_and_bears_no_argument(monkeypatch: pytest.
     with Connection("memory://") as connection:
         monkeypatch.setattr(broker, "_connections", lambda: connection.Pool(1))
         assert broker.nudge()
-        message = connection.SimpleQueue("celery").get(timeout=1)
+        message = connection.SimpleQueue("celery").get(timeout=60)
     assert message.headers["task"] == tasks.nudge.name
     assert message.payload[:2] == [[], {}]
 

@@ -80,8 +80,11 @@ def test_what_anybody_can_make_up_is_answered_and_not_remembered(
     assert (found, n_remembered()) == ([status] * 3, 0)
 
 
-def test_remembered_of_all_times_are_days_that_are_over(filled: list[Method], client: Client) -> None:
+def test_remembered_of_all_times_are_days_that_are_over(
+    filled: list[Method], client: Client, monkeypatch: pytest.MonkeyPatch
+) -> None:
     now = timezone.now()
+    monkeypatch.setattr(timezone, "now", lambda: now)  # no midnight comes between two requests
     over, today, tomorrow = (f"{now + timedelta(days=n):%Y-%m-%d}" for n in (-1, 0, 1))
     for address in ("/board/test/", API, "/board/test.csv"):
         memory.clear()
@@ -92,10 +95,9 @@ def test_remembered_of_all_times_are_days_that_are_over(filled: list[Method], cl
         for at in (today, tomorrow, f"{over}T12:00", f"{over[:-2]}99", f"{over[:-2]}٠١"):
             client.get(address, {"at": at})
         assert n_remembered() == 1
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(timezone, "now", lambda: now + timedelta(days=1))
-        assert client.get(f"/board/test/?at={today}").text.count("The board as of") == 1
-        assert n_remembered() == 2
+    monkeypatch.setattr(timezone, "now", lambda: now + timedelta(days=1))
+    assert client.get(f"/board/test/?at={today}").text.count("The board as of") == 1
+    assert n_remembered() == 2
 
 
 def test_the_api_answers_a_query_alike_with_and_without_memory(filled: list[Method], client: Client) -> None:
