@@ -27,8 +27,9 @@ RUN groupadd --gid 10001 tsttc \
 COPY --from=environment /opt/tsttc /opt/tsttc
 WORKDIR /srv/tsttc
 COPY . .
-# Static files are part of the image. Collecting needs no service, only settings that load.
+# Static files and the wheel for visitors are part of the image. Neither needs a service, only settings that load.
 RUN TSTTC_PROFILE=embedded TSTTC_DATA_DIR=/tmp/collect python manage.py collectstatic --no-input --verbosity 0 \
+    && TSTTC_PROFILE=embedded TSTTC_DATA_DIR=/tmp/collect python manage.py build_wheel \
     && rm -rf /tmp/collect \
     && python -m compileall -q baselines evaluator leaderboard
 

@@ -1,4 +1,4 @@
-"""Draw docs/architecture.svg from the imports of the code: `python -m docs._picture`.
+"""Draw docs/figures/architecture.svg from the imports of the code: `python -m docs._picture`.
 
 The rows are the layers of `pyproject.toml`, the arrows are imports between rooms. An import that a longer way
 of arrows shows as well is left out, else the picture would be a thicket.
@@ -13,7 +13,7 @@ from pathlib import Path
 import grimp
 
 REPOSITORY = Path(__file__).resolve().parent.parent
-PICTURE = REPOSITORY / "docs" / "architecture.svg"
+PICTURE = REPOSITORY / "docs" / "figures" / "architecture.svg"
 CONTRACT = "the leaderboard's rooms import downwards"
 WIDTH, ROW, BOX_HEIGHT, CHARACTER, GAP = 980, 84, 34, 8.4, 22
 

@@ -12,6 +12,8 @@ class LeaderboardConfig(AppConfig):
 
     def ready(self) -> None:
         """Register the system checks; only now can what they look at be imported."""
+        from leaderboard.pages import pages  # noqa: PLC0415 - needs the models
         from leaderboard.submissions import receipts  # noqa: PLC0415 - needs the models
 
         checks.register(receipts.check_keys)
+        checks.register(pages.check_contact, deploy=True)

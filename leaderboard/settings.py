@@ -37,6 +37,8 @@ GROUND_TRUTH_DIR = Path(env.str("TSTTC_GROUND_TRUTH_DIR", default=str(DATA_DIR /
 BAGS_DIR = env.str("TSTTC_BAGS_DIR", default="")
 FILES_DIR = Path(env.str("TSTTC_FILES_DIR", default=str(DATA_DIR / "files")))
 STATIC_ROOT = Path(env.str("TSTTC_STATIC_ROOT", default=str(BASE_DIR / "staticfiles")))
+# The wheel of the evaluator that visitors install, as `build_wheel` makes it.
+DIST_DIR = Path(env.str("TSTTC_DIST_DIR", default=str(STATIC_ROOT.with_name("dist"))))
 if not PRODUCTION:
     # Sessions, password hashes, mailed links in logs: other accounts of this machine read none of it.
     environment.make_private(DATA_DIR)
@@ -187,7 +189,11 @@ STORAGES: dict[str, dict[str, Any]] = {
 STATIC_URL = "/static/"
 # Tests and debugging serve the sources themselves; everything else serves what collectstatic gathered.
 WHITENOISE_AUTOREFRESH = WHITENOISE_USE_FINDERS = TESTING or DEBUG
-STATICFILES_DIRS = [BASE_DIR / "static", ("examples", BASE_DIR / "examples")]
+STATICFILES_DIRS = [
+    BASE_DIR / "static",
+    ("examples", BASE_DIR / "examples"),
+    ("docs", BASE_DIR / "docs" / "figures"),
+]
 
 # --- uploads ---------------------------------------------------------------------------------------------
 
@@ -285,6 +291,8 @@ ACCOUNT_SESSION_REMEMBER = True
 EMAIL_CONFIG = env.email_url("TSTTC_EMAIL_URL", default="consolemail://")
 vars().update(EMAIL_CONFIG)
 DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
+# Who the pages say answers questions; the pages are edited at /maintain/pages/.
+CONTACT_EMAIL = env.str("TSTTC_CONTACT_EMAIL", default="") or DEFAULT_FROM_EMAIL
 # Without a mail server nobody could follow the link; with one, an address counts once it is proved.
 ACCOUNT_EMAIL_VERIFICATION = "mandatory" if env.str("TSTTC_EMAIL_URL", default="") else "none"
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.

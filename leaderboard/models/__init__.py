@@ -13,6 +13,7 @@ from leaderboard.models.boards import BoardVersion, Snapshot
 from leaderboard.models.inference import Analysis, Comparison, Question
 from leaderboard.models.limits import Allowance, CachedValue
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
+from leaderboard.models.pages import PageVersion
 from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
 from leaderboard.models.quotas import Admission, QuotaOverride
 from leaderboard.models.submissions import (

@@ -32,6 +32,9 @@ _SECTIONS = {
     "invite": "account",
     "tokens": "account",
     "docs": "docs",
+    "docs_search": "docs",
+    "guide": "docs",
+    "dist": "docs",
     "api_reference": "api",
 }
 _PREFIXES = {"account_": "account", "maintain": "maintain"}

@@ -13,12 +13,19 @@ from leaderboard.web.boards import (
     edition_views,
     export_views,
 )
-from leaderboard.web.docs import docs_views
-from leaderboard.web.maintain import audit_views, maintainer_views, queue_views, quota_views
+from leaderboard.web.docs import docs_views, page_views, wheel_views
+from leaderboard.web.maintain import (
+    audit_views,
+    edited_page_views,
+    maintainer_views,
+    queue_views,
+    quota_views,
+)
 from leaderboard.web.methods import method_views
 from leaderboard.web.submissions import analysis_views, receipt_views, submission_views
 
 register_converter(export_views.FormatConverter, "export_format")
+register_converter(page_views.PageConverter, "page")
 MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
     path("progress/", maintainer_views.edition_progress, name="maintain_progress"),
@@ -90,7 +97,14 @@ urlpatterns = [
     path("tokens/revoke/", token_views.revoke, name="revoke_token"),
     path("docs/", docs_views.docs, name="docs"),
     path("docs/api/", docs_views.api_page, name="api_reference"),
+    path("docs/search/", takes(docs_views.find, docs_views.SEARCH_PARAMETERS), name="docs_search"),
+    path("docs/<path:guide_name>/", cacheable(docs_views.guide), name="guide"),
+    path("dist/", wheel_views.dist, name="dist"),
+    path("dist/<str:wheel_name>", wheel_views.dist_file, name="dist_file"),
+    path("<page:page_name>/", page_views.site_page, name="site_page"),
     path("maintain/", maintainer_views.hub, name="maintain"),
+    path("maintain/pages/", edited_page_views.site_pages, name="maintain_pages"),
+    path("maintain/pages/<page:page_name>/", edited_page_views.site_page, name="maintain_page"),
     path("maintain/audit/", audit_views.events, name="maintain_audit"),
     path("maintain/audit/events.csv", audit_views.events, {"kind": "csv"}, name="maintain_audit_csv"),
     path("maintain/audit/events.json", audit_views.events, {"kind": "json"}, name="maintain_audit_json"),

@@ -18,7 +18,7 @@ def test_the_picture_is_the_one_that_the_imports_draw() -> None:
         text=True,
         check=True,
     )
-    picture = (REPOSITORY / "docs" / "architecture.svg").read_text(encoding="utf-8")
+    picture = (REPOSITORY / "docs" / "figures" / "architecture.svg").read_text(encoding="utf-8")
     assert drawn.stdout == picture, "draw it anew: python -m docs._picture"
 
 

@@ -24,7 +24,15 @@ RUN = """() => axe.run(document, {resultTypes: ["violations"]}).then(found => fo
   .flatMap(({id, nodes}) => nodes.map(node => [id, node.target, node.failureSummary].join(": "))))"""
 SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 # What leads to no page, or to none that a sample is needed for.
-OTHERS = {"chosen": "csv", "secret": "none", "handle": str(UUID(int=0)), "invitation_id": str(UUID(int=0))}
+OTHERS = {
+    "guide_name": "file-format",
+    "page_name": "privacy",
+    "wheel_name": "none.whl",
+    "chosen": "csv",
+    "secret": "none",
+    "handle": str(UUID(int=0)),
+    "invitation_id": str(UUID(int=0)),
+}
 VIEWS = (
     "/board/val/?columns=mid&nerf=no",
     "/board/val/?columns=rte&q=nothing+like+it",

@@ -24,7 +24,8 @@ def edition(benchmark: None, tmp_path: Path) -> Edition:
 
 
 @pytest.fixture
-def world(edition: Edition, settings: Settings) -> World:
+def world(edition: Edition, settings: Settings, tmp_path: Path) -> World:
     """The seven roles, around one private method."""
+    settings.DIST_DIR = tmp_path / "no-wheel"
     settings.ACCOUNT_RATE_LIMITS = False  # one address asks a thousand times
     return people.populate(edition)

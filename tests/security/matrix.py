@@ -75,6 +75,12 @@ LINES: dict[str, Line] = {
     # What stands in a README is what everybody sees, whoever looks: the owner's method is private.
     "badge": line(GET=all_of("404")),
     "docs": line(GET=OPEN),
+    "docs_search": line(GET=OPEN),
+    "guide": line(GET=OPEN, at={"guide_name": "researchers"}),
+    "site_page": line(GET=OPEN, at={"page_name": "privacy"}),
+    # Nobody has built a wheel.
+    "dist": line(GET=all_of("404")),
+    "dist_file": line(GET=all_of("404"), at={"wheel_name": "tsttc-0-py3-none-any.whl"}),
     "api_reference": line(GET=OPEN),
     # The owner's method is private: its page is its team's, and maintainers'.
     "method": line(GET="404 404 200 200 200 404 404"),
@@ -110,6 +116,9 @@ LINES: dict[str, Line] = {
     "revoke_token": line(POST="in 404 404 404 404 in in"),
     # --- maintainers' pages: to everybody else they are not there ---
     "maintain": line(GET=KEEPERS),
+    "maintain_pages": line(GET=KEEPERS),
+    # Without a text there is nothing to save.
+    "maintain_page": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"page_name": "rules"}),
     "maintain_audit": line(GET=KEEPERS),
     "maintain_audit_csv": line(GET=KEEPERS),
     "maintain_audit_json": line(GET=KEEPERS),

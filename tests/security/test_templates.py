@@ -30,9 +30,13 @@ def test_no_template_takes_text_for_markup() -> None:
     assert found == {}
 
 
-# The one place that trusts a text which is not empty: it puts one drawing of numbers into another. All others
-# join pieces by `format_html_join`, which escapes what is no markup already.
-TRUSTING = {"leaderboard/web/boards/svg.py": ['SafeString(drawn.replace(">", f">{zero}", 1))']}
+# The two places that trust a text which is not empty: one puts a drawing of numbers into another, one has
+# what a parser made of Markdown, which escapes all markup in it. All others join pieces by
+# `format_html_join`, which escapes what is no markup already.
+TRUSTING = {
+    "leaderboard/web/boards/svg.py": ['SafeString(drawn.replace(">", f">{zero}", 1))'],
+    "leaderboard/web/markdown.py": ["SafeString(html)"],
+}
 
 
 def test_no_code_takes_text_for_markup() -> None:

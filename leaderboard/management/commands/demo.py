@@ -15,6 +15,7 @@ from django.core.management import call_command
 from django.core.management.base import BaseCommand, CommandError
 
 from leaderboard.demo.supervisor import Process, StartFailed, port_is_free, supervise
+from leaderboard.management.commands.build_wheel import build, is_built
 
 # What a multipart body has beside the file.
 FORM_BYTES = 1_000_000
@@ -49,6 +50,8 @@ class Command(BaseCommand):
         call_command("migrate", verbosity=0)
         if static_files_changed(Path(settings.STATIC_ROOT)):
             call_command("collectstatic", interactive=False, clear=True, verbosity=0)
+        if not is_built():
+            build()
         login = io.StringIO()
         call_command("seed_demo", stdout=login)
         address = f"http://{host}:{port}"

@@ -1,19 +1,44 @@
 """The pages of documentation."""
 
-from django.http import HttpRequest, HttpResponse
+from typing import Final
+
+from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.views.decorators.http import require_safe
 
-from leaderboard.web.docs import api_reference, reference
+from leaderboard.http import ANYTHING, Parameters
+from leaderboard.web.docs import api_reference, guides, reference, search, wheels
+
+SEARCH_PARAMETERS: Final[Parameters] = {"q": ANYTHING}
 
 
 @require_safe
 def docs(request: HttpRequest) -> HttpResponse:
     """How to submit, the file's format, the errors, the API."""
-    return render(request, "docs/docs.html", reference.docs())
+    context = {"navigation": guides.navigation(), "wheel": wheels.current(), **reference.docs()}
+    return render(request, "docs/docs.html", context)
+
+
+@require_safe
+def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
+    """One guide of `docs/`."""
+    if guide_name not in guides.files():
+        raise Http404(f"There is no guide {guide_name!r}.")
+    before, after = guides.neighbours(guide_name)
+    context = {"guide": guides.guide(guide_name), "before": before, "after": after}
+    return render(request, "docs/guide.html", {"navigation": guides.navigation(), **context})
+
+
+@require_safe
+def find(request: HttpRequest) -> HttpResponse:
+    """What the documentation says about some words."""
+    query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
+    context = {"query": query, "hits": search.find(query), "longest": search.MAX_QUERY}
+    return render(request, "docs/search.html", {"navigation": guides.navigation(), **context})
 
 
 @require_safe
 def api_page(request: HttpRequest) -> HttpResponse:
     """Every operation, parameter and object of the API."""
-    return render(request, "docs/api_reference.html", {"api": api_reference.reference()})
+    context = {"navigation": guides.navigation(), "api": api_reference.reference()}
+    return render(request, "docs/api_reference.html", context)

@@ -21,6 +21,7 @@ from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, preview
 from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
+from leaderboard.pages import pages
 from leaderboard.quotas import rules
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.forms import SiteForm
@@ -74,6 +75,7 @@ def hub(request: HttpRequest) -> HttpResponse:
         "queue": queue_tables.totals(),
         "n_overrides": QuotaOverride.objects.count(),
         "n_events": AuditEvent.objects.count(),
+        "has_imprint": pages.current(pages.IMPRINT) is not None,
         "ignored": rules.ignored(),
     }
     return render(request, "maintain/hub.html", context)

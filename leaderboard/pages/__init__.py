@@ -1,0 +1,1 @@
+"""The pages that maintainers write: rules, contact, privacy, imprint, licence."""

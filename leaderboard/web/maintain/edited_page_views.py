@@ -1,0 +1,66 @@
+"""Editing rules, contact, privacy, imprint and licence."""
+
+from typing import Any
+
+from django import forms
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect, render
+from django.utils import timezone
+from django.views.decorators.http import require_safe
+
+from leaderboard.pages import pages
+from leaderboard.pages.pages import MAX_TEXT, PAGES
+from leaderboard.web import markdown
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+
+
+class PageForm(SiteForm):
+    """The text of a page, and the version that was edited."""
+
+    text = forms.CharField(
+        strip=False,
+        help_text="Markdown: ## headings, lists, tables, **bold**, [links](https://…). HTML is shown as text "
+        f"and images are left out. At most {MAX_TEXT:,} characters.",
+        widget=forms.Textarea(attrs={"rows": 24}),
+        error_messages={"required": "The text is empty; expected at least a sentence."},
+    )
+    replaces = forms.IntegerField(
+        widget=forms.HiddenInput,
+        error_messages=dict.fromkeys(("required", "invalid"), "The form lacks the version; reload the page."),
+    )
+
+
+@maintainers_only
+@require_safe
+def site_pages(request: HttpRequest) -> HttpResponse:
+    """Every page, and when it was changed."""
+    rows = [(page, pages.current(page.name)) for page in PAGES.values()]
+    return render(request, "maintain/pages.html", {"rows": rows, "imprint": pages.IMPRINT})
+
+
+@maintainers_only
+@asks_first
+def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
+    """The form with the text of a page, or with one that it had; a preview; the texts until now."""
+    versions = pages.versions(page_name)
+    chosen = next((each for each in versions if str(each.number) == request.GET.get("version")), None)
+    shown = chosen or (versions[0] if versions else None)
+    text = shown.text if shown and request.GET.get("version") != "0" else pages.default_text(page_name)
+    form = PageForm.asked(request, initial={"text": text, "replaces": versions[0].number if versions else 0})
+    context: dict[str, Any] = {"page": PAGES[page_name], "versions": versions}
+    if form.is_valid():
+        if "preview" in request.POST:
+            return form_page(
+                request,
+                "maintain/page.html",
+                form,
+                preview=markdown.page(form.cleaned_data["text"]),
+                **context,
+            )
+        with form.refusals():
+            pages.edit(name=page_name, actor=maintainer_of(request), now=timezone.now(), **form.cleaned_data)
+            messages.success(request, f"{PAGES[page_name].title} was changed.")
+            return redirect("site_page", page_name)
+    return form_page(request, "maintain/page.html", form, **context)

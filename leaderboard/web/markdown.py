@@ -1,0 +1,141 @@
+"""Markdown as HTML: headings with anchors, tables that scroll, and none of the writer's own markup.
+
+What looks like HTML in a text is shown as text. Used for the guides in `docs/` and for the pages that
+maintainers write.
+"""
+
+import re
+import unicodedata
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Final
+
+from django.utils.safestring import SafeString
+from markdown_it import MarkdownIt
+from markdown_it.token import Token
+
+Target = Callable[[str], str]
+# Where links may lead: pages of any host, mail, and places on this site.
+_TARGET: Final = re.compile(r"(?:https?:|mailto:|/|#|\?)", re.IGNORECASE)
+_TABLE: Final = '<div class="scroll" tabindex="0" role="group" aria-label="Table">\n<table class="list">\n'
+
+
+@dataclass(frozen=True)
+class TextHeading:
+    """A heading: 1 is the title. Its anchor is what a link to it names."""
+
+    level: int
+    text: str
+    anchor: str
+
+
+@dataclass(frozen=True)
+class Part:
+    """What stands below one heading, as plain text: what a search looks through."""
+
+    heading: TextHeading
+    text: str
+
+
+@dataclass(frozen=True)
+class Document:
+    """A text as HTML, and its parts in order."""
+
+    html: SafeString
+    parts: tuple[Part, ...]
+
+    @property
+    def title(self) -> str:
+        """The heading of the first level; empty where there is none."""
+        return next((part.heading.text for part in self.parts if part.heading.level == 1), "")
+
+    @property
+    def chapters(self) -> list[TextHeading]:
+        """The headings of the second level."""
+        return [part.heading for part in self.parts if part.heading.level == 2]
+
+
+def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]]) -> Document:
+    """A text of the project's own.
+
+    `link` says where an address in it leads, `image` which attributes the element of a picture has.
+    """
+    tokens = _parser(images=True).parse(text)
+    for token in _inline(tokens):
+        if "href" in token.attrs:
+            token.attrSet("href", link(str(token.attrs["href"])))
+        if "src" in token.attrs:
+            token.attrs.update(image(str(token.attrs["src"])))
+    return _document(tokens, _parser(images=True))
+
+
+def page(text: str) -> Document:
+    """A text that a maintainer wrote, for below the title of a page: no image, and no title of its own."""
+    parser = _parser(images=False)
+    tokens = parser.parse(text)
+    for token in tokens:
+        if token.type in {"heading_open", "heading_close"} and token.tag == "h1":
+            token.tag = "h2"
+    for token in _inline(tokens):
+        if "href" in token.attrs and not _TARGET.match(str(token.attrs["href"])):
+            token.attrSet("href", "#")
+    return _document(tokens, parser)
+
+
+@cache
+def _parser(*, images: bool) -> MarkdownIt:
+    parser = MarkdownIt("commonmark", {"html": False}).enable(["table", "strikethrough"])
+    return parser if images else parser.disable("image")
+
+
+def _inline(tokens: Sequence[Token]) -> list[Token]:
+    return [child for token in tokens for child in token.children or ()]
+
+
+def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
+    """Give headings their anchors and tables their classes, and take the plain text of each part."""
+    parts: list[Part] = []
+    heading, texts, anchors = TextHeading(0, "", ""), list[str](), set[str]()
+    for at, token in enumerate(tokens):
+        if token.type == "heading_open":
+            parts.append(Part(heading, " ".join(texts)))
+            words = _plain(tokens[at + 1])
+            heading, texts = TextHeading(int(token.tag[1]), words, _anchor(words, anchors)), []
+            token.attrSet("id", heading.anchor)
+        elif token.type in {"fence", "code_block"}:
+            texts.append(token.content)
+        elif token.type == "inline" and tokens[at - 1].type != "heading_open":
+            texts.append(_plain(token))
+        elif token.type in {"th_open", "td_open"} and "right" in str(token.attrs.pop("style", "")):
+            token.attrSet("class", "number")
+    parts.append(Part(heading, " ".join(texts)))
+    html = parser.renderer.render(tokens, parser.options, {})
+    html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")
+    # The parser escapes what is no markup of its own.
+    drawn = SafeString(html)
+    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
+
+
+def _plain(token: Token) -> str:
+    return "".join(
+        child.content if child.type in {"text", "code_inline"} else " "
+        for child in token.children or ()
+        if child.type in {"text", "code_inline", "softbreak", "hardbreak"}
+    )
+
+
+def _anchor(words: str, taken: set[str]) -> str:
+    """What links to a heading name, as most programs that draw Markdown make it.
+
+    >>> _anchor("Who sees a method?", set()), _anchor("`check`", {"check"})
+    ('who-sees-a-method', 'check_1')
+    """
+    plain = unicodedata.normalize("NFKD", words).encode("ascii", "ignore").decode()
+    first = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", plain).strip().lower()) or "part"
+    found, n_before = first, 0
+    while found in taken:
+        n_before += 1
+        found = f"{first}_{n_before}"
+    taken.add(found)
+    return found

@@ -1,0 +1,159 @@
+"""The guides of `docs/` are pages of the site, with navigation and search, and their links lead somewhere."""
+
+from urllib.parse import unquote, urlsplit
+
+import pytest
+from django.contrib.staticfiles import finders
+from django.test import Client
+
+from leaderboard.web.docs import guides, search
+from tests import pages
+from tests.leaderboard.web.test_every_page import assert_sound
+
+OLD_PLACES = {
+    "/docs/": [
+        "submit",
+        "format",
+        "manifest",
+        "problems",
+        "metrics",
+        "scoring",
+        "uncertainty",
+        "published",
+        "api",
+    ],
+    "/docs/api/": ["problem-quota-exceeded", "problem-nan", "submit", "board", "shape-Error"],
+}
+
+
+@pytest.fixture(scope="module")
+def anchors() -> dict[str, set[str]]:
+    """The places in pages that were looked at already."""
+    return {}
+
+
+def places(client: Client, address: str, anchors: dict[str, set[str]]) -> set[str]:
+    if address not in anchors:
+        root = pages.get(client, address)
+        anchors[address] = {each.attributes.get("id", "") for each in root.everything()} | {""}
+    return anchors[address]
+
+
+@pytest.mark.parametrize("name", sorted(guides.files()))
+def test_every_link_of_a_guide_leads_to_a_page_and_a_place_in_it(
+    client: Client, benchmark: None, anchors: dict[str, set[str]], name: str
+) -> None:
+    article = pages.get(client, f"/docs/{name}/").one("article")
+    broken = []
+    for link in article.all("a"):
+        parts = urlsplit(link.attributes["href"])
+        if parts.scheme or parts.path == "/dist/":  # that page is about what is not built here
+            continue
+        if parts.path.startswith("/static/"):
+            if not finders.find(unquote(parts.path.removeprefix("/static/"))):
+                broken.append(link.attributes["href"])
+        elif unquote(parts.fragment) not in places(client, parts.path or f"/docs/{name}/", anchors):
+            broken.append(link.attributes["href"])
+    assert broken == []
+
+
+def test_every_guide_is_a_sound_page(client: Client, benchmark: None) -> None:
+    for name in guides.files():
+        root = assert_sound(client.get(f"/docs/{name}/"))
+        assert root.one("h1").text == guides.guide(name).title
+
+
+def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_is(
+    client: Client, benchmark: None
+) -> None:
+    for address in ("/docs/", "/docs/researchers/", "/docs/api/", "/docs/scoring/"):
+        nav = next(
+            e for e in pages.get(client, address).all("nav") if e.attributes["aria-label"] == "Documentation"
+        )
+        assert [a.attributes["href"] for a in nav.all("a") if "aria-current" in a.attributes] == [address]
+        listed = {a.attributes["href"] for a in nav.all("a")}
+        assert {
+            "/docs/researchers/",
+            "/docs/api-guide/",
+            "/docs/api/",
+            "/docs/operations/",
+            "/dist/",
+        } <= listed
+
+
+def test_the_chapters_of_a_guide_stand_below_it_in_the_navigation(client: Client, benchmark: None) -> None:
+    root = pages.get(client, "/docs/scoring/")
+    chapters = [a.attributes["href"] for a in root.one("ul", class_="chapters").all("a")]
+    assert chapters == [f"#{h2.attributes['id']}" for h2 in root.one("article").all("h2")]
+
+
+def test_the_address_of_a_guide_without_its_slash_leads_to_it_and_others_are_not_found(
+    client: Client, benchmark: None
+) -> None:
+    assert client.get("/docs/researchers").headers["Location"] == "/docs/researchers/"
+    for name in ("nowhere", "../settings", "adr", "_site", "index.md"):
+        assert client.get(f"/docs/{name}/").status_code == 404
+
+
+@pytest.mark.parametrize(("address", "ids"), OLD_PLACES.items())
+def test_places_that_were_linked_before_are_still_there(
+    client: Client, benchmark: None, address: str, ids: list[str]
+) -> None:
+    assert [each for each in ids if each not in places(client, address, {})] == []
+
+
+# --- search ----------------------------------------------------------------------------------------------
+
+
+def found(client: Client, query: str) -> list[tuple[str, str]]:
+    """Address and text of each place that the search page shows."""
+    root = assert_sound(client.get("/docs/search/", {"q": query}))
+    items = [li for hits in root.all("ol", class_="hits") for li in hits.all("li")]
+    return [(li.one("a").attributes["href"], li.text) for li in items]
+
+
+@pytest.mark.parametrize(
+    ("query", "address"),
+    [
+        ("quota", "/docs/access/#quotas"),
+        ("natural keys", "/docs/file-format/#keys"),
+        ("IDEMPOTENCY", "/docs/api-guide/#safe-retries"),
+        ("quota-exceeded", "/docs/api/#problem-quota-exceeded"),
+        ("restore backup", "/docs/maintainers/#back-up-and-restore"),
+        ("bootstr", "/docs/uncertainty/"),
+    ],
+)
+def test_what_people_look_for_is_among_the_first_five(
+    client: Client, benchmark: None, query: str, address: str
+) -> None:
+    first = [place for place, _ in found(client, query)[:5]]
+    assert any(place.startswith(address) for place in first), first
+
+
+def test_every_address_that_the_search_gives_is_a_place(
+    client: Client, benchmark: None, anchors: dict[str, set[str]]
+) -> None:
+    for address, _ in found(client, "the"):
+        parts = urlsplit(address)
+        assert parts.fragment in places(client, parts.path, anchors), address
+
+
+def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, benchmark: None) -> None:
+    assert "<mark>quota</mark>" in client.get("/docs/search/?q=quota").text
+    for query in ("<script>alert(1)</script>", '"><img src=x>', "\x00", "%", "a" * 5000, "(" * 50):
+        answer = client.get("/docs/search/", {"q": query})
+        assert answer.status_code == 200
+        assert "<script>alert" not in answer.text
+        assert "<img src=x" not in answer.text
+
+
+def test_without_words_there_is_a_form_and_without_a_find_there_is_advice(
+    client: Client, benchmark: None
+) -> None:
+    assert found(client, "") == []
+    assert "Try fewer words" in client.get("/docs/search/?q=xyzzyq").text
+
+
+def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:
+    assert search.find("quota xyzzyq")
+    assert search.find("xyzzyq") == []

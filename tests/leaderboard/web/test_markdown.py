@@ -1,0 +1,62 @@
+"""Markdown of maintainers becomes headings, lists and tables, and never markup of their own."""
+
+import pytest
+
+from leaderboard.web import markdown
+from tests import pages
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "<script>alert(1)</script>",
+        "Hello <img src=x onerror=alert(1)> there",
+        "<p style='color:red'>red</p>",
+        "[here](javascript:alert(1))",
+        "[here](JaVaScRiPt:alert(1))",
+        "[here](data:text/html,x)",
+        "<javascript:alert(1)>",
+        "![a picture](https://elsewhere.example/x.png)",
+        "# Title\n\n<b>bold</b>",
+        "| a |\n|:-:|\n| <i>x</i> |",
+    ],
+)
+def test_no_text_becomes_a_script_an_image_or_a_style(text: str) -> None:
+    root = pages.read(f"<main>{markdown.page(text).html}</main>")
+    found = root.everything()
+    assert {each.tag for each in found} <= {
+        "main",
+        "p",
+        "a",
+        "h2",
+        "div",
+        "table",
+        "thead",
+        "tbody",
+        "tr",
+        "th",
+        "td",
+    }
+    assert all(
+        set(each.attributes) <= {"href", "id", "class", "tabindex", "role", "aria-label"} for each in found
+    )
+    hrefs = [each.attributes["href"] for each in found if each.tag == "a"]
+    assert all(href.startswith(("https://elsewhere.example/", "#")) for href in hrefs)
+
+
+def test_a_page_has_no_title_of_its_own_and_headings_have_anchors() -> None:
+    drawn = markdown.page("# One\n\n## Two words!\n\n## Two words\n")
+    root = pages.read(drawn.html)
+    assert [(each.tag, each.attributes["id"]) for each in root.children] == [
+        ("h2", "one"),
+        ("h2", "two-words"),
+        ("h2", "two-words_1"),
+    ]
+
+
+def test_a_part_has_the_text_below_its_heading() -> None:
+    drawn = markdown.page("Before\n\n## A `b`\n\nOne *two*\nthree.\n\n```sh\nls -l\n```\n")
+    assert [(part.heading.text, part.text) for part in drawn.parts] == [
+        ("", "Before"),
+        ("A b", "One two three. ls -l\n"),
+    ]
