@@ -79,9 +79,7 @@ def edit(*, name: str, text: str, replaces: int, actor: User | None, now: dateti
     if (shown.number if shown else 0) != replaces:
         raise _changed_meanwhile()
     if text == (shown.text if shown else default_text(name)):
-        raise Refused(
-            "unchanged-text", "The text is the one that the page has; expected another.", field="text"
-        )
+        raise Refused("bad-value", "The text is the one that the page has; expected another.", field="text")
     try:
         with transaction.atomic():
             version = PageVersion.objects.create(
@@ -96,7 +94,7 @@ def edit(*, name: str, text: str, replaces: int, actor: User | None, now: dateti
 
 def _changed_meanwhile() -> Refused:
     return Refused(
-        "page-changed",
+        "changed-meanwhile",
         "Somebody changed this page after you opened the form. Copy your text and open the form again.",
         field="text",
     )

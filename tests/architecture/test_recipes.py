@@ -18,7 +18,7 @@ from tests.services import ServiceMissing, skip_or_fail
 REPOSITORY = Path(__file__).resolve().parents[2]
 RECIPES = pytest.mark.parametrize("recipe", [recipes.github(), recipes.gitlab()], ids=["github", "gitlab"])
 # An argument of pip: the name alone, or with extras or a version, and no address behind it.
-BARE_NAME = re.compile(r"pip install\b[^\n`]*?[ \"']tsttc(?![\w.-]| @)")
+BARE_NAME = re.compile(r"pip install\b[^\n`]*?[ \"']tsttc(?![\w.-]|(?:\[[\w,-]*\])? @)")
 
 
 def texts() -> list[Path]:
