@@ -16,8 +16,8 @@ import numpy as np
 
 from baselines.clips import N_FRAMES, TARGET, Clip, Image
 from baselines.highway import CAMERA_HEIGHT_M, IMAGE_HEIGHT_PX, IMAGE_WIDTH_PX, VEHICLES, Floats
-from baselines.rendering import camera, textures
-from baselines.rendering.textures import Texture
+from baselines.rendering import camera, surroundings, vehicles
+from baselines.rendering.textures import Colour, Texture
 from baselines.simulation import Split
 from evaluator.metrics.scale import FRAME_RATE_HZ
 
@@ -89,7 +89,7 @@ class _Scene:
     gap_m: Floats
     lateral_m: Floats
     ego_mps: float
-    rear: textures.Rear
+    rear: vehicles.Rear
     scenery: Image
     scenery_m: Floats
     scenery_shift_px: float
@@ -187,11 +187,11 @@ def _scene(split: Split, anno_id: int, *, rng: np.random.Generator, width_px: fl
         gap_m=gap_m,
         lateral_m=split.lateral_m[anno_id],
         ego_mps=ego_mps,
-        rear=textures.rear(split.vehicle[anno_id], texels=texels, rng=rng),
-        scenery=textures.scenery(int(rng.integers(textures.N_SCENERIES))),
+        rear=vehicles.rear(split.vehicle[anno_id], texels=texels, rng=rng),
+        scenery=surroundings.scenery(int(rng.integers(surroundings.N_SCENERIES))),
         scenery_m=np.maximum(behind_m + rng.uniform(0.4, 0.8) * ego_mps * to_target_s, gap_m + 3.0),
         scenery_shift_px=float(rng.uniform(-180, 180)),
-        road=textures.road(int(rng.integers(4))),
+        road=surroundings.road(int(rng.integers(surroundings.N_ROADS))),
         road_shift_m=float(rng.normal(scale=0.25)),
         road_start_m=float(rng.uniform(0, 60)),
         brakes_from=int(rng.choice((0, 3, 6), p=(0.3, 0.1, 0.6))),
@@ -245,7 +245,7 @@ class _Canvas:
         projected[..., 1] = self._y0 + scale * (CAMERA_HEIGHT_M - y_m)
         return projected
 
-    def _fill(self, polygons_px: Floats, colour: textures.Colour) -> None:
+    def _fill(self, polygons_px: Floats, colour: Colour) -> None:
         """Fill polygons (n, corners, 2) that do not overlap."""
         fixed = np.clip(np.round((polygons_px - 0.5) * 16), -(2**20), 2**20).astype(np.int32)
         cv2.fillPoly(self._pixels, list(fixed), (*colour, 255), cv2.LINE_AA, 4)
@@ -256,7 +256,7 @@ class _Canvas:
         now_m = float(scene.scenery_m[self._frame])
         # A texel is a pixel of the target frame.
         texels = now_m / float(scene.scenery_m[TARGET])
-        height, width = textures.SCENERY_SIZE
+        height, width = surroundings.SCENERY_SIZE
         foot_px = self._y0 + scene.focal_px * CAMERA_HEIGHT_M / now_m
         rows = min(self._size[1], int(np.ceil(foot_px)))
         if rows <= 0:
@@ -278,9 +278,9 @@ class _Canvas:
         first = max(0, int(np.ceil(self._y0 + scene.focal_px * CAMERA_HEIGHT_M / far_m)))
         if first >= self._size[1]:
             return
-        per_m = 1 / textures.ROAD_M_PER_TEXEL
+        per_m = 1 / surroundings.ROAD_M_PER_TEXEL
         passed_m = scene.road_start_m + scene.ego_mps * self._frame / FRAME_RATE_HZ
-        length, width = textures.ROAD_SIZE
+        length, width = surroundings.ROAD_SIZE
         # From (x, y) to texels: depth = focal · height / (y − y0), across = (x − x0) · depth / focal.
         middle, along = width / 2 + scene.road_shift_m * per_m, (passed_m * per_m) % length
         side, reach = CAMERA_HEIGHT_M * per_m, scene.focal_px * CAMERA_HEIGHT_M * per_m
@@ -325,7 +325,7 @@ class _Canvas:
         dark = (int(blue * 0.7), int(green * 0.7), int(red * 0.7))
         top = 0.62 if vehicle.name == "sedan" else 0.9
 
-        def fill(low: float, high: float, start: float, end: float, colour: textures.Colour) -> None:
+        def fill(low: float, high: float, start: float, end: float, colour: Colour) -> None:
             """A panel between shares of the height, and of the length counted from the tail."""
             depth_m = gap_m + (back_m - gap_m) * np.array([start, start, end, end])
             y_m = vehicle.height_m * np.array([low, high, high, low])
