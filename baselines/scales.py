@@ -48,6 +48,21 @@ def best_of(errors: Floats, *, n_top: int) -> NDArray[np.intp]:
     return np.argsort(errors, kind="stable")[:n_top]
 
 
+def at_best_shifts(errors: Floats) -> tuple[Floats, NDArray[np.int_]]:
+    """(n,) and (n, 2): of the errors (n, 2c + 1, 2c + 1), y before x, the least of each scale, and its shift,
+    x and y from −c to c.
+
+    >>> least, shifts = at_best_shifts(np.array([[[3.0, 3, 3], [3, 3, 1], [3, 3, 3]]]))
+    >>> least.tolist(), shifts.tolist()
+    ([1.0], [[1, 0]])
+    """
+    n_shifts = errors.shape[2]
+    flat = errors.reshape(len(errors), -1)
+    places = np.argmin(flat, axis=1)
+    shifts = np.stack([places % n_shifts, places // n_shifts], axis=1) - n_shifts // 2
+    return flat[np.arange(len(errors)), places], shifts
+
+
 def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:
     """α̂ = Σ wᵢ αᵢ with wᵢ = (1/MSEᵢ) / Σ (1/MSE), the paper's mean over the best bins (§5.3).
 

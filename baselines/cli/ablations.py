@@ -9,30 +9,24 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from baselines.cli import require_opencv
-from baselines.cli.runs import n_cores
+from baselines.cli.options import TRUTH, jobs_option, truth_option
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned
 from evaluator.cli.options import json_option
-from evaluator.cli.reading import FOLDER, TABLE, naming
+from evaluator.cli.reading import FOLDER, naming
 
 if TYPE_CHECKING:
     from baselines.ablation import Ablation, AblationRow
     from evaluator import GroundTruth
 
 NAMES: Final = ("bins", "frame-gap", "shift", "expansion")
-TRUTH: Final = "truth.csv"
 
 
 @click.command(short_help="Vary a setting of Pixel MSE, beside the paper's table.")
 @click.argument("name", metavar="bins|frame-gap|shift|expansion", type=click.Choice(NAMES))
 @click.argument("folder", type=FOLDER)
-@click.option(
-    "--truth",
-    "truth_path",
-    type=TABLE,
-    default=None,
-    metavar="FILE",
-    help="Ground truth: a CSV file or an annotation folder. [default: truth.csv in FOLDER, or FOLDER itself]",
+@truth_option(
+    "Ground truth: a CSV file or an annotation folder. [default: truth.csv in FOLDER, or FOLDER itself]"
 )
 @click.option(
     "--variant",
@@ -41,12 +35,10 @@ TRUTH: Final = "truth.csv"
     show_default=True,
     help="Of Pixel MSE.",
 )
-@click.option(
-    "--jobs", type=click.IntRange(1, 1024), default=None, help="Processes. [default: one for each processor]"
-)
+@jobs_option
 @json_option
 def ablate(
-    *, name: str, folder: Path, truth_path: Path | None, variant: str, jobs: int | None, as_json: bool
+    *, name: str, folder: Path, truth_path: Path | None, variant: str, n_processes: int, as_json: bool
 ) -> None:
     """Run Pixel MSE on FOLDER for each value of one setting, and print its scores beside the paper's.
 
@@ -77,7 +69,7 @@ def ablate(
                 folder=sequences,
                 truth=truth,
                 parameters={"variant": variant},
-                n_processes=jobs or n_cores(),
+                n_processes=n_processes,
                 progress=progress,
             )
     if as_json:

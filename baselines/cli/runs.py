@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from baselines.cli import require_opencv
+from baselines.cli.options import gap_option, jobs_option
 from baselines.methods import METHODS, Method, Parameter, Value, get_method
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -64,11 +65,6 @@ def _whole(end: float | None) -> int | None:
     return None if end is None else int(end)
 
 
-def n_cores() -> int:
-    """The processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 @click.command(short_help="Run a method over a folder, into a prediction file.")
 @click.argument("method_name", metavar="METHOD", type=click.Choice([method.name for method in METHODS]))
 @click.argument("folder", type=FOLDER)
@@ -80,18 +76,9 @@ def n_cores() -> int:
     metavar="FILE",
     help="Write the predictions to this file.",
 )
-@click.option(
-    "--gap",
-    "frame_gap",
-    type=click.IntRange(1, 5),
-    default=5,
-    show_default=True,
-    help="Frames between reference and target.",
-)
+@gap_option
 @_method_options
-@click.option(
-    "--jobs", type=click.IntRange(1, 1024), default=None, help="Processes. [default: one for each processor]"
-)
+@jobs_option
 @click.option("--strict", is_flag=True, help="Write nothing and exit 1 where a sequence needs a fallback.")
 @json_option
 def run(
@@ -100,7 +87,7 @@ def run(
     folder: Path,
     out: Path,
     frame_gap: int,
-    jobs: int | None,
+    n_processes: int,
     strict: bool,
     as_json: bool,
     **options: Value,
@@ -140,7 +127,7 @@ def run(
                     parameters=given,
                     frame_gap=frame_gap,
                     out=out,
-                    n_processes=jobs or n_cores(),
+                    n_processes=n_processes,
                     strict=strict,
                     progress=progress,
                 )

@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from baselines.cli import require_opencv
+from baselines.cli.options import TRUTH, gap_option, truth_option
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.reading import FOLDER, TABLE, naming, write_bytes
+from evaluator.cli.reading import FOLDER, naming, write_bytes
 
 if TYPE_CHECKING:
     from baselines.drawing import Figure
     from baselines.folders import SequenceFolder
 
 SUFFIXES: Final = (".svg", ".png")
-TRUTH: Final = "truth.csv"
 
 
 @click.command(short_help="Draw what Pixel MSE saw of a sequence, and its choice.")
@@ -31,22 +31,8 @@ TRUTH: Final = "truth.csv"
     metavar="FIGURE",
     help="Write the figure to this file, .svg or .png.",
 )
-@click.option(
-    "--gap",
-    "frame_gap",
-    type=click.IntRange(1, 5),
-    default=5,
-    show_default=True,
-    help="Frames between reference and target.",
-)
-@click.option(
-    "--truth",
-    "truth_path",
-    type=TABLE,
-    default=None,
-    metavar="FILE",
-    help="Ground truth whose value is shown. [default: truth.csv in FOLDER, if it is there]",
-)
+@gap_option
+@truth_option("Ground truth whose value is shown. [default: truth.csv in FOLDER, if it is there]")
 @click.option("--dark", is_flag=True, help="Light lines on a dark ground.")
 def show(
     *, folder: Path, anno_id: int, output: Path, frame_gap: int, truth_path: Path | None, dark: bool

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from baselines.cli import require_opencv
-from baselines.cli.runs import n_cores
+from baselines.cli.options import jobs_option
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.options import json_option
@@ -126,12 +126,10 @@ def _track_table(split: Split) -> str:
     "--first", type=click.IntRange(0), default=0, show_default=True, help="The first anno_id rendered."
 )
 @click.option("--count", type=click.IntRange(1), default=None, help="How many are rendered. [default: all]")
-@click.option(
-    "--jobs", type=click.IntRange(1, 1024), default=None, help="Processes. [default: one for each processor]"
-)
+@jobs_option
 @json_option
 def render(
-    *, folder: Path, first: int, count: int | None, jobs: int | None, as_json: bool, **options: Any
+    *, folder: Path, first: int, count: int | None, n_processes: int, as_json: bool, **options: Any
 ) -> None:
     """Render sequences with known truth into FOLDER, which `tsttc baseline run` takes.
 
@@ -162,7 +160,7 @@ def render(
                 seed=options["seed"],
                 path=folder,
                 rows=rows,
-                n_processes=jobs or n_cores(),
+                n_processes=n_processes,
                 progress=progress,
             )
     except WorkerEnded:

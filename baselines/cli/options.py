@@ -1,0 +1,49 @@
+"""Options that several subcommands share."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from typing import Any, Final, TypeVar
+
+import click
+
+from evaluator.cli.reading import TABLE
+
+TRUTH: Final = "truth.csv"
+"""The ground truth of a folder, as `tsttc baseline render` writes it."""
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def gap_option(command: Command) -> Command:
+    """--gap: which frame is the reference."""
+    return click.option(
+        "--gap",
+        "frame_gap",
+        type=click.IntRange(1, 5),
+        default=5,
+        show_default=True,
+        help="Frames between reference and target.",
+    )(command)
+
+
+def jobs_option(command: Command) -> Command:
+    """--jobs: how many processes."""
+    return click.option(
+        "--jobs",
+        "n_processes",
+        type=click.IntRange(1, 1024),
+        default=n_cores,
+        help="Processes. [default: one for each processor]",
+    )(command)
+
+
+def truth_option(what: str) -> Callable[[Command], Command]:
+    """--truth: the ground truth, by default that of the folder."""
+    return click.option("--truth", "truth_path", type=TABLE, metavar="FILE", help=what)
+
+
+def n_cores() -> int:
+    """The processors that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
