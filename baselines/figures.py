@@ -77,7 +77,7 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
     reference_box, target_box = estimator.boxes(clip, frames, frame_gap=frame_gap)
     best = int(np.argmin(match.errors))
     scale, size = float(match.scales[best]), size_of(target_box)
-    cell_px = size / patches.cells_of(target_box)
+    cell_px = size / patches.cells_of(target_box, max_cells=estimator.cells)
     middle = centre_of(reference_box) + scale * cell_px * match.shifts[best]
     found_box = box_around(middle, scale * size)
     # Both crops have one scale, so that the eye sees the change of size; the third follows the found box.

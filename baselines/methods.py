@@ -121,6 +121,14 @@ METHODS: Final[tuple[Method, ...]] = (
             Parameter("top", 3, "Best scale ratios that are averaged.", kind=int, low=1, high=400),
             Parameter("expand", 1.1, "Enlargement of the boxes.", kind=float, low=0.5, high=2.0),
             Parameter(
+                "cells",
+                64,
+                "Most cells along the longer side of a patch; a cell is a pixel or more (paper's variant).",
+                kind=int,
+                low=16,
+                high=256,
+            ),
+            Parameter(
                 "search",
                 "full",
                 "All scale ratios at full detail, or first a few in coarse patches (paper's variant).",

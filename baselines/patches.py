@@ -21,7 +21,9 @@ Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
 
 MAX_CELLS: Final = 64
-"""A patch has at most so many cells along its longer side; greater boxes are compared more coarsely."""
+"""Unless told otherwise, a patch has at most so many cells along its longer side; greater boxes are compared
+more coarsely.
+"""
 
 MIN_SIDE_PX: Final = 4.0
 """A narrower box shows nothing that could be compared."""
@@ -126,14 +128,14 @@ def require_centre_inside(image: Image, box: Floats, *, name: str) -> None:
         raise Unusable(f"{name} box outside the image")
 
 
-def cells_of(box: Floats) -> NDArray[np.int_]:
-    """(2,): columns and rows of the patch of a box: a cell for a pixel, fewer for boxes over `MAX_CELLS` px.
+def cells_of(box: Floats, *, max_cells: int = MAX_CELLS) -> NDArray[np.int_]:
+    """(2,): columns and rows of the patch of a box: a cell for a pixel, fewer for boxes over `max_cells` px.
 
     >>> cells_of(np.array([0.0, 0, 48, 40])).tolist(), cells_of(np.array([0.0, 0, 128, 96])).tolist()
     ([48, 40], [64, 48])
     """
     width, height = size_of(box).tolist()
-    return fewer_cells((height, width), max_cells=MAX_CELLS)
+    return fewer_cells((height, width), max_cells=max_cells)
 
 
 def fewer_cells(shape: tuple[float, ...], *, max_cells: int) -> NDArray[np.int_]:

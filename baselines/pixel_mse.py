@@ -12,7 +12,6 @@ all scales (rows) and all shifts (columns) is one matrix product instead of 125 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any, Final, Literal, get_args
 
@@ -24,7 +23,15 @@ from baselines import patches, pixel_mse_toolkit
 from baselines.boxes import MAX_EXPANSION, centre_of, expand, shared_expansion, size_of
 from baselines.clips import TARGET, Clip, Image
 from baselines.estimates import Estimate, Unusable
-from baselines.scales import N_BINS, N_TOP, Match, best_of, scale_bins, weighted_scale_ratio
+from baselines.scales import (
+    N_BINS,
+    N_TOP,
+    Match,
+    at_best_shifts,
+    best_of,
+    scale_bins,
+    weighted_scale_ratio,
+)
 
 Floats = NDArray[np.float64]
 
@@ -54,8 +61,9 @@ class PixelMse:
     """The paper's Pixel MSE, or what the toolkit's code does under that name (`pixel_mse_toolkit`).
 
     `bins` scale ratios over the range of the frame gap; shifts of up to `shift` cells; mean over the `top`
-    best bins; boxes `expand` times as large, where the image has room. `search="coarse-to-fine"` compares
-    coarsely first, then all bins near the best one, four times as fast; only the paper's variant has it.
+    best bins; boxes `expand` times as large, where the image has room. Only the paper's variant has the other
+    two: a patch has at most `cells` cells along its longer side, each at least a pixel; and
+    `search="coarse-to-fine"` compares coarsely first, then all bins near the best one, four times as fast.
     """
 
     variant: Variant = "paper"
@@ -63,6 +71,7 @@ class PixelMse:
     shift: int = MAX_SHIFT
     top: int = N_TOP
     expand: float = MAX_EXPANSION
+    cells: int = patches.MAX_CELLS
     search: Search = "full"
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
@@ -76,15 +85,27 @@ class PixelMse:
         frames = (frame(TARGET - frame_gap), frame(TARGET))
         reference_box, target_box = self.boxes(clip, frames, frame_gap=frame_gap)
         scales = scale_bins(frame_gap=frame_gap, n_bins=self.bins)
-        search = _SEARCHES[self.search] if self.variant == "paper" else pixel_mse_toolkit.search
-        return search(
+        if self.variant == "toolkit":
+            return pixel_mse_toolkit.search(
+                *frames,
+                reference_box=reference_box,
+                target_box=target_box,
+                scales=scales,
+                max_shift=self.shift,
+                n_top=self.top,
+            )
+        comparison = Comparison.of(
             *frames,
             reference_box=reference_box,
             target_box=target_box,
-            scales=scales,
+            max_scale=float(scales[-1]),
             max_shift=self.shift,
-            n_top=self.top,
+            max_cells=self.cells,
         )
+        if self.search == "coarse-to-fine":
+            scales = near_the_best(comparison, scales, max_shift=self.shift)
+        errors = comparison.errors(scales, max_shift=self.shift)
+        return _match(comparison, scales, errors, n_top=self.top)
 
     def boxes(self, clip: Clip, frames: tuple[Image, Image], *, frame_gap: int) -> tuple[Floats, Floats]:
         """The expanded boxes of the reference and the target in these frames; raises as a call does."""
@@ -120,9 +141,10 @@ class Comparison:
         target_box: Floats,
         max_scale: float,
         max_shift: int,
+        max_cells: int = patches.MAX_CELLS,
     ) -> Comparison:
         """Cut and shrink what a search up to `max_scale` and `max_shift` looks at; `Unusable` if flat."""
-        n_cells = patches.cells_of(target_box)
+        n_cells = patches.cells_of(target_box, max_cells=max_cells)
         cell_px = size_of(target_box) / n_cells
         shrink = max(1.0, float(np.max(cell_px)))
         window = patches.cut(
@@ -218,68 +240,18 @@ def _band(length: int, width: int) -> Floats:
     return ((offsets >= 0) & (offsets < width)).astype(np.float64)
 
 
-def search_fully(
-    reference: Image,
-    target: Image,
-    *,
-    reference_box: Floats,
-    target_box: Floats,
-    scales: Floats,
-    max_shift: int,
-    n_top: int,
-) -> Match:
-    """All scales at all shifts. Images are grey, boxes expanded already."""
-    comparison = Comparison.of(
-        reference,
-        target,
-        reference_box=reference_box,
-        target_box=target_box,
-        max_scale=float(np.max(scales)),
-        max_shift=max_shift,
-    )
-    return _match(comparison, scales, comparison.errors(scales, max_shift=max_shift), n_top)
-
-
-def search_coarse_to_fine(
-    reference: Image,
-    target: Image,
-    *,
-    reference_box: Floats,
-    target_box: Floats,
-    scales: Floats,
-    max_shift: int,
-    n_top: int,
-) -> Match:
-    """Every fifth scale in a coarse patch, then all scales near the best of these."""
-    fine = Comparison.of(
-        reference,
-        target,
-        reference_box=reference_box,
-        target_box=target_box,
-        max_scale=float(np.max(scales)),
-        max_shift=max_shift,
-    )
-    coarse = fine.coarser(COARSE_CELLS)
-    coarse_shift = math.ceil(max_shift * float(np.max(fine.cell_px / coarse.cell_px)))
+def near_the_best(comparison: Comparison, scales: Floats, *, max_shift: int) -> Floats:
+    """The scales near the best of every fifth one, which are compared in a coarser patch."""
+    coarse = comparison.coarser(COARSE_CELLS)
+    coarse_shift = math.ceil(max_shift * float(np.max(comparison.cell_px / coarse.cell_px)))
     errors = coarse.errors(scales[::COARSE_STEP], max_shift=coarse_shift)
     place = COARSE_STEP * int(np.argmin(errors.min(axis=(1, 2))))
-    near = scales[max(0, place - NEAR) : place + NEAR + 1]
-    return _match(fine, near, fine.errors(near, max_shift=max_shift), n_top)
+    return scales[max(0, place - NEAR) : place + NEAR + 1]
 
 
-_SEARCHES: Final[dict[Search, Callable[..., Match]]] = {
-    "full": search_fully,
-    "coarse-to-fine": search_coarse_to_fine,
-}
-
-
-def _match(comparison: Comparison, scales: Floats, errors: Floats, n_top: int) -> Match:
+def _match(comparison: Comparison, scales: Floats, errors: Floats, *, n_top: int) -> Match:
     """The best shift of each scale, and the mean over the best scales."""
-    n_shifts = errors.shape[2]
-    flat = errors.reshape(len(scales), -1)
-    places = np.argmin(flat, axis=1)
-    least = flat[np.arange(len(scales)), places]
-    shifts = np.stack([places % n_shifts, places // n_shifts], axis=1) - n_shifts // 2
+    least, shifts = at_best_shifts(errors)
     best = best_of(least, n_top=n_top)
     return Match(
         scales=scales,

@@ -24,7 +24,7 @@ from baselines import patches
 from baselines.boxes import centre_of, size_of
 from baselines.clips import Image
 from baselines.estimates import Unusable
-from baselines.scales import Match, best_of
+from baselines.scales import Match, at_best_shifts, best_of
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
@@ -114,14 +114,11 @@ def search(
     contrast = float(np.var(crops.resampled(1.0), axis=(1, 2)).mean())
     if contrast * 255**2 < patches.MIN_CONTRAST**2:
         raise Unusable("box without texture")
-    errors = errors_of(crops, scales).reshape(len(scales), -1)
-    places = np.argmin(errors, axis=1)
-    least = errors[np.arange(len(scales)), places]
-    n_shifts = 2 * max_shift + 1
+    least, shifts = at_best_shifts(errors_of(crops, scales))
     return Match(
         scales=scales,
         errors=least * 255**2,
-        shifts=np.stack([places % n_shifts, places // n_shifts], axis=1) - max_shift,
+        shifts=shifts,
         scale_ratio=_softmax_mean(scales, least, n_top),
         confidence=1.0 - float(np.min(least)) / contrast,
     )
