@@ -41,7 +41,8 @@ class SequenceFolder:
 
     `boxes` is (n, 6, 4), NaN for a frame without a box: pixels, or parts of the image's width and height
     where `is_normalised`. `boxes_from` names their file or folder, for messages. `images` is the folder that
-    holds the folders of the recordings.
+    holds the folders of the recordings. `has_own_numbers` says that no manifest gave the anno_ids: a board
+    may number the sequences in another way.
     """
 
     path: Path
@@ -50,6 +51,7 @@ class SequenceFolder:
     boxes: NDArray[np.float64]
     boxes_from: str
     is_normalised: bool
+    has_own_numbers: bool = False
 
     @property
     def n_sequences(self) -> int:
@@ -176,4 +178,12 @@ def read_folder(path: Path) -> SequenceFolder:
         missing = f"no {BOXES} and no" if given is not None else f"neither {MANIFEST} with {BOXES} nor"
         raise reject("unreadable", f"The folder has {missing} annotation files; {expected}.", path.name)
     manifest, boxes = found
-    return SequenceFolder(path, root, manifest, boxes, "annotation files", is_normalised=True)
+    return SequenceFolder(
+        path,
+        root,
+        manifest,
+        boxes,
+        "annotation files",
+        is_normalised=True,
+        has_own_numbers=given is None,
+    )

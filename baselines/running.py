@@ -125,14 +125,14 @@ def _done(
         "method": method.name,
         "version": tsttc_version(),
         "provenance": method.provenance(parameters),
-        "parameters": {name: _plain(value) for name, value in parameters.items()},
+        "parameters": _plain(parameters),
         "seconds": round(seconds, 3),
         "n_fallback": _shortened(n_fallback),
         "opencv": cv2.__version__,
+        **_weights(parameters),
     }
-    data = write_predictions(
-        manifest=folder.manifest, scale_ratio=scale_ratio, frame_gap=frame_gap, meta=meta
-    )
+    keys = folder.manifest.natural_keys if folder.has_own_numbers else folder.manifest.anno_id_keys
+    data = write_predictions(keys=keys, scale_ratio=scale_ratio, frame_gap=frame_gap, meta=meta)
     return Run(scale_ratio, n_fallback, examples, n_resumed, seconds, meta, data)
 
 
@@ -150,15 +150,24 @@ def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value]
         "folder": str(folder.images.resolve()),
         "sequences": folder.digest(),
         "method": method.name,
-        "parameters": {name: _plain(value) for name, value in parameters.items()},
+        "parameters": _plain(parameters),
+        **_weights(parameters),
         "frame_gap": frame_gap,
         "versions": [tsttc_version(), cv2.__version__, np.__version__],
     }
     return hashlib.sha256(json.dumps(named, sort_keys=True).encode()).hexdigest()
 
 
-def _plain(value: object) -> object:
-    return str(value) if isinstance(value, Path) else value
+def _plain(parameters: Mapping[str, Value]) -> dict[str, object]:
+    """The parameters as JSON has them; of a file its name, for its folder is nobody's business."""
+    return {name: value.name if isinstance(value, Path) else value for name, value in parameters.items()}
+
+
+def _weights(parameters: Mapping[str, Value]) -> dict[str, dict[str, str]]:
+    """Under "weights", the SHA-256 of each file among the parameters; nothing where there is none."""
+    files = {name: value for name, value in parameters.items() if isinstance(value, Path)}
+    digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
+    return {"weights": digests} if digests else {}
 
 
 def _shortened(n_fallback: Mapping[str, int]) -> dict[str, int]:

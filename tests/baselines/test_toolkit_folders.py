@@ -1,5 +1,6 @@
 """The dataset as it is downloaded is read as it is."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +10,7 @@ import pytest
 from baselines.folders import read_folder
 from baselines.images import ImageCache
 from baselines.running import run_method
-from evaluator import Rejected, read_manifest, read_predictions
+from evaluator import Manifest, Rejected, read_manifest, read_predictions
 from tests.baselines.made_folders import GREY_LEVELS, SIZE, box, picture, write_image
 from tests.evaluator.toolkit_folders import START_NS, STEP_NS, camera, foreign_class, write_folder
 
@@ -45,24 +46,45 @@ def test_boxes_and_frames_are_those_of_the_annotation_files(tmp_path: Path, as_a
     assert np.abs(clip.colour(0).astype(int) - picture(0, 6)).mean() < 4
 
 
-def test_a_run_over_a_download_is_a_file_for_its_manifest(tmp_path: Path) -> None:
-    folder = download(tmp_path)
-    done = run_method(
-        folder=read_folder(folder), method=GREY_LEVELS, parameters={}, frame_gap=5, out=tmp_path / "p.json"
-    )
+def run_on(folder: Path) -> bytes:
+    """The file of a run over this folder."""
+    out = folder / "p.json"
+    done = run_method(folder=read_folder(folder), method=GREY_LEVELS, parameters={}, frame_gap=5, out=out)
     assert done.n_fallback == {}
-    found = read_predictions((tmp_path / "p.json").read_bytes(), manifest=read_manifest(folder))
-    assert len(found.ttc_s) == 2
+    return out.read_bytes()
+
+
+def test_a_run_over_a_download_is_a_file_for_any_manifest_of_its_sequences(tmp_path: Path) -> None:
+    folder = download(tmp_path)
+    own = read_manifest(folder)
+    data = run_on(folder)
+    assert list(json.loads(data)["predictions"]) == list(own.natural_keys)
+    write_renumbered(folder, own)
+    board = read_manifest(folder / "manifest.csv")
+    np.testing.assert_array_equal(
+        read_predictions(data, manifest=board).ttc_s, read_predictions(data, manifest=own).ttc_s[::-1]
+    )
+
+
+def test_a_manifest_beside_the_files_gives_the_file_its_anno_ids(tmp_path: Path) -> None:
+    folder = download(tmp_path)
+    write_renumbered(folder, read_manifest(folder))
+    assert list(json.loads(run_on(folder))["predictions"]) == ["50", "40"]
+
+
+def write_renumbered(folder: Path, own: Manifest) -> None:
+    """A `manifest.csv` of the same two sequences in the reverse order, as 50 and 40."""
+    header, *rows = own.to_csv().decode().splitlines()
+    renumbered = [
+        f"{anno_id},{row.partition(',')[2]}" for anno_id, row in zip((50, 40), rows[::-1], strict=True)
+    ]
+    (folder / "manifest.csv").write_text("\n".join([header, *renumbered, ""]))
 
 
 def test_a_manifest_beside_the_files_gives_order_and_anno_ids(tmp_path: Path) -> None:
     folder = download(tmp_path)
     own = read_folder(folder)
-    header, *rows = own.manifest.to_csv().decode().splitlines()
-    renumbered = [
-        f"{anno_id},{row.partition(',')[2]}" for anno_id, row in zip((50, 40), rows[::-1], strict=True)
-    ]
-    (folder / "manifest.csv").write_text("\n".join([header, *renumbered, ""]))
+    write_renumbered(folder, own.manifest)
     found = read_folder(folder)
     assert found.manifest.anno_id.tolist() == [50, 40]
     assert found.manifest.ts_ns.tolist() == own.manifest.ts_ns.tolist()[::-1]

@@ -9,6 +9,7 @@ import pytest
 from baselines.clips import TARGET, Clip, Image
 from baselines.estimates import Unusable
 from baselines.tracking import TrackerRefused, Tracking, median_flow
+from tests.baselines.onnx_models import UNCHANGED_PX, write_models
 from tests.baselines.scenes import changed, kitti_clips, mean_mid, planted, swapped
 
 track = Tracking()
@@ -108,6 +109,18 @@ def test_models_that_are_absent_or_no_models_are_refused_in_words(tmp_path: Path
     head.write_bytes(b"no model")
     with pytest.raises(TrackerRefused, match="cannot read the models"):
         Tracking(tracker="nano", backbone=backbone, head=head)
+
+
+@pytest.mark.parametrize(("seen", "least", "most"), [(0.7, 0.3, 0.8), (1.0, 0.98, 1.02), (1.5, 1.5, 3.0)])
+def test_nano_track_follows_with_the_models_that_are_given(
+    tmp_path: Path, seen: float, least: float, most: float
+) -> None:
+    backbone, head = write_models(tmp_path, edge_px=seen * UNCHANGED_PX)
+    follow = Tracking(tracker="nano", backbone=backbone, head=head)
+    clip = planted(0.8)
+    found = follow(clip, frame_gap=TARGET).scale_ratio
+    assert least < found < most
+    assert follow(clip, frame_gap=TARGET).scale_ratio == found, "each sequence begins anew"
 
 
 def test_the_error_on_real_frames_is_at_most_13_mid() -> None:

@@ -1,5 +1,6 @@
 """`tsttc baseline run` and `list`: from a folder to a file that the other commands take."""
 
+import hashlib
 import json
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 from baselines.methods import METHODS, Method
 from tests.baselines.made_folders import made_folder, write_boxes
+from tests.baselines.onnx_models import UNCHANGED_PX, write_models
 from tests.evaluator.worlds import Tsttc, on_terminal
 
 
@@ -36,6 +38,19 @@ def test_the_file_of_a_run_is_taken_by_check(tsttc: Tsttc, folder: Path, tmp_pat
     assert result.stderr == ""
     assert tsttc("check", out, "--manifest", folder / "manifest.csv").exit_code == 0
     assert json.loads(out.read_text())["meta"]["parameters"] == {"measure": "height"}
+
+
+def test_the_file_names_its_weights_by_their_digests(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    models = dict(zip(("backbone", "head"), write_models(tmp_path, edge_px=UNCHANGED_PX), strict=True))
+    options = [word for name, path in models.items() for word in (f"--{name}", path)]
+    out = tmp_path / "p.json"
+    result = tsttc("baseline", "run", "tracking", folder, "--out", out, "--tracker", "nano", *options)
+    assert result.exit_code == 0, result.stderr
+    meta = json.loads(out.read_text())["meta"]
+    assert meta["parameters"]["backbone"] == "backbone.onnx", "whose folder is nobody's business"
+    assert meta["weights"] == {
+        name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in models.items()
+    }
 
 
 def test_fallbacks_are_counted_by_reason_with_an_example(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
