@@ -36,6 +36,7 @@ _SECTIONS = {
     "guide": "docs",
     "dist": "docs",
     "api_reference": "api",
+    "api_operation": "api",
 }
 _PREFIXES = {"account_": "account", "maintain": "maintain"}
 

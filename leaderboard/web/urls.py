@@ -97,6 +97,7 @@ urlpatterns = [
     path("tokens/revoke/", token_views.revoke, name="revoke_token"),
     path("docs/", docs_views.docs, name="docs"),
     path("docs/api/", docs_views.api_page, name="api_reference"),
+    path("docs/api/<slug:operation_id>/", cacheable(docs_views.api_operation), name="api_operation"),
     path("docs/search/", takes(docs_views.find, docs_views.SEARCH_PARAMETERS), name="docs_search"),
     path("docs/<path:guide_name>/", cacheable(docs_views.guide), name="guide"),
     path("dist/", wheel_views.dist, name="dist"),

@@ -26,6 +26,7 @@ SCHEMES: tuple[Literal["light", "dark"], ...] = ("light", "dark")
 # What leads to no page, or to none that a sample is needed for.
 OTHERS = {
     "guide_name": "file-format",
+    "operation_id": "submit",
     "page_name": "privacy",
     "wheel_name": "none.whl",
     "chosen": "csv",

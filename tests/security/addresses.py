@@ -95,6 +95,7 @@ def _filled(route: Route, scene: Scene) -> Iterator[str]:
         "object_id": ("1",),
         "content_type_id": ("1",),
         "guide_name": ("researchers", "api-guide", "adr/0001-the-evaluator-is-arithmetic", "nowhere"),
+        "operation_id": ("submit", "board", "nothing"),
         "page_name": ("rules", "contact", "privacy", "imprint", "licence"),
         "wheel_name": ("tsttc-0-py3-none-any.whl",),
         "app_label": ("leaderboard",),

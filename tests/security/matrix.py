@@ -82,6 +82,7 @@ LINES: dict[str, Line] = {
     "dist": line(GET=all_of("404")),
     "dist_file": line(GET=all_of("404"), at={"wheel_name": "tsttc-0-py3-none-any.whl"}),
     "api_reference": line(GET=OPEN),
+    "api_operation": line(GET=OPEN, at={"operation_id": "submit"}),
     # The owner's method is private: its page is its team's, and maintainers'.
     "method": line(GET="404 404 200 200 200 404 404"),
     # --- one's own ---

@@ -27,15 +27,11 @@ def reference() -> Node:
     schemas = _inline_enums(named, named)
     return {
         "operations": [
-            _operation(method.upper(), path, node, schemas)
+            _operation(method.upper(), path, node, schemas, schema["components"]["responses"])
             for path, methods in _inline_enums(schema["paths"], named).items()
             for method, node in methods.items()
         ],
-        "objects": [
-            {"name": name, "about": node.get("description", ""), "fields": _fields(node)}
-            for name, node in schemas.items()
-            if "properties" in node
-        ],
+        "objects": [_object(name, node) for name, node in schemas.items() if "properties" in node],
         "codes": API_CODES.items(),
         "file_codes": [(code, about) for code, about in PROBLEM_CODES.items() if code not in API_CODES],
     }
@@ -54,8 +50,8 @@ def _inline_enums(node: Any, named: Node) -> Any:
     return {key: _inline_enums(value, named) for key, value in node.items()}
 
 
-def _operation(method: str, path: str, node: Node, schemas: Node) -> Node:
-    """One operation. Answers that every operation may give are references; the page names them once."""
+def _operation(method: str, path: str, node: Node, schemas: Node, shared: Node) -> Node:
+    """One operation. Answers that every operation may give are references into `shared`."""
     parameters = sorted(node.get("parameters", []), key=lambda p: (p["in"] != "path", path.find(p["name"])))
     content = node.get("requestBody", {}).get("content", {})
     bodies = {media: schemas[_target(body["schema"])] for media, body in content.items()}
@@ -74,7 +70,34 @@ def _operation(method: str, path: str, node: Node, schemas: Node) -> Node:
             if "$ref" not in answer
             for schema in [next(iter(answer.get("content", {"": {}}).values())).get("schema", {})]
         ],
+        "errors": [
+            (status, shared[_target(answer)]["description"])
+            for status, answer in sorted(node["responses"].items())
+            if "$ref" in answer
+        ],
+        "objects": [_object(name, schemas[name]) for name in _objects_in(node, schemas)],
     }
+
+
+def _object(name: str, node: Node) -> Node:
+    return {"name": name, "about": node.get("description", ""), "fields": _fields(node)}
+
+
+def _objects_in(node: Any, schemas: Node) -> list[str]:
+    """The names of the objects that the answers of an operation consist of, in the order of their mention."""
+    found: list[str] = []
+    waiting = [node["responses"]]
+    while waiting:
+        each = waiting.pop(0)
+        if isinstance(each, list):
+            waiting[:0] = each
+        elif isinstance(each, dict):
+            name = _target(each) if "$ref" in each else ""
+            if name in schemas and name not in found:
+                found.append(name)
+                waiting.append(schemas[name])
+            waiting[:0] = [value for value in each.values() if isinstance(value, dict | list)]
+    return found
 
 
 def _fields(node: Node) -> list[Node]:

@@ -1,13 +1,14 @@
 """The pages of documentation."""
 
-from typing import Final
+from typing import Any, Final
 
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import render
+from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from leaderboard.http import ANYTHING, Parameters
-from leaderboard.web.docs import api_reference, guides, reference, search, wheels
+from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
 
 SEARCH_PARAMETERS: Final[Parameters] = {"q": ANYTHING}
 
@@ -25,7 +26,9 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
     if guide_name not in guides.files():
         raise Http404(f"There is no guide {guide_name!r}.")
     before, after = guides.neighbours(guide_name)
-    context = {"guide": guides.guide(guide_name), "before": before, "after": after}
+    context: dict[str, Any] = {"guide": guides.guide(guide_name), "before": before, "after": after}
+    if guide_name.startswith("adr/"):
+        context["above"] = reverse("guide", args=["decisions"])
     return render(request, "docs/guide.html", {"navigation": guides.navigation(), **context})
 
 
@@ -35,6 +38,21 @@ def find(request: HttpRequest) -> HttpResponse:
     query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
     context = {"query": query, "hits": search.find(query), "longest": search.MAX_QUERY}
     return render(request, "docs/search.html", {"navigation": guides.navigation(), **context})
+
+
+@require_safe
+def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
+    """One operation of the API: a request, its answer, parameters and errors."""
+    operations = api_reference.reference()["operations"]
+    operation = next((each for each in operations if each["id"] == operation_id), None)
+    if operation is None:
+        raise Http404(f"There is no operation {operation_id!r}.")
+    context = {
+        "operation": operation,
+        "example": api_examples.shown(operation_id),
+        "above": reverse("api_reference"),
+    }
+    return render(request, "docs/api_operation.html", {"navigation": guides.navigation(), **context})
 
 
 @require_safe

@@ -136,10 +136,14 @@ def _address(name: str) -> str:
     return reverse("guide", args=[name])
 
 
+def _page_of(operation_id: str) -> str:
+    return reverse("api_operation", args=[operation_id])
+
+
 def _reference() -> Iterator[tuple[str, str, str, str]]:
     api = api_reference.reference()
     page = reverse("api_reference")
     for operation in api["operations"]:
-        yield "API reference", operation["name"], f"{page}#{operation['id']}", operation["about"]
+        yield "API reference", operation["name"], _page_of(operation["id"]), operation["about"]
     for code, about in (*api["codes"], *api["file_codes"]):
         yield "Problem codes", code, f"{page}#problem-{code}", about.replace("`", "")

@@ -1,0 +1,212 @@
+"""An example of each operation of the API: what to send, by curl, by `tsttc` and from Python, and the answer.
+
+The answers in `api_answers.json` were given by the API itself; `tests/api_examples.py` sends every request
+and records them. Ids, times and signatures are the same in all of them, and of a long list only the first
+member is shown.
+"""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any, Final
+from urllib.parse import urlencode
+
+from django.conf import settings
+
+SITE: Final = "https://leaderboard.example.org"
+"""The site of the recorded answers; a page shows its own instead."""
+SUBMISSION: Final = "0f8b1c2d-3e4f-4a5b-8c6d-7e8f9a0b1c2d"
+METHOD: Final = "7c9e6679-7425-4de9-944b-e07fc1f90ae7"
+OTHER: Final = "550e8400-e29b-41d4-a716-446655440000"
+DRAFT: Final = "16fd2706-8baf-433b-82eb-8c7fada847da"
+NOBODYS: Final = "6ba7b810-9dad-41d1-80b4-00c04fd430c8"
+_FORM: Final = {"split": "val", "method": "Deep TTC"}
+_ANSWERS: Final = Path(__file__).with_name("api_answers.json")
+
+
+@dataclass(frozen=True)
+class Call:
+    """A request: `form` goes as multipart with the file, `body` as JSON."""
+
+    method: str
+    path: str
+    query: tuple[tuple[str, str], ...] = ()
+    body: Mapping[str, Any] | None = None
+    form: Mapping[str, str] | None = None
+    has_file: bool = False
+    has_token: bool = True
+    bearer: str = "$TSTTC_TOKEN"
+
+    @property
+    def target(self) -> str:
+        """Path and query."""
+        return f"{self.path}?{urlencode(self.query)}" if self.query else self.path
+
+    def curl(self, site: str) -> str:
+        """The command that sends it."""
+        parts = [f'curl "{site}{self.target}"']
+        if self.method not in {"GET", "POST"} or (self.method == "POST" and not (self.form or self.body)):
+            parts[0] = f'curl -X {self.method} "{site}{self.target}"'
+        if self.has_token:
+            parts.append(f'-H "Authorization: Bearer {self.bearer}"')
+        parts += [f"-F {name}='{text}'" for name, text in (self.form or {}).items()]
+        if self.has_file:
+            parts.append("-F file=@predictions.json")
+        if self.body is not None:
+            parts += ["-H 'Content-Type: application/json'", f"-d '{json.dumps(self.body)}'"]
+        return " \\\n  ".join(parts)
+
+
+@dataclass(frozen=True)
+class Example:
+    """A request that is answered, one that is refused, and the same from the command line and from Python."""
+
+    call: Call
+    refused: Call
+    command: str = ""
+    python: str = ""
+    by: str = field(default="owner")  # who asks: "maintainer" has a token of theirs
+
+
+def _get(path: str, *query: tuple[str, str], has_token: bool = False) -> Call:
+    return Call("GET", f"/api/v1/{path}", query, has_token=has_token)
+
+
+def _own(path: str, *query: tuple[str, str]) -> Call:
+    return _get(path, *query, has_token=True)
+
+
+def _send(method: str, path: str, *, has_token: bool = True, **parts: Any) -> Call:
+    return Call(method, f"/api/v1/{path}", has_token=has_token, **parts)
+
+
+EXAMPLES: Final[Mapping[str, Example]] = {
+    # The order is that in which they are sent: what reads comes before what changes.
+    "list_splits": Example(_get("splits"), _send("GET", "splits", bearer="wrong")),
+    "board": Example(
+        _get("splits/val/board", ("sort", "rte"), ("intervals", "1")),
+        _get("splits/val/board", ("sort", "speed")),
+        "tsttc board val --sort rte",
+        'client.board("val", sort="rte", has_intervals=True)',
+    ),
+    "changelog": Example(
+        _get("splits/val/changelog", ("limit", "10")), _get("splits/val/changelog", ("limit", "0"))
+    ),
+    "list_editions": Example(_get("splits/val/editions"), _get("splits/val/editions", ("after", "x"))),
+    "edition_board": Example(
+        _get("splits/val/editions/1/board"),
+        _get("splits/val/editions/99/board"),
+        "tsttc board val --edition 1",
+        'client.board("val", edition=1)',
+    ),
+    "manifest": Example(
+        _get("splits/val/manifest"), _get("splits/nowhere/manifest"), "", 'client.manifest("val")'
+    ),
+    "compare": Example(
+        _get("compare", ("split", "val"), ("m", METHOD), ("m", OTHER)),
+        _get("compare", ("split", "val"), ("m", METHOD)),
+        "",
+        f'client.compare("val", ["{METHOD}", "{OTHER}"])',
+    ),
+    "method": Example(
+        _get(f"methods/{METHOD}"), _get(f"methods/{NOBODYS}"), "", f'client.method("{METHOD}")'
+    ),
+    "list_methods": Example(_own("methods", ("limit", "1")), _get("methods")),
+    "quota": Example(_own("quota"), _get("quota"), "tsttc quota", "client.quota()"),
+    "list_submissions": Example(_own("submissions", ("limit", "1")), _own("submissions", ("after", "x"))),
+    "submission": Example(
+        _own(f"submissions/{SUBMISSION}", ("wait", "60")),
+        _own(f"submissions/{SUBMISSION}", ("wait", "100")),
+        f"tsttc status {SUBMISSION} --watch",
+        f'client.submission("{SUBMISSION}")',
+    ),
+    "receipt": Example(
+        _own(f"submissions/{SUBMISSION}/receipt"),
+        _own(f"submissions/{SUBMISSION}/receipt", ("edition", "99")),
+        f"tsttc receipt {SUBMISSION}",
+        f'client.receipt("{SUBMISSION}")',
+    ),
+    "foresee_method": Example(
+        _own(f"methods/{DRAFT}/visibility", ("as", "ANONYMOUS")),
+        _own(f"methods/{DRAFT}/visibility", ("as", "EVERYONE")),
+        "",
+        f'client.foreseen("{DRAFT}", "ANONYMOUS")',
+    ),
+    "edit_method": Example(
+        _send("PATCH", f"methods/{DRAFT}", body={"n_frames": 6, "cameras": "ONE"}),
+        _send("PATCH", f"methods/{DRAFT}", body={"n_frames": -1}),
+    ),
+    "show_method": Example(
+        _send(
+            "POST",
+            f"methods/{DRAFT}/visibility",
+            body={"visibility": "ANONYMOUS", "confirm": True},
+        ),
+        _send("POST", f"methods/{DRAFT}/visibility", body={"visibility": "PUBLIC"}),
+        f"tsttc publish {DRAFT} --as anonymous",
+        f'client.show_method("{DRAFT}", "ANONYMOUS")',
+    ),
+    "submit": Example(
+        _send(
+            "POST",
+            "submissions",
+            form={"split": "val", "method": "Deep TTC", "note": "lr 1e-4"},
+            has_file=True,
+        ),
+        _send("POST", "submissions", form=_FORM),
+        'tsttc submit predictions.json --split val --method "Deep TTC" --note "lr 1e-4" --wait',
+        'with open("predictions.json", "rb") as file:\n'
+        '    client.submit(file, filename="predictions.json", split="val", method="Deep TTC")',
+    ),
+    "withdraw": Example(
+        _send("POST", f"submissions/{SUBMISSION}/withdraw"), _send("POST", f"submissions/{NOBODYS}/withdraw")
+    ),
+    "edition_progress": Example(
+        _own("splits/val/editions/2/progress"), _get("splits/val/editions/2/progress"), by="maintainer"
+    ),
+    "edition_preview": Example(
+        _own("splits/val/editions/2/preview"), _get("splits/val/editions/2/preview"), by="maintainer"
+    ),
+    "revoke_token": Example(
+        _send("POST", "tokens/revoke", has_token=False, body={"token": "tsttc_0123456789abcdef"}),
+        _send("POST", "tokens/revoke", has_token=False, body={}),
+    ),
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a request was answered: a status and its phrase, headers worth a line, and the body as text."""
+
+    status: str
+    headers: Mapping[str, str]
+    body: str
+
+
+@cache
+def _recorded() -> dict[str, dict[str, Any]]:
+    found: dict[str, dict[str, Any]] = json.loads(_ANSWERS.read_text(encoding="utf-8"))
+    return found
+
+
+def shown(operation_id: str) -> dict[str, Any]:
+    """What the page of an operation shows: the requests as commands, and their answers."""
+    example, recorded = EXAMPLES[operation_id], _recorded()[operation_id]
+    return {
+        "curl": example.call.curl(settings.SITE_URL),
+        "command": example.command,
+        "python": example.python,
+        "answer": _answer(recorded["answer"]),
+        "refused_curl": example.refused.curl(settings.SITE_URL),
+        "refused": _answer(recorded["refused"]),
+        "refused_code": recorded["refused"]["body"]["code"],
+    }
+
+
+def _answer(recorded: Mapping[str, Any]) -> Answer:
+    body = recorded["body"]
+    text = body if isinstance(body, str) else json.dumps(body, indent=2, ensure_ascii=False)
+    ours = {name: value.replace(SITE, settings.SITE_URL) for name, value in recorded["headers"].items()}
+    return Answer(recorded["status"], ours, text.replace(SITE, settings.SITE_URL))
