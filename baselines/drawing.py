@@ -104,39 +104,52 @@ class Figure:
     title: str
     shapes: list[Shape] = field(default_factory=list)
 
-    def svg(self) -> str:
-        """SVG with its pictures inside, without scripts, styles or references to other files."""
+    def svg(self, *, jpeg_quality: int = JPEG_QUALITY) -> str:
+        """SVG with its pictures inside, without scripts, styles or references to other files.
+
+        `jpeg_quality` is from 1 to 100; lower is smaller.
+        """
         lines = [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
             f'width="{self.width}" height="{self.height}" role="img" font-family="{FONT}">',
             f"<title>{escape(self.title)}</title>",
             f'<rect width="{self.width}" height="{self.height}" fill="{self.theme.ground}"/>',
-            *map(_svg_of, self.shapes),
+            *(_svg_of(shape, jpeg_quality) for shape in self.shapes),
             "</svg>",
         ]
         return "\n".join(lines) + "\n"
 
-    def png(self) -> bytes:
-        """PNG with `PNG_SCALE` pixels a unit."""
+    def pixels(self) -> Image:
+        """The figure painted with `PNG_SCALE` pixels a unit: (height, width, 3), blue first."""
         shape = (self.height * PNG_SCALE, self.width * PNG_SCALE, 3)
         canvas: Image = np.full(shape, _bgr(self.theme.ground), dtype=np.uint8)
         for each in self.shapes:
             _paint(canvas, each)
-        done, data = cv2.imencode(".png", canvas)
-        if not done:
-            raise ArithmeticError(f"OpenCV cannot encode an image of shape {shape}.")
-        return data.tobytes()
+        return canvas
+
+    def png(self) -> bytes:
+        """PNG with `PNG_SCALE` pixels a unit."""
+        return encoded(self.pixels(), ".png")
+
+
+def encoded(pixels: Image, ending: str, *, quality: int = JPEG_QUALITY) -> bytes:
+    """Pixels as a file with this ending, `.png` or `.jpg`; `quality`, from 1 to 100, is a JPEG's."""
+    done, data = cv2.imencode(ending, pixels, [cv2.IMWRITE_JPEG_QUALITY, quality] if ending == ".jpg" else [])
+    if not done:
+        raise ArithmeticError(f"OpenCV cannot encode an image of shape {pixels.shape}.")
+    return data.tobytes()
 
 
 # --- SVG ---------------------------------------------------------------------------------------------------
 
 
-def _svg_of(shape: Shape) -> str:
+def _svg_of(shape: Shape, jpeg_quality: int) -> str:
     match shape:
         case Picture():
+            data = _jpeg(shape.pixels, jpeg_quality)
             return (
                 f'<image x="{shape.x:g}" y="{shape.y:g}" width="{shape.width:g}" height="{shape.height:g}" '
-                f'preserveAspectRatio="none" href="data:image/jpeg;base64,{_jpeg(shape.pixels)}"/>'
+                f'preserveAspectRatio="none" href="data:image/jpeg;base64,{data}"/>'
             )
         case Line():
             points = " ".join(f"{x:.2f},{y:.2f}" for x, y in shape.points)
@@ -157,11 +170,8 @@ def _svg_of(shape: Shape) -> str:
             )
 
 
-def _jpeg(pixels: Image) -> str:
-    done, data = cv2.imencode(".jpg", pixels, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    if not done:
-        raise ArithmeticError(f"OpenCV cannot encode an image of shape {pixels.shape}.")
-    return base64.b64encode(data.tobytes()).decode()
+def _jpeg(pixels: Image, quality: int) -> str:
+    return base64.b64encode(encoded(pixels, ".jpg", quality=quality)).decode()
 
 
 # --- PNG ---------------------------------------------------------------------------------------------------

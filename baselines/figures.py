@@ -19,6 +19,8 @@ from evaluator.metrics.scale import FRAME_RATE_HZ, fps_of_gap, scale_ratio_to_tt
 
 _MARGIN: Final = 24.0
 _GAP: Final = 16.0
+# From here on both equations of the task figure have room side by side.
+_WIDE: Final = 900
 
 
 class _Crop:
@@ -196,8 +198,9 @@ def task_figure(
     """
     ratio = 1 / (1 + 1 / (float(fps_of_gap(TARGET)) * ttc_s))
     n_rows = math.ceil(N_FRAMES / n_columns)
-    side, label, foot = 168.0, 40.0, 96.0
+    side, label = 168.0, 40.0
     width = 2 * _MARGIN + n_columns * side + (n_columns - 1) * _GAP
+    foot = 46.0 if width >= _WIDE else 114.0
     height = _MARGIN + n_rows * (side + label) + foot
     title = (
         f"Six frames at 10 Hz. The vehicle's box is {ratio:.3f} times as large in the first as in the last: "
@@ -217,27 +220,25 @@ def task_figure(
         at_s = (frame - TARGET) / FRAME_RATE_HZ
         figure.shapes.append(Text(f"{at_s:.1f} s".replace("-", "−"), x, y + side + 20, colours.quiet))
         figure.shapes.append(Text(name, x + side, y + side + 20, colours.ink, anchor="end", is_bold=True))
-    y = _MARGIN + n_rows * (side + label) + 26
-    figure.shapes.append(
-        Text(
-            f"size in the reference ÷ size in the target = α = {ratio:.3f}",
-            _MARGIN,
-            y,
-            colours.mark,
-            17,
-            is_bold=True,
-        )
-    )
-    figure.shapes.append(
-        Text(
-            f"time to contact τ = 1 / (2 Hz · (1/α − 1)) = {_seconds(ttc_s)}",
-            _MARGIN,
-            y + 30,
-            colours.ink,
-            17,
-        )
-    )
+    _add_equations(figure, ratio, ttc_s, y=_MARGIN + n_rows * (side + label) + 26)
     return figure
+
+
+def _add_equations(figure: Figure, ratio: float, ttc_s: float, *, y: float) -> None:
+    """The scale ratio and the time to contact: side by side, or below each other on two lines each."""
+    colours = figure.theme
+    scale = ("size in the reference ÷ size in the target", f"= α = {ratio:.3f}")
+    time = ("time to contact τ = 1 / (2 Hz · (1/α − 1))", f"= {_seconds(ttc_s)}")
+    if figure.width < _WIDE:
+        lines = [
+            (text, colour) for texts, colour in ((scale, colours.mark), (time, colours.ink)) for text in texts
+        ]
+        for i, (text, colour) in enumerate(lines):
+            figure.shapes.append(Text(text, _MARGIN, y + 24 * i, colour, 16, is_bold=i < 2))
+        return
+    left = figure.width / 2 + _GAP / 2
+    figure.shapes.append(Text(" ".join(scale), _MARGIN, y, colours.mark, 17, is_bold=True))
+    figure.shapes.append(Text(" ".join(time), left, y, colours.ink, 17))
 
 
 def _seconds(ttc_s: float) -> str:

@@ -23,12 +23,11 @@ PUBLIC = (
         "/board/test.tex?intervals=1",
         "/board/test.md?sort=rte",
     ),
-    *("/board/test.bib", "/board/test/editions/1.csv", "/feed.atom", "/board/test/feed.atom"),
+    *("/board/test.bib", "/board/test/editions/1.csv", "/sitemap.xml", "/feed.atom", "/board/test/feed.atom"),
     *("/methods/{method}/badge.svg", "/methods/{method}/badge.svg?split=val", "/api/v1/methods/{method}"),
 )
 OF_THE_PAST = (
     *(
-        "/?at={at}",
         "/board/test/?at={at}",
         "/board/test/?at={at}&sort=-rte&page=2",
         "/board/test/?at=2020-01-01",

@@ -65,6 +65,12 @@ def latest_change(split: Split) -> Publication | None:
     return latest if latest and latest.replaced_id else None
 
 
+def latest_changes(n: int) -> list[Publication]:
+    """The last changes of all boards, the newest first."""
+    rows = Publication.objects.select_related("split", "edition__ground_truth", "replaced__ground_truth")
+    return list(rows.order_by("-at", "-pk")[:n])
+
+
 def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionRecord, ...]:
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")

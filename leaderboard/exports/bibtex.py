@@ -37,7 +37,8 @@ def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]
 
 
 @lru_cache(maxsize=1)
-def _benchmark() -> dict[str, str]:
+def benchmark_source() -> dict[str, str]:
+    """The benchmark's paper as its published results name it: title, authors, year, url."""
     path = PUBLISHED_DIR / "tsttc-2023.json"
     source: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))["source"]
     return source
@@ -45,13 +46,13 @@ def _benchmark() -> dict[str, str]:
 
 def benchmark_key() -> str:
     """How the benchmark's paper is cited."""
-    source = _benchmark()
+    source = benchmark_source()
     return _paper_key(source["authors"], source["year"], source["title"])
 
 
 def of_benchmark() -> str:
     """The benchmark's paper."""
-    source = _benchmark()
+    source = benchmark_source()
     return _paper(benchmark_key(), source["title"], source["authors"], str(source["year"]), source["url"])
 
 

@@ -15,9 +15,10 @@ class SweepBeat(models.Model):
         default=0, help_text="What waited for a ground truth that the sweeping worker cannot read."
     )
 
-    # When a worker last began to sweep, and to clean; see `workers.queue`.
+    # When a worker last began to sweep, to clean, and to draw cards; see `workers.queue`.
     sweep_begun_at = models.DateTimeField(null=True, blank=True)
     clean_begun_at = models.DateTimeField(null=True, blank=True)
+    cards_begun_at = models.DateTimeField(null=True, blank=True)
 
     # What was removed because no submission named it, since the beginning; see `workers.upkeep`.
     cleaned_at = models.DateTimeField(null=True, blank=True)

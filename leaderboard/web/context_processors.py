@@ -12,7 +12,7 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.models import Split
 
 _SECTIONS = {
-    "home": "board",
+    "home": "home",
     "board": "board",
     "edition": "board",
     "editions": "board",

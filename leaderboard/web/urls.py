@@ -8,12 +8,14 @@ from leaderboard.web.boards import (
     badge_and_feed_views,
     board_query,
     board_views,
+    card_views,
     chart_views,
     compare_views,
     edition_views,
     export_views,
 )
 from leaderboard.web.docs import docs_views, page_views, wheel_views
+from leaderboard.web.landing import crawler_views, landing_views
 from leaderboard.web.maintain import (
     audit_views,
     edited_page_views,
@@ -36,8 +38,10 @@ MAINTAINED_EDITION = [
     path("discard/", maintainer_views.discard, name="maintain_discard"),
 ]
 urlpatterns = [
-    path("", cacheable(board_views.home, board_query.PARAMETERS), name="home"),
+    path("", cacheable(landing_views.home, board_query.PARAMETERS), name="home"),
+    path("board/", takes(landing_views.main_board, board_query.PARAMETERS), name="main_board"),
     path("board/<slug:split>/", cacheable(board_views.board, board_query.PARAMETERS), name="board"),
+    path("board/<slug:split>/card.png", takes(card_views.board_card), name="board_card"),
     path("board/<slug:split>/charts/", takes(chart_views.board_charts), name="charts"),
     path(
         "board/<slug:split>/charts/progress.json",
@@ -67,6 +71,10 @@ urlpatterns = [
         cacheable(badge_and_feed_views.badge, badge_and_feed_views.PARAMETERS),
         name="badge",
     ),
+    path("methods/<uuid:method_id>/card.png", takes(card_views.method_card), name="method_card"),
+    path("robots.txt", crawler_views.robots, name="robots"),
+    path("sitemap.xml", cacheable(crawler_views.sitemap), name="sitemap"),
+    path("favicon.ico", crawler_views.favicon, name="favicon"),
     path("submit/", submission_views.submit, name="submit"),
     path("submit/template/<slug:split>.json", submission_views.template, name="template"),
     path("submissions/", submission_views.submission_list, name="submissions"),

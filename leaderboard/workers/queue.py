@@ -23,7 +23,7 @@ from leaderboard.models import Evaluation, SweepBeat
 from leaderboard.ops import health, rate_limits
 from leaderboard.scoring import analyses, lifecycle, worker
 from leaderboard.storage import truth_values
-from leaderboard.workers import backlog, upkeep
+from leaderboard.workers import backlog, pictures, upkeep
 
 log = structlog.get_logger(__name__)
 
@@ -61,6 +61,12 @@ def clean_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
     """Clean, unless somebody has begun to within `CLEAN_S`."""
     if _begun("clean_begun_at", every_s=settings.CLEAN_S):
         upkeep.clean(now=clock.database_now())
+
+
+def draw_cards_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
+    """Draw the cards that are missing, unless somebody has begun to within `SWEEP_S`."""
+    if _begun("cards_begun_at", every_s=settings.SWEEP_S):
+        pictures.draw(now=clock.database_now(), is_stopping=stopping.is_set)
 
 
 def _begun(field: str, *, every_s: float) -> bool:
@@ -132,7 +138,7 @@ class Poller(threading.Thread):
 
 
 def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
-    """Let this process look for work, sweep and clean by itself.
+    """Let this process look for work, sweep, clean and draw cards by itself.
 
     One for each, so that neither a long run nor a slow store keeps the queue from being swept.
     """
@@ -140,6 +146,7 @@ def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
         Poller(poll, every_s=settings.POLL_S, rng=rng),
         Poller(sweep_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
         Poller(clean_if_due, every_s=min(settings.CLEAN_S, 60.0), rng=rng),
+        Poller(draw_cards_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
     )
     for poller in pollers:
         poller.start()

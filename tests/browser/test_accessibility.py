@@ -42,7 +42,7 @@ VIEWS = (
 )
 # Parts of pages, for a page that is open.
 PARTS = ("/state/", "/progress/")
-FAULTS = ("/nowhere/", "/?sort=nothing", f"/board/{world.SPLIT}/?at=never")
+FAULTS = ("/nowhere/", f"/board/{world.SPLIT}/?sort=nothing", f"/board/{world.SPLIT}/?at=never")
 
 
 @pytest.fixture(scope="module")

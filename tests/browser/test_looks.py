@@ -13,6 +13,7 @@ pytestmark = pytest.mark.browser
 
 PUBLIC = (
     "/",
+    "/board/test/",
     "/board/test/?sort=-rte_negative",
     "/board/test/?columns=mid&q=deep",
     "/board/test/charts/",
@@ -92,7 +93,7 @@ def test_print_has_the_whole_table_and_no_navigation(
     # A sheet of A4 is 703 px wide between its margins: as narrow as a small tablet.
     page = new_page(viewport=viewport)
     page.emulate_media(media="print")
-    page.goto("/")
+    page.goto("/board/test/")
     expect(page.locator(".site-nav")).to_be_hidden()
     expect(page.locator("table.board thead tr").last.locator("th:visible")).to_have_count(12)
 

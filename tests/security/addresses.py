@@ -133,4 +133,4 @@ def _queries(route: Route, scene: Scene, described: dict[str, dict[str, Any]]) -
 
 
 # Pages that have a board in them, and take its questions.
-BOARDS = {"home", "board", "edition", "charts", "export", "edition_export"}
+BOARDS = {"board", "edition", "charts", "export", "edition_export"}

@@ -97,7 +97,7 @@ def somewhere(asked: list[str]) -> Iterator[str]:
 
 
 def is_of_a_board(address: str) -> bool:
-    return address.startswith(("/board/", "/api/v1/splits/")) or address.partition("?")[0] == "/"
+    return address.startswith(("/board/", "/api/v1/splits/"))
 
 
 def differences(directory: Path, *, limit: int | None) -> tuple[list[str], int, dict[int, int]]:

@@ -21,13 +21,22 @@ PEOPLES_LINKS = re.compile(r'<a\b[^>]*href="\{\{\s*[\w.]*(?:paper_url|code_url)\
 
 def test_no_template_takes_text_for_markup() -> None:
     assert len(TEMPLATES) > 40
-    trusting = re.compile(r"\|\s*safe\b|\|\s*safeseq\b|autoescape\s+off|<script(?![^>]*\bsrc=)|javascript:")
+    script = r"<script(?![^>]*\bsrc=)(?! type=\"application/ld\+json\">)"
+    trusting = re.compile(rf"\|\s*safe\b|\|\s*safeseq\b|autoescape\s+off|{script}|javascript:")
     found = {
         str(path.relative_to(REPOSITORY)): trusting.findall(path.read_text())
         for path in TEMPLATES
         if trusting.search(path.read_text())
     }
     assert found == {}
+
+
+def test_every_text_in_data_for_search_engines_is_escaped_for_a_script() -> None:
+    data = re.compile(r'<script type="application/ld\+json">(.*?)</script>', re.DOTALL)
+    found = [text for path in TEMPLATES for text in data.findall(path.read_text())]
+    filled = [name for text in found for name in re.findall(r"{{(.*?)}}", text)]
+    assert filled
+    assert [name for name in filled if not name.strip().endswith("|escapejs")] == []
 
 
 # The two places that trust a text which is not empty: one puts a drawing of numbers into another, one has

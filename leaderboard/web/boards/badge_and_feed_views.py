@@ -14,7 +14,7 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import badges, feeds
 from leaderboard.http import matching
 from leaderboard.models import Method, Split
-from leaderboard.web.boards.board_views import HOME_SPLIT
+from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.context_processors import split_or_404
 
 PARAMETERS: Final = {"split": matching(r"[a-zA-Z0-9_-]{0,32}")}
@@ -23,7 +23,7 @@ PARAMETERS: Final = {"split": matching(r"[a-zA-Z0-9_-]{0,32}")}
 @require_safe
 def badge(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Rank and MiD of a method on `?split=`, as a drawing for a README."""
-    split = split_or_404(request, request.GET.get("split") or HOME_SPLIT)
+    split = split_or_404(request, request.GET.get("split") or MAIN_SPLIT)
     entries = snapshots.board(split=split, viewer=AnonymousUser()).entries
     entry = next((entry for entry in entries if entry.method_id == method_id), None)
     if entry is None and not Method.objects.shown().filter(pk=method_id).exists():

@@ -17,13 +17,8 @@ from leaderboard.web.boards.board_query import BoardQuery
 from leaderboard.web.boards.board_tools import tools
 from leaderboard.web.context_processors import split_or_404
 
-HOME_SPLIT = "test"
-
-
-@require_safe
-def home(request: HttpRequest) -> HttpResponse:
-    """The board that papers quote."""
-    return board(request, HOME_SPLIT)
+MAIN_SPLIT = "test"
+"""The split whose board papers quote."""
 
 
 @require_safe

@@ -14,7 +14,7 @@ from leaderboard.models import Split
 from leaderboard.ops import rate_limits
 from leaderboard.scoring import comparisons, questions
 from leaderboard.web.boards import compare_tables
-from leaderboard.web.boards.board_views import HOME_SPLIT
+from leaderboard.web.boards.board_views import MAIN_SPLIT
 
 _ID: Final = r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}"
 PARAMETERS: Final = {
@@ -36,7 +36,7 @@ class UnknownSplit(comparisons.BadComparison):
 @require_safe
 def compare(request: HttpRequest) -> HttpResponse:
     """Two to five methods of one board, their differences and what they mean; or the choice of them."""
-    wanted, name = request.GET.getlist("m"), request.GET.get("split") or HOME_SPLIT
+    wanted, name = request.GET.getlist("m"), request.GET.get("split") or MAIN_SPLIT
     splits = splits_of(request)
     split = next((split for split in splits if split.pk == name), None)
     try:

@@ -196,7 +196,9 @@ class PageCacheMiddleware:
     """Answers anybody from memory where that holds, and remembers what views of that kind answer."""
 
     # Where such views are; elsewhere not even the path is looked up.
-    PREFIXES: Final = ("/board/", "/methods/", "/compare/", "/feed", "/api/v1/splits", "/api/v1/methods/")
+    PREFIXES: Final = (
+        *("/board/", "/methods/", "/compare/", "/feed", "/sitemap", "/api/v1/splits", "/api/v1/methods/"),
+    )
 
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response

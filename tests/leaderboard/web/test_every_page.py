@@ -22,6 +22,7 @@ PUBLIC = [
     "/board/test/",
     "/board/val/",
     "/board/demo/",
+    "/board/",
     "/?sort=-rte",
     "/docs/",
     "/docs/api/",
@@ -59,11 +60,12 @@ PRIVATE = [
 FAULTS = {
     "/nowhere/": 404,
     "/board/nowhere/": 404,
-    "/?sort=nowhere": 400,
+    "/board/test/?sort=nowhere": 400,
     f"/methods/{UUID(int=1)}/": 404,
 }
 # Elements whose text is read by a machine, and attributes that run or style something in place.
 INLINE_TAGS = {"style"}
+DATA = {"application/json", "application/ld+json"}
 INLINE_ATTRIBUTES = re.compile(r"^(on\w+|style)$")
 # Links that browsers follow only when somebody asks them to.
 LEADING_ON = {"canonical", "alternate"}
@@ -107,7 +109,7 @@ def assert_nothing_inline(html: pages.Element) -> None:
 
 def is_data(element: pages.Element) -> bool:
     """Whether it holds data for a script, which no browser runs."""
-    return element.tag == "script" and element.attributes == {"type": "application/json"}
+    return element.tag == "script" and element.attributes.get("type") in DATA
 
 
 def assert_nothing_from_elsewhere(html: pages.Element) -> None:
@@ -115,7 +117,8 @@ def assert_nothing_from_elsewhere(html: pages.Element) -> None:
         if (element.tag in {"script", "img", "iframe", "source"} and not is_data(element)) or (
             element.tag == "link" and element.attributes["rel"] not in LEADING_ON
         ):
-            address = element.attributes.get("src", element.attributes.get("href", ""))
+            names = ("src", "srcset", "href")
+            address = next((found for name in names if (found := element.attributes.get(name))), "")
             assert OWN.match(address), element
             if not address.startswith("/methods/"):  # a badge is drawn, and no file
                 assert finders.find(address.removeprefix("/static/")), f"{address} is no static file"
@@ -177,9 +180,9 @@ def test_a_page_of_a_fault_leads_back_to_where_one_was_with_its_filters(
 ) -> None:
     settings.SITE_URL = "https://board.example.org"
     main = pages.get(client, "/nowhere/", 404).one("main")
-    assert [a.attributes["href"] for a in main.all("a")] == ["/", "/docs/"]
+    assert [a.attributes["href"] for a in main.all("a")] == ["/board/", "/docs/"]
     root = assert_sound(client.get("/nowhere/", headers={"Referer": referer}))
-    assert [a.attributes["href"] for a in root.one("main").all("a")] == [*back, "/", "/docs/"]
+    assert [a.attributes["href"] for a in root.one("main").all("a")] == [*back, "/board/", "/docs/"]
 
 
 def test_pages_of_a_submissions_life_are_sound(client: Client, edition: Edition, owner: User) -> None:

@@ -41,7 +41,7 @@ def test_board_shows_the_name_that_was_given_and_no_address(client: Client, edit
     builders.submit(User.objects.get(email="new@example.org"), builders.predictions(edition))
     builders.score_all()
     client.logout()
-    board = client.get("/")
+    board = client.get("/board/test/")
     assert any("Lapwings" in method for method in pages.column(pages.page(board), 1))
     assert b"new@example.org" not in board.content
 

@@ -37,10 +37,6 @@ def test_columns_are_the_papers_in_its_order(client: Client, benchmark: None) ->
     ]
 
 
-def test_home_is_the_test_board(client: Client, benchmark: None) -> None:
-    assert pages.board_rows(get(client, "/")) == pages.board_rows(get(client, "/board/test/"))
-
-
 def test_published_numbers_stand_as_printed(client: Client, benchmark: None) -> None:
     first = pages.board_rows(get(client))[0]
     assert first[RANK] == "1"
@@ -108,16 +104,16 @@ def test_best_and_second_are_marked_for_eye_and_ear(client: Client, benchmark: N
 
 
 def test_sorting_keeps_the_ranks(client: Client, benchmark: None) -> None:
-    root = get(client, "/?sort=-mid")
+    root = get(client, "/board/test/?sort=-mid")
     assert pages.column(root, RANK) == ["5", "4", "3", "2", "1"]
 
 
 def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) -> None:
-    root = get(client, "/?sort=mid_crucial")
+    root = get(client, "/board/test/?sort=mid_crucial")
     (decisive,) = [head for head in root.all("th") if "aria-sort" in head.attributes]
     assert decisive.attributes["aria-sort"] == "ascending"
     assert decisive.one("a").attributes["href"] == "?sort=-mid_crucial"
-    turned = get(client, "/?sort=-mid_crucial")
+    turned = get(client, "/board/test/?sort=-mid_crucial")
     (decisive,) = [head for head in turned.all("th") if "aria-sort" in head.attributes]
     assert decisive.attributes["aria-sort"] == "descending"
     assert decisive.one("a").attributes["href"] == "?sort=mid_crucial"
@@ -130,7 +126,7 @@ def test_the_newest_come_first_when_sorting_by_date(client: Client, benchmark: N
 
 @pytest.mark.parametrize("sort", ["nothing", "mid;drop", "--mid", "-", "<script>alert(1)</script>"])
 def test_sorting_by_no_column_is_a_clear_400(client: Client, benchmark: None, sort: str) -> None:
-    response = client.get("/", {"sort": sort})
+    response = client.get("/board/test/", {"sort": sort})
     assert response.status_code == 400
     said = pages.page(response).one("main").text
     assert "cannot be sorted by" in said
@@ -185,7 +181,7 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
         data = builders.predictions(edition, factor=factor)
         builders.submit(owner, data, method=name, visibility=visibility)
     builders.score_all()
-    assert b"Secret" not in client.get("/").content
+    assert b"Secret" not in client.get("/board/test/").content
     seen = {}
     for user in (owner, teammate, stranger):
         client.force_login(user)

@@ -31,7 +31,7 @@ def get(client: Client, method: Method) -> pages.Element:
 
 
 def test_board_leads_to_the_method(client: Client, method: Method) -> None:
-    links = [a.attributes["href"] for a in pages.page(client.get("/")).one("tbody").all("a")]
+    links = [a.attributes["href"] for a in pages.page(client.get("/board/test/")).one("tbody").all("a")]
     assert f"/methods/{method.pk}/" in links
 
 
@@ -47,7 +47,9 @@ def test_it_says_what_it_is_and_where_to_read_more(client: Client, method: Metho
 
 
 def test_its_values_are_those_of_the_board(client: Client, method: Method) -> None:
-    (row,) = [row for row in pages.board_rows(pages.page(client.get("/"))) if row[1].startswith("Foo")]
+    (row,) = [
+        row for row in pages.board_rows(pages.page(client.get("/board/test/"))) if row[1].startswith("Foo")
+    ]
     main = get(client, method).one("main")
     values = [
         cell.text.removesuffix(" best").removesuffix(" second")

@@ -14,7 +14,7 @@ from tests import board_rows
 pytestmark = pytest.mark.slow
 
 API = "/api/v1/splits/test/board"
-PAGES = ("/", "/board/test/", API, "/board/test.csv", "/board/test/editions/", "/compare/")
+PAGES = ("/", "/board/test/", API, "/board/test.csv", "/board/test/editions/", "/compare/", "/sitemap.xml")
 
 
 @pytest.fixture

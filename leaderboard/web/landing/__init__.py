@@ -1,0 +1,1 @@
+"""The landing page, and what crawlers ask for: robots.txt, the sitemap, the icon."""

@@ -1,0 +1,76 @@
+"""What crawlers and browsers ask for by fixed names: robots.txt, sitemap.xml, favicon.ico."""
+
+from collections.abc import Iterator, Sequence
+from datetime import datetime
+from typing import Final
+
+from django.conf import settings
+from django.http import HttpRequest, HttpResponse, HttpResponseRedirect
+from django.templatetags.static import static
+from django.urls import reverse
+from django.views.decorators.http import require_safe
+
+from leaderboard.boards import snapshots
+from leaderboard.boards.rows import Entry
+from leaderboard.boards.snapshots import splits_of
+from leaderboard.exports import sitemaps
+from leaderboard.exports.sitemaps import SitePage
+from leaderboard.models import Edition, Split, Visibility
+
+# Public pages that are about no board.
+PAGES: Final = ("home", "docs", "api_reference")
+# Pages of one's own, and views of a page that the page itself offers: its orders, filters and days.
+_NOT_FOR_CRAWLERS: Final = (
+    *("/accounts/", "/admin/", "/api/", "/maintain/", "/submissions/", "/team/", "/tokens/", "/*?"),
+)
+
+
+@require_safe
+def robots(request: HttpRequest) -> HttpResponse:
+    """What crawlers need not look at."""
+    lines = [
+        "User-agent: *",
+        *(f"Disallow: {path}" for path in _NOT_FOR_CRAWLERS),
+        f"Sitemap: {settings.SITE_URL}{reverse('sitemap')}",
+    ]
+    return HttpResponse("\n".join([*lines, ""]), content_type="text/plain; charset=utf-8")
+
+
+@require_safe
+def favicon(request: HttpRequest) -> HttpResponse:
+    """The icon, for who asks for it by its usual name instead of by the link of the page."""
+    return HttpResponseRedirect(static("favicon.ico"))
+
+
+@require_safe
+def sitemap(request: HttpRequest) -> HttpResponse:
+    """Every public page. Private and anonymous methods and withdrawn rows are left out."""
+    pages = [
+        *(SitePage(_absolute(name)) for name in PAGES),
+        *_of_boards(splits_of(request)),
+    ]
+    return HttpResponse(sitemaps.xml(pages), content_type="application/xml; charset=utf-8")
+
+
+def _of_boards(splits: Sequence[Split]) -> Iterator[SitePage]:
+    for split in splits:
+        for name in ("board", "charts", "editions"):
+            yield SitePage(_absolute(name, split.pk))
+    editions = Edition.objects.exclude(published_at=None).order_by("split", "number")
+    for split_id, number, published_at in editions.values_list("split", "number", "published_at"):
+        yield SitePage(_absolute("edition", split_id, number), published_at)
+    methods: dict[str, datetime | None] = {}
+    for _, drawn in snapshots.shown_on(splits):
+        methods |= {str(entry.method_id): entry.listed_at for entry in drawn.entries if _is_listed(entry)}
+    for method_id, listed_at in sorted(methods.items()):
+        yield SitePage(_absolute("method", method_id), listed_at)
+
+
+def _is_listed(entry: Entry) -> bool:
+    return (
+        entry.method_id is not None and entry.visibility == Visibility.PUBLIC and entry.withdrawn_at is None
+    )
+
+
+def _absolute(name: str, *args: object) -> str:
+    return settings.SITE_URL + reverse(name, args=args)

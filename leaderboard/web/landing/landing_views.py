@@ -1,0 +1,85 @@
+"""The landing page, and the way to the main board."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+from urllib.parse import urlencode
+
+from django.contrib.auth.models import AnonymousUser
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseRedirect
+from django.shortcuts import render
+from django.urls import reverse
+from django.utils import timezone
+from django.views.decorators.http import require_safe
+
+from leaderboard.boards import snapshots
+from leaderboard.boards.snapshots import splits_of
+from leaderboard.exports import bibtex
+from leaderboard.models import Split, User
+from leaderboard.quotas import deadlines
+from leaderboard.web.boards import board_query
+from leaderboard.web.boards.board_views import MAIN_SPLIT
+from leaderboard.web.landing.leaders import lead_words, leaders
+from leaderboard.web.landing.news import latest
+from leaderboard.web.submissions.forms import offers_for
+
+
+@dataclass(frozen=True)
+class SplitDates:
+    """A split, and in a sentence when it takes submissions: from its reader's team where that is known."""
+
+    split: Split
+    sentence: str
+
+
+@require_safe
+def home(request: HttpRequest) -> HttpResponse:
+    """The landing page. It was the main board once: addresses with a board's questions still lead there."""
+    if any(request.GET.get(name) for name in board_query.PARAMETERS):
+        return main_board(request)
+    splits = splits_of(request)
+    main = main_split(splits)
+    source = bibtex.benchmark_source()
+    context = {
+        "dates": dates(splits, reader=request.user, now=timezone.now()),
+        "news": latest(splits),
+        "citation": bibtex.of_benchmark(),
+        "source": source,
+        "authors": [name.strip() for name in source["authors"].split(",")],
+        "board_split": main.pk if main else "",
+    }
+    return render(request, "landing/home.html", context | (_leading(main) if main else {}))
+
+
+@require_safe
+def main_board(request: HttpRequest) -> HttpResponse:
+    """To the main board, as the address asks for it."""
+    main = main_split(splits_of(request))
+    if main is None:
+        raise Http404("There is no board yet.")
+    asked = {name: request.GET[name] for name in board_query.PARAMETERS if request.GET.get(name)}
+    address = reverse("board", args=[main.pk])
+    return HttpResponseRedirect(f"{address}?{urlencode(asked)}" if asked else address)
+
+
+def main_split(splits: Sequence[Split]) -> Split | None:
+    """The split whose numbers papers quote; without it the first, if there is any."""
+    return next((split for split in splits if split.pk == MAIN_SPLIT), next(iter(splits), None))
+
+
+def dates(splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetime) -> list[SplitDates]:
+    """Every split with its dates; for a person who is signed in with what their team has left."""
+    if reader.is_authenticated:
+        offers = offers_for(reader, now=now)
+        return [SplitDates(offer.split, offer.sentence) for offer in offers]
+    return [
+        SplitDates(split, deadlines.sentence_of(split, now=now) or f"Submissions to {split.pk} are open.")
+        for split in splits
+    ]
+
+
+def _leading(main: Split) -> dict[str, Any]:
+    """What the page tells of the main board: only what everybody sees, whoever reads."""
+    board = snapshots.board(split=main, viewer=AnonymousUser())
+    return {"board": board, "leaders": leaders(board), "lead": lead_words(board)}

@@ -1,0 +1,99 @@
+"""The first rows of a board, and in a sentence whether the lead is certain."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.scoring.report import format_published
+from leaderboard.boards.boards import Board
+from leaderboard.boards.rows import Entry, Interval
+from leaderboard.exports.tables import short_authors
+from leaderboard.scoring import verdicts
+from leaderboard.web.boards.score_columns import interval_words
+from leaderboard.web.boards.tables import rank_range
+
+N_LEADERS: Final = 3
+# So many methods are named; of more, the rest is counted.
+_MAX_NAMED: Final = 2
+
+
+@dataclass(frozen=True)
+class Leader:
+    """One of the first rows. `interval` and `rank_range` are empty where they are not known."""
+
+    entry: Entry
+    team: str
+    value: str
+    interval: str
+    rank_range: str
+
+
+def leaders(board: Board) -> tuple[Leader, ...]:
+    """The first rows of a board that is in the order of its ranks."""
+    return tuple(_leader(entry) for entry in _ranked(board)[:N_LEADERS])
+
+
+def _leader(entry: Entry) -> Leader:
+    return Leader(
+        entry=entry,
+        team=short_authors(entry.team) if entry.kind == "published" else entry.team,
+        value=format_published(entry.scores[PRIMARY], decimals=entry.decimals),
+        interval=interval_words(entry.intervals.get(PRIMARY, Interval()), decimals=entry.decimals),
+        rank_range=rank_range(entry).strip("()"),
+    )
+
+
+def _ranked(board: Board) -> list[Entry]:
+    return [entry for entry in board.entries if entry.rank is not None]
+
+
+def lead_words(board: Board) -> str:
+    """Whether the lead is certain, from the rank ranges of the board's rows; empty where nobody leads.
+
+    A rank range holds the ranks that a row may have at 95 % confidence for all rows together.
+    """
+    ranked = _ranked(board)
+    first = [entry for entry in ranked if entry.rank == 1]
+    if len(ranked) < 2:
+        return ""
+    if len(first) > 1:
+        return f"{_listed([entry.method for entry in first])} share the first rank."
+    (leader,) = first
+    found = leader.intervals.get(PRIMARY, Interval())
+    if found.rank_low is None or found.rank_high is None:
+        return (
+            f"It is not known whether the lead of {leader.method} is certain: {_why_unknown(board, leader)}"
+        )
+    if found.rank_high == 1:
+        return f"The lead of {leader.method} is certain: at 95 % confidence its rank is 1."
+    also = [entry.method for entry in ranked[1:] if _may_lead(entry)]
+    others = f" {_listed(also)} may also be first." if also else ""
+    return (
+        f"The lead of {leader.method} is not certain: at 95 % confidence its rank is "
+        f"{found.rank_low} to {found.rank_high}.{others}"
+    )
+
+
+def _may_lead(entry: Entry) -> bool:
+    return entry.intervals.get(PRIMARY, Interval()).rank_low == 1
+
+
+def _why_unknown(board: Board, leader: Entry) -> str:
+    if leader.kind == "published":
+        return "papers report no values per recording."
+    reason = verdicts.why_no_interval(board.edition) if board.edition else ""
+    # As the end of a sentence.
+    return f"{reason[:1].lower()}{reason[1:]}" or "the confidence intervals are being computed."
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Names in a sentence.
+
+    >>> _listed(["A"]), _listed(["A", "B"]), _listed(["A", "B", "C"]), _listed(["A", "B", "C", "D"])
+    ('A', 'A and B', 'A, B and 1 other method', 'A, B and 2 other methods')
+    """
+    if len(names) <= _MAX_NAMED:
+        return " and ".join(names)
+    n_more = len(names) - _MAX_NAMED
+    return f"{', '.join(names[:_MAX_NAMED])} and {n_more} other method{'' if n_more == 1 else 's'}"

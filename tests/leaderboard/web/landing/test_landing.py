@@ -1,0 +1,219 @@
+"""The landing page: what time to contact is, who leads and how certainly, and where to go from there."""
+
+import json
+from datetime import timedelta
+
+import pytest
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard.models import Edition, PublishedResult, Split, Submission, User
+from leaderboard.web.landing.landing_views import main_split
+from tests import builders, pages
+from tests.editions import publish, roll_back
+
+DOORS = ["Get the data", "Submit", "Read the docs", "Paper"]
+
+
+def landing(client: Client) -> pages.Element:
+    return pages.get(client, "/").one("main")
+
+
+def panel(client: Client, name: str) -> pages.Element:
+    return landing(client).one("section", **{"aria-labelledby": name})
+
+
+def alone(client: Client) -> str:
+    """The sentence on the lead, without the link behind it."""
+    return landing(client).one("p", class_="lead-words").text.removesuffix(" Uncertainty")
+
+
+# --- what it shows ---------------------------------------------------------------------------------------
+
+
+def test_it_explains_the_task_in_a_figure_and_two_sentences_and_leads_on(
+    client: Client, benchmark: None
+) -> None:
+    main = landing(client)
+    words, doors = main.one("div", class_="hero-words").all("p")
+    assert words.text.count(". ") == 1
+    assert [a.text for a in doors.all("a")] == DOORS
+    picture = main.one("picture")
+    assert "scale ratio" in picture.one("img").attributes["alt"]
+    drawn = [*picture.all("source"), picture.one("img")]
+    assert len(drawn) == 4
+    assert all({"width", "height"} <= set(each.attributes) for each in drawn)
+
+
+def test_the_leaders_are_the_first_rows_of_the_main_board(client: Client, benchmark: None) -> None:
+    rows = landing(client).one("ol", class_="leaders").all("li")
+    board = pages.board_rows(pages.get(client, "/board/test/"))[:3]
+    assert [row.one("span", class_="number").text for row in rows] == [row[2] for row in board]
+    names = [row.one("p", class_="name").text for row in rows]
+    assert all(row[1].startswith(name) for row, name in zip(board, names, strict=True))
+
+
+def test_a_private_method_leads_nowhere_on_it_not_even_for_its_own_team(
+    signed_in: Client, client: Client, edition: Edition, owner: User
+) -> None:
+    data = builders.predictions(edition, factor=1.001)
+    builders.submit(owner, data, method="Secret", visibility="PRIVATE")
+    builders.score_all()
+    assert b"Secret" not in signed_in.get("/").content
+    assert b"Secret" not in Client().get("/").content
+
+
+def test_without_a_split_an_entry_or_with_one_entry_it_says_so(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    PublishedResult.objects.all().delete()
+    builders.board_changed("test")
+    assert "There are no ranked results on test yet." in panel(client, "leaders").text
+    builders.submit(owner, builders.predictions(edition), method="Alone")
+    builders.score_all()
+    (row,) = panel(client, "leaders").all("li")
+    assert row.one("p", class_="name").text == "Alone"
+    assert landing(client).all("p", class_="lead-words") == []
+    assert main_split([]) is None
+
+
+def test_a_site_without_any_split_has_a_landing_page_and_no_main_board(client: Client, db: None) -> None:
+    PublishedResult.objects.all().delete()
+    Split.objects.all().delete()
+    assert "There is no board yet." in panel(client, "boards").text
+    assert client.get("/board/").status_code == 404
+
+
+# --- whether the lead is certain -------------------------------------------------------------------------
+
+
+def test_a_lead_of_rows_from_papers_is_not_known_to_be_certain(client: Client, benchmark: None) -> None:
+    assert alone(client) == (
+        "It is not known whether the lead of Deep Scale is certain: papers report no values per recording."
+    )
+
+
+def test_the_lead_is_as_certain_as_the_rank_range_of_the_first_row_says(
+    client: Client, edition: Edition, owner: User, open_values: None
+) -> None:
+    PublishedResult.objects.all().delete()
+    for name, factor in (("First", 1.01), ("Last", 2.0)):
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=name)
+    builders.score_all()
+    assert alone(client).endswith("the confidence intervals are being computed.")
+    builders.infer_all()
+    assert alone(client) == "The lead of First is certain: at 95 % confidence its rank is 1."
+    builders.submit(owner, builders.predictions(edition, factor=1.01), method="Twin")
+    builders.score_all()
+    builders.infer_all()
+    assert alone(client) == "First and Twin share the first rank."
+
+
+# --- dates and news --------------------------------------------------------------------------------------
+
+
+def test_dates_are_the_splits_and_for_the_signed_in_what_their_team_has_left(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    closes_at = timezone.now() + timedelta(days=3)
+    Split.objects.filter(pk="test").update(closes_at=closes_at, quota_limit=2)
+    builders.board_changed("test")
+    closing = f"Submissions to test close at {closes_at:%Y-%m-%d %H:%M} UTC."
+    assert closing in panel(client, "boards").text
+    client.force_login(owner)
+    told = panel(client, "boards").text
+    assert closing in told
+    assert "2 of 2" in told
+
+
+def test_news_are_editions_and_entries_the_newest_first(
+    client: Client, rescored: Edition, entries: list[Submission]
+) -> None:
+    publish(rescored)
+    roll_back()
+    links = [a.text for a in panel(client, "news").one("ol").all("a")]
+    assert links[:2] == ["Test, edition 1", "Test, edition 2"]
+    assert links[2:] == [f"M{factor}" for factor in (1.4, 1.2, 1.1)]
+    told = panel(client, "news").text
+    assert "current again: edition 2 was rolled back" in told
+    assert "replaced edition 1: " in told
+    assert "by Owls, rank " in told
+
+
+def test_news_name_an_anonymous_method_by_its_pseudonym(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    sent = builders.submit(owner, builders.predictions(edition), method="Shy", visibility="ANONYMOUS")
+    builders.score_all()
+    told = panel(client, "news").text
+    assert sent.method.pseudonym in told
+    assert not {"Shy", "Owls"} & set(landing(client).text.split())
+
+
+# --- addresses -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("stored", "leads_to"),
+    [
+        ("/?sort=-rte&columns=rte", "/board/test/?sort=-rte&columns=rte"),
+        ("/?at=2026-11-20", "/board/test/?at=2026-11-20"),
+        ("/?q=a+b%26c", "/board/test/?q=a+b%26c"),
+        ("/board/?nerf=no", "/board/test/?nerf=no"),
+        ("/board/", "/board/test/"),
+    ],
+)
+@pytest.mark.parametrize("is_signed_in", [False, True])
+def test_addresses_from_when_the_board_was_here_still_lead_to_it(
+    client: Client, edition: Edition, owner: User, stored: str, leads_to: str, is_signed_in: bool
+) -> None:
+    if is_signed_in:
+        client.force_login(owner)
+    answer = client.get(stored)
+    assert (answer.status_code, sorted(answer["Location"])) == (302, sorted(leads_to))
+    assert client.get(answer["Location"]).status_code == 200
+
+
+@pytest.mark.parametrize("query", ["", "?utm_source=x", "?sort=", "?nonsense=1"])
+def test_anything_else_behind_the_address_is_the_landing_page(
+    client: Client, benchmark: None, owner: User, query: str
+) -> None:
+    assert client.get(f"/{query}").status_code == 200
+    client.force_login(owner)
+    assert client.get(f"/{query}").status_code == 200
+
+
+def test_board_in_the_menu_leads_to_the_main_board_from_everywhere(client: Client, benchmark: None) -> None:
+    found = {
+        address: pages.get(client, address).one("nav", class_="site-nav").all("a")[0].attributes["href"]
+        for address in ("/", "/docs/", "/board/demo/")
+    }
+    assert found == {"/": "/board/test/", "/docs/": "/board/", "/board/demo/": "/board/demo/"}
+
+
+# --- for search engines ----------------------------------------------------------------------------------
+
+
+def test_search_engines_are_told_what_the_dataset_is(client: Client, benchmark: None) -> None:
+    (script,) = pages.get(client, "/").all("script", type="application/ld+json")
+    told = json.loads(script.raw_text)
+    assert (told["@context"], told["@type"], told["name"]) == ("https://schema.org", "Dataset", "TSTTC")
+    assert told["creator"][0] == {"@type": "Person", "name": "Yuheng Shi"}
+    assert "Test, Validation, Demo" in told["description"]
+
+
+def test_a_title_of_a_split_ends_no_script(client: Client, benchmark: None) -> None:
+    Split.objects.filter(pk="demo").update(title='</script>"\\')
+    (script,) = pages.get(client, "/").all("script", type="application/ld+json")
+    assert '</script>"\\' in json.loads(script.raw_text)["description"]
+
+
+def test_it_is_answered_from_memory_until_a_board_changes(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    answer = client.get("/")
+    assert client.get("/", headers={"If-None-Match": answer["ETag"]}).status_code == 304
+    builders.submit(owner, builders.predictions(edition), method="Newest")
+    builders.score_all()
+    again = client.get("/", headers={"If-None-Match": answer["ETag"]})
+    assert (again.status_code, b"Newest" in again.content) == (200, True)
