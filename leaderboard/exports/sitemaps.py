@@ -12,17 +12,17 @@ MAX_PAGES: Final = 50_000
 
 
 @dataclass(frozen=True)
-class SitePage:
+class SitemapEntry:
     """A public page: its absolute address, and when it last changed."""
 
     address: str
     changed_at: datetime | None = None
 
 
-def xml(pages: Iterable[SitePage]) -> bytes:
+def xml(entries: Iterable[SitemapEntry]) -> bytes:
     """These pages, at most as many as the format allows."""
     root = ET.Element("urlset", xmlns=_NAMESPACE)
-    for page in list(pages)[:MAX_PAGES]:
+    for page in list(entries)[:MAX_PAGES]:
         element = ET.SubElement(root, "url")
         ET.SubElement(element, "loc").text = page.address
         if page.changed_at is not None:

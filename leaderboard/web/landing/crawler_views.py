@@ -14,11 +14,13 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import sitemaps
-from leaderboard.exports.sitemaps import SitePage
+from leaderboard.exports.sitemaps import SitemapEntry
 from leaderboard.models import Edition, Split, Visibility
+from leaderboard.pages import pages
+from leaderboard.web.docs import guides
 
 # Public pages that are about no board.
-PAGES: Final = ("home", "docs", "api_reference")
+_NAMED: Final = ("home", "docs", "api_reference", "dist")
 # Pages of one's own, and views of a page that the page itself offers: its orders, filters and days.
 _NOT_FOR_CRAWLERS: Final = (
     *("/accounts/", "/admin/", "/api/", "/maintain/", "/submissions/", "/team/", "/tokens/", "/*?"),
@@ -45,25 +47,27 @@ def favicon(request: HttpRequest) -> HttpResponse:
 @require_safe
 def sitemap(request: HttpRequest) -> HttpResponse:
     """Every public page. Private and anonymous methods and withdrawn rows are left out."""
-    pages = [
-        *(SitePage(_absolute(name)) for name in PAGES),
+    found = [
+        *(SitemapEntry(_absolute(name)) for name in _NAMED),
+        *(SitemapEntry(_absolute("site_page", name)) for name in pages.PAGES),
+        *(SitemapEntry(_absolute("guide", name)) for name in guides.files()),
         *_of_boards(splits_of(request)),
     ]
-    return HttpResponse(sitemaps.xml(pages), content_type="application/xml; charset=utf-8")
+    return HttpResponse(sitemaps.xml(found), content_type="application/xml; charset=utf-8")
 
 
-def _of_boards(splits: Sequence[Split]) -> Iterator[SitePage]:
+def _of_boards(splits: Sequence[Split]) -> Iterator[SitemapEntry]:
     for split in splits:
         for name in ("board", "charts", "editions"):
-            yield SitePage(_absolute(name, split.pk))
+            yield SitemapEntry(_absolute(name, split.pk))
     editions = Edition.objects.exclude(published_at=None).order_by("split", "number")
     for split_id, number, published_at in editions.values_list("split", "number", "published_at"):
-        yield SitePage(_absolute("edition", split_id, number), published_at)
+        yield SitemapEntry(_absolute("edition", split_id, number), published_at)
     methods: dict[str, datetime | None] = {}
     for _, drawn in snapshots.shown_on(splits):
         methods |= {str(entry.method_id): entry.listed_at for entry in drawn.entries if _is_listed(entry)}
     for method_id, listed_at in sorted(methods.items()):
-        yield SitePage(_absolute("method", method_id), listed_at)
+        yield SitemapEntry(_absolute("method", method_id), listed_at)
 
 
 def _is_listed(entry: Entry) -> bool:
