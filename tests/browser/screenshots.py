@@ -25,6 +25,7 @@ EVERYTHING: Final = REPOSITORY / "build" / "screenshots"
 SHOWN: Final = REPOSITORY / "docs" / "screenshots"
 # What the README and the documents show.
 KEPT: Final = (
+    "landing-wide-light",
     "board-wide-light",
     "board-narrow-dark",
     "compare-wide-light",
@@ -58,6 +59,7 @@ print(json.dumps({
 }))
 """
 PUBLIC: Final = {
+    "landing": "/",
     "board": "/board/demo/",
     "board-mid": "/board/demo/?columns=mid&nerf=no",
     "published": "/board/test/",

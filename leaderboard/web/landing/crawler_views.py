@@ -20,7 +20,7 @@ from leaderboard.pages import pages
 from leaderboard.web.docs import guides
 
 # Public pages that are about no board.
-_NAMED: Final = ("home", "docs", "api_reference", "dist")
+_NAMED: Final = ("home", "docs", "api_reference")
 # Pages of one's own, and views of a page that the page itself offers: its orders, filters and days.
 _NOT_FOR_CRAWLERS: Final = (
     *("/accounts/", "/admin/", "/api/", "/maintain/", "/submissions/", "/team/", "/tokens/", "/*?"),

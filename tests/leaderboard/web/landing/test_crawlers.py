@@ -33,7 +33,7 @@ def test_the_sitemap_names_public_pages_and_each_answers(
     assert len(found) == len(set(found))
     assert {"/", "/board/test/", "/board/val/charts/", "/board/test/editions/1/", "/docs/"} <= set(found)
     assert f"/methods/{sent.method_id}/" in found
-    assert {client.get(address).status_code for address in found} == {200}
+    assert [address for address in found if client.get(address).status_code != 200] == []
 
 
 @pytest.mark.parametrize("visibility", ["PRIVATE", "ANONYMOUS"])
