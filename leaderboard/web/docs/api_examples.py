@@ -177,7 +177,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
 
 
 @dataclass(frozen=True)
-class Answer:
+class RecordedAnswer:
     """What a request was answered: a status and its phrase, headers worth a line, and the body as text."""
 
     status: str
@@ -205,8 +205,8 @@ def shown(operation_id: str) -> dict[str, Any]:
     }
 
 
-def _answer(recorded: Mapping[str, Any]) -> Answer:
+def _answer(recorded: Mapping[str, Any]) -> RecordedAnswer:
     body = recorded["body"]
     text = body if isinstance(body, str) else json.dumps(body, indent=2, ensure_ascii=False)
     ours = {name: value.replace(SITE, settings.SITE_URL) for name, value in recorded["headers"].items()}
-    return Answer(recorded["status"], ours, text.replace(SITE, settings.SITE_URL))
+    return RecordedAnswer(recorded["status"], ours, text.replace(SITE, settings.SITE_URL))
