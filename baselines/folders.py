@@ -10,7 +10,7 @@ A sequence's target is frame 5 at its own ts; frame 5 − k has the timestamp ts
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -22,7 +22,7 @@ from baselines.clips import TARGET, Clip, Image
 from baselines.estimates import SequenceFault
 from baselines.images import ImageCache
 from baselines.toolkit_folders import read_toolkit_folder
-from evaluator.problems import Problem, reject
+from evaluator.problems import Problem, Rejected, reject
 from evaluator.truth.annotations import FRAME_STEP_NS
 from evaluator.truth.truth import Manifest, read_manifest
 
@@ -138,13 +138,6 @@ class SequenceFolder:
             expected = f"expected {sequence}, as .jpg or .png"
             return "image is missing", f"The image is missing, its folder has none; {expected}."
         ts_ns = int(path.stem)
-        if ts_ns < stamps[0]:
-            n_frames = sum(self.frame_path(row, other).exists() for other in range(frame, TARGET + 1))
-            message = (
-                "The image is missing, and no frame of this camera is so early; expected "
-                f"{sequence}, which has {n_frames} of the frames {frame} to {TARGET}."
-            )
-            return "too few frames", message
         nearest = min(stamps, key=lambda stamp: abs(stamp - ts_ns))
         if abs(nearest - ts_ns) < FRAME_STEP_NS // 2:
             message = (
@@ -152,6 +145,13 @@ class SequenceFolder:
                 f"expected {sequence}, whose frames are exactly 100,000,000 ns apart."
             )
             return "frames are not 0.1 s apart", message
+        if ts_ns < stamps[0]:
+            n_frames = sum(self.frame_path(row, other).exists() for other in range(frame, TARGET + 1))
+            message = (
+                "The image is missing, and no frame of this camera is so early; expected "
+                f"{sequence}, which has {n_frames} of the frames {frame} to {TARGET}."
+            )
+            return "too few frames", message
         return "image is missing", f"The image is missing; expected {sequence}, as .jpg or .png."
 
 
@@ -168,10 +168,10 @@ def read_folder(path: Path) -> SequenceFolder:
                 f"The folder has a {BOXES} and no {MANIFEST}; expected the manifest of the split beside it."
             )
             raise reject("unreadable", message, path.name)
-        manifest = read_manifest(path / MANIFEST)
+        manifest = _manifest(path)
         boxes, is_normalised = read_boxes(path / BOXES, manifest=manifest)
         return SequenceFolder(path, root, manifest, boxes, BOXES, is_normalised)
-    given = read_manifest(path / MANIFEST) if (path / MANIFEST).is_file() else None
+    given = _manifest(path) if (path / MANIFEST).is_file() else None
     found = read_toolkit_folder(path, manifest=given)
     if found is None:
         expected = f"expected {MANIFEST} and {BOXES}, or the dataset's annotation files (*.pkl)"
@@ -187,3 +187,17 @@ def read_folder(path: Path) -> SequenceFolder:
         is_normalised=True,
         has_own_numbers=given is None,
     )
+
+
+def _manifest(path: Path) -> Manifest:
+    """The manifest of the folder; what is wrong with it has its file's name."""
+    try:
+        return read_manifest(path / MANIFEST)
+    except Rejected as fault:
+        named = [
+            problem
+            if problem.where.startswith(MANIFEST)
+            else replace(problem, where=f"{MANIFEST}, {problem.where}" if problem.where else MANIFEST)
+            for problem in fault.problems
+        ]
+        raise Rejected(named, n_problems=fault.n_problems) from None

@@ -181,7 +181,8 @@ def _report(done: Run, *, out: Path, as_json: bool) -> None:
     resumed = f", {done.n_resumed:,} of them from the interrupted run" if done.n_resumed else ""
     click.echo(f"{out}: {n_sequences:,} sequences in {done.seconds:.1f} s{resumed}.")
     if n_fallback:
-        click.echo(f"{n_fallback:,} of them have a fallback, from the boxes' areas or 1:", err=True)
+        have = "has" if n_fallback == 1 else "have"
+        click.echo(f"{n_fallback:,} of them {have} a fallback, from the boxes' areas or 1:", err=True)
     for reason, count in done.n_fallback.items():
         example = f" ({done.examples[reason]})" if reason in done.examples else ""
         click.echo(f"  {count:,}  {reason}{example}", err=True)

@@ -91,6 +91,13 @@ HEAD = "anno_id,frame,x1,y1,x2,y2\n"
     [
         (without("manifest.csv"), "unreadable", "", "has a boxes.csv and no manifest.csv; expected"),
         (without("boxes.csv"), "unreadable", "", "has no boxes.csv and no annotation files; exp"),
+        (
+            lambda folder: (folder / "manifest.csv").write_text("anno_id,bag_stamp,cam_id,track_id\n"),
+            "missing-columns",
+            "manifest.csv, line 1",
+            "has no column ts; found",
+        ),
+        (lambda folder: (folder / "manifest.csv").write_bytes(b"\xff"), "not-utf8", "manifest.csv", "Byte 0"),
         (boxes_text(""), "missing-columns", "boxes.csv, line 1", "no column anno_id, frame, x1, y1, x2, y2"),
         (
             boxes_text("anno_id,frame,x,y,w,h\n0,5,1,1,9,9\n"),

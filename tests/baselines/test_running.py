@@ -179,6 +179,12 @@ def test_a_strict_run_names_every_missing_box_and_image_before_it_begins(folder:
     assert names(folder) == set()
 
 
+def test_a_first_frame_that_is_late_is_not_taken_for_a_missing_one(folder: Path) -> None:
+    path = image_path(folder, 0, 0)
+    path.rename(path.with_name(f"{int(path.stem) + 3_000_000}.jpg"))
+    assert estimate(folder).n_fallback == {"frames are not 0.1 s apart": 1}
+
+
 @pytest.mark.parametrize(
     ("change", "suffix"), [(cut_off, ".jpg"), (cut_off_png, ".png")], ids=["JPEG", "PNG"]
 )
