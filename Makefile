@@ -95,7 +95,7 @@ echarts: ## build static/vendored/echarts.min.js anew (ECHARTS=… for another v
 	cd "$(CURDIR)" && sha256sum static/vendored/echarts.*
 
 clean: ## remove the environment and everything generated, but not var/ (the demo's data)
-	rm -rf $(VENV) $(VENV)-lock staticfiles build .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(VENV)-lock staticfiles build dist .mypy_cache .ruff_cache .pytest_cache .import_linter_cache .hypothesis
 
 # --- the environment -------------------------------------------------------------------------------------
 

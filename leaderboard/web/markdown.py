@@ -107,8 +107,11 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
             texts.append(token.content)
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
             texts.append(_plain(token))
-        elif token.type in {"th_open", "td_open"} and "right" in str(token.attrs.pop("style", "")):
-            token.attrSet("class", "number")
+        elif token.type in {"th_open", "td_open"}:
+            if "right" in str(token.attrs.pop("style", "")):
+                token.attrSet("class", "number")
+            if not tokens[at + 1].content:
+                token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
     parts.append(Part(heading, " ".join(texts)))
     html = parser.renderer.render(tokens, parser.options, {})
     html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")

@@ -54,6 +54,12 @@ def test_a_page_has_no_title_of_its_own_and_headings_have_anchors() -> None:
     ]
 
 
+def test_a_column_without_a_name_has_no_head_and_numbers_stand_right() -> None:
+    root = pages.read(markdown.page("| | n |\n|---|--:|\n| a | 1 |\n").html)
+    assert [each.text for each in root.all("th")] == ["n"]
+    assert [each.text for each in root.all("td", class_="number")] == ["1"]
+
+
 def test_a_part_has_the_text_below_its_heading() -> None:
     drawn = markdown.page("Before\n\n## A `b`\n\nOne *two*\nthree.\n\n```sh\nls -l\n```\n")
     assert [(part.heading.text, part.text) for part in drawn.parts] == [
