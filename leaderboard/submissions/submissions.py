@@ -11,6 +11,7 @@ from django.core.files.base import File
 from django.db import transaction
 from django.db.models import Q
 
+from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, versions
 from leaderboard.boards.rows import Interval, scored_of
 from leaderboard.errors.refusals import Refused, clean_text
@@ -252,9 +253,10 @@ def _sent_file(file: files.StoredFile, split: Split) -> SentFile:
 
 def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload is None:
-        raise Refused(
-            "no-file", "No prediction file was sent; expected one in the field 'file'.", field="file"
-        )
+        message = "No prediction file was sent; expected one in the field 'file'."
+        raise Refused("no-file", message, field="file")
+    if upload.size == 0:
+        raise Refused("not-json", EMPTY_MESSAGE, field="file")
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
         raise TooLarge("too-large", too_large(found_bytes=upload.size), field="file")
     return upload

@@ -4,6 +4,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from django.conf import settings
+from django.core.exceptions import DisallowedHost
 from django.http import Http404, HttpRequest
 from django.utils.functional import SimpleLazyObject
 from django.utils.http import url_has_allowed_host_and_scheme
@@ -82,13 +83,19 @@ def _came_from(request: HttpRequest) -> str:
 
 
 def page_before(request: HttpRequest) -> str:
-    """The address, without a host, of the page of this site that the request names as its origin; or empty.
-
-    The settings name the site: `request.get_host` raises where the host itself is the fault.
-    """
+    """The address, without a host, of the page of this site that the request names as its origin."""
     address = request.headers.get("Referer", "")
-    is_ours = url_has_allowed_host_and_scheme(address, allowed_hosts={urlsplit(settings.SITE_URL).netloc})
+    is_ours = url_has_allowed_host_and_scheme(address, allowed_hosts=_our_hosts(request))
     parts = urlsplit(address if is_ours else "")
     path = f"{parts.path}?{parts.query}" if parts.query else parts.path
     # A path that begins with two slashes would name another site where it is linked.
     return "" if path.startswith("//") else path
+
+
+def _our_hosts(request: HttpRequest) -> set[str]:
+    """The host that the settings name, and the one that was asked for: a demo also answers as localhost."""
+    hosts = {urlsplit(settings.SITE_URL).netloc}
+    try:
+        return hosts | {request.get_host()}
+    except DisallowedHost:  # the host itself may be the fault that the page tells of
+        return hosts

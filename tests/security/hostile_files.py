@@ -84,7 +84,6 @@ KEYS = {
     "single quotes": b"'7'",
 }
 WHOLE: dict[str, bytes] = {
-    "nothing": b"",
     "a space": b" ",
     "newlines": b"\n" * 1000,
     "NUL": b"\x00",

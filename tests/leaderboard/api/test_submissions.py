@@ -117,6 +117,14 @@ def test_request_without_a_file_is_refused(edition: Edition, owner: User) -> Non
     assert (response.status_code, response.json()["code"]) == (422, "no-file")
 
 
+def test_empty_file_is_refused_at_once_in_the_words_of_the_check(edition: Edition, owner: User) -> None:
+    response = post(client_of(owner), b"")
+    body = response.json()
+    assert (response.status_code, body["code"], body["problems"][0]["where"]) == (422, "not-json", "file")
+    assert body["detail"] == "The file is empty; expected JSON text with a number for every sequence."
+    assert not Submission.objects.exists()
+
+
 @pytest.mark.parametrize(
     "body",
     [b"", b"--x", b"--x\r\nContent-Disposition: form-data; name=file; filename=a\r\n\r\n\x00\xff"],

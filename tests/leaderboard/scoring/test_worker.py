@@ -66,7 +66,7 @@ def with_value(value: str):
 
 # One of each kind; all that a file can have is in `tests/evaluator/faulty_files.py`.
 REJECTED_FILES = {
-    "empty file": (lambda good: b"", "not-json"),
+    "empty file": (lambda good: b" ", "not-json"),
     "wrong top level": (lambda good: b"[1, 2]", "wrong-top-level"),
     "no rate": (
         lambda good: json.dumps({"unit": "scale_ratio", "predictions": good}).encode(),

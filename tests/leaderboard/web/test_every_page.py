@@ -67,8 +67,8 @@ FAULTS = {
 INLINE_TAGS = {"style"}
 DATA = {"application/json", "application/ld+json"}
 INLINE_ATTRIBUTES = re.compile(r"^(on\w+|style)$")
-# Links that browsers follow only when somebody asks them to.
-LEADING_ON = {"canonical", "alternate"}
+# Links that browsers follow only when somebody asks them to, and the part of the page to wait for.
+LEADING_ON = {"canonical", "alternate", "expect"}
 OWN = re.compile(r"^/(?!/)")
 
 
@@ -183,6 +183,16 @@ def test_a_page_of_a_fault_leads_back_to_where_one_was_with_its_filters(
     assert [a.attributes["href"] for a in main.all("a")] == ["/board/", "/docs/"]
     root = assert_sound(client.get("/nowhere/", headers={"Referer": referer}))
     assert [a.attributes["href"] for a in root.one("main").all("a")] == [*back, "/board/", "/docs/"]
+
+
+def test_a_page_of_a_fault_leads_back_also_on_another_host_of_the_site(
+    client: Client, benchmark: None, settings: Settings
+) -> None:
+    settings.SITE_URL, settings.ALLOWED_HOSTS = "http://127.0.0.1:8000", ["localhost", "127.0.0.1"]
+    for host, back in (("localhost:8000", ["/board/test/"]), ("elsewhere.example", [])):
+        came_from = {"Referer": "http://localhost:8000/board/test/", "Host": host}
+        main = pages.page(client.get("/nowhere/", headers=came_from)).one("main")
+        assert [a.attributes["href"] for a in main.all("a")] == [*back, "/", "/docs/"]
 
 
 def test_pages_of_a_submissions_life_are_sound(client: Client, edition: Edition, owner: User) -> None:

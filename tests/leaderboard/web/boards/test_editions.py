@@ -116,7 +116,7 @@ def test_no_time_is_a_clear_400(client: Client, benchmark: None, at: str) -> Non
 
 
 def test_no_time_at_all_is_now_on_the_page_and_to_programs(client: Client, entries: list[Submission]) -> None:
-    root = get(client, "/board/test/?at=")
+    root = pages.page(client.get("/board/test/?at=", follow=True))
     assert pages.board_rows(root) == pages.board_rows(get(client, "/board/test/"))
     assert "The board as of" not in root.one("main").text
     answers = [client.get(f"/api/v1/splits/test/board{query}") for query in ("", "?at=")]
