@@ -1,5 +1,6 @@
 // The check of a prediction file in a worker: the rules, codes and words of evaluator/predictions, which decide.
-// Asked with {manifest, file}, it answers {n_problems, problems, n_found, n_sequences}, or {failed} if it cannot.
+// Asked with {manifest, file}, it answers {n_problems, problems, warnings, n_found, n_sequences}, or {failed} if it
+// cannot.
 "use strict";
 
 const MAX_LISTED = 20;
@@ -457,7 +458,8 @@ function readManifest(text) {
   const ids = lines.map((line) => line[id]);
   const natural = lines.map((line) => [line[bag], line[cam], line[ts], line[track]].join("/"));
   const rows = (keys) => new Map(keys.map((key, row) => [key, row]));
-  return { ids, natural, rowOfId: rows(ids), rowOfNatural: rows(natural), n: ids.length };
+  const windows = lines.map((line) => ({ camera: `${line[bag]}/${line[cam]}`, track: line[track], at: BigInt(line[ts]) }));
+  return { ids, natural, windows, rowOfId: rows(ids), rowOfNatural: rows(natural), n: ids.length };
 }
 
 function checkKeys(members, manifest, findings, place) {
@@ -569,21 +571,83 @@ function check(bytes, manifest) {
   if (isRatio) {
     const rateOf = ratesOf(document, manifest, findings);
     values.forEach((ratio, row) => {
-      if (1 / (rateOf(row) * (1 / ratio - 1)) !== 0) return;
+      values[row] = 1 / (rateOf(row) * (1 / ratio - 1));
+      if (values[row] !== 0) return;
       const found = `The scale ratio ${reprOf(ratio)} is a time to contact of 0`;
       const name = (isNatural ? manifest.natural : manifest.ids)[row];
       findings.add("zero", `${found}; expected one that is not 0.`, document.pointer(name));
     });
   }
   findings.throwIfAny();
-  return nFound;
+  return { n_found: nFound, warnings: warningsOf(values, manifest) };
+}
+
+// --- good values under wrong keys, as in evaluator/predictions/plausibility.py --------------------------------
+
+const MAX_STEP_NS = 1_000_000_000n;
+const MIN_PAIRS = 100;
+const MAX_ROUGHNESS = 0.8;
+const CAUSE =
+  "Probably the anno_ids are those of the toolkit on a machine that lists the annotation files in another order: " +
+  "tsttc convert FILE --annotations FOLDER writes natural keys.";
+
+function warningsOf(seconds, manifest) {
+  const found = roughness(seconds, manifest);
+  if (found === null || found <= MAX_ROUGHNESS) return [];
+  const message =
+    "The values look shuffled: from one window to the next those of one object differ " +
+    `${found.toFixed(2)} times as much as those of two objects; expected at most ${MAX_ROUGHNESS}, since ` +
+    `an object changes slowly. ${CAUSE}`;
+  return [{ code: "shuffled-values", message }];
+}
+
+// How far neighbouring windows of one object differ, over how far successive windows of two objects do.
+function roughness(seconds, manifest) {
+  const { same, other } = (manifest.pairs ??= pairsOf(manifest.windows));
+  if (Math.min(same.length, other.length) < MIN_PAIRS) return null;
+  const ranks = ranksOf(seconds);
+  const apart = meanDifference(ranks, other);
+  return apart > 0 ? meanDifference(ranks, same) / apart : null;
+}
+
+// The rank of each value by scale ratio; equal values share the mean of theirs.
+function ranksOf(seconds) {
+  const growth = seconds.map((value) => -1 / value);
+  const order = growth.map((_, row) => row).sort((a, b) => growth[a] - growth[b] || 0);
+  const ranks = new Float64Array(order.length);
+  for (let from = 0, to = 0; from < order.length; from = to) {
+    while (to < order.length && growth[order[to]] === growth[order[from]]) to++;
+    for (let i = from; i < to; i++) ranks[order[i]] = (from + 1 + to) / 2;
+  }
+  return ranks;
+}
+
+const meanDifference = (ranks, pairs) =>
+  pairs.reduce((sum, [a, b]) => sum + Math.abs(ranks[a] - ranks[b]), 0) / pairs.length;
+
+// Rows of neighbouring windows of one object, and of successive windows of two, of each camera.
+function pairsOf(windows) {
+  const compared = (a, b) => (a < b ? -1 : Number(a > b));
+  const pairs = (names, isWanted) => {
+    const by = (a, b) => names.reduce((found, name) => found || compared(windows[a][name], windows[b][name]), 0);
+    const order = windows.map((_, row) => row).sort(by);
+    const isPair = ([a, b]) => {
+      const [first, second] = [windows[a], windows[b]];
+      return first.camera === second.camera && second.at - first.at <= MAX_STEP_NS && isWanted(first.track === second.track);
+    };
+    return order.slice(1).map((row, i) => [order[i], row]).filter(isPair);
+  };
+  return {
+    same: pairs(["camera", "track", "at"], (isOne) => isOne),
+    other: pairs(["camera", "at", "track"], (isOne) => !isOne),
+  };
 }
 
 // The answer for a file's bytes and the text of a manifest.
 function checked(bytes, manifest) {
-  const answer = { n_problems: 0, problems: [], n_found: 0, n_sequences: manifest.n };
+  const answer = { n_problems: 0, problems: [], warnings: [], n_found: 0, n_sequences: manifest.n };
   try {
-    answer.n_found = check(bytes, manifest);
+    Object.assign(answer, check(bytes, manifest));
   } catch (fault) {
     if (!(fault instanceof Rejected)) throw fault;
     answer.problems = fault.problems;

@@ -21,7 +21,8 @@ function element(tag, text = "", css = "") {
 const MAX_SHOWN = 20;
 let worker = null;
 let asked = 0;
-// What is known of the chosen file: "" nothing, "checking", "good", "bad"; `settled` calls whoever waits for it.
+// What is known of the chosen file: "" nothing, "checking", "good", "doubtful", "bad"; `settled` calls whoever waits
+// for it.
 let verdict = "";
 let settled = () => {};
 
@@ -29,9 +30,11 @@ function say(...parts) {
   byId("checked").replaceChildren(...parts);
 }
 
+const isDoubted = () => verdict === "bad" || verdict === "doubtful";
+
 function conclude(state, ...parts) {
   verdict = state;
-  button.textContent = state === "bad" ? "Submit anyway" : "Submit";
+  button.textContent = isDoubted() ? "Submit anyway" : "Submit";
   say(...parts);
   if (state !== "checking") settled();
 }
@@ -41,8 +44,15 @@ function answered({ data }) {
   if (data.failed) conclude("", element("p", "The file could not be checked here. The server checks it.", "quiet"));
   else if (data.n_problems === 0) {
     const found = `${grouped(data.n_found)} of ${grouped(data.n_sequences)} sequences found.`;
-    conclude("good", element("p", `Checked: ${found} No problems.`, "good"));
+    const told = element("p", `Checked: ${found} No problems.`, "good");
+    conclude(data.warnings.length ? "doubtful" : "good", told, ...data.warnings.map(warning));
   } else conclude("bad", ...problems(data));
+}
+
+function warning({ message, code }) {
+  const told = element("p", "", "notice bad");
+  told.append(element("strong", "Warning."), ` ${message} `, element("span", code, "quiet code"));
+  return told;
 }
 
 function problems({ n_problems: n, problems: all }) {
@@ -214,14 +224,15 @@ function lost() {
   byId("form-errors").replaceChildren(told);
 }
 
-// A file is sent once its check has ended; one with problems only if that is asked for once they are in sight.
+// A file is sent once its check has ended; one with problems or warnings only if that is asked for once they are in
+// sight.
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
   if (isBusy) return;
   busy(true);
   if (verdict === "checking") {
     await new Promise((resolve) => (settled = resolve));
-    if (verdict === "bad") {
+    if (isDoubted()) {
       busy(false);
       button.focus();
       return;

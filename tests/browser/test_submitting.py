@@ -5,16 +5,22 @@ import json
 import re
 import sqlite3
 from contextlib import closing
+from dataclasses import asdict
 from pathlib import Path
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import evaluator
+from evaluator.metrics.scale import Floats
+from evaluator.predictions.plausibility import warnings_of
 from tests.browser.chromium import NARROW, tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import predictions, worker
 from tests.evaluator import faulty_files
+from tests.evaluator.toolkit_folders import driving_folder
+from tests.evaluator.worlds import flat
 from tests.journeys.production import Site, await_that, get
 
 pytestmark = pytest.mark.browser
@@ -95,6 +101,15 @@ def test_by_keyboard_alone_from_signing_up_to_comparing_and_taking_along(
     expect(row).to_contain_text("By keyboard")
     expect(row).to_contain_text("Keyboard team")
     expect(row.locator(".rank")).to_contain_text("1")
+    tab_to(page, "Filters")
+    press("Enter")
+    tab_to(page, "Has code")
+    write("n")
+    expect(page).to_have_url(re.compile(r"/board/test/\?code=no$"))
+    tab_to(page, "Method")
+    press("Enter")
+    page.wait_for_url("**/board/test/?sort=method&code=no")
+    expect(row).to_contain_text("By keyboard")
     for method in ("By keyboard", "By somebody else"):
         tab_to(page, f"Compare {method}")
         press("Space")
@@ -187,7 +202,8 @@ CHECK = """async ([checker, manifest, files]) => {
     const answer = new Promise((resolve) => worker.addEventListener("message", resolve, {once: true}));
     worker.postMessage({id: 1, manifest, file});
     const {data} = await answer;
-    answers[name] = data.failed ?? {n_problems: data.n_problems, problems: data.problems};
+    const {n_problems, problems, warnings} = data;
+    answers[name] = data.failed ?? {n_problems, problems, warnings};
   }
   worker.terminate();
   return answers;
@@ -196,22 +212,60 @@ CHECK = """async ([checker, manifest, files]) => {
 
 def answer_of(data: bytes, manifest: evaluator.Manifest) -> dict[str, object]:
     try:
-        evaluator.read_predictions(data, manifest=manifest)
+        found = evaluator.read_predictions(data, manifest=manifest)
     except evaluator.Rejected as rejected:
-        return rejected.as_dict()
-    return {"n_problems": 0, "problems": []}
+        return {**rejected.as_dict(), "warnings": []}
+    return {"n_problems": 0, "problems": [], "warnings": [asdict(each) for each in warnings_of(found)]}
 
 
-def test_the_check_in_the_browser_has_the_codes_and_words_of_the_server(page: Page, site: Site) -> None:
-    files = {name: case[0] for name, case in faulty_files.CASES.items()} | faulty_files.FURTHER
-    csv = faulty_files.MANIFEST.to_csv()
-    page.goto("/docs/")
-    page.route("**/manifest-of-the-test", lambda route: route.fulfill(body=csv))
+def told_in_the_browser(
+    page: Page, site: Site, files: dict[str, bytes], manifest: evaluator.Manifest
+) -> dict[str, object]:
+    """What the browser says of these files."""
+    page.route("**/manifest-of-the-test", lambda route: route.fulfill(body=manifest.to_csv()))
     static = Path(site.environment["TSTTC_STATIC_ROOT"])
     checker = json.loads((static / "staticfiles.json").read_text())["paths"]["check.js"]
     encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
     told = page.evaluate(CHECK, [f"/static/{checker}", "/manifest-of-the-test", encoded])
+    page.unroute("**/manifest-of-the-test")
+    return dict(told)
+
+
+def test_the_check_in_the_browser_has_the_codes_and_words_of_the_server(page: Page, site: Site) -> None:
+    files = {name: case[0] for name, case in faulty_files.CASES.items()} | faulty_files.FURTHER
+    page.goto("/docs/")
+    told = told_in_the_browser(page, site, files, faulty_files.MANIFEST)
     assert told == {name: answer_of(data, faulty_files.MANIFEST) for name, data in files.items()}
+
+
+def test_the_check_in_the_browser_warns_of_shuffled_values_as_the_server_does(
+    page: Page, site: Site, tmp_path: Path
+) -> None:
+    truth = evaluator.read_truth(driving_folder(tmp_path / "annotations"))
+    keys, ttc_s = truth.manifest.anno_id_keys, truth.ttc_s
+    shuffled = np.random.default_rng(3).permutation(ttc_s)
+
+    def envelope(values: Floats) -> bytes:
+        ratios = dict(zip(keys, (1 / (1 + 1 / (10 * values))).tolist(), strict=True))
+        return json.dumps({"unit": "scale_ratio", "fps": 10, "predictions": ratios}).encode()
+
+    files = {
+        "good": flat(dict(zip(keys, ttc_s.tolist(), strict=True))),
+        "all the same": flat(dict.fromkeys(keys, 5.0)),
+        "few values": flat(dict(zip(keys, np.sign(shuffled).tolist(), strict=True))),
+        "shuffled": flat(dict(zip(keys, shuffled.tolist(), strict=True))),
+        "shuffled, by natural key": flat(
+            dict(zip(truth.manifest.natural_keys, shuffled.tolist(), strict=True))
+        ),
+        "ratios": envelope(ttc_s),
+        "shuffled ratios": envelope(shuffled),
+    }
+    page.goto("/docs/")
+    expected = {name: answer_of(data, truth.manifest) for name, data in files.items()}
+    assert [name for name, answer in expected.items() if answer["warnings"]] == [
+        *("few values", "shuffled", "shuffled, by natural key", "shuffled ratios"),
+    ]
+    assert told_in_the_browser(page, site, files, truth.manifest) == expected
 
 
 def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
