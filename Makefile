@@ -65,8 +65,8 @@ format: $(DEV_STAMP) ## put the code into the house's format
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-screenshots: $(DEV_STAMP) ## photograph the pages into docs/screenshots/
-	$(PY) -m tests.browser.screenshots
+screenshots: $(DEV_STAMP) ## photograph every page (INTO=build/screenshots), and renew docs/screenshots/
+	$(PY) -m tests.browser.screenshots --keep $(if $(INTO),--into $(INTO))
 
 # Universal: one file for every platform and Python; hashes, and no index host. Existing pins stay unless
 # `make lock UPGRADE=--upgrade` asks for newer ones.

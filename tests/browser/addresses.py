@@ -1,18 +1,39 @@
 """Every page that the site has, from its own addresses: a page that is added later joins by itself."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
+import httpx
+
+from tests.journeys.production import PATIENCE_S, Site
 from tests.security.routes import routes
 
 # What serves no pages: programs' doors, the administration (Django's own pages), and what monitoring asks.
 NOT_PAGES = ("api/v1/", "admin/", "healthz", "readyz", "metrics")
+# Parts of pages, for a page that is open.
+PARTS = ("/state/", "/progress/")
 
 
-def addresses(samples: Mapping[str, str]) -> list[str]:
-    """The address of each pattern, its parameters filled in from `samples`.
+def named_addresses(samples: Mapping[str, str]) -> dict[str, str]:
+    """The address of each pattern by its name, its parameters filled in from `samples`.
 
     Raises `KeyError` for a parameter without a sample: a new kind of page needs one thing to be shown with.
     """
     # A regular expression is one of the links that allauth sends by mail.
     found = [each for each in routes() if not each.pattern.startswith(NOT_PAGES) and "^" not in each.pattern]
-    return sorted({route.filled(samples) for route in found})
+    return {route.name: route.filled(samples) for route in found}
+
+
+def addresses(samples: Mapping[str, str]) -> list[str]:
+    """The same, each once."""
+    return sorted(set(named_addresses(samples).values()))
+
+
+def answered_with_pages(site: Site, candidates: Iterable[str], *, cookies: dict[str, str]) -> list[str]:
+    """Those that are answered with a page to whoever has these cookies."""
+    with httpx.Client(base_url=site.url, timeout=PATIENCE_S, trust_env=False, cookies=cookies) as client:
+        answers = {address: client.get(address) for address in candidates if not address.endswith(PARTS)}
+    return [
+        address
+        for address, answer in answers.items()
+        if answer.status_code == 200 and answer.headers["content-type"].startswith("text/html")
+    ]

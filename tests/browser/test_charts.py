@@ -3,14 +3,13 @@
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from playwright.sync_api import Locator, Page, expect
 
 from tests.browser.chromium import LAYOUT_SHIFT, NARROW, OVERFLOW_PX, WIDE, least_shift
 from tests.browser.conftest import NewPage
-from tests.browser.test_accessibility import AXE, RUN
+from tests.browser.inspection import AXE, TRANSFERRED, axe
 from tests.journeys.production import Site
 
 pytestmark = pytest.mark.browser
@@ -50,9 +49,6 @@ MIDDLES = """figure => [...figure.querySelectorAll(".drawing svg path")]
 NAMES = """figure => [...figure.querySelectorAll(".drawing svg text[stroke]")].map(text => {
   const {x, y, width, height} = text.getBoundingClientRect(); return [x, y, x + width, y + height];
 }).filter(box => box[2] > 0)"""
-# Bytes as they came over the line, headers included.
-TRANSFERRED = """() => ["navigation", "resource"].flatMap(kind => performance.getEntriesByType(kind))
-  .map(entry => [entry.name, entry.transferSize])"""
 
 
 @pytest.fixture(scope="module")
@@ -243,5 +239,4 @@ def test_drawn_charts_have_no_fault_that_axe_finds(new_page: NewPage, board: Non
         drawn(page, kind)
     page.mouse.move(*page.locator("figure[data-chart=profile]").evaluate(MIDDLES)[-1])
     page.evaluate(AXE)
-    faults: list[Any] = page.evaluate(RUN)
-    assert faults == []
+    assert list(axe(page, where=scheme)) == []

@@ -1,4 +1,4 @@
-"""What holds of every page on every screen: no complaint, no overflow, no shift, enough contrast."""
+"""What pages look like: points in one line, a focus that is seen, on paper, in the visitor's own colours."""
 
 from functools import partial
 
@@ -7,43 +7,14 @@ from playwright.sync_api import Page, expect
 
 import evaluator
 from tests.browser.chromium import LOW_CONTRAST, NARROW, OVERFLOW_PX, WIDE, least_shift, tab_to
-from tests.browser.conftest import NewPage, sign_up
+from tests.browser.conftest import NewPage
+from tests.browser.inspection import draw_all
 
 pytestmark = pytest.mark.browser
 
-PUBLIC = (
-    "/",
-    "/board/test/",
-    "/board/test/?sort=-rte_negative",
-    "/board/test/?columns=mid&q=deep",
-    "/board/test/charts/",
-    "/board/val/",
-    "/compare/",
-    "/docs/",
-    "/docs/api/",
-    "/docs/api/submit/",
-    "/docs/cli/",
-    "/docs/baselines/",
-    "/docs/search/?q=quota",
-    "/privacy/",
-    "/accounts/login/",
-    "/accounts/signup/",
-    "/accounts/password/reset/",
-)
-PRIVATE = ("/submit/", "/submissions/", "/accounts/email/", "/accounts/password/change/")
 # A tenth of what counts as good: a table's columns may settle by a hair while its rows arrive.
 MAX_SHIFT = 0.01
 SCREENS = [(size, scheme) for size in ("wide", "narrow") for scheme in ("light", "dark")]
-
-
-@pytest.mark.parametrize(("size", "scheme"), SCREENS)
-def test_every_page_fits_its_screen_and_can_be_read(
-    new_page: NewPage, truth: evaluator.GroundTruth, size: str, scheme: str
-) -> None:
-    page = new_page(viewport=WIDE if size == "wide" else NARROW, color_scheme=scheme)
-    look_at(page, PUBLIC)
-    sign_up(page, email=f"{size}-{scheme}@example.org", name="A team with quite a long name, of Somewhere")
-    look_at(page, PRIVATE)
 
 
 def opened(page: Page, address: str) -> None:
@@ -109,3 +80,71 @@ def test_site_has_an_icon_of_its_own(page: Page, truth: evaluator.GroundTruth) -
     assert icon is not None
     answer = page.request.get(icon)
     assert (answer.status, answer.headers["content-type"]) == (200, "image/svg+xml")
+
+
+# A board of 18 columns, which a protocol may have: eight of this one's are shown twice.
+WIDER = """() => {
+  document.querySelector(".board-scroll").classList.add("scrolls");
+  const numbers = row => [...row.children].filter(cell => /\\bat[0-9]/.test(cell.className)
+    && !cell.matches(".interval"));
+  for (const row of document.querySelectorAll("table.board :is(colgroup, thead tr:last-child, tbody tr)"))
+    for (const cell of numbers(row).slice(0, 8)) row.append(cell.cloneNode(true));
+  document.querySelector(".board .groups th:last-child").colSpan += 8;
+}"""
+OUTSIDE = """() => [...document.querySelectorAll("table.board :is(td, th)")]
+  .filter(cell => cell.checkVisibility() && cell.getBoundingClientRect().right > innerWidth)
+  .map(cell => cell.textContent.trim())"""
+
+
+def test_board_with_more_columns_than_fit_is_printed_whole(page: Page, truth: evaluator.GroundTruth) -> None:
+    page.goto("/board/test/")
+    page.evaluate(WIDER)
+    first = page.locator("table.board tbody tr").first
+    expect(first.locator("td:not(.choose, .interval, .rank)")).to_have_count(18)
+    page.emulate_media(media="print")
+    page.set_viewport_size({"width": 1047, "height": 700})  # A4 on its side
+    assert page.evaluate(OUTSIDE) == []
+    assert page.evaluate("getComputedStyle(document.querySelector('.board-scroll')).overflow") == "visible"
+
+
+# The inks that show something: drawings, and lines in the place of tints.
+INKS = """() => {
+  const look = (selector, name) => [...document.querySelectorAll(selector)]
+    .filter(each => each.checkVisibility())
+    .map(each => [`${selector} ${name}`, getComputedStyle(each)[name]]);
+  return [
+    ...look(".whisker .span, .whisker .ring, .axis line", "stroke"),
+    ...look(".whisker .dot", "fill"),
+    ...look("[aria-current]", "outlineColor"),
+    ...look("a.button, .chip, form button:not(.as-link)", "borderTopColor"),
+  ];
+}"""
+OUTLINE = """() => {
+  const style = getComputedStyle(document.activeElement);
+  return [style.outlineStyle, style.outlineColor];
+}"""
+GROUND = "() => getComputedStyle(document.body).backgroundColor"
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_in_colours_that_the_visitor_chose_marks_buttons_and_the_focus_are_seen(
+    new_page: NewPage, truth: evaluator.GroundTruth, scheme: str
+) -> None:
+    page = new_page(forced_colors="active", color_scheme=scheme)
+    for address in ("/board/test/", "/board/test/charts/", "/accounts/login/"):
+        page.goto(address)
+        draw_all(page)
+        ground = page.evaluate(GROUND)
+        inks = page.evaluate(INKS)
+        assert inks
+        assert [what for what, ink in inks if ink == ground] == []
+        for _ in range(8):
+            page.keyboard.press("Tab")
+            style, colour = page.evaluate(OUTLINE)
+            assert style == "solid"
+            assert colour != ground
+    page.goto("/board/test/")
+    styles = page.locator(".splits a").evaluate_all(
+        "all => all.map(e => [e.matches('[aria-current]'), getComputedStyle(e).outlineStyle])"
+    )
+    assert {(is_current, style) for is_current, style in styles} == {(True, "solid"), (False, "none")}

@@ -73,18 +73,21 @@ def populate() -> str:
         versions.changed(SPLIT)
     shown = Submission.objects.get(method__name="Feature pyramid, two frames")
     second = Submission.objects.get(method__name="Dense scale matching")
-    comparisons.of(
-        methods=[shown.method_id, second.method_id],
-        split=Split.objects.get(pk=SPLIT),
-        viewer=AnonymousUser(),
-        now=timezone.now(),
-    )
+    five = list(Method.objects.filter(name__in=METHODS).values_list("pk", flat=True))
+    for methods in ([shown.method_id, second.method_id], five):
+        comparisons.of(
+            methods=methods,
+            split=Split.objects.get(pk=SPLIT),
+            viewer=AnonymousUser(),
+            now=timezone.now(),
+        )
     builders.infer_all()
     _give_maintainers_something_to_do(owner, maintainer)
     return json.dumps(
         {
             "method_id": str(shown.method_id),
             "second_method_id": str(second.method_id),
+            "five": "&".join(f"m={method_id}" for method_id in five),
             "private_method_id": str(secret.method_id),
             "submission_id": str(shown.pk),
             "rejected_id": str(broken.pk),

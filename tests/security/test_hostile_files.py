@@ -30,7 +30,7 @@ READABLE = evaluator.write_predictions(manifest=TRUTH.manifest, ttc_s=TRUTH.ttc_
 WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
 # One of each kind goes the whole way in the suite: stored, queued, read in a child process, told to its team.
 ALL_THE_WAY = (
-    "whole: nothing",
+    "whole: a space",
     "whole: 1,000,000 open brackets",
     "number: integer of 1,000,000 digits",
     "key: lone high surrogate",

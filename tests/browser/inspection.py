@@ -1,0 +1,105 @@
+"""What may be wrong with any page: what it costs, what moves, what does not fit, what axe finds."""
+
+import gzip
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from typing import Any, Final
+
+from playwright.sync_api import Page, expect
+
+from tests.browser.chromium import LAYOUT_SHIFT, LOW_CONTRAST, NARROW, OVERFLOW_PX, WIDE
+
+AXE: Final = (Path(__file__).parent / "vendored" / "axe.min.js").read_text(encoding="utf-8")
+RUN: Final = """(rules) => axe.run(document, {resultTypes: ["violations"], ...(rules && {runOnly: rules})})
+  .then(found => found.violations.flatMap(({id, impact, nodes}) => nodes.map(node =>
+    [id, impact, node.target, node.failureSummary].join(": "))))"""
+# What of a page depends on light and dark; all else is the same in both.
+OF_COLOURS: Final = ["color-contrast", "link-in-text-block"]
+MAX_FIRST_BYTES, MAX_BYTES = 100_000, 350_000
+LIBRARY: Final = "echarts"
+# Bytes as they came over the line, headers included.
+TRANSFERRED: Final = """() => ["navigation", "resource"].flatMap(kind => performance.getEntriesByType(kind))
+  .map(entry => [entry.name, entry.transferSize])"""
+# Half of 1440 and of 1280 px: what is left of them at 200 %.
+ZOOMED_PX: Final = (720, 640)
+# Chromium's own size of letters is 16.
+LARGE_LETTERS: Final = {"standard": 32, "fixed": 26}
+
+
+def inspected(page: Page, addresses: Iterable[str]) -> Iterator[str]:
+    """Everything that is wrong with each of these pages, a sentence each."""
+    session = page.context.new_cdp_session(page)
+    session.send("Network.enable")
+    session.send("Network.setCacheDisabled", {"cacheDisabled": True})  # each is somebody's first visit
+    for address in addresses:
+        for fault in _faults(page, address):
+            yield f"{address}: {fault}"
+
+
+def _faults(page: Page, address: str) -> Iterator[str]:
+    _show(page, WIDE, scheme="light")
+    answer = page.goto(address)
+    assert answer is not None
+    draw_all(page)
+    page.evaluate(AXE)
+    # The proxy compresses whatever is answered (deploy/Caddyfile).
+    yield from _cost(page, len(gzip.compress(answer.body())))
+    yield from axe(page, where="1440 px, light")
+    _show(page, WIDE, scheme="dark")
+    yield from axe(page, where="1440 px, dark", rules=OF_COLOURS)
+    _show(page, NARROW, scheme="dark")
+    yield from axe(page, where="360 px, dark", rules=OF_COLOURS)
+    _show(page, NARROW, scheme="light")
+    yield from axe(page, where="360 px, light")
+    for width in (NARROW["width"], *ZOOMED_PX):
+        page.set_viewport_size({"width": width, "height": 450})
+        yield from _overflow(page, f"{width} px")
+    page.set_viewport_size(WIDE)  # type: ignore[arg-type]  # a plain dict of the right shape
+    yield from _large_letters(page)
+
+
+def _show(page: Page, viewport: dict[str, int], *, scheme: Any) -> None:
+    page.set_viewport_size(viewport)  # type: ignore[arg-type]  # a plain dict of the right shape
+    page.emulate_media(color_scheme=scheme)
+
+
+def draw_all(page: Page) -> None:
+    """Bring every chart of the page into view, and return once all are drawn."""
+    for plot in page.locator("figure.chart .plot").all():
+        if plot.is_visible():
+            plot.scroll_into_view_if_needed()
+            expect(plot.and_(page.locator(".is-drawn"))).to_have_count(1)
+
+
+def _cost(page: Page, document_bytes: int) -> Iterator[str]:
+    """Its bytes, the library of charts apart, and how far anything moved until the last chart was drawn."""
+    loaded = dict(page.evaluate(TRANSFERRED)) | {page.url: document_bytes}
+    first = sum(size for name, size in loaded.items() if LIBRARY not in name)
+    if not 0 < first <= MAX_FIRST_BYTES:
+        yield f"{first:,} bytes before a chart comes into view: {loaded}"
+    if sum(loaded.values()) > MAX_BYTES:
+        yield f"{sum(loaded.values()):,} bytes with its charts: {loaded}"
+    if page.evaluate(LAYOUT_SHIFT) > 0:
+        yield f"moves by {page.evaluate(LAYOUT_SHIFT)} while it loads"
+
+
+def axe(page: Page, *, where: str, rules: list[str] | None = None) -> Iterator[str]:
+    """What axe finds in a page that has it, of whatever weight, and texts that are too pale."""
+    found: list[str] = page.evaluate(RUN, rules) + page.evaluate(LOW_CONTRAST)
+    yield from (f"at {where}: {fault}" for fault in found)
+
+
+def _overflow(page: Page, where: str) -> Iterator[str]:
+    found = page.evaluate(OVERFLOW_PX)
+    if found > 0:
+        yield f"is {found} px wider than the screen at {where}"
+
+
+def _large_letters(page: Page) -> Iterator[str]:
+    """Letters of twice the size, as somebody sets them in the browser, and nothing else zoomed."""
+    session = page.context.new_cdp_session(page)
+    session.send("Page.enable")
+    session.send("Page.setFontSizes", {"fontSizes": LARGE_LETTERS})
+    yield from _overflow(page, "1440 px with letters of 200 %")
+    session.send("Page.setFontSizes", {"fontSizes": {"standard": 16, "fixed": 13}})
+    session.detach()
