@@ -17,11 +17,10 @@ from typing import Final, Literal
 
 from playwright.sync_api import Browser, BrowserContext, Page
 
-from tests.browser.addresses import answered_with_pages, named_addresses
 from tests.browser.chromium import chromium, sign_in
 from tests.browser.inspection import draw_all
 from tests.browser.pictures import smaller
-from tests.browser.site import PASSWORD, web_alone, worker
+from tests.browser.site import PASSWORD, answered_with_pages, web_alone, worker
 from tests.journeys.production import REPOSITORY, Site, await_that
 
 SHOWN: Final = REPOSITORY / "docs" / "screenshots"
@@ -46,12 +45,25 @@ print(Evaluation.objects.filter(finished_at=None).count()
       + Comparison.objects.filter(computed_at=None).count()
       + Edition.objects.filter(split="demo", inferred_at=None).count())
 """
-ASK: Final = """
+NO_ID: Final = "00000000-0000-4000-8000-000000000000"
+SAMPLES: Final = {
+    "split": "demo",
+    "number": "1",
+    "guide_name": "uncertainty",
+    "page_name": "rules",
+    "wheel_name": "none.whl",
+    "chosen": "csv",
+    "secret": "none",
+    "handle": NO_ID,
+    "invitation_id": NO_ID,
+}
+ASK: Final = f"""
 import json
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 from leaderboard.models import Method, Split, Submission
 from leaderboard.scoring import comparisons
+from tests.browser.addresses import named_addresses
 shown = Method.objects.exclude(visibility="PRIVATE").filter(submissions__split="demo").order_by("created_at")
 five = [method.pk for method in shown[:5]]
 split, viewer, now = Split.objects.get(pk="demo"), AnonymousUser(), timezone.now()
@@ -59,19 +71,17 @@ for chosen in (five[:2], five):
     comparisons.of(methods=chosen, split=split, viewer=viewer, now=now)
 own = Submission.objects.filter(submitted_by__email="demo@example.org")
 scored = own.get(method__name="Detection, box height")
-print(json.dumps({
-    "two": "&".join(f"m={pk}" for pk in five[:2]),
-    "five": "&".join(f"m={pk}" for pk in five),
+known = {SAMPLES!r} | {{
+    "two": "&".join(f"m={{pk}}" for pk in five[:2]),
+    "five": "&".join(f"m={{pk}}" for pk in five),
     "public_id": str(five[0]),
     "rejected_id": str(own.get(method__name="First try").pk),
     "submission_id": str(scored.pk),
     "method_id": str(scored.method_id),
     "team_id": str(scored.method.team_id),
-}))
+}}
+print(json.dumps([known, named_addresses(known)]))
 """
-# What a sample is needed for, and leads to no page.
-OTHERS: Final = {"chosen": "csv", "secret": "none", "wheel_name": "none.whl"}
-NO_ID: Final = "00000000-0000-4000-8000-000000000000"
 # Kinds of pages that are not seen at a pattern with the samples alone.
 VIEWS: Final = {
     "board-mid": "/board/demo/?columns=mid&nerf=no",
@@ -92,6 +102,7 @@ class Demo:
 
     site: Site
     known: dict[str, str]
+    named: dict[str, str]  # addresses by the names of their patterns
     email: str
     password: str
 
@@ -107,11 +118,9 @@ def demo() -> Iterator[Demo]:
         site.manage("createsuperuser", "--no-input", "--email", KEEPER)
         with worker(site):
             await_that(lambda: nothing_waits(site), what="the demo is scored", patience_s=PATIENCE_S)
-            known = json.loads(site.manage("shell", "-v0", "-c", ASK).splitlines()[-1])
+            known, named = json.loads(site.manage("shell", "-v0", "-c", ASK).splitlines()[-1])
             await_that(lambda: nothing_waits(site), what="the methods are compared", patience_s=PATIENCE_S)
-        others = OTHERS | {"handle": NO_ID, "invitation_id": NO_ID, "split": "demo", "number": "1"}
-        others |= {"guide_name": "uncertainty", "page_name": "rules"}
-        yield Demo(site, others | known, login[1], login[2])
+        yield Demo(site, known, named, login[1], login[2])
 
 
 def nothing_waits(site: Site) -> bool:
@@ -130,7 +139,7 @@ def signed_in(browser: Browser, demo: Demo, *, email: str, password: str) -> Bro
 def sights(browser: Browser, demo: Demo) -> Iterator[tuple[BrowserContext, dict[str, str]]]:
     """Everybody that there is with the pages that nobody before could see, by name."""
     views = {name: view.format(**demo.known) for name, view in VIEWS.items()}
-    left = {"nothing": views["nothing"]} | named_addresses(demo.known) | views
+    left = {"nothing": views["nothing"]} | demo.named | views
     yield browser.new_context(base_url=demo.site.url), {"nothing": left.pop("nothing")}
     for context in (
         browser.new_context(base_url=demo.site.url),
