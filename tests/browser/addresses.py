@@ -1,16 +1,11 @@
 """Every page that the site has, from its own addresses: a page that is added later joins by itself."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
-import httpx
-
-from tests.journeys.production import PATIENCE_S, Site
 from tests.security.routes import routes
 
 # What serves no pages: programs' doors, the administration (Django's own pages), and what monitoring asks.
 NOT_PAGES = ("api/v1/", "admin/", "healthz", "readyz", "metrics")
-# Parts of pages, for a page that is open.
-PARTS = ("/state/", "/progress/")
 
 
 def named_addresses(samples: Mapping[str, str]) -> dict[str, str]:
@@ -26,14 +21,3 @@ def named_addresses(samples: Mapping[str, str]) -> dict[str, str]:
 def addresses(samples: Mapping[str, str]) -> list[str]:
     """The same, each once."""
     return sorted(set(named_addresses(samples).values()))
-
-
-def answered_with_pages(site: Site, candidates: Iterable[str], *, cookies: dict[str, str]) -> list[str]:
-    """Those that are answered with a page to whoever has these cookies."""
-    with httpx.Client(base_url=site.url, timeout=PATIENCE_S, trust_env=False, cookies=cookies) as client:
-        answers = {address: client.get(address) for address in candidates if not address.endswith(PARTS)}
-    return [
-        address
-        for address, answer in answers.items()
-        if answer.status_code == 200 and answer.headers["content-type"].startswith("text/html")
-    ]

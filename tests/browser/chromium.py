@@ -126,6 +126,21 @@ LAYOUT_SHIFT = """() => new Promise(resolve => {
   requestAnimationFrame(() => requestAnimationFrame(() => resolve(sum)));
 })"""
 
+# What moved, from where to where: x, y, width, height.
+MOVED = """() => new Promise(resolve => {
+  const found = [];
+  const box = ({x, y, width, height}) => [x, y, width, height].map(Math.round).join(" ");
+  const name = node => (node?.outerHTML ?? node?.textContent ?? "gone").trim().slice(0, 80);
+  new PerformanceObserver(list => {
+    for (const {hadRecentInput, sources} of list.getEntries()) if (!hadRecentInput) {
+      for (const {node, previousRect, currentRect} of sources) {
+        found.push(`${name(node)}: ${box(previousRect)} to ${box(currentRect)}`);
+      }
+    }
+  }).observe({type: "layout-shift", buffered: true});
+  requestAnimationFrame(() => requestAnimationFrame(() => resolve(found)));
+})"""
+
 # Every text against the ground it stands on, by WCAG's formula; what is hidden or disabled does not count.
 LOW_CONTRAST = """() => {
   const parse = text => {

@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.chromium import LAYOUT_SHIFT, LOW_CONTRAST, NARROW, OVERFLOW_PX, WIDE
+from tests.browser.chromium import LOW_CONTRAST, MOVED, NARROW, OVERFLOW_PX, WIDE
 
 AXE: Final = (Path(__file__).parent / "vendored" / "axe.min.js").read_text(encoding="utf-8")
 RUN: Final = """(rules) => axe.run(document, {resultTypes: ["violations"], ...(rules && {runOnly: rules})})
@@ -79,8 +79,7 @@ def _cost(page: Page, document_bytes: int) -> Iterator[str]:
         yield f"{first:,} bytes before a chart comes into view: {loaded}"
     if sum(loaded.values()) > MAX_BYTES:
         yield f"{sum(loaded.values()):,} bytes with its charts: {loaded}"
-    if page.evaluate(LAYOUT_SHIFT) > 0:
-        yield f"moves by {page.evaluate(LAYOUT_SHIFT)} while it loads"
+    yield from (f"moves while it loads: {moved}" for moved in page.evaluate(MOVED))
 
 
 def axe(page: Page, *, where: str, rules: list[str] | None = None) -> Iterator[str]:

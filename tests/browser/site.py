@@ -2,7 +2,7 @@
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -11,10 +11,12 @@ import numpy as np
 
 import evaluator
 from leaderboard.demo.truth import simulate
-from tests.journeys.production import BIN, Site, await_that, free_port, running
+from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, free_port, running
 from tests.prepared import put_sqlite, static_files
 
 PASSWORD = "kestrel-altimeter-9"
+# Parts of pages, for a page that is open.
+PARTS = ("/state/", "/progress/")
 WEB = (sys.executable, "-m", "waitress")
 WORKER = (
     *(str(BIN / "celery"), "--app=leaderboard", "worker", "--pool=solo"),
@@ -75,3 +77,14 @@ def open_split(site: Site, split: str) -> evaluator.GroundTruth:
 def predictions(truth: evaluator.GroundTruth, *, factor: float) -> bytes:
     """A valid file: the truth times a factor."""
     return evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * factor)
+
+
+def answered_with_pages(site: Site, candidates: Iterable[str], *, cookies: dict[str, str]) -> list[str]:
+    """Those that are answered with a page to whoever has these cookies."""
+    with httpx.Client(base_url=site.url, timeout=PATIENCE_S, trust_env=False, cookies=cookies) as client:
+        answers = {address: client.get(address) for address in candidates if not address.endswith(PARTS)}
+    return [
+        address
+        for address, answer in answers.items()
+        if answer.status_code == 200 and answer.headers["content-type"].startswith("text/html")
+    ]

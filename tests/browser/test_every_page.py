@@ -7,10 +7,11 @@ from playwright.sync_api import Browser, Page, expect
 
 import evaluator
 from tests.browser import world
-from tests.browser.addresses import addresses, answered_with_pages
-from tests.browser.chromium import LAYOUT_SHIFT, NARROW, OVERFLOW_PX, WIDE, sign_in
+from tests.browser.addresses import addresses
+from tests.browser.chromium import MOVED, NARROW, OVERFLOW_PX, WIDE, sign_in
 from tests.browser.conftest import NewPage
 from tests.browser.inspection import AXE, axe, draw_all, inspected
+from tests.browser.site import answered_with_pages
 from tests.journeys.production import Site
 
 pytestmark = pytest.mark.browser
@@ -144,10 +145,10 @@ def test_a_message_moves_nothing_when_it_comes_and_when_it_goes(
     page.get_by_role("button", name="Sign out").click()
     message = page.locator(".messages .message")
     expect(message).to_be_visible()
-    assert page.evaluate(LAYOUT_SHIFT) == 0
+    assert page.evaluate(MOVED) == []
     message.get_by_role("button", name="Close").click()
     expect(message).to_have_count(0)
-    assert page.evaluate(LAYOUT_SHIFT) == 0
+    assert page.evaluate(MOVED) == []
 
 
 def test_comparison_of_five_is_printed_on_one_sheet_and_nothing_is_cut_off(
