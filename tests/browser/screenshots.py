@@ -26,6 +26,7 @@ from tests.journeys.production import REPOSITORY, Site, await_that
 SHOWN: Final = REPOSITORY / "docs" / "screenshots"
 # What the README and the documents show: its page, how wide, and in which colours.
 KEPT: Final = {
+    "landing-wide-light": ("home", 1440, "light"),
     "board-wide-light": ("board", 1440, "light"),
     "board-narrow-dark": ("board", 360, "dark"),
     "compare-wide-light": ("compare-two", 1440, "light"),
@@ -50,6 +51,7 @@ SAMPLES: Final = {
     "split": "demo",
     "number": "1",
     "guide_name": "uncertainty",
+    "operation_id": "submit",
     "page_name": "rules",
     "wheel_name": "none.whl",
     "chosen": "csv",
