@@ -107,7 +107,7 @@ def test_places_that_were_linked_before_are_still_there(
 
 def found(client: Client, query: str) -> list[tuple[str, str]]:
     """Address and text of each place that the search page shows."""
-    root = assert_sound(client.get("/docs/search/", {"q": query}))
+    root = assert_sound(client.get("/docs/search/", {"q": query}, follow=True))
     items = [li for hits in root.all("ol", class_="hits") for li in hits.all("li")]
     return [(li.one("a").attributes["href"], li.text) for li in items]
 

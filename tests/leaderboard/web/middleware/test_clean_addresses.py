@@ -11,7 +11,7 @@ from leaderboard.models import Edition, User
     [
         ("/board/test/?q=box&frames=&cameras=&boxes=", "/board/test/?q=box"),
         ("/board/test/?q=&frames=", "/board/test/"),
-        ("/?sort=-rte&q=", "/?sort=-rte"),
+        ("/board/val/?sort=-rte&q=", "/board/val/?sort=-rte"),
         ("/board/test/editions/1/?at=&q=a%26b%3D", "/board/test/editions/1/?q=a%26b%3D"),
         ("/compare/?split=test&m=1&m=2&with=", "/compare/?split=test&m=1&m=2"),
         ("/submissions/?q=&split=test&state=", "/submissions/?split=test"),
