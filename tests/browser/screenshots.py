@@ -38,7 +38,7 @@ HEIGHT_PX: Final = 900
 SCHEMES: Final[tuple[Literal["light", "dark"], ...]] = ("light", "dark")
 # A sheet shows this much of a page.
 SHEET_PX, MAX_SHOWN_PX = 2000, 2400
-PATIENCE_S: Final = 300.0
+PATIENCE_S: Final = 1200.0
 KEEPER: Final = "keeper@example.org"
 COUNT_WAITING: Final = """
 from leaderboard.models import Comparison, Edition, Evaluation
@@ -94,6 +94,7 @@ VIEWS: Final = {
     "method-public": "/methods/{public_id}/",
     "submission-rejected": "/submissions/{rejected_id}/",
     "publish": "/methods/{method_id}/visibility/?visibility=PUBLIC",
+    "docs-found": "/docs/search/?q=quota",
     "nothing": "/nowhere/",
 }
 

@@ -33,6 +33,7 @@ VIEWS = (
     "/compare/?split=val",
     "/compare/?split=val&m={method_id}&m={second_method_id}",
     "/compare/?split=val&{five}",
+    "/docs/search/?q=quota",
 )
 FAULTS = ("/nowhere/", f"/board/{world.SPLIT}/?sort=nothing", f"/board/{world.SPLIT}/?at=never")
 # What does nothing unless a script hears it.
