@@ -21,6 +21,8 @@ _MARGIN: Final = 24.0
 _GAP: Final = 16.0
 # From here on both equations of the task figure have room side by side.
 _WIDE: Final = 900
+# Of its texts below the frames: still read where the figure is shrunk to a tablet.
+_LABEL: Final = 15.0
 
 
 class _Crop:
@@ -218,8 +220,12 @@ def task_figure(
         figure.shapes += [crop.picture, outline(crop.place(boxes[frame]), colour=shown)]
         name = {0: "reference", TARGET: "target"}.get(frame, "")
         at_s = (frame - TARGET) / FRAME_RATE_HZ
-        figure.shapes.append(Text(f"{at_s:.1f} s".replace("-", "−"), x, y + side + 20, colours.quiet))
-        figure.shapes.append(Text(name, x + side, y + side + 20, colours.ink, anchor="end", is_bold=True))
+        figure.shapes.append(
+            Text(f"{at_s:.1f} s".replace("-", "−"), x, y + side + 20, colours.quiet, size=_LABEL)
+        )
+        figure.shapes.append(
+            Text(name, x + side, y + side + 20, colours.ink, _LABEL, anchor="end", is_bold=True)
+        )
     _add_equations(figure, ratio, ttc_s, y=_MARGIN + n_rows * (side + label) + 26)
     return figure
 
@@ -234,11 +240,12 @@ def _add_equations(figure: Figure, ratio: float, ttc_s: float, *, y: float) -> N
             (text, colour) for texts, colour in ((scale, colours.mark), (time, colours.ink)) for text in texts
         ]
         for i, (text, colour) in enumerate(lines):
-            figure.shapes.append(Text(text, _MARGIN, y + 24 * i, colour, 16, is_bold=i < 2))
+            figure.shapes.append(Text(text, _MARGIN, y + 24 * i, colour, 15.5, is_bold=i < 2))
         return
-    left = figure.width / 2 + _GAP / 2
-    figure.shapes.append(Text(" ".join(scale), _MARGIN, y, colours.mark, 17, is_bold=True))
-    figure.shapes.append(Text(" ".join(time), left, y, colours.ink, 17))
+    figure.shapes += [
+        Text(" ".join(scale), _MARGIN, y, colours.mark, 18, is_bold=True),
+        Text(" ".join(time), figure.width - _MARGIN, y, colours.ink, 18, anchor="end"),
+    ]
 
 
 def _seconds(ttc_s: float) -> str:

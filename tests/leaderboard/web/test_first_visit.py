@@ -1,4 +1,4 @@
-"""What somebody's first look at a board costs them."""
+"""What somebody's first look at a board, or at the landing page, costs them."""
 
 import gzip
 import re
@@ -14,16 +14,29 @@ from tests import board_rows
 pytestmark = pytest.mark.slow
 
 MAX_BYTES = 100_000
+# Of these a browser loads the one that suits its screen.
+ONE_OF_THEM = re.compile(r"task/(?!wide-light)")
 
 
-def test_a_board_of_hundreds_and_all_that_it_loads_stay_below_100_kb(
-    edition: Edition, owner: User, client: Client
+@pytest.mark.parametrize("address", ["/", "/board/test/"])
+def test_a_page_over_a_board_of_hundreds_and_all_that_it_loads_stay_below_100_kb(
+    edition: Edition, owner: User, client: Client, address: str
 ) -> None:
     board_rows.fill(edition, n=300, user=owner)
-    page = client.get("/board/test/", headers={"Accept-Encoding": "gzip"})
+    page = client.get(address, headers={"Accept-Encoding": "gzip"})
     text = gzip.decompress(page.content).decode()
-    names = set(re.findall(r'(?:href|src)="/static/([^"]+)"', text))
+    names = set(re.findall(r'(?:href|src|srcset)="/static/([^"]+)"', text))
     assert "site.css" in names
-    files = {name: finders.find(re.sub(r"\.[0-9a-f]{12}(?=\.\w+$)", "", name)) for name in names}
+    assert ("task/wide-light.svg" in names) == (address == "/")
+    files = {name: finders.find(name) for name in names if not ONE_OF_THEM.match(name)}
     sizes = {name: len(gzip.compress(Path(str(path)).read_bytes())) for name, path in files.items()}
     assert len(page.content) + sum(sizes.values()) < MAX_BYTES, sizes
+
+
+def test_every_variant_of_the_landing_pages_figure_is_as_small() -> None:
+    sizes = [
+        len(gzip.compress(Path(str(finders.find(f"task/{size}-{theme}.svg"))).read_bytes()))
+        for size in ("wide", "narrow")
+        for theme in ("light", "dark")
+    ]
+    assert max(sizes) < 60_000
