@@ -31,8 +31,8 @@ help: ## list what can be made
 demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (PORT=… for another port)
 	@exec $(PY) manage.py demo --host $(HOST) --port $(PORT)
 
-demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew: render its frames and run the baselines on them
-	nice -n 10 $(PY) -m leaderboard.demo.make_runs --jobs 2
+demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew from rendered frames (RUNS="tracking pixel-mse" for some)
+	nice -n 10 $(PY) -m leaderboard.demo.make_runs --jobs 2 $(if $(RUNS),--only $(RUNS))
 
 test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
 	@status=0; \

@@ -1,7 +1,8 @@
 """`python -m leaderboard.demo.make_runs`: make the demo's runs anew, on frames that are rendered on the way.
 
 The estimates are those of the commands in `leaderboard.demo.runs`; the frames go through memory instead of a
-folder, and all methods look at a frame while it is there. An interrupted run continues where it was.
+folder, and all methods look at a frame while it is there. An interrupted run continues where it was; after a
+change of the code, remove the folder `--work` first.
 """
 
 import argparse
@@ -106,6 +107,8 @@ def make(runs: Sequence[Run], *, work: Path, n_processes: int) -> None:
     journals = [work / f"{run.name}.npy" for run in runs]
     done = [np.load(path) if path.exists() else np.full(split.n_sequences, np.nan) for path in journals]
     rows = np.flatnonzero(np.isnan(done).any(axis=0)).tolist()
+    if len(rows) < split.n_sequences:
+        _say(f"{split.n_sequences - len(rows):,} are done in {work}; remove it to begin anew.")
     folder = RenderedFolder.of(split, seed=SEED, rows=rows)
     reasons: Counter[str] = Counter()
     began_s = saved_s = time.monotonic()
@@ -127,6 +130,8 @@ def make(runs: Sequence[Run], *, work: Path, n_processes: int) -> None:
     for run, values in zip(runs, done, strict=True):
         run.keep(values)
         _say(f"{run.path.name}: {run.command}")
+    for path in journals:
+        path.unlink()
     _say(f"Fallbacks: {dict(reasons)}")
 
 
@@ -145,7 +150,10 @@ def main() -> None:
     # Each process does its work with one thread; those of the linear algebra would only wait for one another.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     runs = [run for run in RUNS if not chosen.only or run.name in chosen.only]
-    make(runs, work=chosen.work, n_processes=chosen.jobs)
+    try:
+        make(runs, work=chosen.work, n_processes=chosen.jobs)
+    except KeyboardInterrupt:
+        sys.exit("Interrupted; the same command continues.")
 
 
 if __name__ == "__main__":

@@ -65,6 +65,7 @@ RUNS = (
     Run("alignment", "alignment"),
     Run("tracking", "tracking"),
     Run("pixel-mse", "pixel-mse"),
+    Run("pixel-mse-toolkit", "pixel-mse", {"variant": "toolkit"}),
     Run("detection-height", "detection", {"measure": "height"}),
     Run("detection-sqrt-area", "detection", {"measure": "sqrt-area"}),
     Run("detection-area", "detection", {"measure": "area"}),

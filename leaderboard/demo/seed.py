@@ -105,6 +105,17 @@ ENTRIES = (
     DemoEntry(
         email=_ON_PIXELS,
         team="Baselines on pixels",
+        method="Pixel MSE, as in the toolkit",
+        description=(
+            "What the dataset's toolkit computes under this name: it scales the target instead, by the "
+            "nearest pixel, and its reference patch is off centre where the object moves away."
+        ),
+        run=get_run("pixel-mse-toolkit"),
+        details={**_MEASURED, "n_frames": 2, "paper_url": _PAPER},
+    ),
+    DemoEntry(
+        email=_ON_PIXELS,
+        team="Baselines on pixels",
         method="SOT, median flow",
         description=(
             "The target box is followed back to the reference frame by median flow; the paper follows it "
