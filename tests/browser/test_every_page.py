@@ -39,6 +39,10 @@ FAULTS = ("/nowhere/", f"/board/{world.SPLIT}/?sort=nothing", f"/board/{world.SP
 # What does nothing unless a script hears it.
 DEAD = """() => [...document.querySelectorAll("button[type=button], .tray, .messages .close")]
   .filter(each => each.checkVisibility()).map(each => each.outerHTML.slice(0, 120))"""
+# Boxes that scroll sideways.
+SCROLLING = """() => [...document.querySelectorAll(".scroll")]
+  .filter(box => box.scrollWidth > box.clientWidth).map(box => box.getAttribute("aria-label"))"""
+MAX_LINE_PX = 40
 CUT_OFF = """() => [...document.querySelectorAll("td, th")].filter(cell => cell.checkVisibility()
     && (cell.getBoundingClientRect().right > innerWidth + 1 || cell.scrollWidth > cell.clientWidth + 4))
   .map(cell => cell.textContent.trim())"""
@@ -100,6 +104,18 @@ def test_no_page_of_maintainers_has_a_fault(new_page: NewPage, site: Site, known
     assert {"/maintain/", "/maintain/queue/", "/maintain/quotas/", team, f"{team}val/end/"} <= set(desk)
     views = [f"/maintain/queue/?state={state}" for state in ("failed", "waiting")]
     assert list(inspected(page, [*desk, *views, "/maintain/quotas/?team=owls"])) == []
+
+
+def test_on_a_phone_maintainers_have_cards_and_a_menu_of_one_line(
+    new_page: NewPage, known: dict[str, str]
+) -> None:
+    page = new_page(viewport=NARROW)
+    sign_in(page, world.MAINTAINER)
+    team = f"/maintain/quotas/{known['team_id']}/"
+    for address in ("/maintain/audit/", "/maintain/queue/", "/maintain/quotas/", team):
+        page.goto(address)
+        assert page.evaluate(SCROLLING) == [], address
+        assert page.evaluate("document.querySelector('.site-account').clientHeight") < MAX_LINE_PX
 
 
 def test_no_page_that_says_what_was_wrong_has_a_fault(browser: Browser, site: Site) -> None:

@@ -1,5 +1,6 @@
 """A board's past: editions at addresses that stay, the board as it stood at a time, what changed."""
 
+import re
 from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
@@ -203,6 +204,18 @@ def test_changelog_tells_every_change_with_its_reason(client: Client, replaced: 
         "Edition 2 replaced edition 1. Labels corrected.",
         "Edition 1 was published. The first edition.",
     ]
+
+
+def test_changelog_has_the_time_of_each_change_and_leads_to_the_board_of_a_day(
+    client: Client, replaced: Edition
+) -> None:
+    root = get(client, EDITIONS)
+    times = [li.one("span", class_="when").text for li in root.one("ol", class_="changelog").all("li")]
+    assert all(re.fullmatch(r"\d{4}-\d\d-\d\d \d\d:\d\d UTC", each) for each in times)
+    (form,) = [each for each in root.all("form") if each.all("input", name="at")]
+    assert form.attributes["action"] == "/board/test/"
+    day = form.one("input", name="at").attributes["value"]
+    assert pages.board_rows(get(client, f"/board/test/?at={day}"))
 
 
 def test_changelog_counts_what_was_left_out_and_names_nobody(
