@@ -1,10 +1,15 @@
-"""The pages of documentation."""
+"""The pages of documentation.
+
+They ask the database for nothing but the splits of the first page, so they answer without one as well. The
+long ones are compressed here: not every site has a proxy that does so.
+"""
 
 from typing import Any, Final
 
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.urls import reverse
+from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
 from leaderboard.http import ANYTHING, Parameters
@@ -13,6 +18,7 @@ from leaderboard.web.docs import api_examples, api_reference, guides, reference,
 SEARCH_PARAMETERS: Final[Parameters] = {"q": ANYTHING}
 
 
+@gzip_page
 @require_safe
 def docs(request: HttpRequest) -> HttpResponse:
     """How to submit, the file's format, the errors, the API."""
@@ -20,6 +26,7 @@ def docs(request: HttpRequest) -> HttpResponse:
     return render(request, "docs/docs.html", context)
 
 
+@gzip_page
 @require_safe
 def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
     """One guide of `docs/`."""
@@ -32,6 +39,7 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
     return render(request, "docs/guide.html", {"navigation": guides.navigation(), **context})
 
 
+@gzip_page
 @require_safe
 def find(request: HttpRequest) -> HttpResponse:
     """What the documentation says about some words."""
@@ -40,6 +48,7 @@ def find(request: HttpRequest) -> HttpResponse:
     return render(request, "docs/search.html", {"navigation": guides.navigation(), **context})
 
 
+@gzip_page
 @require_safe
 def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
     """One operation of the API: a request, its answer, parameters and errors."""
@@ -55,6 +64,7 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
     return render(request, "docs/api_operation.html", {"navigation": guides.navigation(), **context})
 
 
+@gzip_page
 @require_safe
 def api_page(request: HttpRequest) -> HttpResponse:
     """Every operation, parameter and object of the API."""

@@ -130,4 +130,5 @@ def _image(address: str) -> dict[str, str]:
     if size is None:
         raise DeadLink(f"{address} has no viewBox; expected a drawing with one")
     width, height = (str(round(float(number))) for number in size.groups())
-    return {"src": static(f"docs/{address.removeprefix('figures/')}"), "width": width, "height": height}
+    source = static(f"docs/{address.removeprefix('figures/')}")
+    return {"src": source, "width": width, "height": height, "loading": "lazy"}

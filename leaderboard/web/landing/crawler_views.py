@@ -17,7 +17,7 @@ from leaderboard.exports import sitemaps
 from leaderboard.exports.sitemaps import SitemapEntry
 from leaderboard.models import Edition, Split, Visibility
 from leaderboard.pages import pages
-from leaderboard.web.docs import guides
+from leaderboard.web.docs import api_examples, guides
 
 # Public pages that are about no board.
 _NAMED: Final = ("home", "docs", "api_reference")
@@ -51,6 +51,7 @@ def sitemap(request: HttpRequest) -> HttpResponse:
         *(SitemapEntry(_absolute(name)) for name in _NAMED),
         *(SitemapEntry(_absolute("site_page", name)) for name in pages.PAGES),
         *(SitemapEntry(_absolute("guide", name)) for name in guides.files()),
+        *(SitemapEntry(_absolute("api_operation", name)) for name in api_examples.EXAMPLES),
         *_of_boards(splits_of(request)),
     ]
     return HttpResponse(sitemaps.xml(found), content_type="application/xml; charset=utf-8")

@@ -5,6 +5,7 @@ from urllib.parse import unquote, urlsplit
 import pytest
 from django.contrib.staticfiles import finders
 from django.test import Client
+from pytest_django import DjangoAssertNumQueries
 
 from leaderboard.web.docs import guides, search
 from tests import pages
@@ -100,6 +101,16 @@ def test_places_that_were_linked_before_are_still_there(
     client: Client, benchmark: None, address: str, ids: list[str]
 ) -> None:
     assert [each for each in ids if each not in places(client, address, {})] == []
+
+
+def test_a_guide_asks_the_database_for_nothing_and_is_compressed(
+    client: Client, django_assert_num_queries: DjangoAssertNumQueries, db: None
+) -> None:
+    for address in ("/docs/cli/", "/docs/api/board/", "/docs/search/?q=quota", "/docs/api/"):
+        with django_assert_num_queries(0):
+            answer = client.get(address, headers={"Accept-Encoding": "gzip"})
+        assert answer.headers["Content-Encoding"] == "gzip"
+        assert len(answer.content) < 30_000
 
 
 # --- search ----------------------------------------------------------------------------------------------
