@@ -31,7 +31,7 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
     shown = [entry for entry in board.entries if entry.is_visible_to_all]
     context = {
         "board": board,
-        "progress": _progress(board),
+        "progress": progress(board),
         "latency": charts.latency(shown),
         "profile": profile_chart.profile(shown[:N_PROFILES]),
         "n_profiles": N_PROFILES,
@@ -45,10 +45,11 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
 def progress_options(request: HttpRequest, split: str) -> HttpResponse:
     """The progress of a split as options for ECharts: pages fetch it once the chart comes into view."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
-    return JsonResponse(_progress(board).options)
+    return JsonResponse(progress(board).options)
 
 
-def _progress(board: Board) -> Chart:
+def progress(board: Board) -> Chart:
+    """The progress of a board, of what everybody sees of it."""
     shown = [entry for entry in board.entries if entry.is_visible_to_all]
     attempts = snapshots.shown(split=board.split, edition=board.edition).attempts if board.edition else ()
     return charts.progress(shown, attempts)

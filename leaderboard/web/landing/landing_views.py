@@ -18,7 +18,7 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import bibtex
 from leaderboard.models import Split, User
 from leaderboard.quotas import deadlines
-from leaderboard.web.boards import board_query
+from leaderboard.web.boards import board_query, chart_views
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.landing.leaders import lead_words, leaders
 from leaderboard.web.landing.news import latest
@@ -82,4 +82,5 @@ def dates(splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetim
 def _leading(main: Split) -> dict[str, Any]:
     """What the page tells of the main board: only what everybody sees, whoever reads."""
     board = snapshots.board(split=main, viewer=AnonymousUser())
-    return {"board": board, "leaders": leaders(board), "lead": lead_words(board)}
+    fronts = [row for row in chart_views.progress(board).rows if row[-1]]
+    return {"board": board, "leaders": leaders(board), "lead": lead_words(board), "fronts": fronts}

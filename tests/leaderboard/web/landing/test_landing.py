@@ -178,9 +178,9 @@ def test_addresses_from_when_the_board_was_here_still_lead_to_it(
 def test_anything_else_behind_the_address_is_the_landing_page(
     client: Client, benchmark: None, owner: User, query: str
 ) -> None:
-    assert client.get(f"/{query}").status_code == 200
+    assert client.get(f"/{query}", follow=True).status_code == 200
     client.force_login(owner)
-    assert client.get(f"/{query}").status_code == 200
+    assert client.get(f"/{query}", follow=True).status_code == 200
 
 
 def test_board_in_the_menu_leads_to_the_main_board_from_everywhere(client: Client, benchmark: None) -> None:
