@@ -19,7 +19,7 @@ DEV_STAMP := $(VENV)/.installed-dev-$(call checksum,requirements-dev.lock)
 READY := $(or $(wildcard $(DEV_STAMP)),$(SERVER_STAMP))
 
 # A process of the test run for each processor; the tests of one file stay together, with what they share.
-SPREAD := -n auto --dist loadfile
+SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
@@ -35,10 +35,7 @@ demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew from rendered f
 	nice -n 10 $(PY) -m leaderboard.demo.make_runs --jobs 2 $(if $(RUNS),--only $(RUNS))
 
 test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
-	@status=0; \
-	$(PY) -m tests.on_postgresql || status=1; \
-	$(PY) -m pytest $(SPREAD) || status=1; \
-	exit $$status
+	@$(PY) -m tests.everything
 
 test-fast: $(DEV_STAMP) ## what takes less than a minute: no services, no browser, nothing slow
 	$(PY) -m pytest -q $(SPREAD) -m "not slow and not services and not browser"

@@ -7,13 +7,14 @@ import hypothesis
 import pytest
 from django.core.cache import cache
 from django.db import connection
+from django.db.backends.postgresql.operations import DatabaseOperations
 from pytest_django import DjangoDbBlocker
 from pytest_django.fixtures import Settings
 
 from leaderboard.benchmark import splits
 from leaderboard.web.middleware.page_cache import memory
 from leaderboard.web.monitoring import readiness
-from tests import prepared, services
+from tests import emptying, prepared, services, spread
 
 # How long an example takes says more about the machine than about the code, and what is found by chance is
 # not found in the change that fails: `--hypothesis-profile=default` looks further.
@@ -34,6 +35,15 @@ def pytest_configure() -> None:
     prepared.begin()
 
 
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """See `tests/spread.py`; `python -m tests.on_postgresql` repeats only what asks a database."""
+    spread.sort(items)
+    if os.environ.get("TSTTC_DATABASE_ALONE") == "1":
+        others = spread.without_database(items)
+        config.hook.pytest_deselected(items=others)
+        items[:] = [item for item in items if item not in set(others)]
+
+
 @pytest.fixture(scope="session")
 def django_db_modify_db_settings(django_db_modify_db_settings: None) -> None:
     """On the test server, the test database is a copy of the one that was migrated already."""
@@ -47,7 +57,8 @@ def django_db_setup(django_db_setup: None, django_db_blocker: DjangoDbBlocker) -
     """The test database, in which a transactional test may empty the audit trail when it ends."""
     if connection.vendor == "postgresql":
         with django_db_blocker.unblock(), connection.cursor() as cursor:
-            cursor.execute("ALTER TABLE leaderboard_auditevent DISABLE TRIGGER audit_no_truncate")
+            cursor.execute(f"ALTER TABLE {emptying.AUDIT_TRAIL} DISABLE TRIGGER audit_no_truncate")
+        DatabaseOperations.sql_flush = emptying.statements  # type: ignore[method-assign, assignment]
 
 
 @pytest.fixture(scope="session")

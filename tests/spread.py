@@ -1,0 +1,48 @@
+"""How the suite is spread over processes: files stay together, those that take long come first.
+
+Otherwise a file of one test that takes a minute is begun last, and the other processes wait for it.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+
+import pytest
+
+# xdist's own order puts files with few tests last.
+OPTIONS = ("--dist", "loadfile", "--no-loadscope-reorder")
+# The longest first.
+LONG = (
+    "tests/chaos/",
+    "tests/journeys/test_rescoring_under_load.py",
+    "tests/journeys/",
+    "tests/browser/",
+    "tests/security/",
+    "tests/leaderboard/db/",
+    "tests/leaderboard/scoring/",
+)
+
+
+def sort(items: list[pytest.Item]) -> None:
+    """Long files first, the others by their number of tests; within a file nothing changes."""
+    n_tests = Counter(_file_of(item) for item in items)
+
+    def place(item: pytest.Item) -> tuple[int, int, str]:
+        name = _file_of(item)
+        found = [i for i, long in enumerate(LONG) if name.startswith(long)]
+        return (found[0] if found else len(LONG), -n_tests[name], name)
+
+    items.sort(key=place)
+
+
+def without_database(items: Sequence[pytest.Item]) -> list[pytest.Item]:
+    """Tests that ask no database, so another one changes nothing for them."""
+    return [
+        item
+        for item in items
+        if item.get_closest_marker("django_db") is None
+        and not {"db", "transactional_db", "live_server"} & set(getattr(item, "fixturenames", ()))
+    ]
+
+
+def _file_of(item: pytest.Item) -> str:
+    return item.nodeid.partition("::")[0]
