@@ -21,7 +21,7 @@ Place = Callable[[int, str], bool]
 # The last lock that a verb takes which changes a board.
 BOARD_LOCK = "SET CONSTRAINTS ALL IMMEDIATE"
 EVENT = 'INSERT INTO "leaderboard_auditevent"'
-PATIENCE_S = 60.0
+PATIENCE_S = 180.0
 LOOK_EVERY_S = 0.001
 
 

@@ -21,10 +21,11 @@ REPOSITORY = Path(__file__).resolve().parents[2]
 NO_INDEX = ("Could not find a version", "No matching distribution", "Connection", "Temporary failure in name")
 
 
-def pip(python: Path, *arguments: object) -> None:
-    """Run pip; an index out of reach is a missing service, anything else an error."""
+def pip(*arguments: object) -> None:
+    """Run this environment's pip; an index out of reach is a missing service, anything else an error."""
+    options = ("--disable-pip-version-check", "--quiet", "--retries=10")  # of connections; the delays grow
     done = subprocess.run(
-        [python, "-m", "pip", "--disable-pip-version-check", "--quiet", *map(str, arguments)],
+        [sys.executable, "-m", "pip", *options, *map(str, arguments)],
         capture_output=True,
         text=True,
         check=False,
@@ -42,7 +43,8 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
         shutil.copy(REPOSITORY / name, source)
     for name in ("evaluator", "baselines", "leaderboard"):
         shutil.copytree(REPOSITORY / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    pip(Path(sys.executable), "wheel", "--no-deps", "--wheel-dir", out, source)
+    # With the pinned setuptools, as `make` installs: nothing is fetched.
+    pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", out, source)
     (built,) = out.glob("tsttc-*.whl")
     return built
 
@@ -51,12 +53,12 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def environment(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """The programs of an environment that had nothing before the wheel; versions as in the lock file."""
     home = tmp_path_factory.mktemp("environment")
-    venv.create(home, with_pip=True, symlinks=True)
+    venv.create(home, symlinks=True)
     lock = (REPOSITORY / "requirements.lock").read_text()
     versions = home / "constraints.txt"
     # Without hashes: with them pip would ask for one of the wheel itself, which was built a moment ago.
     versions.write_text(re.sub(r" *\\\n +--hash=\S+", "", lock))
-    pip(home / "bin" / "python", "install", "--constraint", versions, wheel)
+    pip("--python", home / "bin" / "python", "install", "--no-compile", "--constraint", versions, wheel)
     yield home / "bin"
     shutil.rmtree(home)
 
@@ -82,7 +84,7 @@ def test_wheel_holds_evaluator_and_baselines_alone(wheel: Path) -> None:
 
 def test_environment_has_no_web_framework(environment: Path) -> None:
     listed = subprocess.run(
-        [environment / "python", "-m", "pip", "list", "--format=freeze"],
+        [sys.executable, "-m", "pip", "--python", environment / "python", "list", "--format=freeze"],
         capture_output=True,
         text=True,
         check=True,

@@ -16,7 +16,7 @@ def test_many_that_start_at_once_read_one_whole_key(tmp_path: Path) -> None:
     barrier = threading.Barrier(16)
 
     def start(_: int) -> str:
-        barrier.wait(60)
+        barrier.wait(180)
         return environment.key_of_checkout(tmp_path / "key", token_urlsafe)
 
     with ThreadPoolExecutor(16) as pool:

@@ -38,7 +38,7 @@ def at_once(*deeds: Callable[[], T]) -> list[T]:
     def do(deed: Callable[[], T]) -> T:
         try:
             connection.ensure_connection()
-            start.wait(60)
+            start.wait(180)
             return deed()
         finally:
             connections.close_all()
