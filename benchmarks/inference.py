@@ -1,8 +1,9 @@
 """What intervals and ranges cost a worker of a real board: 28,600 sequences in 700 recordings, PostgreSQL.
 
-`all` is a board of which nothing is inferred yet, `one_more` the same after one submission more, `pause` the
-longest that a live submission has to wait for the former, and `look` what it costs to see that nothing is to
-do. Processor time of the worker, with OpenBLAS on one core; the database's own comes on top.
+`all` is a board of which nothing is inferred yet, `one_more` the same after one submission more, `one_less`
+after one that left, `private` after one that nobody else sees, `pause` the longest that a live submission has
+to wait for any of these, and `look` what it costs to see that nothing is to do. Processor time of the worker,
+with OpenBLAS on one core; the database's own comes on top.
 `python -m benchmarks.inference [N_ENTRIES …]`.
 """
 
@@ -55,7 +56,7 @@ def measure(n: int) -> None:
 
     from benchmarks._correction import open_split  # noqa: PLC0415
     from leaderboard.demo.truth import simulate  # noqa: PLC0415
-    from leaderboard.models import Comparison, Submission  # noqa: PLC0415
+    from leaderboard.models import Comparison, Method, Score, Submission, Visibility  # noqa: PLC0415
     from leaderboard.scoring import aligned, analyses, comparisons, confidence  # noqa: PLC0415
     from leaderboard.storage import truth_values  # noqa: PLC0415
 
@@ -71,16 +72,25 @@ def measure(n: int) -> None:
         # After its rest, which a large board takes between two of these.
         now = timezone.now() + next(rests)
         (stale,) = confidence.stale(now=now, held=held)
-        pauses.append(time.process_time())
-        return confidence.infer(stale, now=now, between=lambda: pauses.append(time.process_time()))
+        moments = [time.process_time()]
+        is_written = confidence.infer(stale, now=now, between=lambda: moments.append(time.process_time()))
+        pauses.append(float(np.diff([*moments, time.process_time()]).max()))
+        return is_written
 
     last = Submission.objects.order_by("pk").last()
     assert last is not None
     Submission.objects.filter(pk=last.pk).update(withdrawn_at=timezone.now())
     figure("inference", n, "all", _took_s(infer), "s")
     Submission.objects.filter(pk=last.pk).update(withdrawn_at=None)
-    figure("inference", n, "pause", float(np.diff(pauses).max()), "s")
     figure("inference", n, "one_more", _took_s(infer), "s")
+    Method.objects.filter(pk=last.method_id).update(visibility=Visibility.PRIVATE)
+    figure("inference", n, "one_less", _took_s(infer), "s")
+    Submission.objects.filter(pk=last.pk).update(withdrawn_at=timezone.now())
+    infer()
+    Submission.objects.filter(pk=last.pk).update(withdrawn_at=None)
+    Score.objects.filter(evaluation__submission=last).update(low=None, high=None)
+    figure("inference", n, "private", _took_s(infer), "s")
+    figure("inference", n, "pause", max(pauses), "s")
     assert not list(confidence.stale(now=timezone.now() + next(rests), held=held))
     looks = [
         _took_s(lambda: list(confidence.stale(now=timezone.now() + next(rests), held=held)))

@@ -11,6 +11,7 @@ from evaluator.metrics.protocol import split_name
 from leaderboard import versions
 from leaderboard.models import (
     Edition,
+    EditionRanges,
     Evaluation,
     Method,
     Score,
@@ -85,11 +86,14 @@ def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int 
             value=value,
             low=round(value * 0.95, edition.decimals),
             high=round(value * 1.05, edition.decimals),
-            rank_low=max(1, i - 3),
-            rank_high=i + 4,
-            is_with_best=i < 3,
         )
         for i, evaluation in enumerate(evaluations)
         for metric, interval in map(split_name, edition.rules.score_names)
         for value in [round(rng.uniform(8, 80), edition.decimals)]
     )
+    n_columns = len(edition.rules.score_names)
+    kept, _ = EditionRanges.objects.get_or_create(edition=edition, defaults={"ranges": {}})
+    kept.ranges |= {
+        str(row.pk): [[max(1, i - 3), i + 4] for _ in range(n_columns)] for i, row in enumerate(evaluations)
+    }
+    kept.save()

@@ -9,25 +9,21 @@ was before it was rounded. Two quoted rows are never compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Hashable, KeysView, Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.uncertainty import CONFIDENCE, Booleans, Weights
+from evaluator.scoring.pairs import ENTRY, LOWER_END, UPPER_END, Integers, Pairs
+from evaluator.scoring.uncertainty import Booleans
 
 N_RANK_FLIPS: Final = 2_000
 """All pairs are compared at once, 19,900 of 200 entries; their critical value is read from so many draws."""
 
-# So many float32 are a megabyte.
-_CACHED: Final = 1 << 18
-# Beside an entry's own sum of squares, what is below this is left of rounding: the pair is alike.
-_ALIKE: Final = 1e-12
-
-Integers = NDArray[np.int64]
+# Of a board that is kept: room for so many entries more than it has.
+_ROOM: Final = 32
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,161 +75,144 @@ def rank_ranges(
     been rounded from the entry's: so a range holds the published rank as well, which takes quoted values as
     exact. `between` is called every fraction of a second.
     """
+    first = _n_ends(quoted)
     low = np.zeros(published.shape, dtype=np.int64)
     high = low.copy()
-    shape = (N_RANK_FLIPS, sums.shape[1])
-    signs = rng.integers(0, 2, size=shape, dtype=np.int8).astype(np.float32) * 2 - 1
+    signs = _signs(rng, n_recordings=sums.shape[1])
     for column in np.flatnonzero(usable).tolist():
         present = np.flatnonzero(np.isfinite(published[:, column]))
         if not present.size:
             continue
-        rows = present[np.argsort(published[present, column], kind="stable")]
-        family = _Family(sums[rows, :, column], published[rows, column], signs)
-        if quoted is not None:
-            family.add(quoted, column)
-        family.step_down(between)
-        low[rows, column] = 1 + family.n_better()
-        high[rows, column] = family.n_rows - family.n_worse()
+        pairs = _column(signs, quoted, column, n_slots=first + len(published), between=between)
+        pairs.add(
+            first + present,
+            sums=sums[present, :, column],
+            values=published[present, column],
+            kind=ENTRY,
+            between=between,
+        )
+        found = _ranges(pairs, between=between)
+        low[present, column], high[present, column] = (ends[first + present] for ends in found)
     return RankRanges(low, high)
 
 
-class _Side:
-    """Entries against one end of the quoted rows, `sign` +1: entries may be worse, −1: better; (N, Q)."""
+class KeptRanges:
+    """The rank ranges of a board whose pairs are kept: an entry more or less costs its own pairs alone.
 
-    def __init__(self, sign: int, is_askable: Booleans, t: Floats, inverse: Floats, turned: Weights) -> None:
-        self.sign = sign
-        self.t = np.where(is_askable, sign * t, 0.0)
-        self.inverse = (sign * inverse).astype(np.float32)
-        self.turned = turned
-        self.rejected = np.zeros(t.shape, dtype=np.bool_)
-
-
-class _Family:
-    """One column: entries in ascending order, quoted rows, and which hypotheses about them are rejected.
-
-    Of the entries these are θ_b ≤ θ_a of all ordered pairs. Those with b above a can never be rejected and
-    stay at every step; the others leave as they are rejected: `rejected[b, a]`, b is worse. With a
-    quoted row from v − h to v + h they are θ ≤ v + h and θ ≥ v − h; with a value on the other side they, too,
-    can never be rejected and stay.
+    Whatever came and went before, they are those of `rank_ranges` of the present entries, bit for bit. Rows
+    from papers stay as they are. After an exception it is of no use any more.
     """
 
-    def __init__(self, sums: Floats, values: Floats, signs: Weights) -> None:
-        # What all have in common is in no difference, and would cost the products their digits.
-        self._common = sums.mean(axis=0)
-        self._own = sums - self._common
-        self._values, self._signs = values, signs
-        self._turned = self._own.astype(np.float32) @ signs.T
-        inverse, totals = _inverse_error(self._own), self._own.sum(axis=1)
-        is_askable = values[:, None] > values[None, :]
-        self._t = np.where(is_askable, (totals[:, None] - totals[None, :]) * inverse, 0.0)
-        self._inverse = inverse.astype(np.float32)
-        self._sides: list[_Side] = []
-        self.rejected = np.zeros(self._t.shape, dtype=np.bool_)
-        self.n_rows = len(values)
+    def __init__(
+        self,
+        *,
+        n_recordings: int,
+        usable: Booleans,
+        rng: np.random.Generator,
+        quoted: Quoted | None = None,
+        n_entries: int = 0,
+    ) -> None:
+        self._n_columns, self._first = len(usable), _n_ends(quoted)
+        self._slot_of: dict[Hashable, int] = {}
+        n_slots = self._first + n_entries + _ROOM
+        self._free = list(range(n_slots - 1, self._first - 1, -1))
+        signs = _signs(rng, n_recordings=n_recordings)
+        self._columns = {
+            column: _column(signs, quoted, column, n_slots=n_slots)
+            for column in np.flatnonzero(usable).tolist()
+        }
+        self._n_slots = n_slots
 
-    def add(self, quoted: Quoted, column: int) -> None:
-        """Let quoted rows take part that have a value in this column."""
-        is_present = np.isfinite(quoted.values[:, column])
-        values, half = quoted.values[is_present, column], quoted.half_widths[is_present, column]
-        self.n_rows += len(values)
-        for sign in (1, -1):
-            ends = values + sign * half
-            sums = ends[:, None] * quoted.counts[:, column] - self._common
-            inverse = _inverse_error_between(self._own, sums)
-            t = (self._own.sum(axis=1)[:, None] - sums.sum(axis=1)) * inverse
-            is_askable = sign * (self._values[:, None] - ends) > 0
-            turned = sums.astype(np.float32) @ self._signs.T
-            self._sides.append(_Side(sign, is_askable, t, inverse, turned))
+    @property
+    def keys(self) -> KeysView[Hashable]:
+        """Of the entries that are there."""
+        return self._slot_of.keys()
 
-    def step_down(self, between: Callable[[], None]) -> None:
-        """Reject until nothing more is found."""
-        up, down = self._among_entries(between)
-        while True:
-            largest = np.maximum(np.maximum(up, down), self._against_quoted(between))
-            critical = float(np.quantile(largest, CONFIDENCE, method="higher"))
-            is_found = [
-                _reject(rejected, t > critical)
-                for rejected, t in [(self.rejected, self._t), *((s.rejected, s.t) for s in self._sides)]
-            ]
-            if not any(is_found):
-                return
-            if is_found[0]:
-                up, _ = self._among_entries(between)
+    @property
+    def nbytes(self) -> int:
+        """What it takes of memory."""
+        return sum(pairs.nbytes for pairs in self._columns.values())
 
-    def n_better(self) -> Integers:
-        """How many rows are significantly better than each entry."""
-        quoted = [side.rejected.sum(axis=1) for side in self._sides if side.sign > 0]
-        return np.asarray(sum(quoted, start=self.rejected.sum(axis=1)))
+    @staticmethod
+    def nbytes_of(n_entries: int, *, n_recordings: int, n_columns: int) -> int:
+        """What so many entries take, about."""
+        return n_columns * Pairs.nbytes_of(n_entries + _ROOM, n_recordings=n_recordings, n_draws=N_RANK_FLIPS)
 
-    def n_worse(self) -> Integers:
-        """How many rows are significantly worse than each entry."""
-        quoted = [side.rejected.sum(axis=1) for side in self._sides if side.sign < 0]
-        return np.asarray(sum(quoted, start=self.rejected.sum(axis=0)))
+    def remove(self, keys: Collection[Hashable], *, between: Callable[[], None] = lambda: None) -> None:
+        """Take entries off the board."""
+        slots = [self._slot_of.pop(key) for key in keys]
+        for pairs in self._columns.values():
+            pairs.remove(np.array(slots, dtype=np.intp), between=between)
+        self._free += slots
 
-    def _blocks(self, between: Callable[[], None]) -> Iterator[tuple[slice, Weights, Weights]]:
-        """Draws that stay in the processor's cache: which they are, the entries' sums, and room for as many.
+    def add(
+        self,
+        keys: Sequence[Hashable],
+        *,
+        sums: Floats,
+        published: Floats,
+        between: Callable[[], None] = lambda: None,
+    ) -> None:
+        """Put entries on the board, by their `sums` (n, G, columns) and `published` values (n, columns)."""
+        missing = len(keys) - len(self._free)
+        if missing > 0:
+            n_slots = self._n_slots + missing + _ROOM
+            self._free = [*range(n_slots - 1, self._n_slots - 1, -1), *self._free]
+            self._n_slots = n_slots
+        slots = np.array([self._free.pop() for _ in keys], dtype=np.intp)
+        self._slot_of |= zip(keys, slots.tolist(), strict=True)
+        for column, pairs in self._columns.items():
+            pairs.reserve(self._n_slots)
+            present = np.flatnonzero(np.isfinite(published[:, column]))
+            pairs.add(
+                slots[present],
+                sums=sums[present, :, column],
+                values=published[present, column],
+                kind=ENTRY,
+                between=between,
+            )
 
-        All pairs at once, 19,900 × 2,000, would be 160 MB.
-        """
-        n_entries, n_draws = self._turned.shape
-        size = max(_CACHED // n_entries, 1)
-        buffer = np.empty((n_entries, size), dtype=np.float32)
-        for start in range(0, n_draws, size):
-            between()
-            block = slice(start, min(start + size, n_draws))
-            yield block, np.ascontiguousarray(self._turned[:, block]), buffer
-
-    def _among_entries(self, between: Callable[[], None]) -> tuple[Weights, Weights]:
-        """In every draw the largest studentised rise and fall over pairs a < b that are not rejected."""
-        n_entries, n_draws = self._turned.shape
-        up, down = np.zeros((2, n_draws), dtype=np.float32)
-        partners = [a + 1 + np.flatnonzero(~self.rejected[a + 1 :, a]) for a in range(n_entries - 1)]
-        for block, part, buffer in self._blocks(between):
-            for a, rows in enumerate(partners):
-                if rows.size:
-                    rises = _rises(part, part[a], rows, self._inverse[a, rows], buffer)
-                    np.maximum(up[block], rises.max(axis=0), out=up[block])
-                    np.maximum(down[block], -rises.min(axis=0), out=down[block])
-        return up, down
-
-    def _against_quoted(self, between: Callable[[], None]) -> Weights:
-        """In every draw the largest studentised rise against quoted rows that is not rejected."""
-        up = np.zeros(self._turned.shape[1], dtype=np.float32)
-        if not self._sides:
-            return up
-        for block, part, buffer in self._blocks(between):
-            for side in self._sides:
-                for i, turned in enumerate(side.turned):
-                    rows = np.flatnonzero(~side.rejected[:, i])
-                    if rows.size:
-                        rises = _rises(part, turned[block], rows, side.inverse[rows, i], buffer)
-                        np.maximum(up[block], rises.max(axis=0), out=up[block])
-        return up
+    def ranges(self, keys: Sequence[Hashable], *, between: Callable[[], None] = lambda: None) -> RankRanges:
+        """The ranges of these entries among all that are there."""
+        slots = np.array([self._slot_of[key] for key in keys], dtype=np.intp)
+        low, high = np.zeros((2, len(keys), self._n_columns), dtype=np.int64)
+        for column, pairs in self._columns.items():
+            low[:, column], high[:, column] = (ends[slots] for ends in _ranges(pairs, between=between))
+        return RankRanges(low, high)
 
 
-def _reject(rejected: Booleans, found: Booleans) -> bool:
-    """Add what was found to what is rejected; whether any of it is new."""
-    is_new = bool((found & ~rejected).any())
-    np.logical_or(rejected, found, out=rejected)
-    return is_new
+def _signs(rng: np.random.Generator, *, n_recordings: int) -> Floats:
+    """The draws by which recordings are turned, −1 or 1: (G, draws)."""
+    drawn = rng.integers(0, 2, size=(N_RANK_FLIPS, n_recordings), dtype=np.int8)
+    return np.ascontiguousarray(drawn.T, dtype=np.float64) * 2 - 1
 
 
-def _rises(part: Weights, low: Weights, rows: Integers, inverse: Weights, buffer: Weights) -> Weights:
-    """How far some rows of `part` (N, draws) rise above `low` (draws,), in standard errors; in the buffer."""
-    chosen = part[rows[0] : rows[-1] + 1] if rows[-1] - rows[0] + 1 == rows.size else part[rows]
-    rises = buffer[: rows.size, : part.shape[1]]
-    np.subtract(chosen, low, out=rises)
-    return np.multiply(rises, inverse[:, None], out=rises)
+def _n_ends(quoted: Quoted | None) -> int:
+    return 0 if quoted is None else 2 * len(quoted.values)
 
 
-def _inverse_error(sums: Floats) -> Floats:
-    """1 / √ΣD² of every pair, (N, N); 0 for pairs that are alike."""
-    return _inverse_error_between(sums, sums)
+def _column(
+    signs: Floats,
+    quoted: Quoted | None,
+    column: int,
+    *,
+    n_slots: int,
+    between: Callable[[], None] = lambda: None,
+) -> Pairs:
+    """A column with both ends of its quoted rows in the first slots."""
+    pairs = Pairs(signs, n_slots=n_slots)
+    if quoted is None:
+        return pairs
+    values, half = quoted.values[:, column], quoted.half_widths[:, column]
+    present = np.flatnonzero(np.isfinite(values))
+    for first, kind in ((0, UPPER_END), (len(values), LOWER_END)):
+        ends = (values + kind * half)[present]
+        sums = ends[:, None] * quoted.counts[:, column]
+        pairs.add(first + present, sums=sums, values=ends, kind=kind, between=between)
+    return pairs
 
 
-def _inverse_error_between(first: Floats, second: Floats) -> Floats:
-    """1 / √ΣD² of N with M, (N, M), with ΣD² = Q_aa + Q_bb − 2 Q_ab; 0 for pairs that are alike."""
-    one, other = (np.einsum("ng,ng->n", sums, sums)[:, None] for sums in (first, second))
-    squares = one + other.T - 2 * first @ second.T
-    is_alike = squares <= _ALIKE * np.maximum(one, other.T)
-    return np.where(is_alike, 0.0, 1 / np.sqrt(np.where(is_alike, 1.0, squares)))
+def _ranges(pairs: Pairs, *, between: Callable[[], None]) -> tuple[Integers, Integers]:
+    """Of every slot both ends of its range; 0 where there is no entry."""
+    n_better, n_worse = pairs.told_apart(pairs.step_down(between=between))
+    return np.where(pairs.is_entry, 1 + n_better, 0), np.where(pairs.is_entry, pairs.n_rows - n_worse, 0)

@@ -4,7 +4,7 @@ Rows are made from evaluations and from results printed in papers. An anonymous 
 for every page and format: whatever is made of an `Entry` or a `Profile` later cannot tell what neither holds.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import Any
@@ -12,7 +12,16 @@ from uuid import UUID
 
 from evaluator.metrics.protocol import PRIMARY, Protocol, score_name
 from leaderboard.methods.details import Details, details_of, stated
-from leaderboard.models import Edition, Evaluation, Method, PublishedResult, Score, Visibility, days
+from leaderboard.models import (
+    Edition,
+    EditionRanges,
+    Evaluation,
+    Method,
+    PublishedResult,
+    Score,
+    Visibility,
+    days,
+)
 from leaderboard.models.benchmark import SINCE_EVER
 from leaderboard.models.methods import MethodQuerySet
 
@@ -20,7 +29,6 @@ ANONYMOUS_TEAM = "Anonymous"
 OTHER_REASON = "other"
 # Of why a file cannot be scored in another edition, what everybody is told: it is about that edition.
 _REASONS_TOLD = ("missing-keys", "unknown-keys", "undefined-error")
-_INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,11 @@ class Interval:
     rank_low: int | None = None
     rank_high: int | None = None
     is_with_best: bool | None = None
+
+
+_UNKNOWN = Interval()
+# Best and worst rank, and whether that is the best of its column.
+Range = tuple[int, int, bool]
 
 
 @dataclass(frozen=True)
@@ -206,6 +219,12 @@ class Scored:
         """No value under any of the names."""
         return cls(dict.fromkeys(rules.score_names))
 
+    def put(self, name: str, value: float | None, interval: Interval) -> None:
+        """Put in a value with what is known of where it may lie."""
+        self.values[name] = value
+        if interval != _UNKNOWN:
+            self.intervals[name] = interval
+
     def ordered_intervals(self) -> dict[str, Interval]:
         """The intervals in the order of the values, so that a row has the same bytes whenever it is read."""
         return {name: self.intervals[name] for name in self.values if name in self.intervals}
@@ -217,45 +236,51 @@ def flat_scores(evaluation: Evaluation) -> dict[str, float | None]:
 
 
 def scored_of(evaluation: Evaluation) -> Scored:
-    """The values of one evaluation with their intervals."""
+    """The values of one evaluation with their confidence intervals, without rank ranges."""
     found = Scored.nothing(evaluation.edition.rules)
     for score in evaluation.scores.all():
-        name = score_name(score.metric, score.interval)
-        found.values[name] = score.value
-        inferred = [getattr(score, column) for column in _INFERRED]
-        if any(item is not None for item in inferred):
-            found.intervals[name] = Interval(*inferred)
+        found.put(score_name(score.metric, score.interval), score.value, Interval(score.low, score.high))
     return found
 
 
 def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
     """The values of every evaluation in an edition: one query, whatever their number."""
-    return {pk: scored.values for pk, scored in scored_in(edition).items()}
+    return {pk: scored.values for pk, scored in scored_in(edition, has_ranges=False).items()}
 
 
 def scored_in(
     edition: Edition, *, methods: MethodQuerySet | None = None, has_ranges: bool = True
 ) -> dict[UUID, Scored]:
-    """Values and intervals of every evaluation in an edition, or of these methods: one query.
+    """Values and intervals of every evaluation in an edition, or of these methods: two queries.
 
     Ranges are of the entries that stand now; without `has_ranges` they are left out, as if there were none.
     """
     rows = Score.objects.filter(evaluation__edition=edition)
     if methods is not None:
         rows = rows.filter(evaluation__submission__method__in=methods)
+    ranges = _ranges_in(edition) if has_ranges else {}
+    nothing: dict[str, Range] = {}
     found: dict[UUID, Scored] = {}
-    for pk, metric, interval, value, *inferred in rows.values_list(
-        "evaluation_id", "metric", "interval", "value", *_INFERRED
+    for pk, metric, interval, value, low, high in rows.values_list(
+        "evaluation_id", "metric", "interval", "value", "low", "high"
     ):
         scored = found.get(pk)
         if scored is None:
             scored = found[pk] = Scored.nothing(edition.rules)
         name = score_name(metric, interval)
-        scored.values[name] = value
-        known = inferred if has_ranges else inferred[:2]
-        if any(item is not None for item in known):
-            scored.intervals[name] = Interval(*known)
+        scored.put(name, value, Interval(low, high, *ranges.get(str(pk), nothing).get(name, ())))
     return found
+
+
+def _ranges_in(edition: Edition) -> dict[str, dict[str, Range]]:
+    kept = EditionRanges.objects.filter(edition=edition).values_list("ranges", flat=True).first() or {}
+    return {pk: _by_name(columns, edition.rules) for pk, columns in kept.items()}
+
+
+def _by_name(columns: Iterable[Sequence[int] | None], rules: Protocol) -> dict[str, Range]:
+    """The ranges of one evaluation, as they are kept, by the names of its columns."""
+    pairs = zip(rules.score_names, columns, strict=False)
+    return {name: (pair[0], pair[1], pair[0] == 1) for name, pair in pairs if pair is not None}
 
 
 def placed(entry: Entry, rank: int | None) -> Entry:

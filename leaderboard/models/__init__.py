@@ -10,7 +10,7 @@ from leaderboard.models.benchmark import (
     TruthComparison,
 )
 from leaderboard.models.boards import BoardVersion, CardPicture, Snapshot
-from leaderboard.models.inference import Analysis, Comparison, Question
+from leaderboard.models.inference import Analysis, Comparison, EditionRanges, Question
 from leaderboard.models.limits import Allowance, CachedValue
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.pages import PageVersion

@@ -1,10 +1,25 @@
-"""What the workers make of scores beyond the scores: comparisons of two entries, and analyses for owners."""
+"""What the workers make of scores beyond the scores: rank ranges, comparisons, and analyses for owners."""
 
 from django.db import models
 from django.utils import timezone
 
 from leaderboard.models.benchmark import Edition
 from leaderboard.models.submissions import Evaluation
+
+
+class EditionRanges(models.Model):
+    """The rank ranges of an edition's ranked entries, all in one row: one entry more moves most of them."""
+
+    edition = models.OneToOneField(
+        Edition, on_delete=models.CASCADE, primary_key=True, related_name="rank_ranges"
+    )
+    digest = models.CharField(max_length=80, help_text="Names the entries that they are made of.")
+    ranges = models.JSONField(
+        help_text="By evaluation, of every column of the protocol: best and worst rank, or null."
+    )
+
+    def __str__(self) -> str:
+        return f"rank ranges of {self.edition}"
 
 
 class Comparison(models.Model):

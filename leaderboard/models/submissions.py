@@ -234,12 +234,9 @@ class Score(models.Model):
     metric = models.CharField(max_length=32)
     interval = models.CharField(max_length=32)
     value = models.FloatField()
+    # Its confidence interval; its rank range stands in `EditionRanges`.
     low = models.FloatField(null=True, blank=True)
     high = models.FloatField(null=True, blank=True)
-    # Where the entry may stand in its column at 95 %; whether that begins at 1.
-    rank_low = models.PositiveIntegerField(null=True, blank=True)
-    rank_high = models.PositiveIntegerField(null=True, blank=True)
-    is_with_best = models.BooleanField(null=True, blank=True)
 
     class Meta:
         constraints = [

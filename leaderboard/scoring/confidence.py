@@ -8,7 +8,7 @@ that anybody can see whether they still hold: the database is the truth, and mes
 """
 
 import hashlib
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
@@ -18,19 +18,28 @@ from uuid import UUID
 import numpy as np
 import structlog
 from django.db import connection, transaction
-from django.db.models import Exists, OuterRef
+from django.db.models import Exists, OuterRef, Q
 from numpy.typing import NDArray
 
 from evaluator import published
-from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
+from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name, split_name
 from evaluator.scoring import uncertainty
-from evaluator.scoring.ranges import Quoted, rank_ranges
+from evaluator.scoring.ranges import Quoted
 from evaluator.scoring.significance import cut_off
 from leaderboard import versions
 from leaderboard.boards.rows import printed_decimals
 from leaderboard.db import bulk
-from leaderboard.models import Edition, Evaluation, PublishedResult, Score, SentFile, Status, Visibility
-from leaderboard.scoring import disclosure, recording_sums
+from leaderboard.models import (
+    Edition,
+    EditionRanges,
+    Evaluation,
+    PublishedResult,
+    Score,
+    SentFile,
+    Status,
+    Visibility,
+)
+from leaderboard.scoring import disclosure, kept_ranges, recording_sums
 from leaderboard.storage.seeds import seed_of
 
 log = structlog.get_logger(__name__)
@@ -40,11 +49,14 @@ Floats = NDArray[np.float64]
 METHOD = "3"
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
 PATIENCE = timedelta(minutes=1)
-# All pairs are compared, so the work grows with their number: two seconds of rest for 200 entries.
+# Where its pairs are kept, a board of 1,000 entries takes half a second of four, else all pairs are compared.
+REST_PER_KEPT_PAIR = timedelta(microseconds=4)
 REST_PER_PAIR = timedelta(microseconds=60)
 LOCKS = 0x7753
-COLUMNS = ("low", "high", "rank_low", "rank_high", "is_with_best")
-Values = tuple[float | None, float | None, int | None, int | None, bool | None]
+# What is new of the intervals, by the evaluation's id: low, high and the id of their score.
+Ends = dict[UUID, list[tuple[float | None, float | None, int]]]
+# By the evaluation's id, of every column both ends, or None where there is no range.
+Ranges = dict[str, list[list[int] | None]]
 
 
 @dataclass(frozen=True)
@@ -102,12 +114,21 @@ def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
     return list(best.values())
 
 
+def ranked_digest(edition: Edition, rivals: Sequence[ScoredEntry]) -> str:
+    """Names what ranges are made of: nothing that is private is in it."""
+    return _digest(edition, [str(row.evaluation_id) for row in rivals])
+
+
 def digest_of(edition: Edition, rows: Sequence[ScoredEntry]) -> str:
     """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
     rivals = {row.evaluation_id for row in ranked(rows)}
-    lines = sorted(f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in rows)
+    lines = [f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in rows]
+    return _digest(edition, lines)
+
+
+def _digest(edition: Edition, lines: Sequence[str]) -> str:
     printed = sorted(map(repr, _printed(edition)))
-    text = "\n".join([edition.ground_truth_id, edition.protocol, *printed, *lines])
+    text = "\n".join([edition.ground_truth_id, edition.protocol, *printed, *sorted(lines)])
     return f"{METHOD} sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
 
@@ -160,16 +181,17 @@ def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
 
 
 def _rests(entries: Entries, *, now: datetime) -> bool:
-    rest = min(PATIENCE, len(entries.rows) ** 2 * REST_PER_PAIR)
-    inferred_at = entries.edition.inferred_at
-    return inferred_at is not None and now - inferred_at < rest
+    edition, n = entries.edition, len(entries.rows)
+    is_kept = kept_ranges.is_kept(edition, n_entries=n)
+    rest = min(PATIENCE, n**2 * (REST_PER_KEPT_PAIR if is_kept else REST_PER_PAIR))
+    return edition.inferred_at is not None and now - edition.inferred_at < rest
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
 
 
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
-    """Make what is missing of an edition's intervals, and its rank ranges anew. Whether it wrote them.
+    """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
 
     False: they hold already, another worker is at it, or the entries have changed since they were read, and
     whoever looks next does it. `between` is called every fraction of a second. Raises what
@@ -178,10 +200,16 @@ def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lamb
     with _alone(entries.edition) as is_alone:
         if not is_alone or entries.have_ranges:
             return False
-        table = _Table(entries.edition)
-        inferred = _inferred(entries, table, between=between)
-        is_written = _write(entries, table, inferred=inferred, now=now)
-    log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
+        ends = _intervals(entries, between=between)
+        ranges = _ranges(entries, between=between)
+        is_written = _write(entries, ends=ends, ranges=ranges, now=now)
+    log.info(
+        "inferred",
+        edition=str(entries.edition),
+        n_entries=len(entries.rows),
+        is_written=is_written,
+        n_bytes_kept=kept_ranges.n_bytes(),
+    )
     return is_written
 
 
@@ -201,78 +229,58 @@ def _alone(edition: Edition) -> Iterator[bool]:
                 cursor.execute("SELECT pg_advisory_unlock(%s, %s)", [LOCKS, edition.pk])
 
 
-def _inferred(entries: Entries, table: "_Table", *, between: Callable[[], None]) -> Mapping[int, Values]:
-    """What is to stand beside each score of the edition, by the score's id."""
-    edition, rows = entries.edition, entries.rows
-    counts = recording_sums.counts_of(edition)
-    usable = uncertainty.usable_columns(counts)
-    low, high = table.low, table.high
-    if not edition.inference_digest.startswith(f"{METHOD} "):
-        low[[table.row_of[row.evaluation_id] for row in rows]] = np.nan
-    low[:, ~usable], high[:, ~usable] = np.nan, np.nan
-    missing = [
-        row
-        for row in rows
-        for i in [table.row_of[row.evaluation_id]]
-        if np.isnan(low[i][usable & ~np.isnan(table.value[i])]).any()
-    ]
+def _intervals(entries: Entries, *, between: Callable[[], None]) -> Ends:
+    """What is new of the intervals beside the scores."""
+    edition = entries.edition
+    usable = uncertainty.usable_columns(recording_sums.counts_of(edition))
+    names = edition.rules.score_names
+    column_of = {name: j for j, name in enumerate(names)}
+    scores = Score.objects.filter(evaluation__edition=edition)
+    if edition.inference_digest.startswith(f"{METHOD} "):
+        is_usable = Q(pk=None)
+        for column in np.flatnonzero(usable).tolist():
+            metric, interval = split_name(names[column])
+            is_usable |= Q(metric=metric, interval=interval)
+        scores = scores.filter(is_usable, low=None)
+    found: dict[UUID, list[tuple[int, int, float | None, float | None]]] = {}
+    for pk, evaluation_id, metric, interval, low, high in scores.values_list(
+        "pk", "evaluation_id", "metric", "interval", "low", "high"
+    ):
+        cell = (pk, column_of[score_name(metric, interval)], low, high)
+        found.setdefault(evaluation_id, []).append(cell)
+    missing = [row for row in entries.rows if row.evaluation_id in found]
+    changed: Ends = {}
     for start in range(0, len(missing), uncertainty.BATCH):
         between()
         some = missing[start : start + uncertainty.BATCH]
         sums = np.stack([recording_sums.sums_of(edition, file=row.file) for row in some])
-        places = [table.row_of[row.evaluation_id] for row in some]
-        ends = bootstrap_of(edition).intervals(sums)
         # As they are kept: ranges must not depend on which of them were made before.
-        low[places], high[places] = disclosure.published_ends(*ends, edition=edition)
-    rivals = ranked(rows)
-    places = [table.row_of[row.evaluation_id] for row in rivals]
-    rank_low, rank_high = np.zeros(table.value.shape, int), np.zeros(table.value.shape, int)
-    if rivals:
-        ranges = rank_ranges(
-            np.stack([recording_sums.sums_of(edition, file=row.file) for row in rivals]),
-            published=table.value[places],
-            usable=usable,
-            rng=generator_of(edition, purpose="signs"),
-            quoted=_quoted(edition, counts),
-            between=between,
-        )
-        rank_low[places], rank_high[places] = ranges.low, ranges.high
-    decimals = edition.decimals
-    return {
-        pk: (
-            _published(low[i, j], decimals),
-            _published(high[i, j], decimals),
-            int(rank_low[i, j]) or None,
-            int(rank_high[i, j]) or None,
-            bool(rank_low[i, j] == 1) if rank_low[i, j] else None,
-        )
-        for pk, (i, j) in table.cells.items()
+        lows, highs = disclosure.published_ends(*bootstrap_of(edition).intervals(sums), edition=edition)
+        for i, row in enumerate(some):
+            for pk, j, *before in found[row.evaluation_id]:
+                ends = [_published(ends[i, j], edition.decimals) for ends in (lows, highs)]
+                if ends != before:
+                    changed.setdefault(row.evaluation_id, []).append((ends[0], ends[1], pk))
+    return changed
+
+
+def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Ranges] | None:
+    """The rank ranges and the digest of what they are made of; None where those that are there hold."""
+    edition, rivals = entries.edition, ranked(entries.rows)
+    digest = ranked_digest(edition, rivals)
+    if EditionRanges.objects.filter(edition=edition, digest=digest).exists():
+        return None
+    found = kept_ranges.ranges_of(
+        edition,
+        {row.evaluation_id: row.file for row in rivals},
+        quoted=_quoted(edition, recording_sums.counts_of(edition)),
+        between=between,
+    )
+    ends = np.stack([found.low, found.high], axis=2).tolist()
+    return digest, {
+        str(row.evaluation_id): [pair if pair[0] else None for pair in columns]
+        for row, columns in zip(rivals, ends, strict=True)
     }
-
-
-class _Table:
-    """The scores of an edition as arrays (evaluations, columns), NaN where there is none."""
-
-    def __init__(self, edition: Edition) -> None:
-        scores = list(
-            Score.objects.filter(evaluation__edition=edition).values_list(
-                "pk", "evaluation_id", "metric", "interval", "value", *COLUMNS
-            )
-        )
-        ids = sorted({score[1] for score in scores})
-        self.row_of = {pk: i for i, pk in enumerate(ids)}
-        column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
-        self.value, self.low, self.high = (np.full((len(ids), len(column_of)), np.nan) for _ in range(3))
-        self.cells: dict[int, tuple[int, int]] = {}
-        self.before: dict[int, Values] = {}
-        for pk, evaluation_id, metric, interval, value, *inferred in scores:
-            cell = self.row_of[evaluation_id], column_of[score_name(metric, interval)]
-            self.cells[pk] = cell
-            self.before[pk] = (inferred[0], inferred[1], inferred[2], inferred[3], inferred[4])
-            self.value[cell] = value
-            self.low[cell], self.high[cell] = (
-                np.nan if end is None else end for end in (inferred[0], inferred[1])
-            )
 
 
 def _n_effective(edition: Edition) -> dict[str, float]:
@@ -306,11 +314,11 @@ def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.
     return uncertainty.bootstrap_of(seed, np.frombuffer(counts).reshape(shape))
 
 
-def _write(entries: Entries, table: _Table, *, inferred: Mapping[int, Values], now: datetime) -> bool:
+def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, now: datetime) -> bool:
     """Write what was made, all or nothing, if the entries are still the same.
 
-    They are read for the second time here, with the edition locked: the comparison of compare-and-set. The
-    table need not be: a score does not change, and only who has the edition locked writes beside it.
+    They are read for the second time here, with the edition locked: the comparison of compare-and-set. Scores
+    need not be: a score does not change, and only who has the edition locked writes beside it.
     """
     edition = entries.edition
     shown = {row.evaluation_id for row in entries.rows if row.is_shown}
@@ -326,15 +334,18 @@ def _write(entries: Entries, table: _Table, *, inferred: Mapping[int, Values], n
             or Entries.of(present).digest != entries.digest
         ):
             return False
-        changed = [(*values, pk) for pk, values in inferred.items() if table.before[pk] != values]
-        bulk.update(Score, COLUMNS, changed)
+        bulk.update(Score, ("low", "high"), [row for rows in ends.values() for row in rows])
+        if ranges is not None:
+            digest, of = ranges
+            EditionRanges.objects.update_or_create(edition=edition, defaults={"digest": digest, "ranges": of})
         Edition.objects.filter(pk=edition.pk).update(
             inferred_at=now, inference_digest=entries.digest, floor=floor, n_effective=n_effective
         )
-        ids = {i: pk for pk, i in table.row_of.items()}
         # Whose rows only their own team sees, changes nothing that anybody else is shown.
-        is_seen = (floor, n_effective) != (present.floor, present.n_effective) or any(
-            ids[table.cells[row[-1]][0]] in shown for row in changed
+        is_seen = (
+            (floor, n_effective) != (present.floor, present.n_effective)
+            or ranges is not None
+            or not shown.isdisjoint(ends)
         )
         if is_seen and present.published_at is not None:
             versions.changed(present.split_id)

@@ -225,12 +225,15 @@ def teams_best_other(submission: Submission, place: BoardPlace) -> Entry | None:
         .prefetch_related("scores")
         .get(pk=found)
     )
-    return submitted_entry(
+    entry = submitted_entry(
         evaluation,
         scored_of(evaluation),
         profile=profile_of(evaluation.submission.method),
         decimals=place.edition.decimals,
     )
+    # What has ranges is a row of the board.
+    rows = (row for row in place.rows if row.submission_id == entry.submission_id)
+    return replace(entry, intervals=next((row.intervals for row in rows), entry.intervals))
 
 
 def nearest_published(progress: Progress, place: BoardPlace) -> Entry | None:

@@ -9,10 +9,12 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
+from evaluator import SCORE_NAMES
 from leaderboard.models import Edition, Method, PublishedResult, QuotaOverride, Score, Split, Submission, User
 from leaderboard.submissions import submissions
 from tests import board_rows, builders, pages
 from tests.editions import board_now, corrected, open_edition, publish
+from tests.leaderboard.scoring.inferred_scores import put_ranges
 
 pytestmark = pytest.mark.slow
 
@@ -112,9 +114,7 @@ def test_what_the_present_edition_left_out_stands_nowhere(
 def test_what_may_be_the_best_is_marked_as_on_the_board(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
-    Score.objects.filter(evaluation__submission=inferred[1], metric="mid", interval="overall").update(
-        rank_low=1
-    )
+    put_ranges(inferred[1], mid=(1, 9))
     builders.board_changed("test")
     for address in (PAGE.format(inferred[1].pk), f"/methods/{inferred[1].method_id}/"):
         root = pages.page(signed_in.get(address))
@@ -127,7 +127,8 @@ def test_what_may_be_the_best_is_marked_as_on_the_board(
 def test_no_mark_and_no_word_of_it_where_nothing_may_be_the_best(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
-    Score.objects.update(rank_low=2)
+    for submission in inferred:
+        put_ranges(submission, **dict.fromkeys(SCORE_NAMES, (2, 9)))
     builders.board_changed("test")
     root = look(signed_in, inferred[3])
     assert root.all("td", class_="with-best") == []
