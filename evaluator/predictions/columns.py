@@ -2,10 +2,11 @@
 
 Files that machines write are monotonous: keys of a few digits, one separator, one number each. For these the
 keys are compared with the manifest's as 64-bit words, then overwritten with spaces, so that what remains of
-the object is a JSON list of numbers for a fast parser. Files with other keys, or another layout, are parsed
-into a dictionary.
+the object is a JSON list of numbers for a fast parser. Natural keys in the manifest's order are cut out of
+the text instead, some thousands at a time, and compared with the manifest's as one text. Files with other
+keys, or another layout, are parsed into a dictionary.
 
-Both ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
+All ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
 result, and answer None for everything else: finding words for a fault is the strict reading's business.
 
 Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has 2n
@@ -14,6 +15,10 @@ sequence of the manifest, and a colon follows, (3) each but the first is precede
 white space, the first by `{` and white space, and (4) the text with all these keys blanked, and the outer
 braces turned into brackets, is a JSON list of n numbers. By (4) there are n - 1 commas, by (3) each stands
 directly before a key; so every part between commas holds one key, at its front, and one number.
+
+The second way is exact for the same reasons: what is cut out is what stands from each odd quotation mark to
+one byte behind the next one, and all of it together is, byte for byte, the text of all keys, which hold no
+quotation mark themselves.
 """
 
 from __future__ import annotations
@@ -30,8 +35,10 @@ from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
 from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
 from evaluator.problems import Findings, Rejected
-from evaluator.truth.packed_keys import WORD_BYTES, KeyWords, Rows, Words
+from evaluator.truth.packed_keys import MAX_DIGITS, WORD_BYTES, KeyWords, Rows, Words
 from evaluator.truth.truth import Manifest
+
+Octets = NDArray[np.uint8]
 
 _WHITE_SPACE: Final = b" \t\r\n"
 _PAD: Final = b" " * WORD_BYTES
@@ -44,6 +51,10 @@ _MAX_AROUND: Final = 64 * 1024
 """At most so much text may stand around the predictions of an envelope that is read by columns."""
 
 _PREDICTIONS: Final = re.compile(rb'"predictions"[ \t\r\n]*:[ \t\r\n]*\{')
+_FIRST_DIGIT: Final = re.compile(rb'\{[ \t\r\n]*"[0-9]{1,%d}"' % MAX_DIGITS)
+_BLOCK: Final = 1 << 19
+"""So many bytes of a file with natural keys are read at once: they stay in the processor's cache."""
+
 _PLACEHOLDER: Final = "predictions, read by columns"
 
 _FLAT: Final = Document(Members(), "ttc", None, None, None, enveloped=False)
@@ -57,7 +68,7 @@ def read_column(data: bytes, manifest: Manifest) -> Aligned | None:
     if parts is None:
         return None
     members, document = parts
-    column = _by_words(members, manifest) or _by_object(members, manifest)
+    column = _by_words(members, manifest) or _by_spelling(members, manifest) or _by_object(members, manifest)
     if column is None:
         return None
     values, keys = column
@@ -113,7 +124,7 @@ def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
 def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
     """Read keys of up to six digits as words; the module's docstring says why this is exact."""
     keys, n = manifest.key_words, manifest.n_sequences
-    if keys is None:
+    if keys is None or not _FIRST_DIGIT.match(text):
         return None
     buffer = bytearray(_PAD + text)
     rows = _blank_keys(buffer, keys, n)
@@ -165,13 +176,79 @@ def _separated(buffer: bytearray, windows: Words, opens: NDArray[np.intp]) -> bo
     return bool((ends == ends[0]).all())
 
 
-def _numbers(text: bytearray, n: int) -> Floats | None:
+def _numbers(text: bytes | bytearray, n: int) -> Floats | None:
     """The float64 values of a JSON list of n numbers, or None for anything else."""
     try:
         # Packing is the fastest way into an array; it also counts.
         return np.frombuffer(struct.pack(f"{n}d", *_LIST.decode(text)))
     except (msgspec.MsgspecError, ValueError, RecursionError, struct.error):
         return None
+
+
+def _by_spelling(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
+    """Read natural keys in the manifest's order, block by block; see the module's docstring."""
+    keys, n = manifest.natural_key_text, manifest.n_sequences
+    start, row = text.find(b'"'), 0
+    if keys is None or not keys.is_first_of(text, start) or text[:start].strip(_WHITE_SPACE) != b"{":
+        return None
+    octets, values = np.frombuffer(text, dtype=np.uint8), np.empty(n)
+    between: bytes | None = None
+    while start < len(text):
+        block = octets[start : start + _BLOCK]
+        quotes = np.flatnonzero(block == _QUOTE)
+        is_last = start + len(block) == len(text)
+        # All but the last block end before the key that the next one begins with.
+        n_members = (len(quotes) - (0 if is_last else 1)) // 2
+        if n_members < 1 or row + n_members > n:
+            return None
+        stop = len(block) - 1 if is_last else int(quotes[2 * n_members])
+        opens, closes = quotes[: 2 * n_members + (not is_last) : 2], quotes[1 : 2 * n_members : 2]
+        if between is None and len(opens) > 1:
+            between = _between(block[: opens[1]].tobytes())
+        if not _follow(block, opens[1:], between):
+            return None
+        expected = keys.octets[keys.ends[row] : keys.ends[row + n_members]]
+        rest = _cut_out(block[:stop], opens[:n_members], closes, expected)
+        if rest is None:
+            return None
+        rest = rest if is_last else rest.removesuffix(between or b"")
+        part = _numbers(b"[%b]" % rest, n_members)
+        if part is None:
+            return None
+        values[row : row + n_members] = part
+        start, row = (len(text) if is_last else start + stop), row + n_members
+    return (values, "natural_key") if row == n else None
+
+
+def _between(first: bytes) -> bytes | None:
+    """The comma and the white space at the end of the first member, or None for anything else."""
+    number = first.rstrip(_WHITE_SPACE)
+    return first[len(number) - 1 :] if number[-1:] == b"," else None
+
+
+def _follow(block: Octets, opens: Rows, between: bytes | None) -> bool:
+    """Whether each of these marks follows this comma and white space."""
+    if not len(opens):
+        return True
+    if between is None:
+        return False
+    before = enumerate(reversed(between), 1)
+    return all(bool((block[opens - back] == octet).all()) for back, octet in before)
+
+
+def _cut_out(block: Octets, opens: Rows, closes: Rows, expected: Octets) -> bytes | None:
+    """What is left of a block without its keys, or None if these are not the expected ones."""
+    stops = closes + 2
+    lengths = np.empty(2 * len(opens), dtype=np.intp)
+    lengths[::2] = stops - opens
+    lengths[1:-1:2] = opens[1:] - stops[:-1]
+    lengths[-1] = len(block) - stops[-1]
+    if lengths.min() < 0:
+        return None
+    is_key = np.repeat(np.tile([True, False], len(opens)), lengths)
+    if not np.array_equal(block[is_key], expected):
+        return None
+    return bytes(block[~is_key])
 
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:

@@ -1,7 +1,9 @@
-"""The anno_ids of a manifest as the 64-bit words in which they stand in a prediction file."""
+"""The keys of a manifest as they stand in a prediction file: as 64-bit words, or as one text."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
@@ -72,6 +74,34 @@ class KeyWords:
         rows = np.zeros(int(self._anno_id.max()) + 1, dtype=np.intp)
         rows[self._anno_id] = np.arange(len(self._anno_id))
         return rows
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeyText:
+    """Keys of any length with their punctuation, `"a/b":"a/c":`, one after the other.
+
+    `ends` (n + 1,) are where they end, from the 0 before the first one on.
+    """
+
+    octets: NDArray[np.uint8]
+    ends: Rows
+
+    @classmethod
+    def of(cls, keys: Sequence[str]) -> KeyText | None:
+        """The text of these keys, or None when JSON would write one of them in another way."""
+        try:
+            text = "".join([f'"{key}":' for key in keys]).encode()
+        except UnicodeEncodeError:
+            return None
+        octets = np.frombuffer(text, dtype=np.uint8)
+        ends = np.flatnonzero(octets == ord('"'))[1::2] + 2
+        if text.count(b'"') != 2 * len(keys) or b"\\" in text or int(octets.min()) < ord(" "):
+            return None
+        return cls(octets, np.concatenate([[0], ends]))
+
+    def is_first_of(self, text: bytes, start: int) -> bool:
+        """Whether the first key stands in a file from there on."""
+        return text.startswith(self.octets[: self.ends[1]].tobytes(), start)
 
 
 def _spell(anno_id: NDArray[np.int64], n_digits: Rows) -> Words:

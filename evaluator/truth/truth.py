@@ -25,7 +25,7 @@ from evaluator.metrics.scale import Floats, exact_log, scale_ratio_10hz
 from evaluator.problems import Findings, quoted, reject
 from evaluator.truth.annotation_folders import read_annotations
 from evaluator.truth.csv_tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
-from evaluator.truth.packed_keys import KeyWords
+from evaluator.truth.packed_keys import KeyText, KeyWords
 
 Integers = NDArray[np.int64]
 
@@ -60,7 +60,8 @@ class Manifest:
         _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
         _find_duplicates(findings, "duplicate-natural-keys", "natural key", manifest.natural_keys, table)
         findings.raise_if_any()
-        _ = manifest.key_words  # made here, so that the first file is read as fast as the next
+        # Made here, so that the first file is read as fast as the next.
+        _ = manifest.key_words, manifest.natural_key_text
         return manifest
 
     @property
@@ -100,6 +101,11 @@ class Manifest:
     def key_words(self) -> KeyWords | None:
         """The anno_ids as the words of a file, where they are short enough."""
         return KeyWords.of(self.anno_id)
+
+    @cached_property
+    def natural_key_text(self) -> KeyText | None:
+        """The natural keys as the text of a file, where JSON writes them as they are."""
+        return KeyText.of(self.natural_keys)
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:

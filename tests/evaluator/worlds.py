@@ -53,14 +53,16 @@ def on_terminal(
     return done, screen_text(terminal)
 
 
-def make_truth(ttc_s: Iterable[float], *, anno_ids: Sequence[int] | None = None) -> GroundTruth:
+def make_truth(
+    ttc_s: Iterable[float], *, anno_ids: Sequence[int] | None = None, bags: Sequence[str] | None = None
+) -> GroundTruth:
     """A ground truth with these values: four sequences per recording, distinct natural keys."""
     values = [float(value) for value in ttc_s]
     n = len(values)
     return GroundTruth.from_table(
         Table(
             anno_id=list(anno_ids or range(n)),
-            bag_stamp=[f"{row // 4:04d}" for row in range(n)],
+            bag_stamp=list(bags or (f"{row // 4:04d}" for row in range(n))),
             cam_id=["1"] * n,
             ts_ns=[500_000_000 + 100_000_000 * row for row in range(n)],
             track_id=[str(row % 4) for row in range(n)],

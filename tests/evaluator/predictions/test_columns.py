@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from evaluator import Manifest, Rejected, read_predictions
 from evaluator.metrics.scale import Floats
+from evaluator.predictions import columns
 from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
 from tests.evaluator.worlds import envelope, flat, make_truth
@@ -171,6 +172,57 @@ def test_good_files_read_the_same_both_ways(file: tuple[bytes, Manifest]) -> Non
 @given(file=files(values=spellings | oddities))
 def test_odd_values_read_the_same_both_ways(file: tuple[bytes, Manifest]) -> None:
     assert_equivalent(*file)
+
+
+LONG = make_truth([4.0] * 40).manifest
+
+
+@st.composite
+def natural_files(draw: st.DrawFn) -> bytes:
+    """Natural keys in the manifest's order, in a layout of a machine; perhaps with one fault."""
+    colon, comma = draw(
+        st.sampled_from([(":", ","), (": ", ", "), (": ", ",\n  "), (" :", " ,"), (":", ", ")])
+    )
+    values = draw(st.lists(spellings, min_size=40, max_size=40))
+    members = [f'"{key}"{colon}{value}' for key, value in zip(LONG.natural_keys, values, strict=True)]
+    text = "{" + comma.join(members) + "}"
+    faults = st.sampled_from(['"', ",", ", ", " ", "\t", "5", "", ":", "}", '"x":1,', "\\", "é", "\x00"])
+    if draw(st.booleans()):
+        at = draw(st.integers(0, len(text)))
+        text = text[:at] + draw(faults) + text[at + draw(st.integers(0, 2)) :]
+    if draw(st.booleans()):
+        first, second = draw(st.tuples(st.integers(0, 39), st.integers(0, 39)))
+        text = text.replace(LONG.natural_keys[first], LONG.natural_keys[second])
+    return text.encode()
+
+
+@settings(max_examples=200)
+@given(data=natural_files(), block=st.sampled_from([40, 64, 100, 250, 1_000, 1 << 19]))
+def test_natural_keys_read_the_same_both_ways_in_blocks_of_any_size(data: bytes, block: int) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(columns, "_BLOCK", block)
+        assert_equivalent(data, LONG)
+
+
+def test_natural_keys_in_order_need_no_dictionary(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(columns, "_OBJECT", None)
+    for separators in ((",", ":"), (", ", ": "), (",\n", ": ")):
+        data = json.dumps(dict.fromkeys(LONG.natural_keys, 2.5), separators=separators).encode()
+        for block in (128, 1 << 19):
+            monkeypatch.setattr(columns, "_BLOCK", block)
+            assert_equivalent(data, LONG, by_columns=True)
+    data = json.dumps({"unit": "ttc", "predictions": dict.fromkeys(LONG.natural_keys, 2.5)}).encode()
+    assert_equivalent(data, LONG, by_columns=True)
+
+
+@pytest.mark.parametrize("name", ['a"b', "a\\b", "a\nb", "ü"])
+def test_names_that_json_writes_in_another_way_are_read_too(name: str) -> None:
+    manifest = make_truth([4.0, 2.0, 3.0], bags=[name, "b", "c"]).manifest
+    for is_ascii in (True, False):
+        data = json.dumps(dict.fromkeys(manifest.natural_keys, 2.5), ensure_ascii=is_ascii).encode()
+        assert_equivalent(data, manifest, by_columns=True)
+    raw = "{" + ",".join(f'"{key}":2.5' for key in manifest.natural_keys) + "}"
+    assert_equivalent(raw.encode(), manifest)
 
 
 TOKENS = [
