@@ -86,6 +86,15 @@ class Preview:
         )
 
     @property
+    def entries(self) -> tuple[Change, ...]:
+        """Submissions that either edition may show: those that were rejected and stay so are none."""
+        return tuple(
+            change
+            for change in self.changes
+            if (change.old_status, change.new_status) != (Status.REJECTED, Status.REJECTED)
+        )
+
+    @property
     def n_changed(self) -> int:
         """Entries of which anything changes."""
         return sum(change.is_changed for change in self.changes)

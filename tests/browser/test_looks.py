@@ -148,3 +148,20 @@ def test_in_colours_that_the_visitor_chose_marks_buttons_and_the_focus_are_seen(
         "all => all.map(e => [e.matches('[aria-current]'), getComputedStyle(e).outlineStyle])"
     )
     assert {(is_current, style) for is_current, style in styles} == {(True, "solid"), (False, "none")}
+
+
+LEFT_PX = """() => ["h1", ".site-name", ".site-footer p"]
+  .map(name => Math.round(document.querySelector(name).getBoundingClientRect().left))"""
+
+
+@pytest.mark.parametrize("width", [1280, 1440, 1920])
+def test_head_content_and_foot_of_every_kind_of_page_begin_at_one_edge(
+    new_page: NewPage, truth: evaluator.GroundTruth, width: int
+) -> None:
+    page = new_page(viewport={"width": width, "height": 900})
+    edges = set()
+    boards = ("/board/test/", "/board/test/charts/", "/board/test/editions/", "/compare/")
+    for address in (*boards, "/privacy/", "/accounts/login/"):
+        page.goto(address)
+        edges.update(page.evaluate(LEFT_PX))
+    assert len(edges) == 1

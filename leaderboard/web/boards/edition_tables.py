@@ -204,7 +204,8 @@ def change_table(found: Preview) -> dict[str, Any]:
     """A preview, as the comparison's template places it."""
     return {
         "headings": [score_heading(name) for name in found.names],
-        "rows": [_change_row(change, found.names) for change in found.changes],
+        "rows": [_change_row(change, found.names) for change in found.entries],
+        "n_rejected_in_both": len(found.changes) - len(found.entries),
         "truth": _change_words(found.truth, found.published, found.edition),
         "totals": _totals(found),
     }
@@ -222,7 +223,7 @@ def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
         )
     return (
         *sequences,
-        ("entries", grouped(len(found.changes))),
+        ("entries", grouped(len(found.entries))),
         ("entries changed", grouped(found.n_changed)),
         ("ranks changed", grouped(found.n_moved)),
         ("newly rejected", grouped(found.n_newly_rejected)),

@@ -262,6 +262,20 @@ def test_entries_that_become_rejected_say_why(
     )
 
 
+def test_what_was_rejected_before_and_stays_so_is_no_entry(
+    keeper: Client, entries: list[Submission], owner: User, tmp_path: Path
+) -> None:
+    builders.submit(owner, b'{"0": 0}', method="Broken")
+    builders.score_all()
+    open_edition(extended(tmp_path))
+    builders.score_all()
+    root = get(keeper, SECOND)
+    assert totals(root)["entries"] == "4"
+    assert "Broken" not in root.one("table", class_="changes").text
+    assert "1 submission rejected in both editions is not listed" in root.one("main").text
+    assert len(keeper.get(f"{SECOND}preview.csv").content.decode().splitlines()) == 1 + 5
+
+
 def test_private_entries_are_marked_for_maintainers(keeper: Client, rescored: Edition) -> None:
     Method.objects.filter(name="M1.1").update(visibility=Visibility.PRIVATE)
     rows = get(keeper, SECOND).one("table", class_="changes").one("tbody").all("tr")
