@@ -4,12 +4,15 @@ import json
 from datetime import timedelta
 
 import pytest
+from django.db import connection
 from django.test import Client
+from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from leaderboard.models import Edition, PublishedResult, Split, Submission, User
 from leaderboard.web.landing.landing_views import main_split
-from tests import builders, pages
+from leaderboard.web.middleware import page_cache
+from tests import board_rows, builders, pages
 from tests.editions import publish, roll_back
 
 DOORS = ["Get the data", "Submit", "Read the docs", "Paper"]
@@ -217,3 +220,18 @@ def test_it_is_answered_from_memory_until_a_board_changes(
     builders.score_all()
     again = client.get("/", headers={"If-None-Match": answer["ETag"]})
     assert (again.status_code, b"Newest" in again.content) == (200, True)
+
+
+def test_its_statements_are_as_many_for_one_entry_as_for_thirty(
+    client: Client, edition: Edition, owner: User
+) -> None:
+    found = []
+    for n in (1, 29):
+        board_rows.fill(edition, n=n, user=owner)
+        client.get("/board/test/")  # draws the board, which is kept
+        page_cache.memory.clear()
+        with CaptureQueriesContext(connection) as asked:
+            client.get("/")
+        found.append(len(asked))
+    # The splits, and what became of their editions.
+    assert found == [2, 2]
