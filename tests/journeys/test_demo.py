@@ -96,6 +96,8 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
         answer = visitor.post_form("/accounts/login/", {"login": login[1], "password": login[2]})
         assert answer.url.path == "/submit/"
         assert "simulated" in visitor.text_of("/board/demo/").lower()
+        assert f"pip install {url}/dist/tsttc-" in visitor.text_of("/dist/")
+        assert "anno_id" in visitor.text_of("/docs/search/?q=anno_id")
 
         (first,) = workers(supervisor)
         os.kill(first, signal.SIGKILL)
