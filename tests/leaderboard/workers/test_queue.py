@@ -8,9 +8,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timedelta
+from typing import Any
 
 import pytest
-from django.db import connections
+from django.db import connection, connections
 from django.utils import timezone
 
 from leaderboard.boards import snapshots
@@ -72,11 +73,16 @@ def test_workers_that_ask_at_the_same_moment_sweep_once(done: list[str]) -> None
     begun(1, queue.sweep_if_due, hours_ago=1)
     done.clear()
     SweepBeat.objects.update(sweep_begun_at=timezone.now() - timedelta(hours=1))
-    barrier = threading.Barrier(6)
+    all_have_looked = threading.Barrier(6)
+
+    def after_all_looks(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
+        if sql.startswith("UPDATE") and SweepBeat._meta.db_table in sql:
+            all_have_looked.wait(PATIENCE_S)
+        return execute(sql, *rest)
 
     def ask() -> None:
-        barrier.wait(PATIENCE_S)
-        queue.sweep_if_due(rng=random.Random(0), stopping=threading.Event())
+        with connection.execute_wrapper(after_all_looks):
+            queue.sweep_if_due(rng=random.Random(0), stopping=threading.Event())
         connections.close_all()
 
     asking = [threading.Thread(target=ask) for _ in range(6)]
