@@ -9,7 +9,10 @@ from celery import shared_task
 from django.utils import timezone
 
 from leaderboard.scoring import worker
-from leaderboard.workers import backlog
+
+# `queue` is what a worker runs by itself. Celery only logs an error of the signal that starts it, and goes on
+# without; an error here keeps the worker from starting.
+from leaderboard.workers import backlog, queue  # noqa: F401
 
 
 @shared_task(name="leaderboard.tasks.nudge")
