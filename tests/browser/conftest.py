@@ -9,9 +9,8 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import evaluator
-from tests import services
 from tests.browser.chromium import WIDE, Complaints, chromium
-from tests.browser.site import PASSWORD, open_split, web_alone
+from tests.browser.site import PASSWORD, open_split, site_to_look_at
 from tests.journeys.production import Site
 
 PATIENCE_MS = 120_000
@@ -23,13 +22,9 @@ NewPage = Callable[..., Page]
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A site without a worker; nothing is started where there is no browser to look at it."""
-    try:
-        services.chromium()
-    except services.ServiceMissing as missing:
-        services.skip_or_fail(missing)
     limits = {"TSTTC_MAX_PREDICTIONS_BYTES": str(MAX_PREDICTIONS_BYTES), "TSTTC_QUOTAS": "0"}
     limits |= {"TSTTC_THROTTLES": "0"}
-    with web_alone(tmp_path_factory.mktemp("site"), **limits) as running:
+    with site_to_look_at(tmp_path_factory.mktemp("site"), **limits) as running:
         yield running
 
 

@@ -1,13 +1,14 @@
 """The board on every screen: it fits, its heads stay, it answers at once, and it keeps what is ticked."""
 
 import re
+from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.chromium import NARROW, OVERFLOW_PX, WIDE, sign_in, timers_at_rest
 from tests.browser.conftest import NewPage
-from tests.browser.site import PASSWORD, open_split
+from tests.browser.site import PASSWORD, open_split, site_to_look_at
 from tests.journeys.production import Site
 
 pytestmark = pytest.mark.browser
@@ -45,6 +46,13 @@ HEAD_TOP_PX = """() => {
   scrollTo(0, document.querySelector("table.board tbody tr:nth-child(40)").offsetTop);
   return document.querySelector("table.board thead").getBoundingClientRect().top;
 }"""
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
+    """A site of this module's own, since the charts' module fills the same split."""
+    with site_to_look_at(tmp_path_factory.mktemp("board"), TSTTC_QUOTAS="0", TSTTC_THROTTLES="0") as running:
+        yield running
 
 
 @pytest.fixture(scope="module")

@@ -8,10 +8,9 @@ import pytest
 from playwright.sync_api import Page, expect
 
 import evaluator
-from tests import services
 from tests.browser.chromium import NARROW, WIDE, sign_in, timers_at_rest
 from tests.browser.conftest import NewPage, show, sign_up, submit
-from tests.browser.site import PASSWORD, open_split, predictions, web_alone, worker
+from tests.browser.site import PASSWORD, open_split, predictions, site_to_look_at, worker
 from tests.browser.test_looks import SCREENS, look_at
 from tests.journeys.production import Site, await_that, get
 
@@ -26,11 +25,7 @@ DESK = f"/maintain/{SPLIT}/editions/2/"
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A site of this module's own: what it publishes would change the boards that others look at."""
-    try:
-        services.chromium()
-    except services.ServiceMissing as missing:
-        services.skip_or_fail(missing)
-    with web_alone(tmp_path_factory.mktemp("corrections")) as running:
+    with site_to_look_at(tmp_path_factory.mktemp("corrections")) as running:
         yield running
 
 
