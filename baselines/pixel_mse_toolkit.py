@@ -32,6 +32,10 @@ Pixels = NDArray[np.float32]
 MAX_CROP_PX: Final = 128
 MAX_SCORE: Final = 10_000.0
 
+NEARLY: Final = 1e-3
+SMALLEST: Final = 1e-7
+"""What errors of float32 products, of values 0 … 1, are compared by: they are true to a tenth of either."""
+
 _GROUP_PX: Final = 6
 """Patches that begin within so many pixels of each other share one matrix product."""
 
@@ -115,6 +119,7 @@ def search(
     if contrast * 255**2 < patches.MIN_CONTRAST**2:
         raise Unusable("box without texture")
     least, shifts = at_best_shifts(errors_of(crops, scales))
+    settle_ties(crops, scales, least, shifts, n_top=n_top)
     return Match(
         scales=scales,
         errors=least * 255**2,
@@ -141,6 +146,22 @@ def errors_of(crops: Crops, scales: Floats) -> Floats:
         part = centred.reference[:, low[1] : rows, low[0] : columns]
         errors[group] = _errors_of_group(part, centred, scales[group], offsets)
     return np.maximum(errors, 0.0)
+
+
+def settle_ties(crops: Crops, scales: Floats, least: Floats, shifts: NDArray[np.int_], *, n_top: int) -> None:
+    """Compute in float64 those of `least` (n,), at `shifts` (n, 2), that are nearly as small as the best.
+
+    By the nearest pixel, neighbouring scales often give the same patch and so the same error. Products in
+    float32 round them apart, on each processor in its own way, and so choose other bins.
+    """
+    bound = float(np.sort(least)[min(n_top, len(least)) - 1])
+    for place in np.flatnonzero(least <= bound * (1 + NEARLY) + SMALLEST):
+        scale = float(scales[place])
+        left, top = crops.starts(scale) + shifts[place] + crops.margin
+        columns, rows = crops.patch
+        part = crops.reference[:, top : top + rows, left : left + columns]
+        difference = np.subtract(part, crops.resampled(scale), dtype=np.float64)
+        least[place] = np.mean(np.square(difference))
 
 
 def _errors_of_group(part: Pixels, crops: Crops, scales: Floats, offsets: NDArray[np.int_]) -> Floats:
