@@ -20,7 +20,7 @@ class SignupNameForm(forms.Form):
         max_length=80,
         required=False,
         help_text="Your own name or your team's. Without one, boards show “Team” and a number. "
-        "Only your team sees your email address.",
+        "Your team and the maintainers see your email address.",
         widget=forms.TextInput(attrs={"autocomplete": "nickname"}),
     )
     field_order = ["email", "name", "password1", "password2"]
