@@ -228,13 +228,13 @@ def kill_a_worker_with_a_batch(site: Site, is_opened: Callable[[], bool]) -> int
     working = site.workers[0]
 
     def has_hands_full() -> bool:
-        if n_held(site) == 0:
-            return is_opened() and n_undecided(site) == 0
         working.send(signal.SIGSTOP)
         if n_held(site) > 0:
             return True
         working.send(signal.SIGCONT)
-        return False
+        # It works while this is asked, and no longer, so it cannot finish between two looks.
+        n_left = n_undecided(site)
+        return is_opened() and n_left == 0
 
     deadline_s = time.monotonic() + PATIENCE_S
     while not has_hands_full():
