@@ -1,8 +1,8 @@
 """TSTTC's evaluator: prediction files in, motion-in-depth error and relative time-to-contact error out.
 
     truth = read_truth("annotations/val")  # the folder that comes with the dataset, or a table
-    predictions = read_predictions(Path("mine.json").read_bytes(), manifest=truth.manifest)
-    print(evaluate(predictions, truth).to_json())
+    predictions = read_predictions("mine.json", manifest=truth.manifest)
+    print(evaluate(predictions, truth))
 
 Arithmetic about files: no network, no clock, no global state.
 """

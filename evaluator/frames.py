@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import json
+from typing import Any, Final
 
 import pandas as pd
 
+from evaluator.arguments import require
 from evaluator.predictions.predictions import Predictions, read_predictions
 from evaluator.truth.truth import Manifest
+
+NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
 
 
 def manifest_frame(manifest: Manifest) -> pd.DataFrame:
@@ -26,10 +30,28 @@ def manifest_frame(manifest: Manifest) -> pd.DataFrame:
 def predictions_from_frame(frame: pd.DataFrame, *, manifest: Manifest, column: str = "ttc_s") -> Predictions:
     """Predictions from a frame with one row per sequence, in any order: seconds in `column`.
 
-    The sequence is named by the column `anno_id`, or by the index. Raises `Rejected` in the words that a file
-    with these values would get, `KeyError` for a column that is not there.
+    A sequence is named by the columns `bag_stamp`, `cam_id`, `ts` and `track_id`, its natural key; else by
+    `anno_id`, a column or the name of the index. Raises `Rejected` in the words that a file with these values
+    would get, `ValueError` for a frame that names no sequences, `KeyError` for a column that is not there.
     """
-    keys = frame["anno_id"] if "anno_id" in frame.columns else frame.index
-    pairs = zip(keys, frame[column].astype("float64"), strict=True)
+    require(frame, pd.DataFrame, name="frame")
+    if column not in frame.columns:
+        raise KeyError(f"The frame has no column {column!r}; found {', '.join(map(str, frame.columns))}.")
+    pairs = zip(_keys(frame), frame[column].astype("float64"), strict=True)
     members = ",".join(f"{json.dumps(str(key))}:{json.dumps(value)}" for key, value in pairs)
     return read_predictions(f"{{{members}}}".encode(), manifest=manifest)
+
+
+def _keys(frame: pd.DataFrame) -> list[Any]:
+    if set(NATURAL_KEY) <= set(frame.columns):
+        columns = zip(*(frame[name].astype(str) for name in NATURAL_KEY), strict=True)
+        return list(map("/".join, columns))
+    if "anno_id" in frame.columns:
+        return list(frame["anno_id"])
+    if frame.index.name == "anno_id":
+        return list(frame.index)
+    # Row numbers of a frame that somebody has sorted or shuffled name other sequences.
+    raise ValueError(
+        f"The frame does not name the sequences; expected the columns {', '.join(NATURAL_KEY)}, or anno_id "
+        "as a column or as the name of the index."
+    )

@@ -9,11 +9,11 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import Final
 
 MAX_LISTED: Final = 20
-"""At most so many problems of one kind, or keys in one problem, are listed; the rest are counted."""
+"""At most so many lines of one kind, or places in one line, are listed; the rest are counted."""
 
 _MAX_QUOTED: Final = 60
 
@@ -83,6 +83,9 @@ class FileWarning:
 
 
 WARNING_CODES: Final[dict[str, str]] = {
+    "not-seconds": "Nearly all values lie beyond ±20 s: probably milliseconds.",
+    "looks-like-ratios": "Nearly all values lie between 0.5 and 1.5: probably scale ratios without a unit.",
+    "flipped-signs": "Values of one object rise while time passes: probably every sign is wrong.",
     "shuffled-values": "Values of one object differ as much as those of several: probably wrong keys.",
     "unlike-truth": "The predictions do not go with the true times, or have the opposite sign.",
     "other-numbering": "The toolkit numbers the sequences of a folder differently on this machine.",
@@ -103,7 +106,7 @@ class Rejected(Exception):
         return _restored, (self.problems, self.n_problems)
 
     def __str__(self) -> str:
-        title = "1 problem" if self.n_problems == 1 else f"{self.n_problems:,} problems"
+        title = n_problems_in_words(self.n_problems, n_lines=len(self.problems))
         return "\n".join([f"{title}:", *(f"  {number}. {p}" for number, p in enumerate(self.problems, 1))])
 
     def as_dict(self) -> dict[str, object]:
@@ -119,35 +122,85 @@ def _restored(problems: tuple[Problem, ...], n_problems: int) -> Rejected:
     return Rejected(problems, n_problems=n_problems)
 
 
+@dataclass(slots=True)
+class _Line:
+    """A problem with the further places where it was found: their number, and the first of them."""
+
+    problem: Problem
+    n_more: int = 0
+    more: list[str] = field(default_factory=list)
+
+    def add(self, where: str) -> None:
+        """Note a further place; a place may have several faults of a kind, one after the other."""
+        if where == (self.more[-1] if self.more else self.problem.where):
+            return
+        self.n_more += 1
+        if len(self.more) <= MAX_LISTED:
+            self.more.append(where)
+
+    def told(self) -> Problem:
+        if not self.n_more:
+            return self.problem
+        # One name more than are shown says that there are more.
+        told = "1 more place has" if self.n_more == 1 else f"{self.n_more:,} more places have"
+        message = f"{self.problem.message} {told} this problem: {listed(self.more)}."
+        return Problem(self.problem.code, message, self.problem.where)
+
+
 class Findings:
-    """Collects problems while a file is read, so that one answer names them all."""
+    """Collects problems while a file is read, so that one answer names them all, equal ones in one line."""
 
     def __init__(self) -> None:
-        self._problems: list[Problem] = []
+        self._lines: list[_Line] = []
+        self._line_of: dict[tuple[str, str], _Line] = {}
         self._counts: Counter[str] = Counter()
+        self._n_lines: Counter[str] = Counter()
+        self._n_unlisted: Counter[str] = Counter()
         self._n_grouped = 0
 
     def add(self, code: str, message: str, where: str = "") -> None:
-        """Note one fault; the first `MAX_LISTED` of a kind are kept, all are counted."""
+        """Note one fault; the first `MAX_LISTED` lines of a kind are kept, all faults are counted.
+
+        A message that was noted before adds its place to that line.
+        """
         self._counts[code] += 1
-        if self._counts[code] <= MAX_LISTED:
-            self._problems.append(Problem(code, message, where))
+        line = self._line_of.get((code, message)) if where else None
+        if line:
+            line.add(where)
+        elif self._n_lines[code] < MAX_LISTED:
+            self._n_lines[code] += 1
+            line = _Line(Problem(code, message, where))
+            self._lines.append(line)
+            self._line_of[code, message] = line
+        else:
+            self._n_unlisted[code] += 1
 
     def group(self, code: str, message: str, where: str = "", *, n_faults: int) -> None:
         """Note many faults of one kind as a single problem, whose message gives count and examples."""
-        self._problems.append(Problem(code, message, where))
+        self._lines.append(_Line(Problem(code, message, where)))
         self._n_grouped += n_faults
 
     def raise_if_any(self) -> None:
         """Raise `Rejected` when anything was noted."""
-        if not self._problems:
+        if not self._lines:
             return
         rest = [
-            Problem(code, f"And {count - MAX_LISTED:,} more like these: {count:,} in all.")
+            Problem(code, f"And {self._n_unlisted[code]:,} more like these: {count:,} in all.")
             for code, count in self._counts.items()
-            if count > MAX_LISTED
+            if self._n_unlisted[code]
         ]
-        raise Rejected([*self._problems, *rest], n_problems=self._counts.total() + self._n_grouped)
+        n_problems = self._counts.total() + self._n_grouped
+        raise Rejected([*(line.told() for line in self._lines), *rest], n_problems=n_problems)
+
+
+def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
+    """How many problems, and why the list below has fewer lines.
+
+    >>> n_problems_in_words(1, n_lines=1), n_problems_in_words(7_000, n_lines=1)
+    ('1 problem', '7,000 problems; equal ones share a line')
+    """
+    told = "1 problem" if n_problems == 1 else f"{n_problems:,} problems"
+    return f"{told}; equal ones share a line" if n_lines < n_problems else told
 
 
 def reject(code: str, message: str, where: str = "") -> Rejected:

@@ -1,11 +1,11 @@
-"""From a pandas frame straight to a report: rows in any order, joined to the manifest by the natural key."""
+"""From a pandas frame straight to a report: rows in any order, named by their natural keys."""
 
 from pathlib import Path
 
 import pandas as pd
 
 import evaluator
-from evaluator.frames import manifest_frame, predictions_from_frame
+from evaluator.frames import predictions_from_frame
 
 HERE = Path(__file__).parent
 truth = evaluator.read_truth(HERE / "truth.csv")
@@ -14,8 +14,6 @@ truth = evaluator.read_truth(HERE / "truth.csv")
 mine = pd.read_csv(HERE / "truth.csv", dtype={"cam_id": str, "track_id": str}).drop(columns="anno_id")
 mine = mine.sample(frac=1.0, random_state=1).assign(ttc_s=mine["ttc"] * 1.05)
 
-keys = ["bag_stamp", "cam_id", "ts", "track_id"]
-frame = manifest_frame(truth.manifest).reset_index().merge(mine, on=keys, how="left")
-predictions = predictions_from_frame(frame, manifest=truth.manifest)
+predictions = predictions_from_frame(mine, manifest=truth.manifest)
 report = evaluator.evaluate(predictions, truth)
 print(pd.Series(report.flat()).round(2).to_string())

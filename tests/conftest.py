@@ -13,7 +13,7 @@ from pytest_django.fixtures import Settings
 
 from leaderboard.benchmark import splits
 from leaderboard.web.middleware.page_cache import memory
-from leaderboard.web.monitoring import readiness
+from leaderboard.web.monitoring import healthiness, readiness
 from tests import emptying, prepared, services, spread
 
 # How long an example takes says more about the machine than about the code, and what is found by chance is
@@ -28,6 +28,11 @@ hypothesis.settings.load_profile("suite")
 
 # Playwright's own loop makes Django's guard against blocking calls in async code misfire.
 os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Bytes are named by their argument: all processes must agree on a name, and a gzip header holds the time."""
+    return argname if isinstance(val, bytes) else None
 
 
 def pytest_configure() -> None:
@@ -81,6 +86,7 @@ def production(tmp_path: Path) -> dict[str, str]:
         "TSTTC_SITE_URL": "https://board.example.org",
         "TSTTC_DATABASE_URL": "postgres://tsttc:secret@127.0.0.1:1/tsttc",
         "TSTTC_BROKER_URL": "redis://127.0.0.1:1/0",
+        "TSTTC_EMAIL_URL": "smtp://127.0.0.1:1",
         "TSTTC_DATA_DIR": str(tmp_path),
     }
 
@@ -113,6 +119,7 @@ def nothing_remembered() -> None:
     """
     memory.clear()
     readiness.forget()
+    healthiness.forget()
     cache.clear()
 
 

@@ -20,8 +20,11 @@ from evaluator.cli.connection import version
 from evaluator.cli.conversions import convert
 from evaluator.cli.exits import MEANINGS, Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.offline import check, manifest, score
+from evaluator.cli.offline import check, manifest, truth
+from evaluator.cli.own import download, list_submissions, methods, whoami, withdraw
+from evaluator.cli.published import published
 from evaluator.cli.receipts import receipt, verify
+from evaluator.cli.scores import plot, score
 from evaluator.cli.submissions import status, submit
 
 __all__ = ["main"]
@@ -89,14 +92,16 @@ Exit codes:
 def main() -> None:
     """Check, score and submit time-to-contact predictions for the TSTTC benchmark.
 
-    check, score, compare --truth, convert and manifest need files alone; the others speak to the leaderboard.
+    check, score, plot, compare --truth, convert, manifest, truth and published need files alone; the others
+    speak to the leaderboard.
     """
 
 
 COMMANDS = (
-    *(check, score, convert, manifest),
-    *(login, logout, submit, status, publish, quota),
-    *(board, compare, receipt, verify),
+    *(check, score, plot, convert, manifest, truth),
+    *(login, logout, whoami, submit, status, list_submissions, methods),
+    *(download, withdraw, publish, quota),
+    *(board, published, compare, receipt, verify),
     completion,
 )
 for _command in COMMANDS:

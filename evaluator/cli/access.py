@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
+from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
 from evaluator.cli.options import json_option, sendable, slug, url_option
 from evaluator.cli.paths import keep_server_of_login, server_of_login
-from evaluator.cli.tokens import account, checked, forget_token, keep_token, required_keyring
+from evaluator.cli.tokens import account, checked, forget_token, keep_token
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Foreseen, Quota
@@ -22,21 +23,22 @@ if TYPE_CHECKING:
 N_MOVED_TOLD = 5  # rows whose rank changes; the first show what the others do
 
 
-@click.command(short_help="Save a token in the keyring of this machine.")
+@click.command(short_help="Save a token on this machine.")
 @url_option
 @json_option
 def login(*, url: str, as_json: bool) -> None:
     """Save a token in the keyring of the operating system, after the server has accepted it.
 
-    The command prompts for the token without showing it, or reads it from standard input. Other commands then
-    use the token and this leaderboard. TSTTC_TOKEN takes precedence if set. Create a token at /tokens/.
+    Without a keyring, as on most servers, it goes into a file that only you can read. The command prompts for
+    the token without showing it, or reads it from standard input. Other commands then use the token and this
+    leaderboard. TSTTC_TOKEN, and the file that TSTTC_TOKEN_FILE names, take precedence if set. Create a token
+    at /tokens/.
 
     \b
     Examples:
       tsttc login --server https://leaderboard.example.org
       pass show tsttc | tsttc login --server https://leaderboard.example.org
     """
-    required_keyring()  # before anybody types in vain
     token = checked(_asked(url), named="What was given")
     with connect(url, with_token=True, token=token) as client:
         client.quota()  # answered to every token, whatever else it is good for
@@ -51,11 +53,11 @@ def login(*, url: str, as_json: bool) -> None:
     click.echo(f"The token is valid and saved for {url} ({printable(keyring)}).")
 
 
-@click.command(short_help="Remove the token from the keyring.")
+@click.command(short_help="Remove the token from this machine.")
 @url_option
 @json_option
 def logout(*, url: str, as_json: bool) -> None:
-    """Remove the token for a leaderboard from the keyring of this machine.
+    """Remove the token for a leaderboard from this machine.
 
     The token stays valid until it expires or you revoke it at /tokens/ of the leaderboard.
 
@@ -73,7 +75,7 @@ def logout(*, url: str, as_json: bool) -> None:
             f"The token for {url} is removed from this machine. Revoke it at {url.rstrip('/')}/tokens/"
         )
     else:
-        click.echo(f"There was no token for {url} in a keyring of this machine.")
+        click.echo(f"There was no token for {url} on this machine.")
 
 
 @click.command(short_help="Show how many submissions your team has left.")
@@ -107,7 +109,7 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
 
 
 @click.command(short_help="Publish one of your methods.")
-@click.argument("method", callback=sendable)
+@click.argument("method", callback=sendable, shell_complete=suggestions.methods)
 @click.option(
     "--as",
     "visibility",

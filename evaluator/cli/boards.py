@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import exports
+from evaluator.cli import exports, suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
 from evaluator.cli.options import json_option, sendable, slug, url_option
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Show the ranked results of a split.")
-@click.argument("split", default="test", callback=slug)
+@click.argument("split", default="test", callback=slug, shell_complete=suggestions.splits)
 @click.option(
     "--sort",
     callback=sendable,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -30,7 +31,14 @@ Scores = Mapping[str, float | None]
 @click.command(short_help="Compare two methods or two files, with confidence intervals and p-values.")
 @click.argument("first", callback=sendable)
 @click.argument("second", callback=sendable)
-@click.option("--split", default="test", show_default=True, callback=slug, help="The board of the methods.")
+@click.option(
+    "--split",
+    default="test",
+    show_default=True,
+    callback=slug,
+    shell_complete=suggestions.splits,
+    help="The board of the methods.",
+)
 @click.option(
     "--truth",
     "truth_path",

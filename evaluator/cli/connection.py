@@ -12,6 +12,7 @@ import click
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
+from evaluator.cli.heartbeat import signs_of_life
 from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.tokens import token_for
 
@@ -33,6 +34,7 @@ WORDS_OF_403 = frozenset({"token-scope", "token-split", "not-admitted"})
 def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator[Client]:
     """A client for the site at `url`, with `token` or the one that is kept for it.
 
+    Before the token or a file goes anywhere, the site has to answer as a leaderboard.
     Its errors leave as failures worded for a person.
     """
     bearer = token or (token_for(url) if with_token else None)
@@ -45,8 +47,14 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
         click.echo(f"Warning: the token goes to {url} unencrypted; use https where you can.", err=True)
     # A job may begin before its server has; a person who mistyped an address wants to hear of it at once.
     patience = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
+    agent = f"tsttc/{version()}"
     try:
-        with Client(url=url, token=bearer, user_agent=f"tsttc/{version()}", patience=patience) as client:
+        with (
+            signs_of_life(url),
+            Client(url=url, token=bearer, user_agent=agent, patience=patience) as client,
+        ):
+            if bearer:
+                client.require_leaderboard()
             yield client
     except ClientError as error:
         raise in_words(error, url=url) from error

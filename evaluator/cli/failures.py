@@ -13,7 +13,7 @@ import click
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.layout import printable
-from evaluator.problems import Problem, Rejected
+from evaluator.problems import Problem, Rejected, n_problems_in_words
 
 
 class Failure(Exception):
@@ -63,18 +63,13 @@ class Failure(Exception):
 def rejected(name: str, fault: Rejected, *, hint: str = "") -> Failure:
     """The failure for a file that the library found at fault."""
     return Failure(
-        f"{name} is rejected: {n_problems_in_words(fault.n_problems)}",
+        f"{name} is rejected: {n_problems_in_words(fault.n_problems, n_lines=len(fault.problems))}",
         exit_code=Exit.REJECTED,
         code="rejected",
         problems=fault.problems,
         n_problems=fault.n_problems,
         hint=hint,
     )
-
-
-def n_problems_in_words(n_problems: int) -> str:
-    """`1 problem`, `2 problems`."""
-    return "1 problem" if n_problems == 1 else f"{n_problems:,} problems"
 
 
 def numbered(problems: Sequence[Problem]) -> Iterator[str]:

@@ -112,9 +112,10 @@ def result_in_words(
     n_out_of_range: int,
     truncated: Mapping[str, int],
     decimals: int = 2,
+    intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> Iterator[str]:
     """One result as lines: the table, its units, and what was counted and truncated."""
-    yield from score_table(scores, counts=counts, decimals=decimals)
+    yield from score_table(scores, counts=counts, decimals=decimals, intervals=intervals)
     yield ""
     yield units(scores)
     outside = f", {n_out_of_range:,} of them in no TTC range, which count in the overall scores only"
@@ -124,9 +125,13 @@ def result_in_words(
 
 
 def score_table(
-    scores: Mapping[str, float | None], *, counts: Mapping[str, int], decimals: int = 2
+    scores: Mapping[str, float | None],
+    *,
+    counts: Mapping[str, int],
+    decimals: int = 2,
+    intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> list[str]:
-    """One result, below each value the number of sequences behind it."""
+    """One result, below each value the ends of its interval and the number of sequences behind it."""
     from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     behind = [counts.get(split_name(name)[1]) for name in scores]
@@ -139,6 +144,17 @@ def score_table(
                 for value in scores.values()
             ),
         ],
+        *(
+            [
+                Cell(words),
+                *(
+                    Cell(format_published(ends[end] if ends else None, decimals=decimals, missing=NO_VALUE))
+                    for ends in map(intervals.get, scores)
+                ),
+            ]
+            for end, words in ((0, "95 % from"), (1, "95 % to"))
+            if intervals
+        ),
         [Cell("count"), *(Cell(NO_VALUE if n is None else f"{n:,}") for n in behind)],
     ]
     return aligned(rows, align="<" + "." * len(scores))

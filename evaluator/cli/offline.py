@@ -1,28 +1,27 @@
-"""The subcommands that need files alone: check, score, manifest. They run the server's own code."""
+"""The subcommands that need files alone: check and manifest. They run the server's own code."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import gates
+from evaluator.cli import suggestions
+from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
-from evaluator.cli.layout import result_in_words
-from evaluator.cli.options import json_option, output_option, predictions_argument
+from evaluator.cli.options import json_option, output_option, predictions_argument, slug, url_option
 from evaluator.cli.reading import FOLDER, TABLE, bytes_of, name_of, naming, write_bytes
 from evaluator.cli.warnings_in_words import (
     echo_warnings,
     numbering_in_words,
     numbering_warnings,
 )
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 
 if TYPE_CHECKING:
-    from evaluator import Manifest, Report
+    from evaluator import GroundTruth, Manifest
     from evaluator.truth.numbering import Numbering
 
 
@@ -99,65 +98,30 @@ def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Ma
     return sequences, None
 
 
-@click.command(short_help="Score a prediction file against your ground truth.")
-@predictions_argument
+@click.command(short_help="Write the manifest of a ground truth or a split: its public list of sequences.")
+@click.argument("truth", metavar="[TRUTH_OR_FOLDER]", type=TABLE, required=False)
 @click.option(
-    "--truth",
-    "truth_path",
-    type=TABLE,
-    required=True,
-    metavar="FILE",
-    help="Ground truth: a CSV file or an annotation folder of the toolkit.",
+    "--split",
+    callback=lambda c, p, value: value and slug(c, p, value),
+    shell_complete=suggestions.splits,
+    help="Get the manifest of this split from the leaderboard.",
 )
-@click.option(
-    "--protocol",
-    type=click.Choice(list(PROTOCOLS)),
-    default=DEFAULT_PROTOCOL,
-    show_default=True,
-    help="Protocol: tsttc-1 as on the board; toolkit gives the numbers of the dataset's toolkit to the bit.",
-)
-@gates.fail_if_option
-@json_option
-def score(
-    *, predictions: Path, truth_path: Path, protocol: str, fail_if: list[gates.Condition], as_json: bool
-) -> None:
-    """Score PREDICTIONS, a JSON file or - for standard input, against your ground truth.
-
-    The scores equal those of the server: two decimals as on the board, full float64 with --json. If you have
-    the dataset, give its annotation folder. A warning means that the predictions hardly correlate with the
-    true times; the usual cause is another order of the sequences.
-
-    \b
-    Examples:
-      tsttc score predictions.json --truth annotations/val/
-      tsttc score predictions.json --truth val.csv --json | jq .scores.overall.mid
-      tsttc score predictions.json --truth val.csv --fail-if "mid > 15.0 or rte > 13"
-    """
-    from evaluator import evaluate, read_predictions, read_truth  # noqa: PLC0415 -- numpy, as above
-    from evaluator.predictions.plausibility import warnings_with_truth  # noqa: PLC0415 -- numpy, as above
-
-    with naming(truth_path):
-        truth = read_truth(truth_path)
-    with naming(predictions):
-        found = read_predictions(bytes_of(predictions), manifest=truth.manifest)
-        report = evaluate(found, truth, protocol=protocol)
-    warnings = warnings_with_truth(found, truth)
-    if not as_json:
-        echo_warnings(warnings)
-    gates.told(
-        {**report.as_dict(), "warnings": [asdict(warning) for warning in warnings]},
-        show=lambda: click.echo("\n".join(_in_words(report))),
-        judge=lambda: gates.judge(fail_if, report.flat()),
-        as_json=as_json,
-    )
-
-
-@click.command(short_help="Write the manifest of a ground truth: its public list of sequences.")
-@click.argument("truth", metavar="TRUTH_OR_FOLDER", type=TABLE)
+@click.option("--edition", type=int, metavar="N", help="With --split: of a former edition, by its number.")
 @output_option("the CSV table")
+@url_option
 @json_option
-def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
+def manifest(
+    *,
+    truth: Path | None,
+    split: str | None,
+    edition: int | None,
+    output: Path | None,
+    url: str,
+    as_json: bool,
+) -> None:
     """Write the manifest of TRUTH_OR_FOLDER: every column of the ground truth but the values.
+
+    With --split, the leaderboard gives that of a split; that needs no token.
 
     TRUTH_OR_FOLDER is a CSV file or a folder of the toolkit's annotations. The manifest lists
     the anno_id and the natural key of every sequence, without true values. For a folder, the command reports
@@ -167,46 +131,86 @@ def manifest(*, truth: Path, output: Path | None, as_json: bool) -> None:
     Examples:
       tsttc manifest truth.csv -o manifest.csv
       tsttc manifest annotations/val/ -o manifest.csv
+      tsttc manifest --split test -o manifest.csv
     """
-    from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
-    from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
-
-    numbering = None
-    with naming(truth):
-        if truth.is_dir():
-            numbering = read_numbering(truth)
-        table = read_manifest(truth) if numbering is None else numbering.manifest
+    if (truth is None) == (split is None):
+        raise click.UsageError("Give either TRUTH_OR_FOLDER or --split.")
+    if edition is not None and split is None:
+        raise click.UsageError("--edition needs --split.")
+    found = _manifest_of_split(str(split), edition, url) if truth is None else _manifest_of(truth)
+    table, numbering = found
     if output is not None:
-        if output.exists() and output.samefile(truth):
+        if truth is not None and output.exists() and output.samefile(truth):
             raise click.BadParameter("this is the ground truth itself; choose another file.", param_hint="-o")
         write_bytes(output, table.to_csv())
-    if as_json:
-        echo_json(
-            {
-                "manifest_digest": table.digest,
-                "n_sequences": table.n_sequences,
-                "n_recordings": table.n_recordings,
-                "n_renumbered": None if numbering is None else numbering.n_renumbered,
-                "output": None if output is None else str(output),
-                **({"csv": table.to_csv().decode()} if output is None else {}),
-            }
-        )
-    elif output is None:
-        click.echo(table.to_csv(), nl=False)
-    else:
-        click.echo(f"{output}: {table.n_sequences:,} sequences of {table.n_recordings:,} recordings.")
+    counts = {"n_sequences": table.n_sequences, "n_recordings": table.n_recordings}
+    n_renumbered = None if numbering is None else numbering.n_renumbered
+    document = {"manifest_digest": table.digest, **counts, "n_renumbered": n_renumbered}
+    _tell_table(table, document, output=output, as_json=as_json)
     if numbering is not None and not as_json:
         click.echo(numbering_in_words(numbering), err=True)
 
 
-def _in_words(report: Report) -> Iterator[str]:
-    yield from result_in_words(
-        report.flat(),
-        counts={name: interval.count for name, interval in report.scores.items()},
-        n_out_of_range=report.n_out_of_range,
-        truncated=report.truncated,
-    )
-    yield ""
-    yield f"protocol     {report.protocol}"
-    yield f"truth        {report.truth_digest}"
-    yield f"predictions  {report.predictions_digest}"
+def _manifest_of_split(split: str, edition: int | None, url: str) -> tuple[Manifest, Numbering | None]:
+    """What the leaderboard gives, checked."""
+    from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
+
+    with connect(url, with_token=False) as client, naming(Path(f"{url.rstrip('/')}: {split}")):
+        return read_manifest(client.manifest(split, edition=edition)), None
+
+
+def _manifest_of(truth: Path) -> tuple[Manifest, Numbering | None]:
+    """The manifest of a table or a folder; of a folder also how the toolkit numbers it here."""
+    from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
+    from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- numpy, as above
+
+    with naming(truth):
+        if truth.is_dir():
+            numbering = read_numbering(truth)
+            return numbering.manifest, numbering
+        return read_manifest(truth), None
+
+
+@click.command(short_help="Write the ground truth of an annotation folder as a CSV table.")
+@click.argument("folder", metavar="FOLDER", type=TABLE)
+@output_option("the CSV table")
+@json_option
+def truth(*, folder: Path, output: Path | None, as_json: bool) -> None:
+    """Write the ground truth of FOLDER, the toolkit's annotations, as a CSV table.
+
+    score and compare read the table faster than the folder. It also states occlusion, lane and box of each
+    object, for score --by.
+
+    \b
+    Example:
+      tsttc truth annotations/val/ -o val.csv
+    """
+    from evaluator import read_truth  # noqa: PLC0415 -- numpy, as above
+
+    with naming(folder):
+        found = read_truth(folder)
+    if output is not None:
+        if output.exists() and output.samefile(folder):
+            raise click.BadParameter("this is the ground truth itself; choose another file.", param_hint="-o")
+        write_bytes(output, found.to_csv())
+    document = {
+        "truth_digest": found.digest,
+        "manifest_digest": found.manifest.digest,
+        "n_sequences": found.n_sequences,
+        "n_recordings": found.manifest.n_recordings,
+    }
+    _tell_table(found, document, output=output, as_json=as_json)
+
+
+def _tell_table(
+    table: Manifest | GroundTruth, document: Mapping[str, object], *, output: Path | None, as_json: bool
+) -> None:
+    """The table itself, or what was written of it."""
+    if as_json:
+        text = {} if output is not None else {"csv": table.to_csv().decode()}
+        echo_json({**document, "output": None if output is None else str(output), **text})
+    elif output is None:
+        click.echo(table.to_csv(), nl=False)
+    else:
+        n_sequences, n_recordings = document["n_sequences"], document["n_recordings"]
+        click.echo(f"{output}: {n_sequences:,} sequences of {n_recordings:,} recordings.")

@@ -41,9 +41,9 @@ def bytes_of(path: Path) -> bytes:
         raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
 
 
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write what `-o` names."""
+def write_bytes(path: Path, data: bytes, *, option: str = "-o") -> None:
+    """Write what `-o`, or another option, names."""
     try:
         path.write_bytes(data)
     except OSError as error:
-        raise click.BadParameter(f"{path} cannot be written: {error.strerror}.", param_hint="-o") from None
+        raise click.BadParameter(f"{path} cannot be written: {error.strerror}.", param_hint=option) from None

@@ -10,10 +10,10 @@ from urllib.parse import urljoin
 
 import click
 
-from evaluator.cli import gates
+from evaluator.cli import gates, suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
-from evaluator.cli.failures import Failure, n_problems_in_words
+from evaluator.cli.failures import Failure
 from evaluator.cli.following import followed, state_in_words
 from evaluator.cli.layout import printable, result_in_words
 from evaluator.cli.options import (
@@ -29,6 +29,7 @@ from evaluator.cli.sending import opened, progress, require_good
 from evaluator.cli.values import in_short
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.metrics.protocol import PRIMARY
+from evaluator.problems import n_problems_in_words
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Submission
@@ -50,10 +51,17 @@ def _key(_context: click.Context, _parameter: click.Parameter, value: str | None
 
 @click.command(short_help="Submit a prediction file to the leaderboard.")
 @predictions_argument
-@click.option("--split", required=True, callback=slug, help="The split: val, test, …")
+@click.option(
+    "--split",
+    required=True,
+    callback=slug,
+    shell_complete=suggestions.splits,
+    help="The split: val, test, …",
+)
 @click.option(
     "--method",
     callback=sendable,
+    shell_complete=suggestions.methods,
     required=True,
     help="Name or id of the method; a new name creates a new method.",
 )
@@ -231,7 +239,8 @@ def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]
     match submission.state:
         case "REJECTED":
             n_problems = submission.n_problems or len(submission.problems)
-            message, exit_code = f"The file is rejected: {n_problems_in_words(n_problems)}.", Exit.REJECTED
+            told = n_problems_in_words(n_problems, n_lines=len(submission.problems))
+            message, exit_code = f"The file is rejected: {told}.", Exit.REJECTED
             hint = "Your quota is not used. Check a corrected file with: tsttc check"
         case "SYSTEM_ERROR":
             message, exit_code = (

@@ -1,20 +1,27 @@
-"""The token: from the environment, or from the keyring of the operating system. Never shown, never an option.
+"""The token: from the environment, the operating system's keyring, or a file. Never shown, never an option.
+
+The file is for machines without a keyring, as most servers are: nobody but its owner may read it.
 
 `keyring` is imported where it is needed: it costs more time than the rest of a command.
 """
 
 from __future__ import annotations
 
+import json
 import os
-from typing import TYPE_CHECKING
+from contextlib import suppress
+from pathlib import Path
+from typing import TYPE_CHECKING, Final
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.options import TOKEN_VARIABLE
+from evaluator.cli.paths import settings_file
 
 if TYPE_CHECKING:
     from keyring.backend import KeyringBackend
 
+TOKEN_FILE_VARIABLE: Final = "TSTTC_TOKEN_FILE"  # noqa: S105 -- the name of a variable
 SERVICE = "tsttc"  # under which the keyring files the tokens; the account is the server's address
 
 
@@ -23,6 +30,9 @@ def token_for(url: str) -> str:
     value = os.environ.get(TOKEN_VARIABLE)
     if value is not None:
         return checked(value, named=TOKEN_VARIABLE)
+    path = os.environ.get(TOKEN_FILE_VARIABLE)
+    if path:
+        return checked(_text_of(Path(path)), named=f"The file that {TOKEN_FILE_VARIABLE} names")
     kept = kept_token(url)
     if kept is None:
         raise _no_token(
@@ -33,7 +43,8 @@ def token_for(url: str) -> str:
 
 def has_token(url: str) -> bool:
     """Whether there is a token, for commands that can do without."""
-    return bool(os.environ.get(TOKEN_VARIABLE, "").strip()) or kept_token(url) is not None
+    is_named = os.environ.get(TOKEN_VARIABLE, "").strip() or os.environ.get(TOKEN_FILE_VARIABLE)
+    return bool(is_named) or kept_token(url) is not None
 
 
 def checked(text: str, *, named: str) -> str:
@@ -65,23 +76,24 @@ def _no_token(words: str, url: str) -> Failure:
 
 
 def kept_token(url: str) -> str | None:
-    """What the keyring has for `url`; None also where there is no keyring, or it stays locked."""
+    """What the keyring has for `url`, or the file; None also where the keyring stays locked."""
+    from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
+
+    backend = usable_keyring()
+    found = None
+    if backend is not None:
+        with suppress(KeyringError, OSError):
+            found = backend.get_password(SERVICE, account(url))
+    return found or _kept_in_file().get(account(url))
+
+
+def keep_token(url: str, token: str) -> str:
+    """Put the token into the keyring, else into the file; gives the name of the place."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
     if backend is None:
-        return None
-    try:
-        return backend.get_password(SERVICE, account(url))
-    except (KeyringError, OSError):
-        return None
-
-
-def keep_token(url: str, token: str) -> str:
-    """Put the token into the keyring; gives the keyring's name."""
-    from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
-
-    backend = required_keyring()
+        return _keep_in_file(_kept_in_file() | {account(url): token})
     try:
         backend.set_password(SERVICE, account(url), token)
     except (KeyringError, OSError) as error:
@@ -90,25 +102,23 @@ def keep_token(url: str, token: str) -> str:
 
 
 def forget_token(url: str) -> bool:
-    """Remove the token from the keyring; whether there was one."""
+    """Remove the token from the keyring and from the file; whether there was one."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
+    if kept_token(url) is None:
+        return False
+    kept = _kept_in_file()
+    was_in_file = kept.pop(account(url), None) is not None
+    if was_in_file:
+        _keep_in_file(kept)
     backend = usable_keyring()
     if backend is None or kept_token(url) is None:
-        return False
+        return was_in_file
     try:
         backend.delete_password(SERVICE, account(url))
     except (KeyringError, OSError) as error:
         raise no_keyring(f"The keyring did not delete the token ({error or type(error).__name__}).") from None
     return True
-
-
-def required_keyring() -> KeyringBackend:
-    """The keyring; raises Failure with what to do on a machine without one."""
-    backend = usable_keyring()
-    if backend is None:
-        raise no_keyring("This machine has no keyring, as is usual without a desktop.")
-    return backend
 
 
 def usable_keyring() -> KeyringBackend | None:
@@ -121,6 +131,49 @@ def usable_keyring() -> KeyringBackend | None:
         return None
     # What keyring falls back on: one that always fails (0), and one that forgets everything (-1).
     return backend if backend.priority > 0 else None
+
+
+def tokens_file() -> Path:
+    """The file of tokens by server, beside that of settings."""
+    return settings_file().with_name("tokens.json")
+
+
+def _kept_in_file() -> dict[str, str]:
+    """The tokens of the file; none where there is none, or it is not what was written."""
+    try:
+        found = json.loads(tokens_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
+        return {}
+    return {str(name): str(token) for name, token in found.items()} if isinstance(found, dict) else {}
+
+
+def _keep_in_file(kept: dict[str, str]) -> str:
+    """Write the file so that nobody else could ever read it; gives its name. Without tokens there is none."""
+    path = tokens_file()
+    try:
+        if not kept:
+            path.unlink(missing_ok=True)
+            return str(path)
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        part = path.with_suffix(f".{os.getpid()}.part")
+        with os.fdopen(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as file:
+            json.dump(kept, file, indent=2)
+        part.replace(path)
+    except OSError as error:
+        raise no_keyring(f"There is no keyring, and {path} cannot be written ({error.strerror}).") from None
+    return f"{path}, which only you can read; this machine has no keyring"
+
+
+def _text_of(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        cause = getattr(error, "strerror", None) or "it is not text"
+        raise Failure(
+            f"{TOKEN_FILE_VARIABLE} names {path}, which cannot be read: {cause}.",
+            exit_code=Exit.AUTH,
+            code="no-token",
+        ) from None
 
 
 def no_keyring(words: str) -> Failure:

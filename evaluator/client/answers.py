@@ -78,6 +78,17 @@ class Method(msgspec.Struct, frozen=True, kw_only=True):
     url: str = ""
 
 
+class Account(msgspec.Struct, frozen=True, kw_only=True):
+    """Whose token it is; `document` is the server's answer unabridged. Without a `split` it is for all."""
+
+    team: str | None
+    token: str
+    scopes: list[str]
+    document: JSON
+    split: str | None = None
+    expires_at: str | None = None
+
+
 class Interval(msgspec.Struct, frozen=True, kw_only=True):
     """Where a value may lie at 95 %, and its row in that column; None where that is not known."""
 

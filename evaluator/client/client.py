@@ -27,6 +27,8 @@ import httpx
 
 from evaluator.client.answers import (
     JSON,
+    Account,
+    BadAnswer,
     Board,
     Compared,
     Foreseen,
@@ -49,9 +51,8 @@ from evaluator.client.exchange import (
 )
 
 LOOPBACK_HOSTS = frozenset({"127.0.0.1", "::1", "localhost"})
-LONGEST_WAIT_S = (
-    20  # for one answer to "is it final?"; what stands in between cuts silence after 30 s or more
-)
+# For one answer to "is it final?"; what stands in between cuts silence after 30 s or more.
+LONGEST_WAIT_S = 20
 
 T = TypeVar("T")
 
@@ -90,6 +91,27 @@ class Client:
 
     def __exit__(self, *exc: object) -> None:
         self._http.close()
+
+    def require_leaderboard(self) -> None:
+        """Raise ClientError for what is no leaderboard; the token is not sent."""
+        self.splits()
+
+    def splits(self) -> list[str]:
+        """The names of the splits, asked without the token. Raises ClientError."""
+        try:
+            response = self._asked_by_anybody("splits", accept="application/json")
+        except Refused as refused:
+            if refused.status in PASSING_STATUSES or refused.code:
+                raise  # a leaderboard that is away, or refuses in its own words
+            raise BadAnswer(url=self.url, found=f"{refused.status} {refused.title}".strip()) from None
+        names = [row.get("split") for row in rows(response, JSON)]
+        if not all(isinstance(name, str) for name in names):
+            raise BadAnswer(url=self.url, found="a list of other things than splits")
+        return [str(name) for name in names]
+
+    def account(self) -> Account:
+        """Whose token this is. Raises ClientError."""
+        return self._get(Account, "account")
 
     def submit(
         self,
@@ -156,9 +178,10 @@ class Client:
         query = urlencode({name: value for name, value in asked.items() if value})
         return f"{self.url}/board/{path}{'?' if query else ''}{query}"
 
-    def manifest(self, split: str) -> bytes:
-        """The split's manifest, CSV: the ground truth's columns but the values. Raises ClientError."""
-        return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*").content
+    def manifest(self, split: str, *, edition: int | None = None) -> bytes:
+        """The manifest of a split, or of an edition of it: all columns but the values. Raises ClientError."""
+        query = {} if edition is None else {"edition": edition}
+        return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
     def manifest_digest(self, split: str) -> str | None:
         """The digest of that manifest; None for a split that has none yet. Raises ClientError."""
@@ -195,15 +218,24 @@ class Client:
 
     def own_method(self, name_or_id: str) -> Method | None:
         """The method of one's own team of that name or id. Raises ClientError."""
-        address = self._address("methods")
-        params: Mapping[str, str] = {}
-        while True:
-            response = self._retry(partial(self._http.get, address, params=params))
-            named = (row for row in rows(response, Method) if name_or_id in {row.id, row.name})
-            found, following = next(named, None), next_page(response)
-            if found is not None or not following or following == params:
-                return found
-            params = following
+        return next((row for row in self.methods() if name_or_id in {row.id, row.name}), None)
+
+    def methods(self) -> Iterator[Method]:
+        """The methods of one's own team by name. Raises ClientError."""
+        return self._listed(Method, "methods")
+
+    def submissions(self) -> Iterator[Submission]:
+        """The submissions of one's own team, newest first. Raises ClientError."""
+        return self._listed(Submission, "submissions")
+
+    def file(self, submission_id: str) -> bytes:
+        """The file of a submission of one's own team, as it was sent. Raises ClientError."""
+        return self._asked("submissions", submission_id, "file").content
+
+    def withdraw(self, submission_id: str) -> Submission:
+        """Withdraw a submission of one's own team, or cancel it; there is no way back. Raises ClientError."""
+        address = self._address("submissions", submission_id, "withdraw")
+        return one(self._retry(lambda: self._http.post(address)), Submission)
 
     def method(self, method_id: str) -> Method:
         """A method, as one may see it. Raises ClientError."""
@@ -296,16 +328,27 @@ class Client:
             return None, refused.retry_after_s
         return one(response, Submission), retry_after_s(response.headers)
 
+    def _listed(self, kind: type[T], *path: str) -> Iterator[T]:
+        """The rows of a list, page after page."""
+        params: Mapping[str, str] = {}
+        while True:
+            response = self._retry(partial(self._http.get, self._address(*path), params=params))
+            yield from rows(response, kind)
+            following = next_page(response)
+            if not following or following == params:
+                return
+            params = following
+
     def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
         return one(self._asked(*path, params=params), kind)
 
     def _asked(self, *path: str, params: Mapping[str, str] | None = None) -> httpx.Response:
-        address = self._address(*path)
-        return self._retry(lambda: self._http.get(address, params=params))
+        return self._retry(lambda: self._http.get(self._address(*path), params=params))
 
-    def _asked_by_anybody(self, *path: str, accept: str) -> httpx.Response:
+    def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
         """What everybody may read is read without the token, which may not be good for reading."""
-        request = self._http.build_request("GET", self._address(*path), headers={"Accept": accept})
+        headers = {"Accept": accept}
+        request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
         request.headers.pop("Authorization", None)
         return self._retry(lambda: self._http.send(request))
 

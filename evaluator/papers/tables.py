@@ -18,7 +18,10 @@ Setting = bool | int | float | str | None
 
 
 class PublishedRow(msgspec.Struct, frozen=True):
-    """One row: `values` go with the table's columns. An ablation's row is of a `method` at a `setting`."""
+    """One row: `values` go with the table's columns. An ablation's row is of a `method` at a `setting`.
+
+    `printed` has the values as the paper prints them, where that is not how a number is written.
+    """
 
     key: str | int | float
     values: tuple[Any, ...]
@@ -27,6 +30,7 @@ class PublishedRow(msgspec.Struct, frozen=True):
     setting: Setting = None
     is_default: bool = False
     printed_as: str | None = None
+    printed: tuple[str, ...] | None = None
 
 
 class PublishedTable(msgspec.Struct, frozen=True):

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from evaluator.arguments import Source, data_of
 from evaluator.metrics.scale import (
     FRAME_RATE_HZ,
     N_FRAMES,
@@ -25,12 +26,13 @@ from evaluator.predictions.alignment import (
     seconds_fault,
 )
 from evaluator.predictions.documents import Document, Members, Unit, parse, read_document
+from evaluator.predictions.packages import json_of
 from evaluator.predictions.writing import write_predictions
 from evaluator.problems import Findings, listed, quoted
 
 
 def convert(
-    data: bytes,
+    source: Source,
     *,
     to: Unit = "ttc",
     fps_hz: float | None = None,
@@ -49,7 +51,7 @@ def convert(
 
     Raises `Rejected` for what no prediction file may hold, `ValueError` for rates that do not fit together.
     """
-    document = read_document(parse(data))
+    document = read_document(parse(json_of(data_of(source))))
     _require_one_rate(document, fps_hz, frame_gap)
     findings = Findings()
     names = [name for name, _ in document.predictions]

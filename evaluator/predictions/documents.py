@@ -35,12 +35,10 @@ _LOOKS_LIKE: Final = {
     b"\x89PNG": "a PNG image",
     b"\xff\xd8\xff": "a JPEG image",
     b"%PDF": "a PDF document",
-    b"\x1f\x8b": "a gzip archive; unpack it first",
     b"PK\x03\x04": "a ZIP archive or a NumPy .npz file; send the JSON file itself",
     b"\x93NUMPY": "a NumPy .npy file",
     b"\x89HDF": "an HDF5 file",
     b"\x80": "a Python pickle",
-    b"anno_id,": "a CSV table",
 }
 
 

@@ -1,4 +1,7 @@
-"""Warnings about files that are well-formed and probably not meant: values that belong to other sequences.
+"""Warnings about files that are well-formed and probably not meant: another unit, sign or order.
+
+Values alone tell milliseconds and scale ratios. Values in time tell signs: a time to contact shrinks while
+time passes, also below 0, where an object that moves away gets farther.
 
 A file whose anno_ids were numbered in another order holds good values under wrong keys, and no rule of the
 format can see that. Two questions can. With the manifest alone: do the values of one object, from one window
@@ -32,12 +35,69 @@ MAX_ROUGHNESS: Final = 0.8
 MIN_CORRELATION: Final = 0.3
 MAX_FLIPPED: Final = 0.3
 
+MIN_VALUES: Final = 100
+"""Of fewer values nothing is said."""
+
+MIN_SHARE: Final = 0.99
+"""Of the values that look like another unit."""
+
+FAR_S: Final = 20.0
+RATIOS: Final = (0.5, 1.5)
+NEAR_S: Final = 10.0
+"""Beyond it, noise decides whether a value rises or falls."""
+MAX_RISING: Final = 0.7
+
 Pairs = NDArray[np.intp]
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
-    """What the file and its manifest tell, without any true value."""
-    found = roughness(predictions.manifest, predictions.ttc_s)
+    """What the file and its manifest tell, without any true value.
+
+    `static/check.js` repeats this in the browser, with the same words.
+    """
+    manifest, ttc_s = predictions.manifest, predictions.ttc_s
+    return [*unit_warnings(ttc_s), *_sign_warnings(manifest, ttc_s), *_order_warnings(manifest, ttc_s)]
+
+
+def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
+    """What the values tell by themselves, (n,): whether they look like another unit than seconds."""
+    n = len(ttc_s)
+    if n < MIN_VALUES:
+        return []
+    n_far = int(np.count_nonzero(np.abs(ttc_s) > FAR_S))
+    n_ratios = int(np.count_nonzero((ttc_s >= RATIOS[0]) & (ttc_s <= RATIOS[1])))
+    if n_far >= MIN_SHARE * n:
+        message = (
+            f"{n_far:,} of {n:,} values lie beyond ±20 s; expected most of them within. Probably they are "
+            "milliseconds, or scale ratios of another frame gap than the file states."
+        )
+        return [FileWarning("not-seconds", message)]
+    if n_ratios >= MIN_SHARE * n:
+        message = (
+            f"{n_ratios:,} of {n:,} values lie between 0.5 and 1.5 s; expected few. Probably they are scale "
+            'ratios: these need "unit": "scale_ratio" and fps or frame_gap beside them.'
+        )
+        return [FileWarning("looks-like-ratios", message)]
+    return []
+
+
+def _sign_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
+    first, second = (ttc_s[rows] for rows in _pairs(manifest)[0].T)
+    near = (np.sign(first) == np.sign(second)) & (np.abs(first) <= NEAR_S) & (np.abs(second) <= NEAR_S)
+    n_rising = int(np.count_nonzero(near & (second > first)))
+    n = n_rising + int(np.count_nonzero(near & (second < first)))
+    if n < MIN_PAIRS or n_rising <= MAX_RISING * n:
+        return []
+    message = (
+        f"The signs look flipped: from one window of an object to the next, {n_rising:,} of {n:,} values "
+        "rise; expected most of them to fall, as a time to contact does while time passes. Probably every "
+        "sign is wrong: τ is negative when the object moves away."
+    )
+    return [FileWarning("flipped-signs", message)]
+
+
+def _order_warnings(manifest: Manifest, ttc_s: Floats) -> list[FileWarning]:
+    found = roughness(manifest, ttc_s)
     if found is None or found <= MAX_ROUGHNESS:
         return []
     message = (
@@ -49,7 +109,11 @@ def warnings_of(predictions: Predictions) -> list[FileWarning]:
 
 
 def warnings_with_truth(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
-    """What the comparison with ground truth tells. Not for hidden values: it says something about them."""
+    """What the values and the comparison with ground truth tell. Not for hidden ones: it tells about them."""
+    return [*unit_warnings(predictions.ttc_s), *_truth_warnings(predictions, truth)]
+
+
+def _truth_warnings(predictions: Predictions, truth: GroundTruth) -> list[FileWarning]:
     found, true = order_of(predictions.ttc_s), order_of(truth.ttc_s)
     if truth.n_sequences < MIN_PAIRS or found.std() == 0 or true.std() == 0:
         return []

@@ -14,10 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from evaluator.metrics.scale import Floats
+from evaluator.arguments import Source, data_of, require
+from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import KeyKind, read_slowly
 from evaluator.predictions.columns import read_column
 from evaluator.predictions.documents import Unit
+from evaluator.predictions.packages import json_of
+from evaluator.predictions.writing import rate_of, require_values
 from evaluator.problems import pointer, reject
 from evaluator.truth.truth import Manifest
 
@@ -40,24 +43,41 @@ class Predictions:
     enveloped: bool = False
     names: tuple[str, ...] | None = None
 
+    def __repr__(self) -> str:
+        ends = f"{self.ttc_s.min():.4g} to {self.ttc_s.max():.4g} s"
+        return f"Predictions({len(self.ttc_s):,} sequences, {ends}, {self.digest[:19]}…)"
+
     @classmethod
     def from_arrays(
         cls,
         *,
-        ttc_s: ArrayLike,
         manifest: Manifest,
+        ttc_s: ArrayLike | None = None,
+        scale_ratio: ArrayLike | None = None,
+        fps_hz: float | None = None,
+        frame_gap: int | None = None,
         digest: str | None = None,
         unit: Unit = "ttc",
         meta: Mapping[str, object] | None = None,
     ) -> Predictions:
-        """Predictions from seconds in the manifest's order, without a file.
+        """Predictions from values in the manifest's order, without a file.
 
-        Without a `digest`, that of the values' little-endian float64 bytes is taken. Raises `ValueError` for
-        another shape than (n,); forbidden values are found by `evaluate`.
+        Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, (n,). Without a `digest`,
+        that of the seconds' little-endian float64 bytes is taken. Raises `ValueError` for another shape and
+        for arguments that do not fit together, `Rejected` for scale ratios that are not greater than 0; other
+        forbidden values are found by `evaluate`.
         """
-        values = np.array(ttc_s, dtype=np.float64)
+        require(manifest, Manifest, name="manifest")
+        name, given = ("scale_ratio", scale_ratio) if ttc_s is None else ("ttc_s", ttc_s)
+        if given is None or (ttc_s is not None and scale_ratio is not None):
+            raise ValueError("Give either ttc_s or scale_ratio.")
+        values = np.array(given, dtype=np.float64)
         if values.shape != (manifest.n_sequences,):
-            raise ValueError(f"ttc_s has the shape {values.shape}; expected ({manifest.n_sequences},).")
+            raise ValueError(f"{name} has the shape {values.shape}; expected ({manifest.n_sequences},).")
+        rate_hz = rate_of(is_ratio=ttc_s is None, fps_hz=fps_hz, frame_gap=frame_gap)
+        if rate_hz is not None:
+            require_values(values, manifest.anno_id_keys, is_ratio=True)
+            values, unit = scale_ratio_to_ttc(values, fps_hz=rate_hz), "scale_ratio"
         values.setflags(write=False)
         found = digest if digest is not None else sha256_digest(values.astype("<f8").tobytes())
         return cls(manifest=manifest, ttc_s=values, digest=found, unit=unit, meta=meta)
@@ -69,15 +89,18 @@ class Predictions:
         return pointer("predictions", names[row]) if self.enveloped else pointer(names[row])
 
 
-def read_predictions(data: bytes, *, manifest: Manifest, max_bytes: int | None = None) -> Predictions:
+def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | None = None) -> Predictions:
     """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault of the file.
 
-    `data` is the whole file in either form of docs/file-format.md; larger than `max_bytes` it is not looked
-    at.
+    `source` is a path, the bytes of the file or the file itself, open, in any form of docs/file-format.md;
+    larger than `max_bytes` it is not looked at.
     """
+    require(manifest, Manifest, name="manifest")
+    data = data_of(source)
     if max_bytes is not None and len(data) > max_bytes:
         raise reject("too-large", f"The file has {len(data):,} bytes; expected at most {max_bytes:,}.")
-    found = read_column(data, manifest) or read_slowly(data, manifest)
+    text = json_of(data, max_rows=2 * manifest.n_sequences + 100_000)
+    found = read_column(text, manifest) or read_slowly(text, manifest)
     found.ttc_s.setflags(write=False)
     return Predictions(
         manifest=manifest,

@@ -55,6 +55,11 @@ def compare(old: GroundTruth, new: GroundTruth) -> Comparison:
 
 def rows_in(old: Manifest, new: Manifest) -> Rows:
     """For every sequence of `new` its row in `old`, (n,); -1 where `old` does not have it."""
+    if old.digest == new.digest:
+        # The same sequences under the same numbers, whose rows may stand in another order.
+        rows = np.empty(new.n_sequences, dtype=np.intp)
+        rows[new.rows_by_id] = np.arange(old.n_sequences)[old.rows_by_id]
+        return rows
     row_of = old.row_of_natural_key
     return np.array([row_of.get(key, -1) for key in new.natural_keys], dtype=np.intp)
 

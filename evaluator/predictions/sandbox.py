@@ -19,7 +19,11 @@ from evaluator.truth.truth import Manifest
 
 
 def warm_up(manifest: Manifest) -> None:
-    """Run every branch that imports late, since nothing can be opened afterwards."""
+    """Run every branch that imports late, since nothing can be opened afterwards.
+
+    What the manifest makes of its keys when they are first needed is made, too, once for all files.
+    """
+    _ = manifest.key_words, manifest.natural_key_text
     for sample in (
         b"{",
         b"[]",
@@ -28,6 +32,9 @@ def warm_up(manifest: Manifest) -> None:
         b'{"unit":"scale_ratio"}',
         b"\xff",
         b'{"a":"b"}',
+        b"\x1f\x8b",
+        b"anno_id,ttc\n\xff",
+        b"anno_id,ttc\n0,x\n",
     ):
         try:
             read_predictions(sample, manifest=manifest)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from evaluator.metrics.scale import N_FRAMES
+from evaluator.arguments import require
+from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap
 from evaluator.predictions.documents import parse, read_document
 from evaluator.problems import Findings, pointer, quoted
 from evaluator.truth.truth import Manifest
 
 
 def write_predictions(
-    path: str | Path | None = None,
+    path: str | os.PathLike[str] | IO[bytes] | None = None,
     *,
     manifest: Manifest | None = None,
     keys: Sequence[str | int] | None = None,
@@ -26,7 +29,7 @@ def write_predictions(
     frame_gap: int | None = None,
     meta: Mapping[str, object] | None = None,
 ) -> bytes:
-    """The bytes of a valid prediction file, also written to `path` if one is given.
+    """The bytes of a valid prediction file, also written to `path`, or to an open file, if one is given.
 
     Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, shape (n,); and either
     `manifest`, whose order the values have, or their `keys`. Every float64 reads back exactly. Seconds
@@ -37,7 +40,7 @@ def write_predictions(
     values = _values(ttc_s, scale_ratio)
     names = _names(manifest, keys, n_values=len(values))
     header = _header(ttc_s is None, fps_hz, frame_gap)
-    _check(values, names, is_ratio=ttc_s is None)
+    require_values(values, names, is_ratio=ttc_s is None)
     predictions = dict(zip(names, values.tolist(), strict=True))
     document: dict[str, object] = dict(predictions)
     if ttc_s is None or meta is not None:
@@ -46,8 +49,10 @@ def write_predictions(
     if meta is not None:
         # What the reader would refuse is refused before it is written.
         read_document(parse(data))
-    if path is not None:
+    if isinstance(path, str | os.PathLike):
         Path(path).write_bytes(data)
+    elif path is not None:
+        path.write(data)
     return data
 
 
@@ -61,9 +66,7 @@ def template(manifest: Manifest) -> bytes:
     return f"{{\n{members}\n}}\n".encode()
 
 
-def _values(
-    ttc_s: ArrayLike | None, scale_ratio: ArrayLike | None
-) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+def _values(ttc_s: ArrayLike | None, scale_ratio: ArrayLike | None) -> Floats:
     if (ttc_s is None) == (scale_ratio is None):
         raise ValueError("Give either ttc_s or scale_ratio.")
     values = np.asarray(ttc_s if ttc_s is not None else scale_ratio, dtype=np.float64)
@@ -75,6 +78,8 @@ def _values(
 def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_values: int) -> Sequence[str]:
     if (manifest is None) == (keys is None):
         raise ValueError("Give either manifest or keys.")
+    if manifest is not None:
+        require(manifest, Manifest, name="manifest")
     names = manifest.anno_id_keys if manifest is not None else tuple(map(str, keys or ()))
     if len(names) != n_values:
         raise ValueError(f"There are {n_values} values for {len(names)} sequences.")
@@ -83,9 +88,8 @@ def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_val
     return names
 
 
-def _check(
-    values: np.ndarray[tuple[int], np.dtype[np.float64]], names: Sequence[str], *, is_ratio: bool
-) -> None:
+def require_values(values: Floats, names: Sequence[str], *, is_ratio: bool) -> None:
+    """Raise `Rejected` for values that no file may hold, by the names of their sequences."""
     findings = Findings()
     bad = ~(values > 0) if is_ratio else ~(np.abs(values) > 0)
     for row in np.flatnonzero(bad).tolist():
@@ -97,6 +101,14 @@ def _check(
             pointer(names[row]),
         )
     findings.raise_if_any()
+
+
+def rate_of(*, is_ratio: bool, fps_hz: float | None, frame_gap: int | None) -> float | None:
+    """The rate of scale ratios in Hz, None for seconds; raises `ValueError` as `write_predictions` does."""
+    header = _header(is_ratio, fps_hz, frame_gap)
+    if not is_ratio:
+        return None
+    return float(fps_of_gap(frame_gap)) if frame_gap is not None else float(str(header["fps"]))
 
 
 def _header(is_ratio: bool, fps_hz: float | None, frame_gap: int | None) -> dict[str, object]:

@@ -5,10 +5,19 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from html import escape
+from typing import TYPE_CHECKING
 
-from evaluator.metrics.protocol import OVERALL, score_name
+from evaluator.metrics.protocol import OVERALL, interval_of, metric_of, score_name
 from evaluator.metrics.scale import Floats
+from evaluator.scoring.breakdown import Details, GroupScores, breakdown
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    import pandas as pd
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,8 +60,11 @@ class Report:
 
     `scores` runs as the protocol's `interval_names`: overall, crucial, …; `n_out_of_range` counts the
     sequences that lie in no range. Only on request, and no part of the JSON: `sequences`, by metric the
-    errors of every sequence, float64 (n,) in the manifest's order, and `bags`. For a hidden split neither
-    leaves the worker.
+    errors of every sequence, float64 (n,) in the manifest's order, with `details`, what they were computed
+    from, and `bags`. For a hidden split none of them leaves the worker.
+
+    `print(report)` shows a table, and so does a notebook. `by`, `frame` and `plot` look closer; they need a
+    report made with `keep_sequences=True`.
     """
 
     protocol: str
@@ -62,8 +74,121 @@ class Report:
     n_out_of_range: int
     truncated: Mapping[str, int]
     scores: Mapping[str, IntervalScore]
-    sequences: Mapping[str, Floats] | None = None
-    bags: RecordingSums | None = None
+    sequences: Mapping[str, Floats] | None = field(default=None, repr=False)
+    bags: RecordingSums | None = field(default=None, repr=False)
+    details: Details | None = field(default=None, repr=False, compare=False)
+
+    def __repr__(self) -> str:
+        overall = self.scores[OVERALL].means
+        means = ", ".join(
+            f"{metric_of(name).symbol} {format_published(value)}" for name, value in overall.items()
+        )
+        return f"Report({self.protocol}, {self.n_sequences:,} sequences, {means})"
+
+    def __str__(self) -> str:
+        header, *rows = self._rows()
+        widths = [max(map(len, column)) for column in zip(header, *rows, strict=True)]
+        lines = [
+            "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])])
+            for row in (header, *rows)
+        ]
+        return "\n".join([*lines, f"{self.n_sequences:,} sequences, protocol {self.protocol}"])
+
+    def _repr_html_(self) -> str:
+        """The table of a notebook."""
+        header, *rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in self._rows()]
+        body = "".join(f"<tr>{row}</tr>" for row in rows)
+        head = f"<tr>{header.replace('td>', 'th>')}</tr>"
+        words = escape(f"{self.n_sequences:,} sequences, protocol {self.protocol}")
+        return f"<table><thead>{head}</thead><tbody>{body}</tbody></table><p>{words}</p>"
+
+    def _rows(self) -> list[list[str]]:
+        """The header, then a row for each TTC range, as texts."""
+        metrics = list(self.scores[OVERALL].means)
+        rows = [["TTC range", *(metric_of(name).heading for name in metrics), "count"]]
+        for name, score in self.scores.items():
+            interval = interval_of(score_name(metrics[0], name))
+            title = f"{name} {interval.seconds}" if interval else name
+            means = [format_published(score.means[metric]) for metric in metrics]
+            rows.append([title, *means, f"{score.count:,}"])
+        return rows
+
+    # --- a closer look ------------------------------------------------------------------------------------
+
+    def breakdown(self, by: str, *, with_intervals: bool = False) -> list[GroupScores]:
+        """The scores of each group: `by` is recording, camera, range, occlusion, lane or box-size.
+
+        Raises `ValueError` for another `by`, for a ground truth that does not have what the groups need, and
+        for a report without sequences.
+        """
+        errors, details = self._kept()
+        return breakdown(details, errors, by=by, with_intervals=with_intervals)
+
+    def by(self, group: str, *, with_intervals: bool = False) -> pd.DataFrame:
+        """The same as a frame, indexed by the group: columns `n_sequences`, `n_recordings`, then the scores.
+
+        With intervals each score has two more columns, as `mid_low` and `mid_high`. Needs pandas.
+        """
+        import pandas as pd  # noqa: PLC0415 -- of an extra
+
+        rows = [
+            {
+                group: row.group,
+                "n_sequences": row.n_sequences,
+                "n_recordings": row.n_recordings,
+                **_with_ends(row, with_intervals=with_intervals),
+            }
+            for row in self.breakdown(group, with_intervals=with_intervals)
+        ]
+        return pd.DataFrame(rows).set_index(group)
+
+    def records(self) -> dict[str, list[object]]:
+        """A column for each fact of a sequence, in the manifest's order: keys, times in seconds, errors.
+
+        What the annotations say of the object is added where they say it. Raises `ValueError` for a report
+        without sequences.
+        """
+        errors, details = self._kept()
+        table = details.truth.to_table()
+        objects = dict[str, list[object]](occ_ratio=list(table.occ_ratio), same_lane=list(table.same_lane))
+        box_height = details.truth.objects.box_height
+        return {
+            "anno_id": list(table.anno_id),
+            "bag_stamp": list(table.bag_stamp),
+            "cam_id": list(table.cam_id),
+            "ts": list(table.ts_ns),
+            "track_id": list(table.track_id),
+            "ttc_s": list(table.ttc_s),
+            "predicted_ttc_s": details.predicted_ttc_s.tolist(),
+            **{name: values.tolist() for name, values in errors.items()},
+            **{name: values for name, values in objects.items() if values},
+            **({} if box_height is None else {"box_height": box_height.tolist()}),
+        }
+
+    def frame(self) -> pd.DataFrame:
+        """Every sequence as a row, by the columns of `records`, indexed by anno_id. Needs pandas."""
+        import pandas as pd  # noqa: PLC0415 -- of an extra
+
+        return pd.DataFrame(self.records()).set_index("anno_id")
+
+    def plot(
+        self, kind: str = "error", *, path: str | Path | None = None, name: str = "", **others: Report
+    ) -> Figure:
+        """Draw `kind`: `error` (by true TTC, with a band), `scatter` or `distribution`; needs matplotlib.
+
+        With `path` the figure is written there (.svg, .pdf, .png). Further reports, by the names that the
+        legend shows, are drawn beside this one, which `name` names.
+        """
+        from evaluator.scoring import plots  # noqa: PLC0415 -- matplotlib is of an extra
+
+        return plots.draw(kind, {name or "predictions": self, **others}, path=path)
+
+    def _kept(self) -> tuple[Mapping[str, Floats], Details]:
+        if self.sequences is None or self.details is None:
+            raise ValueError(
+                "The report has no errors of single sequences; call evaluate(…, keep_sequences=True)."
+            )
+        return self.sequences, self.details
 
     def as_dict(self) -> dict[str, object]:
         """The report as plain data, in the shape of `tsttc score --json`."""
@@ -88,6 +213,15 @@ class Report:
             for metric in self.scores[OVERALL].means
             for interval, score in self.scores.items()
         }
+
+
+def _with_ends(row: GroupScores, *, with_intervals: bool) -> dict[str, float | None]:
+    found: dict[str, float | None] = {}
+    for name, value in row.scores.items():
+        found[name] = value
+        if with_intervals:
+            found[f"{name}_low"], found[f"{name}_high"] = row.intervals[name] or (None, None)
+    return found
 
 
 def published(value: float | None, *, decimals: int = 2) -> float | None:

@@ -26,12 +26,14 @@ from typing import NoReturn
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluator.arguments import require
 from evaluator.metrics.metrics import Terms
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, OVERALL, Protocol, get_protocol
 from evaluator.metrics.scale import Floats, scale_ratio_10hz
 from evaluator.predictions.alignment import ZERO_MESSAGE
 from evaluator.predictions.predictions import Predictions
 from evaluator.problems import Findings
+from evaluator.scoring.breakdown import Details
 from evaluator.scoring.report import IntervalScore, RecordingSums, Report
 from evaluator.truth.truth import GroundTruth
 
@@ -46,9 +48,10 @@ def evaluate(
 ) -> Report:
     """Score `predictions` against `truth`.
 
-    Raises `Rejected` for values that the protocol forbids, `ValueError` for an unknown protocol and for
-    predictions that were aligned with another manifest. With `keep_sequences` the report carries the errors
-    of every sequence, with `keep_bags` their sums per recording.
+    Raises `Rejected` for values that the protocol forbids, `TypeError` for other things than these,
+    `ValueError` for an unknown protocol and for predictions that were aligned with another manifest. With
+    `keep_sequences` the report carries the errors of every sequence and can look closer, with `keep_bags`
+    their sums per recording.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     return Scorer(truth, rules).report(predictions, keep_sequences=keep_sequences, keep_bags=keep_bags)
@@ -83,6 +86,7 @@ class Scorer:
     """
 
     def __init__(self, truth: GroundTruth, protocol: Protocol) -> None:
+        require(truth, GroundTruth, name="truth")
         self._truth = truth
         self._protocol = protocol
         tau = truth.ascending_ttc_s
@@ -125,6 +129,7 @@ class Scorer:
         self, predictions: Predictions, *, keep_sequences: bool = False, keep_bags: bool = False
     ) -> Report:
         """The report on one set of predictions; raises as `evaluate` does."""
+        require(predictions, Predictions, name="predictions")
         predictions = _in_order_of(self._truth, predictions)
         errors = self._errors(predictions)
         return Report(
@@ -137,7 +142,12 @@ class Scorer:
             scores={name: self._score(errors, part) for name, part in self._slices.items()},
             sequences=self._in_file_order(errors) if keep_sequences else None,
             bags=self._recording_sums(errors) if keep_bags else None,
+            details=self._details(predictions) if keep_sequences else None,
         )
+
+    def _details(self, predictions: Predictions) -> Details:
+        predicted_ttc_s, _ = _truncate(predictions.ttc_s, self._protocol)
+        return Details(self._truth, predictions, predicted_ttc_s, self._protocol)
 
     def _score(self, errors: _Errors, part: slice) -> IntervalScore:
         count = part.stop - part.start

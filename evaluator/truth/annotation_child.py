@@ -44,19 +44,20 @@ def warm_up() -> None:
 
 
 def main() -> None:
-    """Arguments: memory limit in bytes; 1 where true times are read, else 0; the same for boxes."""
+    """Arguments: memory limit in bytes; 1 where true times are read, else 0; so for boxes and all frames."""
     obey_the_parent_alone()
     warm_up()
-    memory_bytes, with_ttc, with_boxes = int(sys.argv[1]), sys.argv[2] == "1", sys.argv[3] == "1"
+    memory_bytes = int(sys.argv[1])
+    with_ttc, with_boxes, with_frames = (argument == "1" for argument in sys.argv[2:5])
     limit(memory_bytes=memory_bytes, cpu_s=MAX_CPU_S)
     answers = sys.stdout.buffer
     answers.write(READY)
     answers.flush()
     try:
         files = files_of(sys.stdin.buffer, answers)
-        found = read_files(files, with_ttc=with_ttc, with_boxes=with_boxes)
+        found = read_files(files, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
         table, counts = asdict(found.table), found.n_sequences
-        answer = {"table": table, "n_sequences": counts, "boxes": found.boxes}
+        answer = {"table": table, "n_sequences": counts, "boxes": found.boxes, "frames": found.frame_ttc_s}
         line = json.dumps(answer).encode()
     except Rejected as rejected:
         line = json.dumps(rejected.as_dict()).encode()

@@ -35,13 +35,15 @@ _BYTES_PER_BYTE: Final = 32
 _EXTENSION: Final = ".pkl"
 
 
-def read_annotations(folder: Path, *, with_ttc: bool, with_boxes: bool = False) -> AnnotatedFiles:
+def read_annotations(
+    folder: Path, *, with_ttc: bool, with_boxes: bool = False, with_frames: bool = False
+) -> AnnotatedFiles:
     """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
 
     They stand in the order of the sorted files, numbered so.
 
     Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
-    With `with_boxes`, the boxes of all frames are read too.
+    With `with_boxes`, the boxes of all frames are read too; with `with_frames`, their times to contact.
     Raises `Rejected` for a folder without such files, for files that cannot be read or ask for more memory or
     time than their size warrants, for pickles that ask for foreign code and for files of another structure.
     """
@@ -53,7 +55,7 @@ def read_annotations(folder: Path, *, with_ttc: bool, with_boxes: bool = False) 
     files = sorted(listed, key=lambda path: path.relative_to(folder).parts)
     place = {path: index for index, path in enumerate(files)}
     read = _read_apart if HAS_LIMITS else _read_here
-    found = read(folder, files, with_ttc=with_ttc, with_boxes=with_boxes)
+    found = read(folder, files, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
     return replace(found, listed=[place[path] for path in listed])
 
 
@@ -88,9 +90,12 @@ def _contents(folder: Path, files: Sequence[Path]) -> Iterator[tuple[str, bytes]
         yield name, data
 
 
-def _read_here(folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool) -> AnnotatedFiles:
+def _read_here(
+    folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool, with_frames: bool
+) -> AnnotatedFiles:
     try:
-        return read_files(_contents(folder, files), with_ttc=with_ttc, with_boxes=with_boxes)
+        contents = _contents(folder, files)
+        return read_files(contents, with_ttc=with_ttc, with_boxes=with_boxes, with_frames=with_frames)
     except MemoryError:
         message = "Reading the files needs more memory than there is; expected annotations of the toolkit."
         raise reject("too-large", message, folder.name) from None
@@ -99,7 +104,9 @@ def _read_here(folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxe
 # --- the child's parent ----------------------------------------------------------------------------------
 
 
-def _read_apart(folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool) -> AnnotatedFiles:
+def _read_apart(
+    folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool, with_frames: bool
+) -> AnnotatedFiles:
     """The same by a child process, which gets one file after the other."""
     largest = max(path.stat().st_size for path in files)
     memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * min(largest, MAX_FILE_BYTES)
@@ -111,6 +118,7 @@ def _read_apart(folder: Path, files: Sequence[Path], *, with_ttc: bool, with_box
         str(memory_bytes),
         str(int(with_ttc)),
         str(int(with_boxes)),
+        str(int(with_frames)),
     ]
     environment = {
         "PATH": os.defpath,
@@ -202,4 +210,9 @@ def _decoded(line: bytes) -> AnnotatedFiles:
     if "problems" in answer:
         problems = [Problem(**problem) for problem in answer["problems"]]
         raise Rejected(problems, n_problems=answer["n_problems"])
-    return AnnotatedFiles(Table(**answer["table"]), answer["n_sequences"], boxes=answer["boxes"])
+    return AnnotatedFiles(
+        Table(**answer["table"]),
+        answer["n_sequences"],
+        boxes=answer["boxes"],
+        frame_ttc_s=answer["frames"],
+    )

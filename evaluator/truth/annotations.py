@@ -17,6 +17,7 @@ from typing import Final, cast
 from evaluator.metrics.scale import N_FRAMES
 from evaluator.problems import Findings, quoted, reject
 from evaluator.truth.csv_tables import Table, name_fault
+from evaluator.truth.objects import is_box, plain_occ_ratio, plain_same_lane
 from evaluator.truth.pickles import Attributes, FewNumbers, load_plain
 
 Camera = dict[float, list[Attributes]]
@@ -29,13 +30,15 @@ class AnnotatedFiles:
 
     `listed` is the order in which the file system lists the files of a folder: indices of the sorted ones.
     `boxes` holds, where they are asked for, the 24 numbers of each sequence: x1, y1, x2, y2 of its frames in
-    the order of time, as parts of the image's width and height.
+    the order of time, as parts of the image's width and height; `frame_ttc_s` likewise the 6 times to contact
+    of each in seconds, NaN where a frame has none.
     """
 
     table: Table
     n_sequences: list[int]
     listed: list[int] = field(default_factory=list)
     boxes: list[list[float]] = field(default_factory=list)
+    frame_ttc_s: list[list[float]] = field(default_factory=list)
 
 
 FRAME_STEP_NS: Final = 100_000_000
@@ -46,16 +49,21 @@ _MAX_STAMP: Final = 4_096
 
 
 def read_files(
-    files: Iterable[tuple[str, bytes]], *, with_ttc: bool, with_boxes: bool = False
+    files: Iterable[tuple[str, bytes]],
+    *,
+    with_ttc: bool,
+    with_boxes: bool = False,
+    with_frames: bool = False,
 ) -> AnnotatedFiles:
     """Cut the sequences out of annotation files, given by name and content; one row each, from its target.
 
-    Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
-    With `with_boxes`, every frame needs its `box2d`.
+    Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty, as
+    those of `OBJECT_COLUMNS` do. With `with_boxes`, every frame needs its `box2d`; with
+    `with_frames`, the times to contact of all frames are read, which need not have one.
     Raises `Rejected` for pickles that ask for foreign code and for files of another structure.
     """
     table, findings, places, n_sequences = Table(), Findings(), list[str](), list[int]()
-    boxes = list[list[float]]()
+    boxes, frame_ttc_s = list[list[float]](), list[list[float]]()
     for name, data in files:
         first = len(places)
         for camera in _cameras(data, name):
@@ -64,10 +72,12 @@ def read_files(
                 _add_row(table, sequence[-1], findings, places[-1], with_ttc=with_ttc)
                 if with_boxes:
                     boxes.append([x for seen in sequence for x in _box(seen, findings, places[-1])])
+                if with_frames:
+                    frame_ttc_s.append([_ttc_s(seen) for seen in sequence])
         n_sequences.append(len(places) - first)
     findings.raise_if_any()
     table.places = places
-    return AnnotatedFiles(table, n_sequences, boxes=boxes)
+    return AnnotatedFiles(table, n_sequences, boxes=boxes, frame_ttc_s=frame_ttc_s)
 
 
 def cut_sequences(camera: Camera, *, n_frames: int = N_FRAMES) -> Iterator[list[Attributes]]:
@@ -174,17 +184,36 @@ def _add_row(table: Table, target: Attributes, findings: Findings, place: str, *
     else:
         found = "absent" if ttc_s is None else f"a {type(ttc_s).__name__}"
         findings.add("bad-field", f"ttc_imu is {found}; expected a number of seconds.", place)
+    # No score depends on these: a file that states something else for them is scored all the same.
+    table.occ_ratio.append(plain_occ_ratio(target.get("occ_ratio")))
+    table.same_lane.append(plain_same_lane(target.get("same_lane")))
+    box = _numbers(target.get("box2d"))
+    table.box2d.append(box if box and is_box(box) else None)
+
+
+def _ttc_s(seen: Attributes) -> float:
+    """The true time to contact of a frame, NaN where it has none."""
+    ttc_s = seen.get("ttc_imu")
+    return float(cast("float", ttc_s)) if _is_number(ttc_s) else math.nan
 
 
 def _box(seen: Attributes, findings: Findings, place: str) -> list[float]:
     """The four numbers of `box2d`."""
     box = seen.get("box2d")
-    numbers = box.numbers if isinstance(box, FewNumbers) else box
-    if isinstance(numbers, list | tuple) and len(numbers) == 4 and all(map(_is_number, numbers)):
-        return [float(number) for number in numbers]
+    numbers = _numbers(box)
+    if numbers is not None:
+        return numbers
     found = "absent" if box is None else f"a {type(box).__name__} of other content"
     findings.add("bad-field", f"box2d is {found}; expected four numbers, x1, y1, x2 and y2.", place)
     return [math.nan] * 4
+
+
+def _numbers(box: object) -> list[float] | None:
+    """The four numbers of an array, a list or a tuple; None for anything else."""
+    numbers = box.numbers if isinstance(box, FewNumbers) else box
+    if isinstance(numbers, list | tuple) and len(numbers) == 4 and all(map(_is_number, numbers)):
+        return [float(number) for number in numbers]
+    return None
 
 
 def _is_number(value: object) -> bool:

@@ -12,19 +12,23 @@ change the digest.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluator.arguments import Source
 from evaluator.metrics.protocol import Interval
 from evaluator.metrics.scale import Floats, exact_log, scale_ratio_10hz
 from evaluator.problems import Findings, quoted, reject
 from evaluator.truth.annotation_folders import read_annotations
 from evaluator.truth.csv_tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
+from evaluator.truth.objects import OBJECT_COLUMNS, Objects
 from evaluator.truth.packed_keys import KeyText, KeyWords
 
 Integers = NDArray[np.int64]
@@ -41,28 +45,41 @@ class Manifest:
     track_id: tuple[str, ...]
     digest: str
 
+    def __repr__(self) -> str:
+        return (
+            f"Manifest({self.n_sequences:,} sequences, {self.n_recordings:,} recordings, {self.digest[:19]}…)"
+        )
+
     @classmethod
     def from_table(cls, table: Table) -> Manifest:
         """Check the rows; raises `Rejected` for an empty table and for duplicate ids or natural keys."""
+        return cls._checked(table, table.digests()[0])
+
+    @classmethod
+    def _checked(cls, table: Table, digest: str) -> Manifest:
         if not table.anno_id:
             raise reject("empty", "There are no sequences; expected at least one.")
-        manifest = cls(
-            anno_id=np.array(table.anno_id, dtype=np.int64),
-            bag_stamp=tuple(table.bag_stamp),
-            cam_id=tuple(table.cam_id),
-            ts_ns=np.array(table.ts_ns, dtype=np.int64),
-            track_id=tuple(table.track_id),
-            digest=table.digest(MANIFEST_COLUMNS),
-        )
-        manifest.anno_id.setflags(write=False)
-        manifest.ts_ns.setflags(write=False)
+        manifest = cls._of(table, digest)
         findings = Findings()
-        _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
+        if len(set(table.anno_id)) < len(table.anno_id):
+            _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
         _find_duplicates(findings, "duplicate-natural-keys", "natural key", manifest.natural_keys, table)
         findings.raise_if_any()
-        # Made here, so that the first file is read as fast as the next.
-        _ = manifest.key_words, manifest.natural_key_text
         return manifest
+
+    @classmethod
+    def _of(cls, table: Table, digest: str) -> Manifest:
+        anno_id, ts_ns = (np.array(column, dtype=np.int64) for column in (table.anno_id, table.ts_ns))
+        anno_id.setflags(write=False)
+        ts_ns.setflags(write=False)
+        return cls(
+            anno_id=anno_id,
+            bag_stamp=tuple(table.bag_stamp),
+            cam_id=tuple(table.cam_id),
+            ts_ns=ts_ns,
+            track_id=tuple(table.track_id),
+            digest=digest,
+        )
 
     @property
     def n_sequences(self) -> int:
@@ -139,40 +156,54 @@ class Manifest:
         """The public table: a header and one row per sequence in file order, UTF-8, ended by line feeds."""
         return self.to_table().text(MANIFEST_COLUMNS).encode()
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz` that `load` reads back exactly."""
         save_store(path, table=self.to_table(), manifest_digest=self.digest)
 
     @classmethod
-    def load(cls, path: str | Path) -> Manifest:
+    def load(cls, path: str | os.PathLike[str]) -> Manifest:
         """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest.
 
         The file of a `GroundTruth` serves as well; its values are left aside.
         """
-        table, digest = load_store(path, with_ttc=False)
-        manifest = cls.from_table(table)
-        _check_digest(stored=digest, found=manifest.digest, path=path)
+        stored = load_store(path, with_ttc=False)
+        if stored.is_sealed:
+            return cls._of(stored.table, stored.manifest_digest)
+        manifest = cls.from_table(stored.table)
+        _check_digest(stored=stored.manifest_digest, found=manifest.digest, path=path)
         return manifest
 
 
 @dataclass(frozen=True, eq=False)
 class GroundTruth:
-    """One revision of the hidden values: the manifest, and τ in seconds, float64 (n,), read-only."""
+    """One revision of the hidden values: the manifest, and τ in seconds, float64 (n,), read-only.
+
+    `objects` is what the source states beside; the digest does not contain it, and `save` leaves it out.
+    """
 
     manifest: Manifest
     ttc_s: Floats
     digest: str
+    objects: Objects = field(default_factory=Objects)
+
+    def __repr__(self) -> str:
+        ends = f"{self.ttc_s.min():.4g} to {self.ttc_s.max():.4g} s"
+        return f"GroundTruth({self.n_sequences:,} sequences, {ends}, {self.digest[:19]}…)"
 
     @classmethod
     def from_table(cls, table: Table) -> GroundTruth:
         """Check rows and values; raises `Rejected` naming the rows at fault."""
-        manifest = Manifest.from_table(table)
-        ttc_s = np.array(table.ttc_s, dtype=np.float64)
-        _check_values(ttc_s, table)
-        ttc_s.setflags(write=False)
-        truth = cls(manifest=manifest, ttc_s=ttc_s, digest=table.digest(COLUMNS))
-        _ = truth.ascending_log_scale_ratio  # made here, so that the first evaluation is as fast as the next
+        manifest_digest, digest = table.digests()
+        truth = cls._of(table, Manifest._checked(table, manifest_digest), digest)
+        _check_values(truth.ttc_s, table)
         return truth
+
+    @classmethod
+    def _of(cls, table: Table, manifest: Manifest, digest: str) -> GroundTruth:
+        ttc_s = np.array(table.ttc_s, dtype=np.float64)
+        ttc_s.setflags(write=False)
+        objects = Objects.of(occ_ratio=table.occ_ratio, same_lane=table.same_lane, box2d=table.box2d)
+        return cls(manifest=manifest, ttc_s=ttc_s, digest=digest, objects=objects)
 
     @property
     def n_sequences(self) -> int:
@@ -207,47 +238,60 @@ class GroundTruth:
         """The columns as lists."""
         table = self.manifest.to_table()
         table.ttc_s = self.ttc_s.tolist()
+        table.occ_ratio, table.same_lane, table.box2d = self.objects.to_columns()
         return table
 
     def to_csv(self) -> bytes:
-        """The whole table with τ, in file order, as `read_truth` reads it."""
-        return self.to_table().text(COLUMNS).encode()
+        """The whole table with τ, in file order, as `read_truth` reads it; what is known of objects too."""
+        table = self.to_table()
+        known = tuple(name for name in OBJECT_COLUMNS if getattr(table, name))
+        return table.text(COLUMNS + known).encode()
 
-    def save(self, path: str | Path) -> None:
+    def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz` that `load` reads back exactly."""
         save_store(
             path, table=self.to_table(), manifest_digest=self.manifest.digest, truth_digest=self.digest
         )
 
     @classmethod
-    def load(cls, path: str | Path) -> GroundTruth:
+    def load(cls, path: str | os.PathLike[str]) -> GroundTruth:
         """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest."""
-        table, digest = load_store(path, with_ttc=True)
-        truth = cls.from_table(table)
-        _check_digest(stored=digest, found=truth.digest, path=path)
+        stored = load_store(path, with_ttc=True)
+        if stored.is_sealed:
+            manifest = Manifest._of(stored.table, stored.manifest_digest)
+            return cls._of(stored.table, manifest, stored.truth_digest)
+        truth = cls.from_table(stored.table)
+        _check_digest(stored=stored.truth_digest, found=truth.digest, path=path)
         return truth
 
 
-def read_truth(path: str | Path) -> GroundTruth:
+def read_truth(source: Source) -> GroundTruth:
     """Read ground truth from a CSV file, a saved `.npz`, or a folder of the toolkit's `*.pkl` annotations.
 
-    Rows keep the order of the file. Raises `Rejected`, with line numbers, for duplicate ids or natural keys,
-    malformed fields, non-finite τ and −0.1 ≤ τ ≤ 0, where MiD is undefined.
+    `source` is a path, or the bytes of a CSV file or the file itself, open. Rows keep the order of the file.
+    Raises `Rejected`, with line numbers, for duplicate ids or natural keys, malformed fields, non-finite τ
+    and −0.1 ≤ τ ≤ 0, where MiD is undefined.
     """
-    path = Path(path)
-    if path.suffix == ".npz" and path.is_file():
-        return GroundTruth.load(path)
-    table = read_annotations(path, with_ttc=True).table if path.is_dir() else read_csv(path, with_ttc=True)
-    return GroundTruth.from_table(table)
+    if _is_store(source):
+        return GroundTruth.load(source)
+    return GroundTruth.from_table(_table_of(source, with_ttc=True))
 
 
-def read_manifest(path: str | Path) -> Manifest:
+def read_manifest(source: Source) -> Manifest:
     """Read a manifest from any source that `read_truth` takes; true times may be absent, and are ignored."""
-    path = Path(path)
-    if path.suffix == ".npz" and path.is_file():
-        return Manifest.load(path)
-    table = read_annotations(path, with_ttc=False).table if path.is_dir() else read_csv(path, with_ttc=False)
-    return Manifest.from_table(table)
+    if _is_store(source):
+        return Manifest.load(source)
+    return Manifest.from_table(_table_of(source, with_ttc=False))
+
+
+def _is_store(source: Source) -> TypeGuard[str | os.PathLike[str]]:
+    return isinstance(source, str | os.PathLike) and Path(source).suffix == ".npz" and Path(source).is_file()
+
+
+def _table_of(source: Source, *, with_ttc: bool) -> Table:
+    if isinstance(source, str | os.PathLike) and Path(source).is_dir():
+        return read_annotations(Path(source), with_ttc=with_ttc).table
+    return read_csv(source, with_ttc=with_ttc)
 
 
 def _inside(ttc_s: Floats, low_s: float, high_s: float) -> NDArray[np.bool_]:
@@ -279,7 +323,7 @@ def _find_duplicates(findings: Findings, code: str, noun: str, keys: Sequence[st
             findings.add(code, message, table.where(row))
 
 
-def _check_digest(*, stored: str, found: str, path: str | Path) -> None:
+def _check_digest(*, stored: str, found: str, path: str | os.PathLike[str]) -> None:
     if stored != found:
         message = f"The content has the digest {found}; expected {quoted(stored)}, which is stored with it."
         raise reject("bad-digest", message, Path(path).name)

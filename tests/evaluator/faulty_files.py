@@ -57,13 +57,6 @@ CASES: dict[str, tuple[Any, ...]] = {
         "The file looks like a PNG image.",
         "byte 0",
     ),
-    "a gzip archive": (
-        b"\x1f\x8b\x08\x00",
-        "not-utf8",
-        "Byte 1 of the file is not UTF-8; expected JSON text encoded in UTF-8. "
-        "The file looks like a gzip archive; unpack it first.",
-        "byte 1",
-    ),
     "a ZIP archive": (
         b"PK\x03\x04",
         "not-json",
@@ -351,6 +344,8 @@ FURTHER: dict[str, bytes] = {
     "overlong character": b'{"\xc0\x80": 1}',
     "33 levels": b'{"0":' + b"[" * 33 + b"]" * 33 + b"}",
     "many unknown": flat({f"x{row}": math.nan for row in range(30)}),
+    "an unfilled template": flat(dict.fromkeys(GOOD)),
+    "many different": flat({**{f"x{row}": f"v{row}" for row in range(25)}, "y": "v1", "z": "v23", "0": None}),
     "long numbers": b'{"0": 1' + b"0" * 400 + b', "1": "' + b"z" * 80 + b'", "2": 1, "3": 0.0}',
     "a gap of many digits": envelope(RATIOS, unit="scale_ratio", frame_gap=123456789012345678901234567890123),
     "an endless rate": b'{"unit": "scale_ratio", "fps": 1e999, "predictions": {}}',

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from evaluator import INTERVALS, evaluate, read_predictions, read_truth
+from evaluator import INTERVALS, Predictions, evaluate, read_predictions, read_truth
 from evaluator.cli import main
 from evaluator.cli.exits import Exit
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
@@ -64,6 +68,43 @@ def test_better_model_is_better_by_more_than_chance(tmp_path: Path) -> None:
     assert re.fullmatch(r"MiD of the new one: \d+\.\d \[\d+\.\d, \d+\.\d\]", lines[0])
     assert lines[1].startswith("new − old: -")
     assert float(lines[1].rpartition("p = ")[2]) < 0.05
+
+
+def test_a_training_loop_gets_better_and_ends_with_a_file(tmp_path: Path) -> None:
+    *epochs, last = printed(EXAMPLES / "training_loop.py", tmp_path)
+    found = [float(line.partition("MiD ")[2].partition(",")[0]) for line in epochs]
+    assert found == sorted(found, reverse=True)
+    assert last.startswith(f"best MiD {found[-1]:.2f}; ")
+
+
+def callback(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The callback of the example, as a program would import it."""
+    monkeypatch.syspath_prepend(str(EXAMPLES))
+    return importlib.import_module("lightning_callback").TsttcScores(EXAMPLES / "truth.csv")
+
+
+def test_the_lightning_callback_logs_the_scores_of_a_whole_epoch(monkeypatch: pytest.MonkeyPatch) -> None:
+    scores, trainer, logged = (
+        callback(monkeypatch),
+        SimpleNamespace(sanity_checking=False),
+        dict[str, float](),
+    )
+    model = SimpleNamespace(log_dict=lambda found, **_: logged.update(found))
+    scores.on_validation_epoch_start(trainer, model)
+    for number, rows in enumerate(np.array_split(np.arange(60), 4)):
+        assert logged == {}
+        outputs = {"row": rows, "ttc_s": 1.1 * scores.truth.ttc_s[rows]}
+        scores.on_validation_batch_end(trainer, model, outputs, None, number)
+        if number < 3:
+            scores.on_validation_epoch_end(trainer, model)
+    scores.on_validation_epoch_end(trainer, model)
+    found = Predictions.from_arrays(ttc_s=1.1 * scores.truth.ttc_s, manifest=scores.truth.manifest)
+    assert logged == {f"tsttc/{name}": value for name, value in evaluate(found, scores.truth).flat().items()}
+
+
+def test_the_callback_is_one_of_lightning_s(monkeypatch: pytest.MonkeyPatch) -> None:
+    lightning = pytest.importorskip("lightning.pytorch", reason="Lightning is not installed")
+    assert isinstance(callback(monkeypatch), lightning.Callback)
 
 
 def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None:

@@ -21,7 +21,9 @@ def test_a_rejection_lists_its_problems_in_words_and_as_json() -> None:
     rejected = Rejected(
         [Problem("nan", "The value is NaN; expected …", "/7"), Problem("zero", "…")], n_problems=9
     )
-    assert str(rejected) == "9 problems:\n  1. /7: The value is NaN; expected …\n  2. …"
+    assert (
+        str(rejected) == "9 problems; equal ones share a line:\n  1. /7: The value is NaN; expected …\n  2. …"
+    )
     assert json.loads(rejected.to_json()) == {
         "n_problems": 9,
         "problems": [
@@ -60,6 +62,23 @@ def test_kinds_are_listed_apart() -> None:
         "And 5 more like these: 25 in all.",
         "And 1 more like these: 21 in all.",
     ]
+
+
+def test_equal_problems_share_a_line_that_names_their_places() -> None:
+    findings = Findings()
+    findings.add("zero", "0", "/a")
+    for row in range(28_600):
+        findings.add("not-a-number", "The value is null.", f"/{row}")
+    findings.add("zero", "0", "/b")
+    with pytest.raises(Rejected) as rejected:
+        findings.raise_if_any()
+    zero, null = rejected.value.problems
+    assert (zero.where, zero.message) == ("/a", "0 1 more place has this problem: /b.")
+    places = ", ".join(f"/{row}" for row in range(1, 21))
+    more = f"28,599 more places have this problem: {places}, … (the first 20)."
+    assert (null.where, null.message) == ("/0", f"The value is null. {more}")
+    assert rejected.value.n_problems == 28_602
+    assert str(rejected.value).startswith("28,602 problems; equal ones share a line:\n")
 
 
 def test_names_of_strangers_are_shown_in_printable_ascii() -> None:

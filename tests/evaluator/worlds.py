@@ -71,7 +71,7 @@ def make_truth(
     )
 
 
-def flat(values: Mapping[str, float] | Sequence[float]) -> bytes:
+def flat(values: Mapping[str, object] | Sequence[object]) -> bytes:
     """The toolkit's form; a sequence is keyed by 0, 1, …"""
     members = values if isinstance(values, Mapping) else {str(row): value for row, value in enumerate(values)}
     return json.dumps(members).encode()

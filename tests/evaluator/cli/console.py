@@ -19,6 +19,7 @@ from typing import Any
 
 from evaluator import read_manifest, receipts
 from evaluator.metrics.protocol import SCORE_NAMES
+from evaluator.papers.tables import published_tables
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
 
@@ -253,15 +254,17 @@ def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object
     source = REPOSITORY / "leaderboard" / "benchmark" / "published" / "tsttc-2023.json"
     paper = json.loads(source.read_text())
     names = {method["slug"]: method["name"] for method in paper["methods"]}
+    table = published_tables().table(paper["results_of"])
     entries: list[dict[str, Any]] = [
         {
-            "method": names[slug],
+            "method": names[row.method],
             "team": ", ".join(paper["source"]["authors"].split(", ")),
             "date": str(paper["source"]["year"]),
             "kind": "published",
-            "scores": dict(zip(paper["columns"], values, strict=True)),
+            "scores": dict(zip(table.columns, row.values, strict=True)),
         }
-        for slug, values in paper["results"][split].items()
+        for row in table.rows
+        if row.split == split
     ]
     entries.append(
         {"method": "Foo++", "team": "TJU-V", "date": "2026-11-20", "kind": "submission", "scores": scores}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import pty
 import subprocess
@@ -14,8 +13,10 @@ import keyring
 import pytest
 
 from tests.evaluator.cli.keyrings import LockedKeyring, NoKeyring, RememberingKeyring
-from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
-from tests.evaluator.worlds import REPOSITORY, Tsttc
+from tests.evaluator.cli.recorded_site import IS_LEADERBOARD, RecordedSite, Reply, problem
+from tests.evaluator.worlds import EXAMPLES, REPOSITORY, Tsttc
+
+GOOD = EXAMPLES / "predictions.json"
 
 TOKEN = "tsttc_" + "a1" * 32
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
@@ -33,7 +34,7 @@ def ring() -> Iterator[RememberingKeyring]:
 
 @pytest.fixture(autouse=True)
 def signed_out(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("TSTTC_TOKEN", "TSTTC_URL"):
+    for name in ("TSTTC_TOKEN", "TSTTC_TOKEN_FILE", "TSTTC_URL"):
         monkeypatch.delenv(name, raising=False)
 
 
@@ -71,15 +72,57 @@ def test_what_is_no_token_is_not_sent(
     assert (result.exit_code, site.requests) == (4, [])
 
 
-def test_machine_without_a_keyring_is_told_what_to_do_before_anything_is_typed(
-    tsttc: Tsttc, site: RecordedSite
+def test_machine_without_a_keyring_keeps_the_token_in_a_file_that_only_its_owner_can_read(
+    tsttc: Tsttc, site: RecordedSite, places: Path
 ) -> None:
-    result = tsttc("login", "--server", site.url, "--json", stdin=TOKEN.encode())
+    site.put("GET /api/v1/quota", Reply([]))
+    result = tsttc("login", "--server", site.url, stdin=TOKEN.encode())
+    assert result.exit_code == 0
+    [path] = places.rglob("tokens.json")
+    assert f"{path}, which only you can read; this machine has no keyring" in result.stdout
+    assert TOKEN not in result.output
+    assert (path.stat().st_mode & 0o777, path.parent.stat().st_mode & 0o777) == (0o600, 0o700)
+    site.put(f"GET /api/v1/submissions/{ID}", Reply(SCORED))
+    assert tsttc("status", ID).exit_code == 0
+    assert site.requests[-1].headers["Authorization"] == f"Bearer {TOKEN}"
+    assert tsttc("logout").stdout.startswith(f"The token for {site.url} is removed")
+    assert not path.exists()
+
+
+def test_a_file_that_is_named_gives_the_token_before_the_keyring(
+    tsttc: Tsttc,
+    site: RecordedSite,
+    ring: RememberingKeyring,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ring.kept["tsttc", site.url] = "tsttc_other"
+    site.put("GET /api/v1/quota", Reply([]))
+    path = tmp_path / "token"
+    path.write_text(f"{TOKEN}\r\n")
+    monkeypatch.setenv("TSTTC_TOKEN_FILE", str(path))
+    assert tsttc("quota", "--server", site.url).exit_code == 0
+    assert site.requests[-1].headers["Authorization"] == f"Bearer {TOKEN}"
+    path.unlink()
+    result = tsttc("quota", "--server", site.url)
     assert result.exit_code == 4
-    assert "This machine has no keyring" in result.stderr
-    assert "export TSTTC_TOKEN=…" in result.stderr
-    assert json.loads(result.stdout)["code"] == "no-keyring"
-    assert site.requests == []
+    assert f"TSTTC_TOKEN_FILE names {path}, which cannot be read: No such file or directory." in result.stderr
+
+
+def test_token_goes_to_nothing_that_is_no_leaderboard(tsttc: Tsttc, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TSTTC_TOKEN", TOKEN)
+    for reply in (
+        Reply(b"<html>404</html>", 404, {"Content-Type": "text/html"}),
+        Reply(b"<html>hello</html>", 200, {"Content-Type": "text/html"}),
+        Reply([{"name": "something else"}]),
+    ):
+        with RecordedSite() as other:
+            other.put(IS_LEADERBOARD, reply)
+            result = tsttc("submit", GOOD, "--split", "val", "--method", "Foo++", "--server", other.url)
+            assert result.exit_code == 3
+            assert f"Error: {other.url}" in result.stderr
+            assert "did not answer like a leaderboard" in result.stderr
+            assert other.requests == []
 
 
 def test_keyring_that_stays_locked_is_told_and_means_no_token(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -128,7 +171,7 @@ def test_logout_forgets_token_and_server(
     again = tsttc("logout", "--server", site.url)
     assert (again.exit_code, again.stdout) == (
         0,
-        f"There was no token for {site.url} in a keyring of this machine.\n",
+        f"There was no token for {site.url} on this machine.\n",
     )
 
 

@@ -103,7 +103,9 @@ def test_problems_are_numbered_in_the_library_s_words(tsttc: Tsttc, arguments: t
     result = tsttc(*arguments)
     assert result.exit_code == 1
     assert result.stdout == ""
-    assert result.stderr.splitlines()[0] == f"Error: {BROKEN} is rejected: 7 problems"
+    assert (
+        result.stderr.splitlines()[0] == f"Error: {BROKEN} is rejected: 7 problems; equal ones share a line"
+    )
     numbered = [f"{number:>3}. {words}" for number, words in enumerate(problems_of(BROKEN), start=1)]
     assert result.stderr.splitlines()[1:] == numbered
 
@@ -220,7 +222,7 @@ def test_every_command_explains_itself_with_an_example(tsttc: Tsttc, command: st
     assert result.exit_code == 0
     assert re.search(rf"^    (\S.* \| )?tsttc {command}\b", result.stdout, re.MULTILINE)
     # These print what is not theirs to wrap: a file, a receipt, a script.
-    assert "--json" in result.stdout or command in {"convert", "receipt", "completion"}
+    assert "--json" in result.stdout or command in {"convert", "receipt", "download", "completion"}
 
 
 def examples() -> list[list[str]]:

@@ -276,6 +276,11 @@ def test_completion_knows_commands_and_options(tmp_path: Path) -> None:
             },
         ).stdout
 
-    assert completed("tsttc s", 1).split() == ["plain,score", "plain,submit", "plain,status"]
+    assert completed("tsttc s", 1).split() == [
+        "plain,score",
+        "plain,submit",
+        "plain,status",
+        "plain,submissions",
+    ]
     assert "plain,--fail-if-worse-than" in completed("tsttc submit --fail", 2)
     assert "plain,markdown" in completed("tsttc board --format m", 3)

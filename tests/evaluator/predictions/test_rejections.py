@@ -1,6 +1,5 @@
 """Every fault of a prediction file: its code, its place, its words. Wording is part of the interface."""
 
-import math
 import tracemalloc
 
 import pytest
@@ -58,12 +57,21 @@ def test_many_missing_and_unknown_keys_are_counted_and_twenty_are_named() -> Non
     assert "18, 19, … (the first 20); expected" in missing.message
 
 
-def test_many_faulty_values_are_counted_and_twenty_are_named() -> None:
+def test_many_different_values_are_counted_and_twenty_are_named() -> None:
     manifest = make_truth([4.0] * 100).manifest
-    rejected = rejection(flat([math.nan] * 100), manifest=manifest)
+    rejected = rejection(flat([str(row) for row in range(100)]), manifest=manifest)
     assert rejected.n_problems == 100
     assert [p.where for p in rejected.problems] == [*(f"/{row}" for row in range(20)), ""]
-    assert rejected.problems[-1] == Problem("nan", "And 80 more like these: 100 in all.")
+    assert rejected.problems[-1] == Problem("not-a-number", "And 80 more like these: 100 in all.")
+
+
+def test_an_unfilled_template_is_one_line() -> None:
+    rejected = rejection(flat([None] * 100), manifest=make_truth([4.0] * 100).manifest)
+    (line,) = rejected.problems
+    assert (rejected.n_problems, line.code, line.where) == (100, "not-a-number", "/0")
+    assert line.message.startswith(
+        "The value is null; expected a number of seconds. 99 more places have this problem: /1, /2, "
+    )
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from evaluator import INTERVALS, GroundTruth, Manifest, Problem, Rejected, read_manifest, read_truth
+from evaluator.predictions.revisions import rows_in
 from evaluator.truth.csv_tables import read_csv
 from tests.evaluator.worlds import make_truth
 
@@ -184,7 +185,7 @@ def test_other_extreme_times_are_accepted(write: Write, ttc: str) -> None:
 
 
 def test_all_faults_are_told_at_once_and_twenty_of_a_kind(write: Write) -> None:
-    rejected = rejection(write(*[f"{row},a,1,{row},3,x" for row in range(50)], "60,a,1"))
+    rejected = rejection(write(*[f"{row},a,1,{row},3,x{row}" for row in range(50)], "60,a,1"))
     assert rejected.n_problems == 51
     assert [p.where for p in rejected.problems] == [*(f"line {row + 2}" for row in range(20)), "line 52", ""]
 
@@ -269,6 +270,14 @@ def test_the_digest_knows_no_row_order_but_every_value(write: Write) -> None:
     assert read_truth(write(*ROWS[:2], ROWS[2].replace("cam8", "8"))).digest != digest
 
 
+def test_tables_of_one_digest_are_matched_row_by_row(write: Write) -> None:
+    old = read_truth(write(*ROWS)).manifest
+    for rows in (ROWS, ROWS[::-1], ROWS[1:] + ROWS[:1]):
+        new = read_truth(write(*rows)).manifest
+        assert new.digest == old.digest
+        assert [old.natural_keys[row] for row in rows_in(old, new)] == list(new.natural_keys)
+
+
 # --- keeping ---------------------------------------------------------------------------------------------
 
 
@@ -333,6 +342,15 @@ def test_a_changed_file_is_refused(
     path = tmp_path / "kept.npz"
     read_truth(write(*ROWS)).save(path)
     assert rejection(repacked(path, **changes)).problems[0].code == code
+
+
+def test_a_file_that_was_saved_without_a_seal_is_checked_and_read(tmp_path: Path, write: Write) -> None:
+    truth = read_truth(write(*ROWS))
+    path = tmp_path / "kept.npz"
+    truth.save(path)
+    assert GroundTruth.load(repacked(path, seal=None)).digest == truth.digest
+    changed = rejection(repacked(path, ttc_s=[2.5, -8.125, 24.0]))
+    assert changed.problems[0].code == "bad-digest"
 
 
 @settings(max_examples=100)

@@ -1,0 +1,195 @@
+"""The subcommands about what is one's own: whoami, methods, submissions, withdraw, download."""
+
+from __future__ import annotations
+
+import itertools
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from evaluator.cli import suggestions
+from evaluator.cli.connection import connect
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
+from evaluator.cli.options import json_option, output_option, sendable, slug, url_option
+from evaluator.cli.reading import write_bytes
+from evaluator.metrics.protocol import PRIMARY
+
+if TYPE_CHECKING:
+    from evaluator.client.answers import Submission
+
+
+@click.command(short_help="Show whose token this is, and what it may do.")
+@url_option
+@json_option
+def whoami(*, url: str, as_json: bool) -> None:
+    """Show the team of your token, the token's name, what it may do and when it ends.
+
+    \b
+    Example:
+      tsttc whoami
+    """
+    with connect(url, with_token=True) as client:
+        found = client.account()
+    if as_json:
+        echo_json(found.document)
+        return
+    team = f"team {found.team}" if found.team else "no team yet"
+    limit = f", for {found.split} only" if found.split else ""
+    click.echo(printable(f"{team} at {url.rstrip('/')}"))
+    click.echo(
+        printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, until {found.expires_at}')
+    )
+
+
+@click.command(short_help="List the methods of your team.")
+@url_option
+@json_option
+def methods(*, url: str, as_json: bool) -> None:
+    """List the methods of your team: id, name and who sees them.
+
+    \b
+    Example:
+      tsttc methods
+    """
+    with connect(url, with_token=True) as client:
+        found = list(client.methods())
+    if as_json:
+        echo_json([method.document for method in found])
+        return
+    if not found:
+        click.echo("Your team has no methods yet; tsttc submit creates one.")
+        return
+    table = [[Cell(text, is_bold=True) for text in ("id", "method", "visibility")]]
+    for method in found:
+        called = f" as {method.pseudonym}" if method.visibility == "ANONYMOUS" and method.pseudonym else ""
+        seen = f"{method.visibility.lower()}{called}"
+        table.append([Cell(printable(text)) for text in (method.id, method.name, seen)])
+    for line in aligned(table, align="<<<"):
+        click.echo(line)
+
+
+@click.command("submissions", short_help="List the submissions of your team, newest first.")
+@click.option(
+    "--split",
+    callback=lambda c, p, value: value and slug(c, p, value),
+    shell_complete=suggestions.splits,
+    help="Only this split.",
+)
+@click.option(
+    "--method",
+    callback=sendable,
+    shell_complete=suggestions.methods,
+    help="Only this method, by name or id.",
+)
+@click.option(
+    "-n",
+    "--limit",
+    type=click.IntRange(min=1),
+    default=20,
+    show_default=True,
+    help="At most so many.",
+)
+@url_option
+@json_option
+def list_submissions(*, split: str | None, method: str | None, limit: int, url: str, as_json: bool) -> None:
+    """List the submissions of your team: id, time, split, method, state and MiD.
+
+    \b
+    Examples:
+      tsttc submissions
+      tsttc submissions --split val --method "Foo++" --json | jq -r .[].id
+    """
+    with connect(url, with_token=True) as client:
+        wanted = (
+            each
+            for each in client.submissions()
+            if split in {None, each.split} and method in {None, each.method, each.method_id}
+        )
+        found = list(itertools.islice(wanted, limit))
+    if as_json:
+        echo_json([submission.document for submission in found])
+        return
+    if not found:
+        click.echo("There are no such submissions.")
+        return
+    for line in _table(found):
+        click.echo(line)
+
+
+def _table(found: Sequence[Submission]) -> list[str]:
+    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
+
+    heads = ("id", "submitted", "split", "method", "state", short_name(PRIMARY))
+    table = [[Cell(text, is_bold=True) for text in heads]]
+    for each in found:
+        mid = (each.scores or {}).get(PRIMARY)
+        texts = (
+            each.id,
+            str(each.document.get("submitted_at", ""))[:16].replace("T", " "),
+            each.split,
+            each.method,
+            each.state,
+            format_published(mid, decimals=each.decimals, missing=NO_VALUE),
+        )
+        table.append([Cell(printable(text)) for text in texts])
+    return aligned(table, align="<<<<<.")
+
+
+@click.command(short_help="Withdraw or cancel a submission of your team.")
+@click.argument("submission_id", metavar="ID", callback=slug)
+@click.option("--yes", is_flag=True, help="Do not ask for confirmation; required without a terminal.")
+@url_option
+@json_option
+def withdraw(*, submission_id: str, yes: bool, url: str, as_json: bool) -> None:
+    """Withdraw submission ID. This cannot be undone.
+
+    A submission that waits is cancelled. One on a board leaves a row that says so.
+
+    \b
+    Example:
+      tsttc withdraw 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11
+    """
+    with connect(url, with_token=True) as client:
+        found = client.submission(submission_id)
+        named = printable(f"{found.method} on {found.split}")
+        if not yes:
+            _confirm(f"This withdraws {named}, state {found.state}; it cannot be undone.")
+        done = client.withdraw(submission_id)
+    if as_json:
+        echo_json(done.document)
+        return
+    click.echo(f"{named} is {'cancelled' if done.state == 'CANCELLED' else 'withdrawn'}.")
+
+
+def _confirm(words: str) -> None:
+    if not sys.stdin.isatty():
+        hint = "Nothing was changed. Use --yes to confirm."
+        raise Failure(words, exit_code=Exit.USAGE, code="not-confirmed", hint=hint)
+    click.echo(words, err=True)
+    if not click.confirm("Withdraw?", err=True):
+        raise Failure("Nothing was changed.", exit_code=Exit.USAGE, code="not-confirmed")
+
+
+@click.command(short_help="Get back a prediction file that your team submitted.")
+@click.argument("submission_id", metavar="ID", callback=slug)
+@output_option("it")
+@url_option
+def download(*, submission_id: str, output: Path | None, url: str) -> None:
+    """Get the file of submission ID, byte by byte as your team submitted it.
+
+    \b
+    Example:
+      tsttc download 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 -o predictions.json
+    """
+    with connect(url, with_token=True) as client:
+        data = client.file(submission_id)
+    if output is None:
+        click.echo(data, nl=False)
+        return
+    write_bytes(output, data)
+    click.echo(f"{output}: {len(data):,} bytes.")

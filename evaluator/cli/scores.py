@@ -1,0 +1,368 @@
+"""The subcommands score and plot: one's own results, computed offline by the server's own code."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Final
+
+import click
+
+from evaluator.cli import gates
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, result_in_words, short_name, units
+from evaluator.cli.options import json_option
+from evaluator.cli.reading import TABLE, bytes_of, name_of, naming, write_bytes
+from evaluator.cli.warnings_in_words import echo_warnings
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
+from evaluator.tables.results import WRITERS, ResultRow, names_of
+
+if TYPE_CHECKING:
+    from evaluator import GroundTruth, Report
+    from evaluator.problems import FileWarning
+
+GROUPS: Final = ("recording", "camera", "range", "occlusion", "lane", "box-size")
+FORMATS: Final = ("table", *WRITERS)
+FEW: Final = "one needs 8 recordings of equal size, or more of unequal size"
+KINDS: Final = ("error", "scatter", "distribution")
+
+several_predictions = click.argument(
+    "predictions",
+    type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path),
+    nargs=-1,
+    required=True,
+)
+truth_option = click.option(
+    "--truth",
+    "truth_path",
+    type=TABLE,
+    required=True,
+    metavar="FILE",
+    help="Ground truth: a CSV file or an annotation folder of the toolkit.",
+)
+protocol_option = click.option(
+    "--protocol",
+    type=click.Choice(list(PROTOCOLS)),
+    default=DEFAULT_PROTOCOL,
+    show_default=True,
+    help="Protocol: tsttc-1 as on the board; toolkit gives the numbers of the dataset's toolkit to the bit.",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class _Scored:
+    """One file, read and scored."""
+
+    name: str
+    report: Report
+    warnings: list[FileWarning]
+
+    def document(self) -> dict[str, Any]:
+        return {**self.report.as_dict(), "warnings": [asdict(warning) for warning in self.warnings]}
+
+
+@click.command(short_help="Score prediction files against your ground truth.")
+@several_predictions
+@truth_option
+@protocol_option
+@click.option("--by", type=click.Choice(GROUPS), help="Scores of each group of sequences.")
+@click.option(
+    "--intervals",
+    "with_intervals",
+    is_flag=True,
+    help="Also 95 % confidence intervals (bootstrap over recordings), as on the board.",
+)
+@click.option(
+    "--per-sequence",
+    "per_sequence",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the errors of every sequence to this CSV file.",
+)
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(FORMATS),
+    default="table",
+    show_default=True,
+    help="How the scores are printed; csv has all digits.",
+)
+@gates.fail_if_option
+@json_option
+def score(
+    *,
+    predictions: tuple[Path, ...],
+    truth_path: Path,
+    protocol: str,
+    by: str | None,
+    with_intervals: bool,
+    per_sequence: Path | None,
+    form: str,
+    fail_if: list[gates.Condition],
+    as_json: bool,
+) -> None:
+    """Score PREDICTIONS, one or more JSON files or - for standard input, against your ground truth.
+
+    The scores equal those of the server: two decimals as on the board, full float64 with --json. If you have
+    the dataset, give its annotation folder. Several files make one table. A warning means that the
+    predictions hardly correlate with the true times; the usual cause is another order of the sequences.
+
+    \b
+    Examples:
+      tsttc score predictions.json --truth annotations/val/
+      tsttc score predictions.json --truth val.csv --by occlusion --intervals
+      tsttc score old.json new.json --truth val.csv --format latex
+      tsttc score predictions.json --truth val.csv --json | jq .scores.overall.mid
+      tsttc score predictions.json --truth val.csv --fail-if "mid > 15.0 or rte > 13"
+    """
+    if as_json and form != "table":
+        raise click.UsageError("--json and --format exclude each other; choose one of them.")
+    truth = _truth(truth_path)
+    found = list(_scored(predictions, truth, protocol=protocol))
+    rows = [row for one in found for row in _rows(one, by=by, with_intervals=with_intervals)]
+    if not as_json:
+        for one in found:
+            _warn(one, alone=len(found) == 1)
+    if per_sequence is not None:
+        write_bytes(per_sequence, _per_sequence(found).encode(), option="--per-sequence")
+    if with_intervals and not as_json and not any(any(row.intervals.values()) for row in rows):
+        click.echo(f"There are no confidence intervals: {FEW}.", err=True)
+    tabular = by is not None or with_intervals or len(found) > 1
+    gates.told(
+        _document(found, rows if tabular else [], by=by),
+        show=lambda: click.echo(_shown(found, rows, by=by, form=form), nl=False),
+        judge=lambda: _judge(fail_if, found),
+        as_json=as_json,
+    )
+
+
+@click.command(short_help="Draw figures of prediction files for a paper: SVG, PDF or PNG.")
+@several_predictions
+@truth_option
+@protocol_option
+@click.option(
+    "--kind",
+    type=click.Choice(KINDS),
+    default=KINDS[0],
+    show_default=True,
+    help="error by true TTC with its confidence band, scatter of predicted against true, or distribution.",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    required=True,
+    help="The figure; the ending decides: .svg, .pdf or .png.",
+)
+@json_option
+def plot(
+    *,
+    predictions: tuple[Path, ...],
+    truth_path: Path,
+    protocol: str,
+    kind: str,
+    output: Path,
+    as_json: bool,
+) -> None:
+    """Draw a figure of PREDICTIONS, one or more JSON files or - for standard input. Needs matplotlib.
+
+    Several files are drawn into one figure: name the files as the legend is to name the methods.
+
+    \b
+    Examples:
+      tsttc plot predictions.json --truth annotations/val/ -o error.pdf
+      tsttc plot Old.json New.json --truth val.csv --kind scatter -o scatter.svg
+    """
+    try:
+        from evaluator.scoring import plots  # noqa: PLC0415 -- matplotlib is of an extra
+    except ModuleNotFoundError as error:
+        raise Failure(
+            f"tsttc plot needs matplotlib, which is not installed ({error}).",
+            exit_code=Exit.USAGE,
+            code="not-installed",
+            hint="Install it with: pip install matplotlib",
+        ) from None
+    if output.suffix.lower() not in plots.SUFFIXES:
+        expected = ", ".join(plots.SUFFIXES)
+        raise click.BadParameter(
+            f"found {output.name!r}, expected a name that ends in {expected}.", param_hint="-o"
+        )
+    found = list(_scored(predictions, _truth(truth_path), protocol=protocol))
+    for one in found:
+        _warn(one, alone=len(found) == 1)
+    names = [Path(one.name).stem for one in found]
+    if len(set(names)) < len(names):
+        names = [one.name for one in found]
+    try:
+        plots.draw(kind, dict(zip(names, (one.report for one in found), strict=True)), path=output)
+    except OSError as error:
+        raise click.BadParameter(f"{output} cannot be written: {error.strerror}.", param_hint="-o") from None
+    if as_json:
+        echo_json({"output": str(output), "kind": kind, "names": names})
+    else:
+        click.echo(f"{output}: {kind} of {', '.join(map(printable, names))}.")
+
+
+def _truth(path: Path) -> GroundTruth:
+    from evaluator import read_truth  # noqa: PLC0415 -- numpy, which --help can do without
+
+    with naming(path):
+        return read_truth(path)
+
+
+def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iterator[_Scored]:
+    from evaluator import evaluate, read_predictions  # noqa: PLC0415 -- numpy, as above
+    from evaluator.predictions.plausibility import warnings_with_truth  # noqa: PLC0415 -- numpy, as above
+
+    if len(set(paths)) < len(paths):
+        raise click.UsageError("A file is named twice; expected each once.")
+    names = [path.name for path in paths]
+    for path in paths:
+        with naming(path):
+            read = read_predictions(bytes_of(path), manifest=truth.manifest)
+            report = evaluate(read, truth, protocol=protocol, keep_sequences=True)
+        yield _Scored(
+            path.name if names.count(path.name) == 1 and path.name != "-" else name_of(path),
+            report,
+            warnings_with_truth(read, truth),
+        )
+
+
+def _rows(found: _Scored, *, by: str | None, with_intervals: bool) -> Iterator[ResultRow]:
+    report = found.report
+    if by is not None:
+        try:
+            groups = report.breakdown(by, with_intervals=with_intervals)
+        except ValueError as fault:  # the ground truth lacks the column
+            raise click.BadParameter(str(fault), param_hint="--by") from None
+        for one in groups:
+            ends = one.intervals if with_intervals else {}
+            yield ResultRow(found.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends)
+        return
+    assert report.details is not None  # noqa: S101 -- it was asked for
+    yield ResultRow(
+        found.name,
+        None,
+        report.n_sequences,
+        report.details.truth.manifest.n_recordings,
+        report.flat(),
+        _intervals(report) if with_intervals else {},
+    )
+
+
+def _intervals(report: Report) -> dict[str, tuple[float, float] | None]:
+    from evaluator import confidence_intervals  # noqa: PLC0415 -- numpy, as above
+
+    assert report.details is not None  # noqa: S101 -- it was asked for
+    details = report.details
+    return confidence_intervals(details.predictions, details.truth, protocol=details.protocol)
+
+
+def _warn(found: _Scored, *, alone: bool) -> None:
+    if found.warnings and not alone:
+        click.echo(f"{printable(found.name)}:", err=True)
+    echo_warnings(found.warnings)
+
+
+def _document(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None) -> dict[str, Any]:
+    """One file is its own document; several are listed as `files`. What was asked for beside is added."""
+    documents: list[dict[str, Any]] = []
+    for one in found:
+        document = one.document()
+        own = [row for row in rows if row.file == one.name]
+        if by is not None:
+            document["by"] = by
+            document["groups"] = [_group_document(row) for row in own]
+        elif own and own[0].intervals:
+            document["intervals"] = own[0].intervals
+        documents.append(document)
+    if len(documents) == 1:
+        return documents[0]
+    return {"files": [{"file": one.name, **each} for one, each in zip(found, documents, strict=True)]}
+
+
+def _group_document(row: ResultRow) -> dict[str, Any]:
+    return {
+        "group": row.group,
+        "n_sequences": row.n_sequences,
+        "n_recordings": row.n_recordings,
+        "scores": dict(row.scores),
+        **({"intervals": dict(row.intervals)} if row.intervals else {}),
+    }
+
+
+def _shown(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, form: str) -> str:
+    if form != "table":
+        return WRITERS[form](rows, by=by)
+    if by is None and len(found) == 1:
+        lines = list(_in_words(found[0].report, rows[0]))
+    else:
+        lines = [*_table(rows, by=by), "", units(rows[0].scores), _counts_in_words(found[0].report)]
+    return "".join(f"{line}\n" for line in lines)
+
+
+def _in_words(report: Report, row: ResultRow) -> Iterator[str]:
+    yield from result_in_words(
+        report.flat(),
+        counts={name: interval.count for name, interval in report.scores.items()},
+        n_out_of_range=report.n_out_of_range,
+        truncated=report.truncated,
+        intervals=row.intervals,
+    )
+    yield ""
+    yield f"protocol     {report.protocol}"
+    yield f"truth        {report.truth_digest}"
+    yield f"predictions  {report.predictions_digest}"
+
+
+def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
+    """A row for each file or group; the ends of its intervals are rows below it."""
+    from evaluator import format_published  # noqa: PLC0415 -- numpy, as above
+
+    names, scores = names_of(rows, by=by), list(rows[0].scores)
+
+    def line(texts: Sequence[str], values: Sequence[float | None], last: str) -> list[Cell]:
+        cells = [format_published(value, missing=NO_VALUE) for value in values]
+        return [Cell(printable(text)) for text in (*texts, *cells, last)]
+
+    heads = [*(title for title, _ in names), *map(short_name, scores), "sequences"]
+    lines = [[Cell(head, is_bold=True) for head in heads]]
+    for row in rows:
+        lines.append(line([of(row) for _, of in names], list(row.scores.values()), f"{row.n_sequences:,}"))
+        for end, words in ((0, "  95 % from"), (1, "  95 % to")) if any(row.intervals.values()) else ():
+            ends = [row.intervals[name] for name in scores]
+            values = [None if pair is None else pair[end] for pair in ends]
+            lines.append(line([words, *[""] * (len(names) - 1)], values, ""))
+    return aligned(lines, align="<" * len(names) + "." * len(scores) + ">")
+
+
+def _counts_in_words(report: Report) -> str:
+    return f"{report.n_sequences:,} sequences, protocol {report.protocol}, truth {report.truth_digest}"
+
+
+def _per_sequence(found: Sequence[_Scored]) -> str:
+    from evaluator.tables.formats import csv_lines  # noqa: PLC0415 -- needed here alone
+
+    tables = [one.report.records() for one in found]
+    columns = ["file", *tables[0]]
+    records = (
+        dict(zip(columns, (one.name, *values), strict=True))
+        for one, table in zip(found, tables, strict=True)
+        for values in zip(*table.values(), strict=True)
+    )
+    return "".join(csv_lines(records, columns=columns))
+
+
+def _judge(conditions: list[gates.Condition], found: Sequence[_Scored]) -> None:
+    """The gate of every file; the first that fails is told by its name where there are several."""
+    for one in found:
+        try:
+            gates.judge(conditions, one.report.flat())
+        except Failure as failure:
+            if len(found) > 1:
+                failure.message = f"{printable(one.name)}: {failure.message}"
+                failure.document["title"] = failure.message
+            raise

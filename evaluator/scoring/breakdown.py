@@ -1,0 +1,260 @@
+"""Scores of groups of sequences: by recording, camera, TTC range, occlusion, lane and size of the box.
+
+Groups are made from the manifest, the true times and what the annotations say of the object; within a group
+the errors are averaged as the protocol says. Confidence intervals come from the bootstrap over recordings
+that the board uses.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.metrics.protocol import OVERALL, Protocol, score_name
+from evaluator.metrics.scale import Floats
+from evaluator.truth.truth import GroundTruth
+
+if TYPE_CHECKING:
+    from evaluator.predictions.predictions import Predictions
+
+CURVE_EDGES_S: Final = (
+    -20,
+    -15,
+    -10,
+    -8,
+    -6,
+    -4,
+    -3,
+    -2,
+    -1,
+    0,
+    0.5,
+    1,
+    1.5,
+    2,
+    2.5,
+    3,
+    4,
+    5,
+    6,
+    8,
+    10,
+    12,
+    15,
+    20,
+)
+"""Edges of the true time to contact in seconds: finer where it matters, the ends of the paper's ranges among
+them."""
+
+NOT_STATED: Final = "not stated"
+
+Rows = NDArray[np.intp]
+Ends = tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Details:
+    """What a report was computed from. `predicted_ttc_s` is (n,), truncated by the protocol, in the truth's
+    order.
+
+    For a hidden split it never leaves the worker.
+    """
+
+    truth: GroundTruth
+    predictions: Predictions
+    predicted_ttc_s: Floats
+    protocol: Protocol
+
+
+@dataclass(frozen=True, slots=True)
+class GroupScores:
+    """The scores of one group by their names: None where it has no sequence of a TTC range.
+
+    `intervals` are the 95 % confidence intervals; None where there are too few recordings, or none were
+    asked for.
+    """
+
+    group: str
+    n_sequences: int
+    n_recordings: int
+    scores: Mapping[str, float | None]
+    intervals: Mapping[str, Ends | None]
+
+
+def breakdown(
+    details: Details, errors: Mapping[str, Floats], *, by: str, with_intervals: bool = False
+) -> list[GroupScores]:
+    """The scores of every group of `by`, one of `GROUPS`. `errors` are those of every sequence by metric,
+    (n,) each.
+
+    Raises `ValueError` for an unknown `by`, and where the ground truth lacks the column that it needs.
+    """
+    return scores_of(
+        details,
+        errors,
+        groups=groups_of(details, by=by),
+        # A group that is a TTC range is not cut into ranges once more.
+        has_ranges=by != "range",
+        # One recording has no interval, however many sequences it has.
+        with_intervals=with_intervals and by != "recording",
+    )
+
+
+def scores_of(
+    details: Details,
+    errors: Mapping[str, Floats],
+    *,
+    groups: Mapping[str, Rows],
+    has_ranges: bool = True,
+    with_intervals: bool = False,
+) -> list[GroupScores]:
+    """The scores of groups of sequences, given as the rows of each by its name."""
+    manifest, ttc_s = details.truth.manifest, details.truth.ttc_s
+    masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
+    for interval in details.protocol.intervals if has_ranges else ():
+        masks[interval.name] = (ttc_s >= interval.low_s) & (ttc_s <= interval.high_s)
+    names = [score_name(metric, name) for metric in errors for name in masks]
+    found = []
+    sums, counts = list[Floats](), list[Floats]()
+    for group, rows in groups.items():
+        parts = {name: rows[mask[rows]] for name, mask in masks.items()}
+        means = {
+            score_name(metric, name): float(values[part].mean()) if len(part) else None
+            for metric, values in errors.items()
+            for name, part in parts.items()
+        }
+        found.append((group, rows, means))
+        if with_intervals:
+            for values in errors.values():
+                for part in parts.values():
+                    recordings, n = manifest.recording_index[part], manifest.n_recordings
+                    sums.append(np.bincount(recordings, weights=values[part], minlength=n).astype(np.float64))
+                    counts.append(np.bincount(recordings, minlength=n).astype(np.float64))
+    ends = _intervals(details.truth, sums, counts)
+    return [
+        GroupScores(
+            group,
+            len(rows),
+            len(np.unique(manifest.recording_index[rows])),
+            means,
+            dict(zip(names, ends[number * len(names) :], strict=False)) or dict.fromkeys(names),
+        )
+        for number, (group, rows, means) in enumerate(found)
+    ]
+
+
+def _intervals(truth: GroundTruth, sums: Sequence[Floats], counts: Sequence[Floats]) -> list[Ends | None]:
+    """The interval of each column, all by the same weights."""
+    if not sums:
+        return []
+    from evaluator.scoring.uncertainty import bootstrap_of  # noqa: PLC0415 -- a circle
+
+    columns = np.stack(counts, axis=1)
+    low, high = bootstrap_of(truth.digest, columns).intervals(np.stack(sums, axis=1)[None])
+    return [
+        (one, other) if np.isfinite(one) else None
+        for one, other in zip(low[0].tolist(), high[0].tolist(), strict=True)
+    ]
+
+
+# --- the groups ---------------------------------------------------------------------------------------------
+
+
+def groups_of(details: Details, *, by: str) -> dict[str, Rows]:
+    """The rows of every group that has some, by its name; raises `ValueError` as `breakdown` does."""
+    if by not in GROUPS:
+        raise ValueError(f"Unknown group {by!r}; expected one of {', '.join(GROUPS)}.")
+    return {name: rows for name, rows in GROUPS[by](details).items() if len(rows)}
+
+
+def curve_of(details: Details) -> dict[Ends, Rows]:
+    """The rows of every bin [low, high) of true times, by its ends in seconds, for a curve; empty ones left
+    out."""
+    bins = np.digitize(details.truth.ttc_s, CURVE_EDGES_S)
+    ends = itertools.pairwise(CURVE_EDGES_S)
+    found = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}
+    return {pair: rows for pair, rows in found.items() if len(rows)}
+
+
+def _by_recording(details: Details) -> dict[str, Rows]:
+    return _by_name(details.truth.manifest.bag_stamp)
+
+
+def _by_camera(details: Details) -> dict[str, Rows]:
+    return _by_name(details.truth.manifest.cam_id)
+
+
+def _by_name(names: Sequence[str]) -> dict[str, Rows]:
+    found, index = np.unique(np.array(names), return_inverse=True)
+    order = np.argsort(index, kind="stable")
+    ends = np.cumsum(np.bincount(index))[:-1]
+    return dict(zip(found.tolist(), np.split(order, ends), strict=True))
+
+
+def _by_range(details: Details) -> dict[str, Rows]:
+    ttc_s, left = details.truth.ttc_s, np.ones(details.truth.n_sequences, dtype=bool)
+    found = {}
+    for interval in details.protocol.intervals:
+        inside = (ttc_s >= interval.low_s) & (ttc_s <= interval.high_s)  # both ends, as in the scores
+        found[f"{interval.name} {interval.seconds}"] = np.flatnonzero(inside)
+        left &= ~inside
+    return found | {"in no range": np.flatnonzero(left)}
+
+
+def _by_occlusion(details: Details) -> dict[str, Rows]:
+    values = _stated(details.truth.objects.occ_ratio, "occ_ratio")
+    return {
+        "0 %": np.flatnonzero(values == 0),
+        **{
+            f"{100 * low:g}–{100 * high:g} %": np.flatnonzero((values > low) & (values <= high))
+            for low, high in ((0.0, 0.25), (0.25, 0.5), (0.5, 1.0))
+        },
+        NOT_STATED: np.flatnonzero(np.isnan(values)),
+    }
+
+
+def _by_lane(details: Details) -> dict[str, Rows]:
+    values = _stated(details.truth.objects.same_lane, "same_lane")
+    return {
+        "same lane": np.flatnonzero(values == 1),
+        "other lane": np.flatnonzero(values == 0),
+        NOT_STATED: np.flatnonzero(np.isnan(values)),
+    }
+
+
+def _by_box_size(details: Details) -> dict[str, Rows]:
+    values = _stated(details.truth.objects.box_height, "box2d")
+    edges = (0.0, 0.05, 0.1, 0.2, 0.4)
+    return {
+        **{
+            f"{100 * low:g}–{100 * high:g} %": np.flatnonzero((values > low) & (values <= high))
+            for low, high in itertools.pairwise(edges)
+        },
+        f"over {100 * edges[-1]:g} %": np.flatnonzero(values > edges[-1]),
+        NOT_STATED: np.flatnonzero(np.isnan(values)),
+    }
+
+
+def _stated(values: Floats | None, column: str) -> Floats:
+    if values is None:
+        raise ValueError(
+            f"The ground truth does not state {column}; expected a table with this column, "
+            "or the annotation folder."
+        )
+    return values
+
+
+GROUPS: Final[dict[str, Callable[[Details], dict[str, Rows]]]] = {
+    "recording": _by_recording,
+    "camera": _by_camera,
+    "range": _by_range,
+    "occlusion": _by_occlusion,
+    "lane": _by_lane,
+    "box-size": _by_box_size,
+}
+"""What sequences can be grouped by."""

@@ -1,0 +1,178 @@
+"""What annotations say of the object of a sequence beside its time to contact, in the target frame.
+
+`occ_ratio` (how much of it is occluded, 0 to 1), `same_lane` (whether it drives in the lane of the camera's
+car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score depends on them, no
+digest contains them; offline analyses group by them. A table has a column of them or not, and a value may be
+missing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.metrics.scale import Floats
+
+OBJECT_COLUMNS: Final = ("occ_ratio", "same_lane", "box2d")
+
+_LANES: Final = {"1": True, "true": True, "0": False, "false": False}
+_FARTHEST: Final = 2.0  # a box may be partly outside the image; beyond this it is in pixels
+
+
+@dataclass(frozen=True, eq=False)
+class Objects:
+    """The columns as float64 arrays, NaN where nothing is stated; None where the source has no such column.
+
+    `occ_ratio` and `same_lane` (1 or 0) are (n,), `box2d` is (n, 4).
+    """
+
+    occ_ratio: Floats | None = None
+    same_lane: Floats | None = None
+    box2d: Floats | None = None
+
+    def __repr__(self) -> str:
+        stated = [name for name in OBJECT_COLUMNS if getattr(self, name) is not None]
+        return f"Objects({', '.join(stated) or 'nothing stated'})"
+
+    @classmethod
+    def of(
+        cls,
+        *,
+        occ_ratio: Sequence[float | None],
+        same_lane: Sequence[bool | None],
+        box2d: Sequence[Sequence[float] | None],
+    ) -> Objects:
+        """From the columns of a table; one without any value is absent."""
+        return cls(
+            occ_ratio=_floats(occ_ratio),
+            same_lane=_floats(same_lane),
+            box2d=_floats([[math.nan] * 4 if box is None else box for box in box2d]),
+        )
+
+    def to_columns(self) -> tuple[list[float | None], list[bool | None], list[list[float] | None]]:
+        """The columns of a table, in the order of `OBJECT_COLUMNS`."""
+        return (
+            [None if math.isnan(value) else value for value in _items(self.occ_ratio)],
+            [None if math.isnan(value) else value == 1 for value in _items(self.same_lane)],
+            [None if math.isnan(box[0]) else box for box in _items(self.box2d)],
+        )
+
+    @property
+    def box_height(self) -> Floats | None:
+        """Height of the boxes as a part of the image's height, (n,)."""
+        return None if self.box2d is None else self.box2d[:, 3] - self.box2d[:, 1]
+
+
+def _items(column: Floats | None) -> list[Any]:
+    return [] if column is None else column.tolist()
+
+
+def _floats(column: Sequence[Any]) -> Floats | None:
+    values: NDArray[np.float64] = np.array(column, dtype=np.float64)  # None becomes NaN
+    if np.isnan(values).all():
+        return None
+    values.setflags(write=False)
+    return values
+
+
+# --- of a field of a CSV table: the value, or `ValueError` that says what was expected --------------------
+
+
+def occ_ratio_of(text: str) -> float | None:
+    """How much is occluded.
+
+    >>> occ_ratio_of("0.25"), occ_ratio_of("")
+    (0.25, None)
+    """
+    expected = "a number from 0 to 1, or nothing"
+    if not text:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        raise ValueError(expected) from None
+    if not 0 <= value <= 1:
+        raise ValueError(expected)
+    return value
+
+
+def same_lane_of(text: str) -> bool | None:
+    """Whether the lane is the same.
+
+    >>> same_lane_of("1"), same_lane_of("False"), same_lane_of("")
+    (True, False, None)
+    """
+    if not text:
+        return None
+    if text.lower() not in _LANES:
+        raise ValueError("1, 0 or nothing")
+    return _LANES[text.lower()]
+
+
+def box2d_of(text: str) -> list[float] | None:
+    """Four numbers with spaces between them.
+
+    >>> box2d_of("0.25 0.25 0.5 0.75"), box2d_of("")
+    ([0.25, 0.25, 0.5, 0.75], None)
+    """
+    if not text:
+        return None
+    try:
+        box = [float(part) for part in text.split()]
+    except ValueError:
+        box = []
+    if not is_box(box):
+        raise ValueError(
+            '"x1 y1 x2 y2" as parts of the width and height of the image, x1 < x2 and y1 < y2, or nothing'
+        )
+    return box
+
+
+FIELDS: Final[dict[str, Callable[[str], Any]]] = {
+    "occ_ratio": occ_ratio_of,
+    "same_lane": same_lane_of,
+    "box2d": box2d_of,
+}
+
+
+def text_of(value: float | bool | Sequence[float] | None) -> str:
+    """The field of a value, as the functions above read it.
+
+    >>> text_of(0.25), text_of(True), text_of([0.25, 0.25, 0.5, 0.75]), text_of(None)
+    ('0.25', '1', '0.25 0.25 0.5 0.75', '')
+    """
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return str(int(value))
+    return repr(value) if isinstance(value, float) else " ".join(map(repr, value))
+
+
+def is_box(box: Sequence[float]) -> bool:
+    """Whether these are the corners of a box in parts of an image."""
+    if len(box) != 4 or not all(abs(number) <= _FARTHEST for number in box):  # NaN is not either
+        return False
+    x1, y1, x2, y2 = box
+    return x1 < x2 and y1 < y2
+
+
+# --- of an object of an annotation file: the value, or None for whatever else stands there ----------------
+
+
+def plain_occ_ratio(value: object) -> float | None:
+    """A number from 0 to 1."""
+    if isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value <= 1:
+        return float(value)
+    return None
+
+
+def plain_same_lane(value: object) -> bool | None:
+    """True or False, also as 1 or 0."""
+    if isinstance(value, bool) or (isinstance(value, int | float) and value in (0, 1)):
+        return bool(value)
+    return None

@@ -1,0 +1,137 @@
+"""whoami, methods, submissions, withdraw, download, manifest --split and truth, as a person calls them."""
+
+from __future__ import annotations
+
+import io
+import json
+import queue
+import sys
+from pathlib import Path
+
+import pytest
+from click.shell_completion import ShellComplete
+
+from evaluator import read_manifest, read_truth
+from evaluator.cli import main
+from evaluator.cli.heartbeat import signs_of_life
+from tests.evaluator.cli.console import ID, METHOD_ID, REJECTED_ID
+from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
+from tests.evaluator.toolkit_folders import camera, write_folder
+from tests.evaluator.worlds import EXAMPLES, Tsttc
+
+pytestmark = pytest.mark.usefixtures("at_site")
+
+SUBMISSIONS = [
+    {"id": ID, "state": "SCORED", "split": "val", "method": "Foo++", "scores": {"mid": 13.921}},
+    {
+        "id": REJECTED_ID,
+        "state": "REJECTED",
+        "split": "test",
+        "method": "Bar",
+        "submitted_at": "2026-11-20T12:00:00Z",
+    },
+]
+MANIFEST = EXAMPLES / "manifest.csv"
+
+
+def test_whoami_names_team_token_and_limits(tsttc: Tsttc, site: RecordedSite) -> None:
+    account = {"team": "TJU-V", "token": "ci", "scopes": ["read"], "split": "val", "expires_at": "2027-01-01"}
+    site.put("GET /api/v1/account", Reply(account))
+    result = tsttc("whoami")
+    assert result.stdout == f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01\n'
+    assert json.loads(tsttc("whoami", "--json").stdout) == account
+
+
+def test_methods_are_listed_with_who_sees_them(tsttc: Tsttc, site: RecordedSite) -> None:
+    rows = [
+        {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE"},
+        {"id": ID, "name": "Bar", "visibility": "ANONYMOUS", "pseudonym": "Anonymous 1a2b3c"},
+    ]
+    site.put("GET /api/v1/methods", Reply(rows))
+    lines = tsttc("methods").stdout.splitlines()
+    assert lines[1].split() == [METHOD_ID, "Foo++", "private"]
+    assert lines[2].endswith("anonymous as Anonymous 1a2b3c")
+    assert [row["name"] for row in json.loads(tsttc("methods", "--json").stdout)] == ["Foo++", "Bar"]
+
+
+def test_submissions_are_listed_page_after_page_and_filtered(tsttc: Tsttc, site: RecordedSite) -> None:
+    link = {"Link": f'<{site.url}/api/v1/submissions?after={ID}>; rel="next"'}
+    site.put("GET /api/v1/submissions", *[Reply(SUBMISSIONS[:1], headers=link), Reply(SUBMISSIONS[1:])] * 2)
+    lines = tsttc("submissions").stdout.splitlines()
+    assert lines[1].split() == [ID, "val", "Foo++", "SCORED", "13.92"]
+    assert lines[2].split() == [REJECTED_ID, "2026-11-20", "12:00", "test", "Bar", "REJECTED", "–"]
+    found = json.loads(tsttc("submissions", "--method", "Bar", "--json").stdout)
+    assert [row["id"] for row in found] == [REJECTED_ID]
+
+
+def test_withdraw_asks_first_and_says_what_became_of_it(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put(f"GET /api/v1/submissions/{ID}", Reply(SUBMISSIONS[0]))
+    site.put(f"POST /api/v1/submissions/{ID}/withdraw", Reply(SUBMISSIONS[0] | {"state": "CANCELLED"}))
+    result = tsttc("withdraw", ID)
+    assert (result.exit_code, site.posts) == (2, [])
+    assert "This withdraws Foo++ on val, state SCORED; it cannot be undone." in result.stderr
+    done = tsttc("withdraw", ID, "--yes")
+    assert (done.exit_code, done.stdout) == (0, "Foo++ on val is cancelled.\n")
+
+
+def test_download_gives_the_bytes_as_they_were_sent(tsttc: Tsttc, site: RecordedSite, tmp_path: Path) -> None:
+    data = b'{"0": 1.0}\r\n'
+    site.put(f"GET /api/v1/submissions/{ID}/file", Reply(data))
+    assert tsttc("download", ID).stdout_bytes == data
+    assert tsttc("download", ID, "-o", tmp_path / "mine.json").exit_code == 0
+    assert (tmp_path / "mine.json").read_bytes() == data
+    site.put(f"GET /api/v1/submissions/{REJECTED_ID}/file", Reply(problem("No such submission."), 404))
+    assert tsttc("download", REJECTED_ID).exit_code == 8
+
+
+def test_manifest_of_a_split_comes_from_the_leaderboard_without_a_token(
+    tsttc: Tsttc, site: RecordedSite, tmp_path: Path
+) -> None:
+    site.put(
+        "GET /api/v1/splits/val/manifest", Reply(MANIFEST.read_bytes(), headers={"Content-Type": "text/csv"})
+    )
+    path = tmp_path / "manifest.csv"
+    result = tsttc("manifest", "--split", "val", "-o", path)
+    assert result.stdout == f"{path}: 60 sequences of 6 recordings.\n"
+    assert read_manifest(path).digest == read_manifest(MANIFEST).digest
+    assert site.requests[0].headers["Authorization"] is None
+    for arguments in ((), (MANIFEST, "--split", "val")):
+        assert "Give either TRUTH_OR_FOLDER or --split." in tsttc("manifest", *arguments).stderr
+
+
+def test_truth_of_a_folder_becomes_a_table_with_its_objects(tsttc: Tsttc, tmp_path: Path) -> None:
+    folder = write_folder(tmp_path / "folder", {"a.pkl": [camera({7: list(range(6))}, occ_ratio=0.25)]})
+    path = tmp_path / "val.csv"
+    assert tsttc("truth", folder, "-o", path).stdout == f"{path}: 1 sequences of 1 recordings.\n"
+    found = read_truth(path)
+    assert found.digest == json.loads(tsttc("truth", folder, "--json").stdout)["truth_digest"]
+    assert found.objects.occ_ratio.tolist() == [0.25]
+    assert tsttc("truth", path, "-o", path).exit_code == 2
+
+
+def suggested(*words: str) -> list[str]:
+    """What a shell would offer for the last of these words."""
+    found = ShellComplete(main, {}, "tsttc", "_TSTTC_COMPLETE").get_completions(list(words[:-1]), words[-1])
+    return [item.value for item in found]
+
+
+def test_a_shell_completes_splits_and_one_s_own_methods(site: RecordedSite) -> None:
+    site.put("GET /api/v1/methods", Reply([{"id": METHOD_ID, "name": "Foo++"}, {"id": ID, "name": "Bar"}]))
+    assert suggested("submit", "x.json", "--split", "") == ["val"]
+    assert suggested("submit", "x.json", "--split", "t") == []
+    assert suggested("submit", "x.json", "--method", "F") == ["Foo++"]
+    assert suggested("publish", "") == ["Foo++", "Bar"]
+    assert suggested("publish", "--server", "http://127.0.0.1:9", "") == []
+
+
+def test_a_pipe_hears_of_every_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+    told: queue.Queue[str] = queue.Queue()
+
+    class Pipe(io.StringIO):
+        def write(self, text: str) -> int:
+            told.put(text)
+            return len(text)
+
+    monkeypatch.setattr(sys, "stderr", Pipe())
+    with signs_of_life("https://example.org", every_s=0.001):
+        assert told.get(timeout=60).startswith("Waiting for https://example.org (0 s) …")

@@ -1,0 +1,44 @@
+"""`tsttc published`: the paper's tables, without a server."""
+
+import json
+
+from evaluator.cli.published import FORMATS
+from evaluator.tables.published import WRITERS
+from tests.evaluator.worlds import Tsttc
+
+
+def test_the_tables_are_listed(tsttc: Tsttc) -> None:
+    lines = tsttc("published").stdout.splitlines()
+    assert len(lines) == 1 + 12
+    assert lines[2].split() == ["main-results", "Main", "results", "100"]
+    assert len(json.loads(tsttc("published", "--json").stdout)) == 12
+
+
+def test_a_table_has_its_default_its_notes_and_its_source(tsttc: Tsttc) -> None:
+    text = tsttc("published", "ablation-kernel-size").stdout
+    assert "7 (default)   14.4  12.1" in text
+    assert "Note: A kernel of 9 has a lower error than the default of 7" in text
+    assert text.endswith("section E Ablation Study: https://arxiv.org/abs/2309.01539\n")
+
+
+def test_a_table_is_printed_in_other_formats(tsttc: Tsttc) -> None:
+    assert tuple(WRITERS) == FORMATS
+    for name, start in (
+        ("csv", '"split","method","mid"'),
+        ("latex", "% Main results."),
+        ("markdown", "| Split |"),
+    ):
+        assert tsttc("published", "main-results", "--format", name).stdout.startswith(start)
+    found = json.loads(tsttc("published", "main-results", "--json").stdout)
+    assert found["rows"][3]["values"][0] == 14.4
+
+
+def test_an_unknown_table_and_a_format_without_a_table_are_said_so(tsttc: Tsttc) -> None:
+    result = tsttc("published", "nowhere")
+    assert result.exit_code == 2
+    assert "There is no table 'nowhere'; expected one of dataset-comparison, main-results," in " ".join(
+        result.stderr.split()
+    )
+    result = tsttc("published", "--format", "latex")
+    assert result.exit_code == 2
+    assert "--format latex prints one table; name it" in " ".join(result.stderr.split())

@@ -1,0 +1,112 @@
+"""JSON in gzip and CSV tables: read as the JSON of the same predictions, within limits."""
+
+import gzip
+import zlib
+from typing import Any
+
+import pytest
+
+from evaluator import Rejected, convert, read_predictions, scale_ratio_to_ttc
+from evaluator.predictions import packages
+from evaluator.predictions.predictions import sha256_digest
+from tests.evaluator.worlds import EXAMPLES, Tsttc, flat, make_truth
+
+TRUTH = make_truth([1.0, 4.0, -10.0])
+MANIFEST = TRUTH.manifest
+GOOD = flat([1.5, -2.25, 30.0])
+
+
+def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = None) -> bytes:
+    names = {"ts": "ts_ns"}
+    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*packages.NATURAL_KEY, "anno_id")}
+    values = {"ttc": ["1.5", "-2.25", "3e1"], "scale_ratio": ["0.9", "1.1", "1"], "frame_gap": [5, 5, 1]}
+    cells: dict[str, Any] = keys | values | {"note": ["a", '"b,c"', ""]} | (rows or {})
+    lines = [",".join(columns), *(",".join(str(cells[name][row]) for name in columns) for row in range(3))]
+    return end.join([*lines, ""]).encode()
+
+
+@pytest.mark.parametrize(
+    "columns", [("anno_id", "ttc"), (*packages.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
+)
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+@pytest.mark.parametrize("start", [b"", b"\xef\xbb\xbf"])
+def test_a_table_means_what_its_json_means(columns: tuple[str, ...], end: str, start: bytes) -> None:
+    found = read_predictions(start + table(*columns, end=end), manifest=MANIFEST)
+    assert found.ttc_s.tolist() == [1.5, -2.25, 30.0]
+    assert found.keys == ("natural_key" if "ts" in columns else "anno_id")
+
+
+def test_json_on_one_line_that_mentions_a_column_is_no_table() -> None:
+    data = b'{"unit":"ttc","meta":{"tags":["a","ttc","b"]},"predictions":' + GOOD + b"}"
+    assert read_predictions(data, manifest=MANIFEST).enveloped
+
+
+def test_a_table_of_scale_ratios_has_a_rate_for_each_row() -> None:
+    found = read_predictions(table("anno_id", "scale_ratio", "frame_gap"), manifest=MANIFEST)
+    expected = scale_ratio_to_ttc([0.9, 1.1, 1.0], fps_hz=[2.0, 2.0, 10.0])
+    assert found.ttc_s.tolist() == expected.tolist()
+    assert found.unit == "scale_ratio"
+
+
+def test_gzip_is_unpacked_all_its_members_and_named_by_the_bytes_that_were_sent() -> None:
+    for data in (gzip.compress(GOOD), gzip.compress(GOOD[:9]) + gzip.compress(GOOD[9:])):
+        found = read_predictions(data, manifest=MANIFEST)
+        assert found.ttc_s.tolist() == [1.5, -2.25, 30.0]
+        assert found.digest == sha256_digest(data)
+    assert convert(gzip.compress(GOOD)) == convert(GOOD)
+    assert read_predictions(gzip.compress(table("anno_id", "ttc")), manifest=MANIFEST).ttc_s[0] == 1.5
+
+
+@pytest.mark.parametrize(
+    ("data", "code", "words", "where"),
+    [
+        (
+            gzip.compress(GOOD, mtime=0)[:-9],
+            "not-json",
+            "no intact gzip archive: it ends before its content does.",
+            "",
+        ),
+        (b"\x1f\x8b\x08\x00", "not-json", "no intact gzip archive", ""),
+        (gzip.compress(GOOD, mtime=0) + b"more", "not-json", "no intact gzip archive", ""),
+        (table("anno_id", "note"), "missing-columns", 'has the columns "anno_id,note"; expected', "line 1"),
+        (table("anno_id", "scale_ratio"), "missing-columns", "scale_ratio with fps or frame_gap", "line 1"),
+        (table("ttc", "note"), "missing-columns", "expected anno_id, or bag_stamp", "line 1"),
+        (b"anno_id,ttc\n0,1,2\n", "bad-csv", "The row has 3 fields; expected 2, as the header.", "row 1"),
+        (b'anno_id,ttc\n0,"1\n', "bad-csv", "This is not a CSV table: unexpected end of data.", "line 2"),
+        (b"anno_id,ttc\n0,\xff\n", "not-utf8", "Byte 14 of the table is not UTF-8", "byte 14"),
+    ],
+)
+def test_what_cannot_be_read_is_said_in_words(data: bytes, code: str, words: str, where: str) -> None:
+    with pytest.raises(Rejected) as caught:
+        read_predictions(data, manifest=MANIFEST)
+    [problem] = caught.value.problems
+    assert (problem.code, problem.where) == (code, where)
+    assert words in problem.message
+
+
+def test_faults_of_values_have_the_words_of_json_and_the_key_of_their_row() -> None:
+    rows = {"ttc": ["nan", "x", "0"]}
+    with pytest.raises(Rejected) as caught:
+        read_predictions(table("anno_id", "ttc", rows=rows), manifest=MANIFEST)
+    found = {problem.where: problem.code for problem in caught.value.problems}
+    assert found == {"/0": "nan", "/1": "not-a-number", "/2": "zero"}
+
+
+def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(packages, "MAX_UNPACKED_BYTES", 10_000)
+    bomb = gzip.compress(b" " * 10_001)
+    for data in (bomb, gzip.compress(b" " * 9_000) * 3):
+        with pytest.raises(Rejected) as caught:
+            read_predictions(data, manifest=MANIFEST)
+        assert [problem.code for problem in caught.value.problems] == ["too-large"]
+    assert len(zlib.decompress(gzip.compress(b" " * 10_000), wbits=31)) == 10_000
+    with pytest.raises(Rejected) as caught:
+        packages.json_of(b"anno_id,ttc\n" + b"0,1\n" * 6, max_rows=5)
+    assert [problem.code for problem in caught.value.problems] == ["too-many-members"]
+
+
+def test_every_command_takes_them(tsttc: Tsttc) -> None:
+    data = gzip.compress((EXAMPLES / "predictions.json").read_bytes())
+    result = tsttc("score", "-", "--truth", EXAMPLES / "truth.csv", stdin=data)
+    assert result.exit_code == 0
+    assert tsttc("check", "-", "--manifest", EXAMPLES / "manifest.csv", stdin=data).exit_code == 0
