@@ -40,9 +40,11 @@ class Estimator(Protocol):
 PROBLEM_CODES: Final[dict[str, str]] = {
     "bad-box": "A box is missing, empty, reversed, too small, outside of its image or in another unit.",
     "bad-frame": "An image is missing, not readable or of another size, or a sequence has too few frames.",
+    "bad-weights": "A file of weights is damaged, too large, or of another network.",
     "no-estimate": "A method has no estimate for a sequence.",
+    "reversed-time": "The rows of a track are not in the order of time.",
 }
-"""What can be wrong with frames and boxes, beside the codes of `evaluator.problems` for tables."""
+"""What can be wrong with frames, boxes and tracks, beside the codes of `evaluator.problems` for tables."""
 
 
 class Unusable(Exception):

@@ -205,8 +205,8 @@ def task_figure(
     foot = 46.0 if width >= _WIDE else 114.0
     height = _MARGIN + n_rows * (side + label) + foot
     title = (
-        f"Six frames at 10 Hz. The vehicle's box is {ratio:.3f} times as large in the first as in the last: "
-        f"the scale ratio. It means {_seconds(ttc_s)} to contact."
+        f"Six frames at 10 Hz. The vehicle's box is {_ratio(ratio)} times as large in the first as in the "
+        f"last: the scale ratio. It means {_seconds(ttc_s)} to contact."
     )
     figure = Figure(round(width), round(height), THEMES[theme], title)
     colours = figure.theme
@@ -233,7 +233,7 @@ def task_figure(
 def _add_equations(figure: Figure, ratio: float, ttc_s: float, *, y: float) -> None:
     """The scale ratio and the time to contact: side by side, or below each other on two lines each."""
     colours = figure.theme
-    scale = ("size in the reference ÷ size in the target", f"= α = {ratio:.3f}")
+    scale = ("size in the reference ÷ size in the target", f"= α = {_ratio(ratio)}")
     time = ("time to contact τ = 1 / (2 Hz · (1/α − 1))", f"= {_seconds(ttc_s)}")
     if figure.width < _WIDE:
         lines = [
@@ -246,6 +246,21 @@ def _add_equations(figure: Figure, ratio: float, ttc_s: float, *, y: float) -> N
         Text(" ".join(scale), _MARGIN, y, colours.mark, 18, is_bold=True),
         Text(" ".join(time), figure.width - _MARGIN, y, colours.ink, 18, anchor="end"),
     ]
+
+
+def _ratio(scale: float) -> str:
+    """A scale ratio over the whole gap, with so many digits that the printed time to contact follows from it.
+
+    >>> _ratio(0.8), _ratio(0.811425)
+    ('0.800', '0.8114')
+    """
+
+    def seconds(ratio: float) -> str:
+        growth = float(fps_of_gap(TARGET)) * (1 / ratio - 1)
+        return _seconds(1 / growth if growth else math.inf)
+
+    printed = (f"{scale:.{digits}f}" for digits in range(3, 17))
+    return next((text for text in printed if seconds(float(text)) == seconds(scale)), f"{scale:.3f}")
 
 
 def _seconds(ttc_s: float) -> str:

@@ -37,6 +37,13 @@ class Parameter:
     high: float | None = None
 
     @property
+    def default_in_words(self) -> str | None:
+        """The default as messages show it, of a file its name; None where there is none."""
+        if self.default is None:
+            return None
+        return self.default.name if isinstance(self.default, Path) else str(self.default)
+
+    @property
     def option(self) -> str:
         """`--name`, as it is typed."""
         return "--" + self.name.replace("_", "-")
@@ -91,6 +98,9 @@ class Method:
 
 MEASURES: Final = ("area", "sqrt-area", "height", "width")
 """As in `baselines.boxes`, which loads numpy."""
+
+OWN_WEIGHTS: Final = Path(__file__).parent / "deep_scale" / "rendered.npz"
+"""The weights that come with the package, trained on rendered frames."""
 
 METHODS: Final[tuple[Method, ...]] = (
     Method(
@@ -154,6 +164,23 @@ METHODS: Final[tuple[Method, ...]] = (
         ),
         frames="all",
         boxes="target",
+    ),
+    Method(
+        name="deep-scale",
+        title="Deep Scale",
+        summary="The paper's network, which compares features of both boxes at 20 scale ratios.",
+        factory="baselines.deep_scale.estimator:DeepScale",
+        parameters=(
+            Parameter(
+                "weights", OWN_WEIGHTS, "Weights, of this project or the toolkit's checkpoint.", kind=Path
+            ),
+            Parameter(
+                "device",
+                "numpy",
+                "What computes: numpy, or torch on cpu or cuda.",
+                choices=("numpy", "cpu", "cuda"),
+            ),
+        ),
     ),
     Method(
         name="alignment",

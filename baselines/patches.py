@@ -51,6 +51,10 @@ class Window:
         growth = np.array([columns / n_columns, rows / n_rows])
         return Window(np.asarray(pixels, dtype=np.float32), self.origin, self.pixel_size * growth)
 
+    def darker(self, levels: float) -> Window:
+        """The same part, all its grey levels so much less."""
+        return Window(self.pixels - np.float32(levels), self.origin, self.pixel_size)
+
     def sample(self, x: ArrayLike, y: ArrayLike) -> Pixels:
         """(n, rows, columns): grey levels, bilinear, at the places `x` (n, columns) and `y` (n, rows) of the
         frame, a grid for each of the n; of pixels in colour, (n, rows, columns, 3).

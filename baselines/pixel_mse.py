@@ -121,14 +121,14 @@ class PixelMse:
 class Comparison:
     """The patch of a target box, ready to be compared with a reference frame at one resolution.
 
-    `patch` is float64 (rows, columns) without its mean, `mean` what was taken off, `cell_px` (2,) the size of
-    its cells in pixels of the target frame, `centre` (2,) that of the reference box.
+    `patch` is float64 (rows, columns) without its mean, which was taken off the levels of `reference` too.
+    `cell_px` (2,) is the size of its cells in pixels of the target frame, `centre` (2,) that of the reference
+    box.
     """
 
     reference: patches.Window
     centre: Floats
     patch: Floats
-    mean: float
     cell_px: Floats
 
     @classmethod
@@ -161,10 +161,9 @@ class Comparison:
         size = (n_cells + 2 * max_shift) * cell_px * max_scale
         mean = float(np.mean(patch, dtype=np.float64))
         return cls(
-            reference=patches.cut(reference, centre=centre, size=size, pixel_size=shrink),
+            reference=patches.cut(reference, centre=centre, size=size, pixel_size=shrink).darker(mean),
             centre=centre,
             patch=patch.astype(np.float64) - mean,
-            mean=mean,
             cell_px=cell_px,
         )
 
@@ -204,7 +203,7 @@ class Comparison:
         cells = np.multiply.outer(scales, self.cell_px)
         x = patches.grid_about(self.centre[0], n_cells=columns + 2 * max_shift, cell_px=cells[:, 0])
         y = patches.grid_about(self.centre[1], n_cells=rows + 2 * max_shift, cell_px=cells[:, 1])
-        sampled = np.subtract(self.reference.sample(x, y), self.mean, dtype=kind)
+        sampled = self.reference.sample(x, y).astype(kind, copy=False)
         products = sampled.reshape(len(scales), -1) @ self._placed(max_shift, kind).T
         np.square(sampled, out=sampled)
         energies = _sums_under(sampled, rows=rows, columns=columns)
@@ -216,18 +215,20 @@ class Comparison:
         rows, columns = self.patch.shape
         n_shifts = 2 * max_shift + 1
         shape = (n_shifts, n_shifts, rows + 2 * max_shift, columns + 2 * max_shift)
+        patch = self.patch.astype(kind)
         placed = np.zeros(shape, dtype=kind)
         for dy in range(n_shifts):
             for dx in range(n_shifts):
-                placed[dy, dx, dy : dy + rows, dx : dx + columns] = self.patch
+                placed[dy, dx, dy : dy + rows, dx : dx + columns] = patch
         return placed.reshape(n_shifts**2, -1)
 
 
 def _sums_under(values: NDArray[Any], *, rows: int, columns: int) -> Floats:
     """(n, k, k): sums over all (rows, columns) parts of the n arrays."""
-    n, n_rows, n_columns = values.shape
-    across = values.reshape(-1, n_columns) @ _band(n_columns, columns).astype(values.dtype)
-    return np.asarray(_band(n_rows, rows).T @ across.reshape(n, n_rows, -1).astype(np.float64))
+    _, n_rows, n_columns = values.shape
+    # Down first: that reads the values as they lie.
+    down = _band(n_rows, rows).T.astype(values.dtype) @ values
+    return np.asarray(down.astype(np.float64) @ _band(n_columns, columns))
 
 
 def _band(length: int, width: int) -> Floats:

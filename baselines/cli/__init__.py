@@ -17,8 +17,11 @@ from evaluator.cli.failures import Failure
 COMMANDS: Final = {
     "list": "baselines.cli.listing:list_methods",
     "run": "baselines.cli.runs:run",
+    "train": "baselines.cli.training:train",
     "simulate": "baselines.cli.simulations:simulate",
     "render": "baselines.cli.simulations:render",
+    "annotate": "baselines.cli.annotations:annotate",
+    "noise": "baselines.cli.noise:noise",
     "ablate": "baselines.cli.ablations:ablate",
     "show": "baselines.cli.showing:show",
 }

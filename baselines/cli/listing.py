@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from pathlib import Path
 
 import click
 
@@ -35,7 +36,7 @@ def list_methods(*, as_json: bool) -> None:
 def parameter_in_words(parameter: Parameter) -> str:
     """Its values, its default and what it is for."""
     values = "|".join(parameter.choices) or parameter.kind.__name__.upper()
-    default = "" if parameter.default is None else f" (default {parameter.default})"
+    default = "" if parameter.default is None else f" (default {parameter.default_in_words})"
     return f"{values}{default}: {parameter.help}"
 
 
@@ -49,7 +50,12 @@ def _provenance(method: Method) -> str:
 
 def _document(method: Method) -> dict[str, object]:
     parameters = [
-        {**asdict(parameter), "kind": parameter.kind.__name__.lower(), "choices": list(parameter.choices)}
+        {
+            **asdict(parameter),
+            "default": parameter.default_in_words if parameter.kind is Path else parameter.default,
+            "kind": parameter.kind.__name__.lower(),
+            "choices": list(parameter.choices),
+        }
         for parameter in method.parameters
     ]
     published = None if method.published is None else dict(method.published)

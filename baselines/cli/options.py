@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import click
@@ -42,6 +43,12 @@ def jobs_option(command: Command) -> Command:
 def truth_option(what: str) -> Callable[[Command], Command]:
     """--truth: the ground truth, by default that of the folder."""
     return click.option("--truth", "truth_path", type=TABLE, metavar="FILE", help=what)
+
+
+def require_writable(out: Path) -> None:
+    """Say before the work, not after it, that its result has no place."""
+    if not os.access(out.parent, os.W_OK):
+        raise click.BadParameter(f"{out.parent} is no folder that can be written to.", param_hint="--out")
 
 
 def n_cores() -> int:

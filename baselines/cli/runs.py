@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from baselines.cli import require_opencv
-from baselines.cli.options import gap_option, jobs_option
+from baselines.cli.options import gap_option, jobs_option, require_writable
 from baselines.methods import METHODS, Method, Parameter, Value, get_method
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -38,7 +38,9 @@ def _option(of_method: Mapping[str, Parameter]) -> Callable[[Command], Command]:
     """The option of a name, with the parameters of that name by method."""
     parameter = next(iter(of_method.values()))
     defaults = [
-        f"{method} {other.default}" for method, other in of_method.items() if other.default is not None
+        f"{method} {other.default_in_words}"
+        for method, other in of_method.items()
+        if other.default is not None
     ]
     default = f" [default: {', '.join(defaults)}]" if defaults else ""
     kind: click.ParamType[Any]
@@ -105,7 +107,7 @@ def run(
     """
     method = get_method(method_name)
     given = _given(method, options)
-    _require_writable(out)
+    require_writable(out)
     require_opencv()
     from baselines.cli.progress import shown_progress  # noqa: PLC0415 -- OpenCV, which --help can do without
     from baselines.folders import read_folder  # noqa: PLC0415 -- as above
@@ -113,10 +115,7 @@ def run(
     from baselines.processes import WorkerEnded  # noqa: PLC0415 -- as above
     from baselines.running import run_method  # noqa: PLC0415 -- as above
 
-    try:
-        method.estimator(method.filled(given))
-    except ValueError as error:
-        raise click.UsageError(str(error)) from None
+    _require_estimator(method, given)
     with naming(folder):
         sequences = read_folder(folder)
         try:
@@ -158,10 +157,17 @@ def _given(method: Method, options: Mapping[str, Value]) -> dict[str, Value]:
     return given
 
 
-def _require_writable(out: Path) -> None:
-    """Say before the run, not after it, that its result has no place."""
-    if not os.access(out.parent, os.W_OK):
-        raise click.BadParameter(f"{out.parent} is no folder that can be written to.", param_hint="--out")
+def _require_estimator(method: Method, given: Mapping[str, Value]) -> None:
+    """Say before the folder is read that the method cannot be made with these options."""
+    try:
+        filled = method.filled(given)
+        weights = filled.get("weights")
+        with naming(weights) if isinstance(weights, Path) else nullcontext():
+            method.estimator(filled)
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    except OSError as error:
+        raise click.UsageError(f"{error.filename} cannot be read: {error.strerror}.") from None
 
 
 def _report(done: Run, *, out: Path, as_json: bool) -> None:

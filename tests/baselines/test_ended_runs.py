@@ -18,6 +18,7 @@ import pytest
 from baselines.journals import Journal
 from tests.baselines.made_folders import image_path, made_folder
 from tests.evaluator.worlds import REPOSITORY, Tsttc
+from tests.signals import default_signals
 
 pytestmark = [
     pytest.mark.slow,
@@ -44,13 +45,14 @@ def held_run(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", int]]:
     """A run in a process group of its own that waits for the image, and the writing end of that."""
     out = folder.parent / "p.json"
     words = ["baseline", "run", "pixel-mse", str(folder), "--out", str(out), "--jobs", "2"]
-    process = subprocess.Popen(
-        [sys.executable, "-m", "evaluator", *words],
-        cwd=REPOSITORY,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
+    with default_signals():
+        process = subprocess.Popen(
+            [sys.executable, "-m", "evaluator", *words],
+            cwd=REPOSITORY,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
     guard = subprocess.Popen(  # ends a test whose image is never opened
         [sys.executable, "-c", f"import time; time.sleep({MOST_S}); open({str(image_path(folder, 12, 0))!r})"]
     )

@@ -1,5 +1,6 @@
 """Figures: what they show, in both formats."""
 
+import re
 import xml.etree.ElementTree as ET
 
 import cv2
@@ -94,6 +95,16 @@ def test_the_task_figure_shows_six_frames_and_says_the_scale_ratio(clip: Clip, n
     assert all(picture.x + picture.width <= figure.width for picture in pictures)
     assert "= α = 0.800" in texts(figure)
     assert "= 2.0 s" in texts(figure)
+
+
+@pytest.mark.parametrize("ttc_s", [2.152, 0.31, 7.77, -3.04, 48.0, 400.0])
+def test_the_time_to_contact_follows_from_the_scale_ratio_as_printed(clip: Clip, ttc_s: float) -> None:
+    frames = [clip.grey(frame) for frame in range(6)]
+    printed = texts(task_figure(frames, boxes=clip.boxes, ttc_s=ttc_s)).replace("−", "-")
+    ratio = float(re.findall(r"= α = ([\d.]+)", printed)[0])
+    recomputed_s = 1 / (2 * (1 / ratio - 1))
+    shown = f"{recomputed_s:.{1 if abs(ttc_s) < 10 else 0}f}" if recomputed_s <= 100 else "over 100"
+    assert f"= {shown} s" in printed
 
 
 def test_boxes_of_the_task_figure_keep_their_ratio(clip: Clip) -> None:

@@ -107,5 +107,5 @@ def test_an_object_without_a_box_is_refused_with_its_place(tmp_path: Path, wrong
     problem = rejected.value.problems[0]
     assert (problem.code, problem.where) == ("bad-field", "0007.pkl, sequence 0")
     assert problem.message.startswith("box2d is ")
-    assert problem.message.endswith("expected four numbers, x1, y1, x2 and y2.")
+    assert "expected four numbers, x1, y1, x2 and y2. 1 more place has this problem" in problem.message
     assert read_manifest(tmp_path).n_sequences == 2, "whoever wants no boxes does without"

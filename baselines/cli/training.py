@@ -1,0 +1,194 @@
+"""`tsttc baseline train`: weights of Deep Scale, from a folder with ground truth or from rendered frames."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from baselines.cli import require_opencv
+from baselines.cli.options import TRUTH, require_writable
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.options import json_option
+from evaluator.cli.reading import FOLDER, naming
+
+if TYPE_CHECKING:
+    from baselines.deep_scale.samples import Source
+    from baselines.deep_scale.training import Epoch
+
+_VALIDATION_SEED = 7
+_FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
+
+
+@click.command(short_help="Train Deep Scale, on a folder or on rendered frames.")
+@click.argument("folder", type=FOLDER, required=False)
+@click.option(
+    "-o",
+    "--out",
+    required=True,
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Write the weights of the best epoch to this file.",
+)
+@click.option("--val", "val_folder", type=FOLDER, help="Score each epoch on this folder. [default: rendered]")
+@click.option(
+    "--sequences",
+    "n_sequences",
+    type=click.IntRange(40, 1_000_000),
+    default=6000,
+    show_default=True,
+    help="Without FOLDER: rendered sequences to learn from.",
+)
+@click.option(
+    "--val-sequences",
+    "n_val",
+    type=click.IntRange(40, 100_000),
+    default=320,
+    show_default=True,
+    help="Without --val: rendered sequences to score each epoch on.",
+)
+@click.option("--epochs", type=click.IntRange(1, 10_000), default=36, show_default=True)
+@click.option("--batch", type=click.IntRange(1, 4096), default=16, show_default=True, help="Pairs of a step.")
+@click.option(
+    "--rate",
+    "lr_per_pair",
+    type=click.FloatRange(0, 1, min_open=True),
+    default=1e-4,
+    show_default=True,
+    help="Greatest learning rate, for each pair of a step.",
+)
+@click.option("--optimizer", type=click.Choice(["sgd", "adam"]), default="sgd", show_default=True)
+@click.option(
+    "--ratio-weight",
+    type=click.FloatRange(0, 1e6),
+    default=0.0,
+    show_default=True,
+    help="Adds so many times |ln α̂ − ln α| to the loss.",
+)
+@click.option("--similarity", type=click.Choice(["cosine", "dot"]), default="cosine", show_default=True)
+@click.option(
+    "--cells",
+    "n_cells",
+    type=click.IntRange(5, 100),
+    default=50,
+    show_default=True,
+    help="Cells of the target's box in each direction.",
+)
+@click.option(
+    "--box",
+    "max_box_px",
+    type=click.FloatRange(16, 400),
+    default=120.0,
+    show_default=True,
+    help="Larger boxes are shrunk to so many pixels.",
+)
+@click.option(
+    "--margin",
+    "margin_px",
+    type=click.FloatRange(0, 64),
+    default=16.0,
+    show_default=True,
+    help="Pixels around what is compared.",
+)
+@click.option("--start", type=_FILE, help="Begin with the weights of this file.")
+@click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True)
+@click.option("--device", type=click.Choice(["cpu", "cuda"]), default="cpu", show_default=True)
+@json_option
+def train(
+    *,
+    folder: Path | None,
+    out: Path,
+    val_folder: Path | None,
+    n_sequences: int,
+    n_val: int,
+    start: Path | None,
+    device: str,
+    as_json: bool,
+    **recipe: Any,
+) -> None:
+    """Train the network of Deep Scale on FOLDER, or without it on rendered frames.
+
+    A folder has frames and boxes as for `tsttc baseline run`, and truth.csv. After each epoch, the network is
+    scored on sequences that it does not learn from. The defaults are the paper's recipe. If a training is
+    interrupted, the same command continues it after its last whole epoch.
+
+    \b
+    Examples:
+      tsttc baseline train tsttc/train/ --val tsttc/val/ --out weights.npz --device cuda
+      tsttc baseline train --out weights.npz --sequences 2000 --optimizer adam
+    """
+    require_writable(out)
+    require_opencv()
+    if find_spec("torch") is None:
+        message = "Training needs torch; install it with: pip install '.[train]' in a checkout."
+        raise Failure(message, exit_code=Exit.USAGE, code="no-torch")
+    from baselines.cli.progress import shown_progress  # noqa: PLC0415 -- OpenCV and torch, as above
+    from baselines.deep_scale import training  # noqa: PLC0415 -- as above
+    from baselines.deep_scale.weights import Use, read_weights  # noqa: PLC0415 -- as above
+
+    wanted = Use(*(recipe.pop(name) for name in ("similarity", "n_cells", "max_box_px", "margin_px")))
+    with naming(start or out):
+        weights = read_weights(start) if start else None
+    source = _folder_source(folder) if folder else _rendered(n_sequences, seed=1000 + recipe["seed"])
+    validation = _folder_source(val_folder) if val_folder else _rendered(n_val, seed=_VALIDATION_SEED)
+    total = source.truth.n_sequences * recipe["epochs"]
+    try:
+        with naming(folder or out), shown_progress("Deep Scale", total=total) as progress:
+            epochs = training.train(
+                source=source,
+                validation=training.Validation(validation),
+                recipe=training.Recipe(use=wanted, **recipe),
+                out=out,
+                start=weights,
+                device=device,
+                progress=progress,
+                after_epoch=_tell,
+            )
+    except OSError as error:
+        raise click.BadParameter(f"{out} cannot be written: {error.strerror}.", param_hint="--out") from None
+    except training.DeviceMissing:
+        message = "--device cuda needs a graphics card that torch can use; expected cpu here."
+        raise click.UsageError(message) from None
+    _report(epochs, out=out, as_json=as_json)
+
+
+def _rendered(n_sequences: int, *, seed: int) -> Source:
+    import numpy as np  # noqa: PLC0415 -- --help can do without
+
+    from baselines.deep_scale.samples import RenderedSequences  # noqa: PLC0415 -- as above
+    from baselines.simulation import split  # noqa: PLC0415 -- as above
+
+    drawn = split(
+        rng=np.random.default_rng(seed), n_sequences=n_sequences, n_recordings=max(1, n_sequences // 40)
+    )
+    return RenderedSequences(drawn, seed=seed)
+
+
+def _folder_source(path: Path) -> Source:
+    """The sequences of a folder that has its ground truth; raises `Failure` for one that has not."""
+    from baselines.deep_scale.samples import FolderSequences  # noqa: PLC0415 -- --help can do without
+    from baselines.folders import read_folder  # noqa: PLC0415 -- as above
+    from evaluator import read_truth  # noqa: PLC0415 -- as above
+
+    has_table = (path / TRUTH).is_file()
+    with naming(path):
+        return FolderSequences.of(read_folder(path), read_truth(path / TRUTH if has_table else path))
+
+
+def _tell(epoch: Epoch) -> None:
+    line = f"epoch {epoch.number}: loss {epoch.loss:.3f}, MiD {epoch.mid:.1f}, RTE {epoch.rte:.1f} %"
+    if epoch.n_left_out:
+        line += f"; {epoch.n_left_out:,} sequences left out"
+    click.echo(line, err=True)
+
+
+def _report(epochs: list[Epoch], *, out: Path, as_json: bool) -> None:
+    best = min(epochs, key=lambda epoch: epoch.mid)
+    if as_json:
+        echo_json({"output": str(out), "best": best.number, "epochs": [asdict(epoch) for epoch in epochs]})
+        return
+    click.echo(f"{out}: epoch {best.number} of {len(epochs)}, MiD {best.mid:.1f}, RTE {best.rte:.1f} %.")

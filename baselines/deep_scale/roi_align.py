@@ -1,0 +1,38 @@
+"""RoI align (He et al., Mask R-CNN, 2017) as two matrix products: rows of the map, then its columns.
+
+The rules are torchvision's with `aligned=False` and `sampling_ratio=-1`: a cell is the mean of
+ceil(box side / cells) samples in each direction, each bilinear; the map's first value lies at 0; a sample
+before −1 or after the map's length is 0, and one between there and the edge takes the edge's value.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def sampling_matrix(low: float, high: float, *, n_cells: int, length: int) -> NDArray[np.float64]:
+    """(n_cells, length): times one axis of a map, the means in the cells of a box from `low` to `high` there.
+
+    A box narrower than 1 counts as 1 wide, as in torchvision.
+
+    >>> sampling_matrix(0.0, 2.0, n_cells=2, length=3).tolist()
+    [[0.5, 0.5, 0.0], [0.0, 0.5, 0.5]]
+    """
+    side = max(high - low, 1.0)
+    n_samples = max(1, math.ceil(side / n_cells))
+    cell = side / n_cells
+    offsets = (np.arange(n_samples) + 0.5) / n_samples
+    places = low + cell * (np.arange(n_cells)[:, np.newaxis] + offsets)
+    inside = (places >= -1.0) & (places <= length)
+    held = np.clip(places, 0.0, length - 1)
+    below = np.minimum(held.astype(np.intp), length - 1)
+    above = np.minimum(below + 1, length - 1)
+    part = held - below
+    matrix = np.zeros((n_cells, length))
+    cells = np.broadcast_to(np.arange(n_cells)[:, np.newaxis], places.shape)
+    np.add.at(matrix, (cells, below), inside * (1 - part))
+    np.add.at(matrix, (cells, above), inside * part)
+    return matrix / n_samples

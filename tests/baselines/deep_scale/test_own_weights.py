@@ -1,0 +1,59 @@
+"""The weights that come with the package: what their card says, and what they are good for."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.deep_scale.estimator import DeepScale
+from baselines.deep_scale.figures import confidence_figure
+from baselines.deep_scale.weights import read_weights
+from baselines.drawing import Line, Picture, Text
+from baselines.folders import read_folder
+from baselines.images import ImageCache
+from baselines.methods import OWN_WEIGHTS
+from baselines.pixel_mse import PixelMse
+from baselines.rendering.clips import render
+from baselines.simulation import split
+from evaluator import read_truth
+from tests.baselines.scenes import mean_mid, planted
+
+SEED, N = 7, 20
+"""The first of the rendered sequences of docs/deep-scale.md, from which nothing was learned."""
+
+
+def test_the_card_says_how_the_weights_were_made() -> None:
+    card = read_weights(OWN_WEIGHTS).card
+    assert set(card) >= {"title", "licence", "stages"}
+    for stage in card["stages"]:
+        assert set(stage) >= {"recipe", "data", "epochs"}
+        assert stage["recipe"]["seed"] != SEED
+    assert OWN_WEIGHTS.stat().st_size < 400_000
+
+
+@pytest.mark.slow
+def test_on_rendered_frames_they_beat_the_papers_pixel_mse() -> None:
+    drawn = split(rng=np.random.default_rng(SEED), n_sequences=320, n_recordings=8)
+    clips = [render(drawn, anno_id=row, seed=SEED).clip for row in range(N)]
+    ours, theirs = (
+        mean_mid([method(clip, frame_gap=5).scale_ratio for clip in clips], drawn.truth.ttc_s[:N])
+        for method in (DeepScale(), PixelMse())
+    )
+    assert ours < theirs
+
+
+@pytest.mark.slow
+def test_on_real_frames_they_are_not_lost(kitti_clip: Path, clip_folder: Path) -> None:
+    folder, cache, method = read_folder(clip_folder), ImageCache(), DeepScale()
+    rows = range(0, folder.n_sequences, 2)
+    found = [method(folder.clip(row, cache=cache), frame_gap=5).scale_ratio for row in rows]
+    assert mean_mid(found, read_truth(kitti_clip / "truth.csv").ttc_s[::2]) <= 20
+
+
+def test_the_figure_shows_both_crops_and_all_confidences() -> None:
+    figure = confidence_figure(planted(0.8), estimator=DeepScale(), frame_gap=5, true_ttc_s=2.0)
+    words = "\n".join(shape.text for shape in figure.shapes if isinstance(shape, Text))
+    assert "truth 0.800" in words
+    assert sum(isinstance(shape, Picture) for shape in figure.shapes) == 2
+    bars = [shape for shape in figure.shapes if isinstance(shape, Line) and shape.width == 8]
+    assert len(bars) == 20
