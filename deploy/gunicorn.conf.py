@@ -4,7 +4,9 @@ It stands behind a proxy that buffers requests, so a slow upload never occupies 
 """
 
 import os
+import shutil
 import signal
+import tempfile
 from typing import Any
 
 from leaderboard.ops.logs import logging_settings
@@ -23,6 +25,16 @@ graceful_timeout = 30
 # would have the keys of mailed links in it.
 accesslog = None
 logconfig_dict = logging_settings(as_json=True, level="INFO")
+
+
+# All processes count their answers here, so that a scrape of one has the sum; before any of them is made.
+if "PROMETHEUS_MULTIPROC_DIR" not in os.environ:
+    os.environ["PROMETHEUS_MULTIPROC_DIR"] = tempfile.mkdtemp(prefix="tsttc-figures-")
+
+
+def on_exit(server: Any) -> None:
+    """The figures end with the processes."""
+    shutil.rmtree(os.environ["PROMETHEUS_MULTIPROC_DIR"], ignore_errors=True)
 
 
 def post_worker_init(worker: Any) -> None:

@@ -132,8 +132,10 @@ class SubmissionAdmin(ReadOnlyAdmin):
 class SplitAdmin(AuditedAdmin):
     """A split's texts, times, quotas and decimals. Its published edition changes by publishing only."""
 
-    list_display = ["name", "title", "is_hidden", "published_edition", "opens_at", "closes_at", "quota_limit"]
+    list_display = ["name", "title", "listing", "is_hidden", "published_edition", "opens_at", "closes_at"]
     audited_fields = (
+        "title",
+        "listing",
         "needs_admission",
         "how_to_be_admitted",
         "opens_at",
@@ -144,10 +146,10 @@ class SplitAdmin(AuditedAdmin):
         "quota_rejected_limit",
         "decimals",
     )
-    readonly_fields = ["name", "published_edition", "is_hidden", "is_simulated"]
+    readonly_fields = ["name", "published_edition", "is_hidden", "is_simulated", "same_truth_as"]
 
     def has_add_permission(self, request: HttpRequest) -> bool:
-        """Splits come with the benchmark."""
+        """The page below /maintain/splits/ adds splits."""
         return False
 
     def has_delete_permission(self, request: HttpRequest, obj: Model | None = None) -> bool:
@@ -253,7 +255,7 @@ class ApiTokenAdmin(ReadOnlyAdmin):
 class UserAdmin(AuditedAdmin, DjangoUserAdmin):
     """Accounts."""
 
-    audited_fields = ("email", "is_active", "is_staff", "is_superuser")
+    audited_fields = ("is_active", "is_staff", "is_superuser")  # no address: events stay for ever
     ordering = ["email"]
     list_display = ["email", "name", "is_staff", "is_active", "date_joined"]
     search_fields = ["email", "name"]

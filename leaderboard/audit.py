@@ -5,6 +5,7 @@ it binds each event to the one before it by its hash. What holds until then says
 `docs/adr/0032-the-sweep-seals-the-audit-trail.md`.
 """
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
@@ -15,12 +16,15 @@ from django.db.models import QuerySet
 from django.utils import timezone
 
 from leaderboard.db import bulk
-from leaderboard.models import AuditEvent, User
+from leaderboard.models import AuditEvent, AuditText, User
 from leaderboard.models.audit import GENESIS, Unsealed
 
 # Names whoever seals among PostgreSQL's advisory locks: "audit" in ASCII.
 _LOCK = 0x6175646974
 _CHUNK = 2000
+# What stands in an event for a name that is in a table of its own.
+_TEXT = "text:"
+_IS_TEXT = re.compile(r"text:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII)
 MAX_BREAKS = 20
 
 
@@ -31,16 +35,41 @@ def record(
     noun_id: object,
     actor: User | None = None,
     details: Mapping[str, Any] | None = None,
+    names: Mapping[str, str] | None = None,
 ) -> AuditEvent:
     """Write one deed. Call it inside the transaction of the deed itself: both happen, or neither.
+
+    `names` are what people call themselves and their work. They stand in a table of their own, where they can
+    be blanked; the event has their ids among its details. An address stands in neither.
 
     `details` are texts, whole numbers, truth values, None, and lists and mappings of them; never a secret,
     never a value of a hidden ground truth. Raises `TypeError` for anything else, also for floats, which no
     two databases give back alike.
     """
-    return AuditEvent.objects.create(
-        verb=verb, noun=noun, noun_id=_storable(str(noun_id)), actor=actor, details=_plain(details or {})
-    )
+    noun_id = _storable(str(noun_id))
+    texts = {
+        name: AuditText(text=_storable(text)[:300], actor=actor, noun=noun, noun_id=noun_id)
+        for name, text in (names or {}).items()
+    }
+    AuditText.objects.bulk_create(texts.values())
+    told = _plain(details or {}) | {name: f"{_TEXT}{row.pk}" for name, row in texts.items()}
+    return AuditEvent.objects.create(verb=verb, noun=noun, noun_id=noun_id, actor=actor, details=told)
+
+
+def names_in(events: Iterable[AuditEvent]) -> dict[str, str]:
+    """The names that these events speak of, by what stands for them in `details`; blanked ones are empty."""
+    told = [value for event in events for value in event.details.values()]
+    refs = [value for value in told if isinstance(value, str) and value.startswith(_TEXT)]
+    ids = [value.removeprefix(_TEXT) for value in refs if _IS_TEXT.fullmatch(value)]
+    found = {
+        f"{_TEXT}{pk}": text for pk, text in AuditText.objects.filter(pk__in=ids).values_list("pk", "text")
+    }
+    return dict.fromkeys(refs, "") | found
+
+
+def blank(rows: QuerySet[AuditText]) -> int:
+    """Blank these names for good. The chain stays as it is. Returns how many there were."""
+    return rows.exclude(text="").update(text="")
 
 
 def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:

@@ -8,14 +8,11 @@ Every variable is described in `docs/operations.md`.
 import logging
 import sys
 from datetime import timedelta
-from ipaddress import ip_network
 from pathlib import Path
 from secrets import token_urlsafe
 from typing import Any
 
-import environ
 from csp.constants import NONE, SELF
-from django.core.exceptions import ImproperlyConfigured
 from django.core.management.utils import get_random_secret_key
 
 from leaderboard.api import settings
@@ -23,7 +20,7 @@ from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
 
 BASE_DIR = Path(__file__).resolve().parent.parent
-env = environ.Env()
+env = environment.env
 
 PRODUCTION = environment.PRODUCTION
 TESTING = "pytest" in sys.modules
@@ -81,6 +78,8 @@ INSTALLED_APPS = [
 MIDDLEWARE = [
     # First, so that every line that a request causes carries its id.
     "leaderboard.web.middleware.request_log.RequestLogMiddleware",
+    # What went through everything below before is answered here.
+    "leaderboard.web.middleware.page_cache.ReadyAnswerMiddleware",
     # What anything below answers, from memory or from a view, gets the same headers.
     "leaderboard.web.middleware.response_headers.HeadersMiddleware",
     "django.middleware.security.SecurityMiddleware",
@@ -130,16 +129,16 @@ DEFAULT_AUTO_FIELD = "django.db.models.BigAutoField"
 # --- database, cache, files ------------------------------------------------------------------------------
 
 DATABASES = {
-    "default": env.db_url_config(
+    "default": environment.database(
         required(
             "TSTTC_DATABASE_URL",
             embedded=f"sqlite:///{DATA_DIR / 'leaderboard.sqlite3'}",
-            by={"web", "worker", "migrate", "maintainer"},
+            by={"web", "worker", "migrate", "maintainer", "mailer"},
             elsewhere="sqlite://:memory:",
         )
     )
 }
-if "sqlite" in DATABASES["default"]["ENGINE"]:
+if "sqlite" in DATABASES["default"].get("ENGINE", ""):
     DATABASES["default"]["OPTIONS"] = {
         # A deferred transaction that turns into a writer fails at once with "database is locked".
         "transaction_mode": "IMMEDIATE",
@@ -159,7 +158,7 @@ APPLICATION_PASSWORD = env.str("TSTTC_APPLICATION_PASSWORD", default="")
 # in an S3-compatible service that web and workers on several machines share (see leaderboard/storage/s3.py).
 FILES_URL = env.str("TSTTC_FILES_URL", default="")
 if FILES_URL and not FILES_URL.startswith("s3://"):
-    raise ImproperlyConfigured("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
+    environment.FAULTS.append("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
 
 # Signing in is limited by what is counted here (allauth), so that all web processes count together.
 if PRODUCTION:
@@ -223,7 +222,7 @@ HEARTBEAT_S = env.float("TSTTC_HEARTBEAT_S", default=LEASE_S / 4)
 WALL_S = env.float("TSTTC_WALL_S", default=300.0)
 if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
     # A lease as long as the run itself could not tell a worker that vanished from a file that takes too long.
-    raise ImproperlyConfigured(
+    environment.FAULTS.append(
         f"TSTTC_HEARTBEAT_S is {HEARTBEAT_S:g}, TSTTC_LEASE_S {LEASE_S:g}, TSTTC_WALL_S {WALL_S:g}; "
         "expected each to be shorter than the next."
     )
@@ -295,13 +294,17 @@ ACCOUNT_SIGNUP_FIELDS = ["email*", "password1*", "password2*"]
 ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.account.team_forms.SignupNameForm"
 ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
 ACCOUNT_SESSION_REMEMBER = True
-EMAIL_CONFIG = env.email_url("TSTTC_EMAIL_URL", default="consolemail://")
+EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default="consolemail://"))
 vars().update(EMAIL_CONFIG)
+# Somebody waits on a page meanwhile; what is not sent within it is sent later.
+EMAIL_TIMEOUT = env.float("TSTTC_EMAIL_TIMEOUT_S", default=5.0)
+# Whether workers send what waits in the outbox: where they know the mail server.
+SENDS_MAIL = bool(env.str("TSTTC_EMAIL_URL", default=""))
 DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
 # Who the pages say answers questions; the pages are edited at /maintain/pages/.
 CONTACT_EMAIL = env.str("TSTTC_CONTACT_EMAIL", default="") or DEFAULT_FROM_EMAIL
 # Without a mail server nobody could follow the link; with one, an address counts once it is proved.
-ACCOUNT_EMAIL_VERIFICATION = "mandatory" if env.str("TSTTC_EMAIL_URL", default="") else "none"
+ACCOUNT_EMAIL_VERIFICATION = "mandatory" if SENDS_MAIL else "none"
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
@@ -331,8 +334,7 @@ API_RATES: dict[str, str | None] = {
     "revoke": "10/min",
     "refused": "60/min",
 }
-# What somebody sends on pages, and pages that one address has drawn anew by one process: boards as of a time,
-# which take long, among all.
+# What somebody sends on pages, and pages that a process draws anew for one address, as of a time apart.
 PAGE_RATES: dict[str, str | None] = {"send": "60/min", "draw": "300/min", "as_of": "30/min"}
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
     API_RATES, PAGE_RATES = dict.fromkeys(API_RATES), dict.fromkeys(PAGE_RATES)
@@ -343,8 +345,12 @@ WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)
 # --- what is written down, and who may look --------------------------------------------------------------
 
 LOG_LEVEL = env.str("TSTTC_LOG_LEVEL", default="INFO").upper()
+# Who is told of faults of ours by mail, each once an hour.
+ERROR_EMAILS = env.list("TSTTC_ERROR_EMAILS", default=[])
 LOGGING = logs.logging_settings(
-    as_json=env.str("TSTTC_LOG_FORMAT", default="json" if PRODUCTION else "text") == "json", level=LOG_LEVEL
+    as_json=env.str("TSTTC_LOG_FORMAT", default="json" if PRODUCTION else "text") == "json",
+    level=LOG_LEVEL,
+    has_reports=bool(ERROR_EMAILS),
 )
 logs.configure()
 DJANGO_STRUCTLOG_CELERY_ENABLED = True
@@ -355,7 +361,7 @@ DJANGO_STRUCTLOG_CELERY_TASK_START_LOG_LEVEL = logging.DEBUG
 DJANGO_STRUCTLOG_CELERY_TASK_SUCCESS_LOG_LEVEL = logging.DEBUG
 # Who may read /metrics; see leaderboard/web/monitoring.py.
 METRICS_TOKEN = env.str("TSTTC_METRICS_TOKEN", default="")
-METRICS_NETWORKS = [*map(ip_network, env.list("TSTTC_METRICS_NETWORKS", default=["127.0.0.0/8", "::1/128"]))]
+METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.0.0.0/8", "::1/128"])
 
 # --- security --------------------------------------------------------------------------------------------
 
@@ -382,10 +388,12 @@ SESSION_COOKIE_HTTPONLY = True
 CSRF_COOKIE_HTTPONLY = True
 if PRODUCTION and env.bool("TSTTC_HTTPS", default=True):
     SECURE_SSL_REDIRECT = True
-    SECURE_REDIRECT_EXEMPT = [r"^healthz$", r"^readyz$", r"^metrics$"]
+    SECURE_REDIRECT_EXEMPT = [r"^healthz$", r"^readyz$", r"^healthy$", r"^metrics$"]
     SECURE_PROXY_SSL_HEADER = ("HTTP_X_FORWARDED_PROTO", "https")
     SECURE_HSTS_SECONDS = 365 * 24 * 3600
     SECURE_HSTS_INCLUDE_SUBDOMAINS = True
     SECURE_HSTS_PRELOAD = True
     SESSION_COOKIE_SECURE = True
     CSRF_COOKIE_SECURE = True
+
+environment.require_sound()

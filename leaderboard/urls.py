@@ -20,6 +20,7 @@ urlpatterns = [
     path("admin/", admin.site.urls),
     path("healthz", monitoring.healthz, name="healthz"),
     path("readyz", monitoring.readyz, name="readyz"),
+    path("healthy", monitoring.healthy, name="healthy"),
     path("metrics", monitoring.exposition, name="metrics"),
 ]
 

@@ -15,12 +15,10 @@ const KINDS = [
   [[0x89, 0x50, 0x4e, 0x47], "a PNG image"],
   [[0xff, 0xd8, 0xff], "a JPEG image"],
   [[0x25, 0x50, 0x44, 0x46], "a PDF document"],
-  [[0x1f, 0x8b], "a gzip archive; unpack it first"],
   [[0x50, 0x4b, 0x03, 0x04], "a ZIP archive or a NumPy .npz file; send the JSON file itself"],
   [[0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59], "a NumPy .npy file"],
   [[0x89, 0x48, 0x44, 0x46], "an HDF5 file"],
   [[0x80], "a Python pickle"],
-  [[0x61, 0x6e, 0x6e, 0x6f, 0x5f, 0x69, 0x64, 0x2c], "a CSV table"],
 ];
 
 // --- words -------------------------------------------------------------------------------------------------
@@ -64,32 +62,55 @@ class Rejected extends Error {
 
 const reject = (code, message, where = "") => new Rejected([{ code, message, where }]);
 
+// Equal problems share a line, which names the places of the others.
 class Findings {
-  problems = [];
-  counts = new Map();
+  lines = [];
+  lineOf = new Map();
+  kinds = new Map();
   nGrouped = 0;
 
   add(code, message, where = "") {
-    const count = (this.counts.get(code) ?? 0) + 1;
-    this.counts.set(code, count);
-    if (count <= MAX_LISTED) this.problems.push({ code, message, where });
+    if (!this.kinds.has(code)) this.kinds.set(code, { n: 0, nLines: 0, nUnlisted: 0 });
+    const kind = this.kinds.get(code);
+    const key = `${code} ${message}`;
+    const line = where ? this.lineOf.get(key) : undefined;
+    kind.n++;
+    if (line) {
+      line.nMore++;
+      if (line.more.length <= MAX_LISTED) line.more.push(where);
+    } else if (kind.nLines < MAX_LISTED) {
+      kind.nLines++;
+      this.lineOf.set(key, this.#line(code, message, where));
+    } else kind.nUnlisted++;
   }
 
   group(code, message, where, nFaults) {
-    this.problems.push({ code, message, where });
+    this.#line(code, message, where);
     this.nGrouped += nFaults;
   }
 
+  #line(code, message, where) {
+    const line = { code, message, where, nMore: 0, more: [] };
+    this.lines.push(line);
+    return line;
+  }
+
   throwIfAny() {
-    if (!this.problems.length) return;
-    const rest = [...this.counts]
-      .filter(([, count]) => count > MAX_LISTED)
-      .map(([code, count]) => {
-        const message = `And ${grouped(count - MAX_LISTED)} more like these: ${grouped(count)} in all.`;
+    if (!this.lines.length) return;
+    const told = this.lines.map(({ code, message, where, nMore, more }) => {
+      if (!nMore) return { code, message, where };
+      const others = counted(nMore, "more place has", "more places have");
+      return { code, message: `${message} ${others} this problem: ${listed(more)}.`, where };
+    });
+    const kinds = [...this.kinds];
+    const rest = kinds
+      .filter(([, { nUnlisted }]) => nUnlisted)
+      .map(([code, { n, nUnlisted }]) => {
+        const message = `And ${grouped(nUnlisted)} more like these: ${grouped(n)} in all.`;
         return { code, message, where: "" };
       });
-    const nCounted = [...this.counts.values()].reduce((sum, count) => sum + count, 0);
-    throw new Rejected([...this.problems, ...rest], nCounted + this.nGrouped);
+    const nCounted = kinds.reduce((sum, [, { n }]) => sum + n, 0);
+    throw new Rejected([...told, ...rest], nCounted + this.nGrouped);
   }
 }
 
@@ -561,7 +582,18 @@ function ratesOf(document, manifest, findings) {
   return () => (problem ? NaN : toHz(document.rate.value));
 }
 
+// JSON in gzip and CSV tables are left to the server, as evaluator/predictions/packages.py tells them.
+const COLUMNS = ["anno_id", "bag_stamp", "cam_id", "ts", "track_id", "ttc", "ttc_s", "scale_ratio", "fps", "frame_gap"];
+
+function isPackaged(bytes) {
+  if (bytes[0] === 0x1f && bytes[1] === 0x8b) return true;
+  const line = new TextDecoder().decode(bytes.subarray(0, 2000)).trimStart().split(/[\r\n]/, 1)[0];
+  const fields = line.split(",").map((name) => name.trim().replace(/^"|"$/g, ""));
+  return fields.length > 1 && !/^[{[]/.test(line) && fields.some((name) => COLUMNS.includes(name));
+}
+
 function check(bytes, manifest) {
+  if (isPackaged(bytes)) throw new Error("not JSON as it comes");
   const document = readDocument(parse(bytes, 2 * manifest.n + 100_000));
   const findings = new Findings();
   const { isNatural, nFound } = checkKeys(document.predictions, manifest, findings, document.pointer);
@@ -582,16 +614,59 @@ function check(bytes, manifest) {
   return { n_found: nFound, warnings: warningsOf(values, manifest) };
 }
 
-// --- good values under wrong keys, as in evaluator/predictions/plausibility.py --------------------------------
+// --- another unit or sign, and good values under wrong keys, as in evaluator/predictions/plausibility.py --------------------------------
 
 const MAX_STEP_NS = 1_000_000_000n;
 const MIN_PAIRS = 100;
 const MAX_ROUGHNESS = 0.8;
+const MIN_VALUES = 100;
+const MIN_SHARE = 0.99;
+const NEAR_S = 10;
+const MAX_RISING = 0.7;
 const CAUSE =
   "Probably the anno_ids are those of the toolkit on a machine that lists the annotation files in another order: " +
   "tsttc convert FILE --annotations FOLDER writes natural keys.";
 
 function warningsOf(seconds, manifest) {
+  manifest.pairs ??= pairsOf(manifest.windows);
+  return [...unitWarnings(seconds), ...signWarnings(seconds, manifest), ...orderWarnings(seconds, manifest)];
+}
+
+function unitWarnings(seconds) {
+  const n = seconds.length;
+  const nFar = seconds.filter((value) => Math.abs(value) > 20).length;
+  const nRatios = seconds.filter((value) => value >= 0.5 && value <= 1.5).length;
+  if (n < MIN_VALUES) return [];
+  if (nFar >= MIN_SHARE * n) {
+    const message =
+      `${grouped(nFar)} of ${grouped(n)} values lie beyond ±20 s; expected most of them within. Probably they are ` +
+      "milliseconds, or scale ratios of another frame gap than the file states.";
+    return [{ code: "not-seconds", message }];
+  }
+  if (nRatios >= MIN_SHARE * n) {
+    const message =
+      `${grouped(nRatios)} of ${grouped(n)} values lie between 0.5 and 1.5 s; expected few. Probably they are scale ` +
+      'ratios: these need "unit": "scale_ratio" and fps or frame_gap beside them.';
+    return [{ code: "looks-like-ratios", message }];
+  }
+  return [];
+}
+
+function signWarnings(seconds, manifest) {
+  const steps = manifest.pairs.same.map(([a, b]) => [seconds[a], seconds[b]]);
+  const near = steps.filter(
+    ([a, b]) => Math.sign(a) === Math.sign(b) && Math.abs(a) <= NEAR_S && Math.abs(b) <= NEAR_S && a !== b,
+  );
+  const nRising = near.filter(([a, b]) => b > a).length;
+  if (near.length < MIN_PAIRS || nRising <= MAX_RISING * near.length) return [];
+  const message =
+    `The signs look flipped: from one window of an object to the next, ${grouped(nRising)} of ${grouped(near.length)} ` +
+    "values rise; expected most of them to fall, as a time to contact does while time passes. Probably every sign is " +
+    "wrong: τ is negative when the object moves away.";
+  return [{ code: "flipped-signs", message }];
+}
+
+function orderWarnings(seconds, manifest) {
   const found = roughness(seconds, manifest);
   if (found === null || found <= MAX_ROUGHNESS) return [];
   const message =
@@ -603,7 +678,7 @@ function warningsOf(seconds, manifest) {
 
 // How far neighbouring windows of one object differ, over how far successive windows of two objects do.
 function roughness(seconds, manifest) {
-  const { same, other } = (manifest.pairs ??= pairsOf(manifest.windows));
+  const { same, other } = manifest.pairs;
   if (Math.min(same.length, other.length) < MIN_PAIRS) return null;
   const ranks = ranksOf(seconds);
   const apart = meanDifference(ranks, other);

@@ -56,7 +56,8 @@ function warning({ message, code }) {
 }
 
 function problems({ n_problems: n, problems: all }) {
-  const head = element("p", `${grouped(n)} problem${n === 1 ? "" : "s"} in the file. The server would reject it.`, "bad");
+  const told = `${grouped(n)} problem${n === 1 ? "" : "s"} in the file. The server would reject it.`;
+  const head = element("p", all.length < n ? `${told} Equal problems share a point.` : told, "bad");
   const list = element("ol", "", "problems");
   for (const { where, message, code } of all.slice(0, MAX_SHOWN)) {
     const item = element("li");

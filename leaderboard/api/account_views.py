@@ -1,4 +1,4 @@
-"""The user's quota, and the revocation of leaked tokens."""
+"""Whose token it is, the user's quota, and the revocation of leaked tokens."""
 
 from typing import cast
 
@@ -14,6 +14,7 @@ from leaderboard.api.exceptions import problem
 from leaderboard.api.parsers import LimitedJSONParser
 from leaderboard.api.schema import errors
 from leaderboard.api.serializers import (
+    AccountSerializer,
     LeakedTokenSerializer,
     QuotaSerializer,
     RevokedSerializer,
@@ -22,6 +23,18 @@ from leaderboard.api.throttling import RevokeThrottle
 from leaderboard.models import Scope, Split, User
 from leaderboard.people import teams, tokens
 from leaderboard.quotas import deadlines
+
+
+class AccountView(APIView):
+    """The token and its team."""
+
+    token_scopes = (Scope.READ, Scope.SUBMIT)
+
+    @extend_schema(operation_id="account", responses=AccountSerializer)
+    def get(self, request: Request) -> Response:
+        """Whose token this is and what it may do. It names no person."""
+        team = teams.current_team_of(user=cast("User", request.user))
+        return Response(AccountSerializer({"team": team, "token": request.auth}).data)
 
 
 class QuotaView(APIView):
@@ -37,7 +50,8 @@ class QuotaView(APIView):
         user = cast("User", request.user)
         team = teams.current_team_of(user=user)
         only = split_of(request.auth)
-        splits = Split.objects.filter(pk=only) if only is not None else Split.objects.all()
+        splits = Split.objects.shown()
+        splits = splits.filter(pk=only) if only is not None else splits
         rows = [deadlines.left(team=team, user=user, split=split, now=now) for split in splits]
         return Response(QuotaSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 

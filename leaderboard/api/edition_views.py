@@ -33,7 +33,7 @@ class EditionsView(APIView):
     )
     def get(self, request: Request, split: str) -> Response:
         """Published editions, newest first, in pages; `Link` names the next page."""
-        get_object_or_404(Split, pk=split)
+        get_object_or_404(Split.objects.shown(), pk=split)
         rows = EDITIONS.filter(split=split).exclude(published_at=None)
         page = pagination.page_of(rows, request, order="-number")
         data = EditionSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says
@@ -52,7 +52,7 @@ class ChangelogView(APIView):
     )
     def get(self, request: Request, split: str) -> Response:
         """Which edition was published when and why; newest first, in pages."""
-        get_object_or_404(Split, pk=split)
+        get_object_or_404(Split.objects.shown(), pk=split)
         rows = Publication.objects.filter(split=split).select_related("edition", "replaced")
         page = pagination.page_of(rows, request, order="-at")
         data = PublicationSerializer(page.rows, many=True).data  # type: ignore[arg-type]  # many rows, as it says

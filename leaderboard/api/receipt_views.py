@@ -1,7 +1,8 @@
-"""Score receipts, for the submission's own team."""
+"""What only a submission's own team gets: the receipt of its score, and its file."""
 
 from typing import cast
 
+from django.http import FileResponse, Http404, HttpResponseBase, HttpResponseNotModified
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.request import Request
@@ -12,7 +13,9 @@ from leaderboard.api.exceptions import edition_number
 from leaderboard.api.receipt_serializers import ReceiptSerializer
 from leaderboard.api.schema import errors
 from leaderboard.api.views import visible
-from leaderboard.models import User
+from leaderboard.http import is_known
+from leaderboard.models import Submission, User
+from leaderboard.storage import files
 from leaderboard.submissions import receipts
 
 
@@ -37,6 +40,35 @@ class ReceiptView(APIView):
         """The signed scores of a submission, for its team; verify them offline with `tsttc verify`."""
         text = request.query_params.get("edition")
         number = edition_number(text) if text is not None else None
-        rows = visible(request).filter(method__team__memberships__user=cast("User", request.user))
-        submission = get_object_or_404(rows, pk=submission_id)
+        submission = _own(request, submission_id)
         return Response(receipts.receipt(submission=submission, edition_number=number))
+
+
+class FileView(APIView):
+    """The prediction file of a submission."""
+
+    @extend_schema(
+        operation_id="submission_file", responses={(200, "application/octet-stream"): bytes, **errors(404)}
+    )
+    def get(self, request: Request, submission_id: str) -> HttpResponseBase:
+        """The bytes as your team sent them. Other teams' files do not exist, also for maintainers."""
+        submission = _own(request, submission_id)
+        name = files.predictions_name(submission.digest)
+        if not files.store().exists(name):
+            raise Http404
+        tag = {"ETag": f'"{submission.digest}"'}
+        if is_known(request._request, tag["ETag"]):
+            return HttpResponseNotModified(headers=tag)
+        return FileResponse(
+            files.store().open(name, "rb"),
+            as_attachment=True,
+            filename=submission.filename or "predictions.json",
+            content_type="application/octet-stream",
+            headers=tag,
+        )
+
+
+def _own(request: Request, submission_id: str) -> Submission:
+    """A submission of the user's own team. Raises `Http404`."""
+    rows = visible(request).filter(method__team__memberships__user=cast("User", request.user))
+    return get_object_or_404(rows, pk=submission_id)

@@ -38,6 +38,7 @@ PATH_PARAMETERS: Mapping[str, str] = {
     "number": "Number of the edition.",
     "submission_id": "Id of the submission.",
     "method_id": "Id of the method.",
+    "name": "Name of the table.",
 }
 # What a value looks like: by the format of its field, else by the field's type and name.
 FORMATS: Mapping[str, str] = {

@@ -35,7 +35,7 @@ class NewSubmissionSerializer(serializers.Serializer[Any]):
 
     split = serializers.CharField(help_text=SPLIT)
     method = serializers.CharField(help_text="Name or id of your method; a new name creates a method.")
-    file = serializers.FileField(help_text="The prediction file (JSON).")
+    file = serializers.FileField(help_text="The prediction file: JSON, JSON in gzip, or CSV.")
     description = serializers.CharField(
         required=False, help_text="Description of the method; replaces the former one."
     )
@@ -104,8 +104,8 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
     warnings = WarningSerializer(
         many=True, help_text="Probable mistakes in a scored file, found from the file and the manifest alone."
     )
-    problems = ProblemSerializer(many=True, help_text="Problems of a rejected file, the first of each kind.")
-    n_problems = serializers.IntegerField(help_text="Number of problems, listed or not.")
+    problems = ProblemSerializer(many=True, help_text="Problems of a rejected file, equal ones in one item.")
+    n_problems = serializers.IntegerField(help_text="Number of problems, equal and unlisted ones included.")
 
     def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
         """The submission with its progress, and its rank if it has one."""

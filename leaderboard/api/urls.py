@@ -10,6 +10,7 @@ from leaderboard.api import (
     edition_views,
     method_views,
     pagination,
+    published_views,
     receipt_views,
     schema_views,
     submission_views,
@@ -30,6 +31,8 @@ urlpatterns = [
         method_views.VisibilityView.as_view(),
         name="api-method-visibility",
     ),
+    path("submissions/<uuid:submission_id>/file", receipt_views.FileView.as_view(), name="api-file"),
+    path("account", account_views.AccountView.as_view(), name="api-account"),
     path("quota", account_views.QuotaView.as_view(), name="api-quota"),
     path("tokens/revoke", account_views.RevokeView.as_view(), name="api-revoke-token"),
     path("compare", compare_views.CompareView.as_view(), name="api-compare"),
@@ -66,6 +69,16 @@ urlpatterns = [
         name="api-changelog",
     ),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
+    path(
+        "published",
+        cacheable(published_views.PublishedTablesView.as_view()),
+        name="api-published-tables",
+    ),
+    path(
+        "published/<slug:name>",
+        cacheable(published_views.PublishedTableView.as_view()),
+        name="api-published-table",
+    ),
     path("schema", schema_views.SchemaView.as_view(), name="api-schema"),
     path(
         "docs",

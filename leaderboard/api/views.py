@@ -5,7 +5,7 @@ from typing import cast
 from django.http import FileResponse, Http404, HttpResponseBase, HttpResponseNotModified
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
-from drf_spectacular.utils import extend_schema
+from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
 from rest_framework.response import Response
@@ -16,6 +16,7 @@ from leaderboard.api.schema import errors
 from leaderboard.api.serializers import SplitSerializer
 from leaderboard.api.submission_serializers import SubmissionSerializer
 from leaderboard.boards import snapshots
+from leaderboard.editions import history
 from leaderboard.http import is_known
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
@@ -68,26 +69,34 @@ class SplitsView(APIView):
 
     @extend_schema(operation_id="list_splits", responses=SplitSerializer(many=True))
     def get(self, request: Request) -> Response:
-        """All splits with their published editions."""
-        rows = Split.objects.select_related("published_edition__ground_truth")
+        """All splits with their published editions, archived ones last."""
+        rows = snapshots.splits_of(request._request)
         return Response(SplitSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 
 class ManifestView(APIView):
-    """The public manifest of a split's published ground truth."""
+    """The public manifest of a split's ground truth, of the board or of a former edition."""
 
     permission_classes = [AllowAny]
 
     @extend_schema(
         operation_id="manifest",
+        parameters=[
+            OpenApiParameter(
+                "edition",
+                int,
+                description="The number of an edition that is or was the board. Default: the board's.",
+            )
+        ],
         responses={(200, "text/csv"): str, **errors(404)},
     )
     def get(self, request: Request, split: str) -> HttpResponseBase:
         """All columns of the ground truth but the time to contact, as CSV."""
-        found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
-        if found.published_edition is None:
+        rows = Split.objects.shown().select_related("published_edition__ground_truth")
+        found = get_object_or_404(rows, pk=split)
+        digest = history.manifest_digest(split=found, number=request.GET.get("edition", ""))
+        if digest is None:
             raise Http404
-        digest = found.published_edition.ground_truth.manifest_digest
         tag = {"ETag": f'"{digest}"'}
         if is_known(request._request, tag["ETag"]):
             return HttpResponseNotModified(headers=tag)

@@ -1,20 +1,19 @@
 """The splits that the benchmark has from the start, and the rows quoted from papers."""
 
-import json
-import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
-from django.core.exceptions import ValidationError
 from django.db import transaction
+from django.db.models import QuerySet
 from django.utils import timezone
 
-from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
+from evaluator.papers.tables import published_tables
 from leaderboard import audit, versions
-from leaderboard.errors.refusals import Refused
+from leaderboard.benchmark import papers
+from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import PublishedResult, Split, User
 from leaderboard.models.benchmark import SINCE_EVER
 
@@ -69,13 +68,23 @@ def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResu
             there = {name: value for name, value in fields.items() if name in columns}
             _, is_new = split_model.objects.get_or_create(name=fields["name"], defaults=there)
             made |= {fields["name"]} if is_new else set()
+        known = [fields["name"] for fields in SPLITS]
         for path in sorted(PUBLISHED_DIR.glob("*.json")):
-            for row in _rows_of(json.loads(path.read_text(encoding="utf-8"))):
+            for row in papers.rows_of(_with_results(papers.parse(path.read_bytes())), splits=known):
                 names = {"split_id": row.pop("split_id"), "slug": row.pop("slug")}
                 if has_times:
                     row["added_at"] = SINCE_EVER if names["split_id"] in made else now
                 if not result_model.objects.filter(**names).exists():
                     result_model.objects.create(**names, **row)
+
+
+def _with_results(document: Mapping[str, Any]) -> dict[str, Any]:
+    """A document of ours with its numbers: `results_of` names the paper's table that has them."""
+    table = published_tables().table(document["results_of"])
+    results: dict[str, dict[str, list[Any]]] = {}
+    for row in table.rows:
+        results.setdefault(row.split or "", {})[row.method or ""] = list(row.values)
+    return {**document, "columns": list(table.columns), "results": results}
 
 
 @dataclass(frozen=True)
@@ -93,9 +102,11 @@ def import_published(
     """Put the rows of one paper on the boards from now on, all or none of them.
 
     A row that is there with the same content stays. One with other content is replaced, which boards of the
-    past do not notice. Raises `Refused` for that unless `is_replacing`, and for what is no such document.
+    past do not notice. Raises `Refused` for that unless `is_replacing`, `papers.BadDocument` for what is no
+    such document, and `NotMaintainer`; `actor` None is the command line.
     """
-    rows = _sound_rows(document)
+    require_maintainer(actor, to="add rows of papers")
+    rows = papers.rows_of(document, splits=Split.objects.values_list("name", flat=True))
     found: dict[str, list[str]] = {"added": [], "replaced": [], "unchanged": []}
     with transaction.atomic():
         for row in rows:
@@ -115,6 +126,12 @@ def import_published(
     return Imported(**{outcome: tuple(names) for outcome, names in found.items()})
 
 
+def quoted() -> QuerySet[PublishedResult]:
+    """The quoted rows that the boards show now, split by split, the newest first."""
+    rows = PublishedResult.objects.filter(replaced_at=None).select_related("split")
+    return rows.order_by("split__position", "split", "-added_at", "pk")
+
+
 def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) -> str:
     """Add or replace one row. Returns which of the two was done, or that it is unchanged."""
     standing = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
@@ -127,77 +144,9 @@ def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) ->
             raise Refused(
                 "bad-value",
                 f"The row {row['slug']!r} of {row['split_id']} is there with another {', '.join(changed)}; "
-                "expected the same, or --replace.",
+                "expected the same, or that it is to be replaced (--replace).",
+                field="is_replacing",
             )
         PublishedResult.objects.filter(pk=there.pk).update(replaced_at=now)
     PublishedResult.objects.create(**row, added_at=now)
     return "added" if there is None else "replaced"
-
-
-def _sound_rows(document: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """The rows of a document, each as one that can be kept. Raises `Refused`."""
-    try:
-        rows = list(_rows_of(document))
-    except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise Refused(
-            "bad-value",
-            f"The document lacks {error} or has it in another form; expected one such as those in "
-            "leaderboard/benchmark/published/.",
-        ) from None
-    known = set(Split.objects.values_list("name", flat=True))
-    for row in rows:
-        if row["split_id"] not in known:
-            expected = ", ".join(sorted(known))
-            raise Refused(
-                "unknown-split", f"There is no split {row['split_id']!r}; expected one of {expected}."
-            )
-        if not _are_named(row["scores"]) or not all(map(_is_score, row["scores"].values())):
-            raise Refused(
-                "bad-value",
-                f"The values of the row {row['slug']!r} of {row['split_id']} are no numbers from 0, one for "
-                f"each name of a protocol; expected one or null for each of {', '.join(SCORE_NAMES)}.",
-            )
-        try:
-            PublishedResult(**row).full_clean(validate_unique=False, validate_constraints=False)
-        except ValidationError as error:
-            [field, *_] = error.message_dict
-            said = error.message_dict[field][0]
-            raise Refused("bad-value", f"The row {row['slug']!r}: the field {field!r}: {said}") from None
-    if not rows:
-        raise Refused("bad-value", "The document has no rows; expected some under 'results'.")
-    return rows
-
-
-def _are_named(scores: Mapping[str, object]) -> bool:
-    return any(scores.keys() == set(protocol.score_names) for protocol in PROTOCOLS.values())
-
-
-def _is_score(value: object) -> bool:
-    if value is None:
-        return True
-    return isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < math.inf
-
-
-def _rows_of(document: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-    """The rows of one paper's main table; see `leaderboard/benchmark/published/` for the form."""
-    source = document["source"]
-    methods = {method["slug"]: method for method in document["methods"]}
-    for split_name, rows in document["results"].items():
-        for slug, values in rows.items():
-            method = methods[slug]
-            yield {
-                "split_id": split_name,
-                "slug": slug,
-                "method_name": method["name"],
-                "description": method["description"],
-                "authors": source["authors"],
-                "source_title": source["title"],
-                "source_url": source["url"],
-                "source_table": source["table"],
-                "code_url": source["code"],
-                "year": source["year"],
-                "uses_nerf": method["uses_nerf"],
-                "latency_ms": method["latency_ms"],
-                "hardware": "one RTX 3090, batch 1, FP16" if method["latency_ms"] else "",
-                "scores": dict(zip(document["columns"], values, strict=True)),
-            }

@@ -232,7 +232,7 @@ def _best_of_each(
 ) -> list[Entry]:
     """One row for each of these methods, without its rank: the best of its submissions, masked if need be."""
     scored_rows = Evaluation.objects.filter(
-        edition=edition, status=Status.SCORED, submission__method__in=methods
+        edition=edition, status=Status.SCORED, submission__method__in=methods, submission__hidden_at=None
     )
     # No row says anything of reports and problems, which are long.
     rows = scored_rows.select_related("submission__method__team").defer("report", "problems")

@@ -28,6 +28,7 @@ from leaderboard.boards.current import CurrentBoard
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshot_store import BoundedCache, StoredSnapshot, decode, encode
 from leaderboard.models import Edition, Snapshot, Split
+from leaderboard.models.benchmark import Listing
 
 log = structlog.get_logger(__name__)
 
@@ -49,24 +50,47 @@ _drawing, _drawing_as_of = threading.Lock(), threading.Lock()
 
 
 def splits() -> list[Split]:
-    """Every split with its published edition, and with what is kept of it: a whole page's first statement."""
-    rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
-    return list(_stamped(rows, to_edition="published_edition__"))
+    """The splits that are not switched off, with their published editions and with what is kept of these.
+
+    Archived ones come last. It is a whole page's first statement.
+    """
+    return _shown(_all_splits())
 
 
 def splits_of(request: HttpRequest) -> list[Split]:
     """The same, read once a request."""
+    return _shown(_all_splits_of(request))
+
+
+def state_of(request: HttpRequest) -> int:
+    """The sum of the versions of all boards as this request found them; see `versions.state`."""
+    return versions.state_of(_all_splits_of(request))
+
+
+def _all_splits() -> list[Split]:
+    rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
+    return list(_stamped(rows, to_edition="published_edition__"))
+
+
+def _all_splits_of(request: HttpRequest) -> list[Split]:
     found: list[Split] | None = getattr(request, "splits", None)
     if found is None:
-        found = splits()
+        found = _all_splits()
         request.splits = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
     return found
 
 
+def _shown(rows: Sequence[Split]) -> list[Split]:
+    shown = [split for split in rows if split.listing != Listing.OFF]
+    return sorted(shown, key=lambda split: split.is_archived)
+
+
 def editions() -> "QuerySet[Edition]":
-    """Published editions with what is kept of them, to be filtered further."""
-    rows = Edition.objects.exclude(published_at=None).select_related(
-        "split__published_edition__ground_truth", "ground_truth"
+    """Published editions of splits that are not switched off, with what is kept of them; to be filtered."""
+    rows = (
+        Edition.objects.filter(split__in=Split.objects.shown())
+        .exclude(published_at=None)
+        .select_related("split__published_edition__ground_truth", "ground_truth")
     )
     return _stamped(rows, to_split="split__")
 

@@ -48,7 +48,11 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     assuming_visible.shown_at = method.shown_at or now
     others = _public_others(method)
     sights = []
-    splits = Split.objects.exclude(published_edition=None).select_related("published_edition__ground_truth")
+    splits = (
+        Split.objects.shown()
+        .exclude(published_edition=None)
+        .select_related("published_edition__ground_truth")
+    )
     for split in splits:
         edition = split.published_edition
         rows = boards.public_rows(split=split, edition=edition, assuming_visible=assuming_visible)

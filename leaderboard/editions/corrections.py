@@ -106,7 +106,7 @@ def _imported(split: Split, digest: str | None) -> GroundTruth:
     if digest is None:
         assert split.published_edition is not None  # noqa: S101 - the caller has looked
         return split.published_edition.ground_truth
-    row = split.ground_truths.filter(digest=digest).first()
+    row = GroundTruth.objects.filter(split=split.truth_split_id, digest=digest).first()
     if row is None:
         raise Refused(
             "edition-refused",

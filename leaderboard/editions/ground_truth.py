@@ -73,7 +73,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
         row, is_new = GroundTruth.objects.get_or_create(
             digest=truth.digest,
             defaults={
-                "split": split,
+                "split_id": split.truth_split_id,
                 "manifest_digest": truth.manifest.digest,
                 "source": path.name[:200],
                 "n_sequences": truth.manifest.n_sequences,
@@ -87,9 +87,11 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
                 "imported_by": actor,
             },
         )
-        if row.split_id != split.pk:
+        if row.split_id != split.truth_split_id:
             raise Refused(
-                "edition-refused", f"This ground truth belongs to the split {row.split_id!r} already."
+                "edition-refused",
+                f"This ground truth belongs to the split {row.split_id!r} already; a split that shares it is "
+                f"made with: manage.py add_split NAME --same-truth-as {row.split_id}",
             )
         if old is not None and counts is not None:
             _keep_comparison(old, row, counts)

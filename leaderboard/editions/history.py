@@ -66,8 +66,9 @@ def latest_change(split: Split) -> Publication | None:
 
 
 def latest_changes(n: int) -> list[Publication]:
-    """The last changes of all boards, the newest first."""
-    rows = Publication.objects.select_related("split", "edition__ground_truth", "replaced__ground_truth")
+    """The last changes of all boards that are not switched off, the newest first."""
+    rows = Publication.objects.filter(split__in=Split.objects.shown())
+    rows = rows.select_related("split", "edition__ground_truth", "replaced__ground_truth")
     return list(rows.order_by("-at", "-pk")[:n])
 
 
@@ -76,7 +77,11 @@ def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionR
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
     # All at once, since each edition that followed another asks for one.
     has_followed = any(publication.replaced_id for publication in publications)
-    compared = list(TruthComparison.objects.filter(new__split=split).order_by("pk")) if has_followed else []
+    compared = (
+        list(TruthComparison.objects.filter(new__split=split.truth_split_id).order_by("pk"))
+        if has_followed
+        else []
+    )
     return tuple(record_of(each, publications, compared) for each in published.order_by("-number"))
 
 
@@ -170,3 +175,13 @@ def maintainer_overview(split: Split) -> MaintainerOverview:
         system_errors=tuple((e, n_failed[e.pk]) for e in rows if e.pk in n_failed),
         predecessor=corrections.predecessor(split),
     )
+
+
+def manifest_digest(*, split: Split, number: str) -> str | None:
+    """The manifest of the board, or of the edition of a number that is or was it; None for no such one."""
+    if not number:
+        return split.published_edition.ground_truth.manifest_digest if split.published_edition else None
+    if not (number.isascii() and number.isdigit() and len(number) < 7):
+        return None
+    editions = split.editions.filter(number=int(number)).exclude(published_at=None)
+    return editions.values_list("ground_truth__manifest_digest", flat=True).first()

@@ -1,6 +1,6 @@
 """The tables. Constraints live here; the functions that change rows live in the rooms."""
 
-from leaderboard.models.audit import AuditEvent
+from leaderboard.models.audit import AuditEvent, AuditText
 from leaderboard.models.benchmark import (
     Edition,
     GroundTruth,
@@ -12,6 +12,7 @@ from leaderboard.models.benchmark import (
 from leaderboard.models.boards import BoardVersion, CardPicture, Snapshot
 from leaderboard.models.inference import Analysis, Comparison, EditionRanges, Question
 from leaderboard.models.limits import Allowance, CachedValue
+from leaderboard.models.mails import Mail, MailKind, MutedKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.pages import PageVersion
 from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User

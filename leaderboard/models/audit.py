@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import uuid
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -79,6 +80,22 @@ class AuditEventQuerySet(models.QuerySet["AuditEvent"]):
     def _raw_delete(self, using: str | None) -> NoReturn:
         # What deleting rows that refer to another one comes down to.
         raise AppendOnly
+
+
+class AuditText(models.Model):
+    """A name that an event speaks of. The event has its id; the text can be blanked, and no hash notices."""
+
+    id = models.UUIDField(primary_key=True, default=uuid.uuid4, editable=False)
+    text = models.CharField(max_length=300, blank=True, help_text="Empty: blanked.")
+    actor = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
+    noun = models.CharField(max_length=40)
+    noun_id = models.CharField(max_length=80)
+
+    class Meta:
+        indexes = [models.Index(fields=["noun", "noun_id"], name="audit_text_by_noun")]
+
+    def __str__(self) -> str:
+        return self.text
 
 
 class AuditEvent(models.Model):

@@ -3,6 +3,7 @@
 from datetime import UTC, datetime
 from typing import ClassVar, Self
 
+from django.core.exceptions import ValidationError
 from django.db import connection, models
 from django.db.models import Q
 from django.utils import timezone
@@ -15,8 +16,20 @@ from leaderboard.models.quotas import QuotaRules
 SINCE_EVER = datetime(1970, 1, 1, tzinfo=UTC)
 
 
+class Listing(models.TextChoices):
+    """Where a split is found."""
+
+    LISTED = "LISTED", "listed"
+    ARCHIVED = "ARCHIVED", "archived"
+    OFF = "OFF", "switched off"
+
+
 class SplitQuerySet(models.QuerySet["Split"]):
     """Questions about splits."""
+
+    def shown(self) -> Self:
+        """Those that are on pages, in forms and in the API: all that are not switched off."""
+        return self.exclude(listing=Listing.OFF)
 
     def lock_shared(self, name: str) -> "Split":
         """The split as it is, and stays until the transaction ends; others may hold it like this as well.
@@ -50,8 +63,27 @@ class Split(QuotaRules):
         blank=True,
         help_text="How a team asks for it, as the end of a sentence, like “write to …”.",
     )
+    listing = models.CharField(
+        max_length=8,
+        choices=Listing,
+        default=Listing.LISTED,
+        help_text="Archived: its board stays, and it takes no submissions. "
+        "Switched off: it is on no page, in no form and in no list of the API.",
+    )
+    same_truth_as = models.ForeignKey(
+        "self",
+        null=True,
+        blank=True,
+        on_delete=models.PROTECT,
+        related_name="challenges",
+        help_text="The split whose ground truth it shares: a challenge with its own dates and quota.",
+    )
     opens_at = models.DateTimeField(null=True, blank=True)
     closes_at = models.DateTimeField(null=True, blank=True)
+    announcement = models.CharField(
+        max_length=300, blank=True, help_text="One line of plain text on its pages, until it ends."
+    )
+    announcement_ends_at = models.DateTimeField(null=True, blank=True)
     decimals = models.PositiveSmallIntegerField(
         default=1,
         choices=[(1, "one"), (2, "two")],
@@ -72,10 +104,39 @@ class Split(QuotaRules):
                 condition=Q(opens_at=None) | Q(closes_at=None) | Q(opens_at__lt=models.F("closes_at")),
                 name="split_opens_before_it_closes",
             ),
+            models.CheckConstraint(
+                condition=Q(announcement="", announcement_ends_at=None)
+                | (~Q(announcement="") & Q(announcement_ends_at__isnull=False)),
+                name="split_announcement_has_an_end",
+            ),
+            models.CheckConstraint(condition=~Q(title=""), name="split_has_a_title"),
+            models.CheckConstraint(condition=Q(listing__in=Listing.values), name="split_listing_is_known"),
+            models.CheckConstraint(
+                condition=Q(same_truth_as=None) | ~Q(same_truth_as=models.F("name")),
+                name="split_shares_the_truth_of_another_one",
+            ),
         ]
 
     def __str__(self) -> str:
         return self.name
+
+    def clean(self) -> None:
+        """Raise `ValidationError` for rules that make no sense, alone or beside the split it shares with."""
+        super().clean()
+        if self.announcement and self.announcement_ends_at is None:
+            message = "The announcement has no end; expected an end beside its text."
+            raise ValidationError({"announcement_ends_at": message})
+        if self.announcement_ends_at is not None and not self.announcement:
+            message = "The announcement has no text; expected a text beside its end."
+            raise ValidationError({"announcement": message})
+        other = self.same_truth_as
+        if other is not None and self.is_hidden and self.decimals > other.decimals:
+            raise ValidationError(
+                {
+                    "decimals": f"The split would publish {self.decimals} decimals of the hidden values of "
+                    f"{other.pk!r}, which publishes {other.decimals}; expected at most {other.decimals}."
+                }
+            )
 
     def faults(self) -> dict[str, str]:
         """The same, and of its times."""
@@ -93,6 +154,21 @@ class Split(QuotaRules):
         if self.opens_at and self.closes_at and self.opens_at >= self.closes_at:
             return None, None
         return self.opens_at, self.closes_at
+
+    def announcement_at(self, now: datetime) -> str:
+        """The line that its pages show at this moment; empty if there is none, or if it has ended."""
+        ends_at = self.announcement_ends_at
+        return self.announcement if ends_at is not None and now < ends_at else ""
+
+    @property
+    def is_archived(self) -> bool:
+        """Whether its board stays and it takes nothing any more."""
+        return self.listing == Listing.ARCHIVED
+
+    @property
+    def truth_split_id(self) -> str:
+        """The split that its ground truth belongs to: itself, or the one that it shares with."""
+        return self.same_truth_as_id or self.pk
 
     @property
     def has_ground_truth(self) -> bool:

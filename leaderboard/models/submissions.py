@@ -37,9 +37,11 @@ class SubmissionQuerySet(models.QuerySet["Submission"]):
         """The person's own team's submissions; maintainers see all, strangers none."""
         if not user.is_authenticated:
             return self.none()
-        if user.is_maintainer:
-            return self
-        return self.filter(method__team__memberships__user=user)
+        return self if user.is_maintainer else self.of(user)
+
+    def of(self, user: User) -> Self:
+        """The person's own team's submissions, without those to splits that are switched off."""
+        return self.filter(method__team__memberships__user=user, split__in=Split.objects.shown())
 
     def standing(self) -> Self:
         """Submissions that their team has not withdrawn."""
@@ -72,6 +74,9 @@ class Submission(models.Model):
     note = models.CharField(max_length=500, blank=True)
     commit = models.CharField("commit of the code", max_length=64, blank=True)
     withdrawn_at = models.DateTimeField(null=True, blank=True)
+    hidden_at = models.DateTimeField(
+        null=True, blank=True, help_text="When a maintainer took it off the boards of all times."
+    )
 
     objects: ClassVar[SubmissionQuerySet] = SubmissionQuerySet.as_manager()  # type: ignore[assignment]  # a manager, by its own words
 

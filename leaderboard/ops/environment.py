@@ -7,6 +7,7 @@ import os
 import stat
 from collections.abc import Callable, Collection
 from contextlib import suppress
+from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from tempfile import mkstemp
 from typing import Any
@@ -14,7 +15,68 @@ from typing import Any
 import environ
 from django.core.exceptions import ImproperlyConfigured
 
-env = environ.Env()
+FAULTS: list[str] = []
+"""What is wrong with the variables, as sentences: all of it is said at once, by `require_sound`."""
+ASKED: set[str] = set()
+"""The variables that somebody reads."""
+
+
+class Environment(environ.Env):
+    """The variables. An empty one is as good as none; a malformed one goes to `FAULTS`, as its default."""
+
+    def get_value(self, var: str, cast: Any = None, default: Any = environ.Env.NOTSET, **options: Any) -> Any:
+        """The value of a variable, or the default."""
+        ASKED.add(var)
+        if not os.environ.get(var):
+            return default
+        try:
+            return super().get_value(var, cast=cast, default=default, **options)
+        except (ValueError, TypeError, ImproperlyConfigured):
+            kind = getattr(cast, "__name__", "value")
+            expected = {"int": "a whole number", "float": "a number", "bool": "0 or 1"}.get(kind, f"a {kind}")
+            FAULTS.append(f"{var} is {os.environ[var]!r}; expected {expected}.")
+            return default
+
+
+def database(text: str) -> dict[str, Any]:
+    """Django's settings of a database from its URL."""
+    return _parsed("TSTTC_DATABASE_URL", text, env.db_url_config, "postgres://user:password@host:5432/name")
+
+
+def mail_server(text: str) -> dict[str, Any]:
+    """Django's settings of a mail server from its URL."""
+    return _parsed("TSTTC_EMAIL_URL", text, env.email_url_config, "smtp+tls://user:password@host:587")
+
+
+def networks(name: str, *, default: list[str]) -> list[IPv4Network | IPv6Network]:
+    """The networks that a variable lists."""
+    found = []
+    for text in env.list(name, default=default):
+        try:
+            found.append(ip_network(text.strip()))
+        except ValueError:
+            FAULTS.append(f"{name} has {text!r}; expected networks such as 10.0.0.0/8, separated by commas.")
+    return found
+
+
+def _parsed(name: str, text: str, parse: Callable[[str], dict[str, Any]], example: str) -> dict[str, Any]:
+    try:
+        found = parse(text) if text else {}
+    except (ValueError, KeyError, LookupError, ImproperlyConfigured):
+        found = {}
+    if text and not found.get("ENGINE", found.get("EMAIL_BACKEND")):
+        # Without the text: it may have a password.
+        FAULTS.append(f"{name} is not understood; expected an address such as {example}.")
+    return found
+
+
+def require_sound() -> None:
+    """Say everything that is wrong with the variables. Raises `ImproperlyConfigured`."""
+    if FAULTS:
+        raise ImproperlyConfigured("\n".join(FAULTS))
+
+
+env = Environment()
 
 PROFILE: str = env.str("TSTTC_PROFILE", default="embedded")
 if PROFILE not in {"embedded", "production"}:
@@ -22,7 +84,7 @@ if PROFILE not in {"embedded", "production"}:
 PRODUCTION = PROFILE == "production"
 
 # Which process this is, so that none has to be given a secret that it has no use for.
-PROCESSES = ("web", "worker", "migrate", "maintainer")
+PROCESSES = ("web", "worker", "migrate", "maintainer", "mailer")
 PROCESS: str = env.str("TSTTC_PROCESS", default="web")
 if PROCESS not in PROCESSES:
     raise ImproperlyConfigured(f"TSTTC_PROCESS is {PROCESS!r}; expected one of {', '.join(PROCESSES)}.")
@@ -36,9 +98,7 @@ def required(name: str, *, embedded: Any, by: Collection[str] = PROCESSES, elsew
     if not PRODUCTION:
         return env.str(name, default=embedded)
     if PROCESS in by and not env.str(name, default=""):
-        raise ImproperlyConfigured(
-            f"{name} is not set. In production it has no default; docs/operations.md describes it."
-        )
+        FAULTS.append(f"{name} is not set. In production it has no default; docs/operations.md describes it.")
     return env.str(name, default="") or elsewhere
 
 

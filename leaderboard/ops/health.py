@@ -65,7 +65,24 @@ def sweep_age_s(*, using: str = "default") -> float | None:
 
 def checks() -> tuple[Check, ...]:
     """Ask database, sweep and broker. Takes at most about three times `CHECK_TIMEOUT_S`; never raises."""
-    return (*_database(), _broker())
+    return (*_database(), broker())
+
+
+def ready() -> tuple[Check, ...]:
+    """Ask the database alone, without which no page and no submission works; never raises."""
+    return (database(),)
+
+
+def database() -> Check:
+    """Whether a new connection to the database answers."""
+    started_s = time.monotonic()
+    try:
+        with _own_connection() as alias, connections[alias].cursor() as cursor:
+            cursor.execute("SELECT 1")
+    except DatabaseProblem as fault:
+        log.warning("database_not_ready", reason=str(fault)[:200])
+        return Check("database", is_ok=False, detail="does not answer")
+    return Check("database", is_ok=True, detail=_answered(started_s))
 
 
 def n_out_of_reach(*, using: str = "default") -> int:
@@ -119,8 +136,8 @@ def _sweep(age_s: float | None) -> Check:
     return Check("sweep", is_ok=age_s < MAX_SWEEP_AGE_S, detail=detail)
 
 
-def _broker() -> Check:
-    """A new connection to the broker."""
+def broker() -> Check:
+    """Whether a new connection to the broker answers."""
     started_s = time.monotonic()
     options: dict[str, Any] = {
         **settings.CELERY_BROKER_TRANSPORT_OPTIONS,

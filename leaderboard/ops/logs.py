@@ -97,14 +97,22 @@ def configure() -> None:
     )
 
 
-def logging_settings(*, as_json: bool, level: str) -> dict[str, Any]:
-    """The value of Django's `LOGGING`: everything to standard error, in one form."""
+def logging_settings(*, as_json: bool, level: str, has_reports: bool = False) -> dict[str, Any]:
+    """The value of Django's `LOGGING`: everything to standard error, in one form; faults by mail as well."""
+    reports: dict[str, Any] = {
+        "class": "leaderboard.mails.fault_reports.FaultReportHandler",
+        "formatter": "line",
+        "level": "ERROR",
+    }
     return {
         "version": 1,
         "disable_existing_loggers": False,
         "formatters": {"line": {"()": "leaderboard.ops.logs.formatter", "as_json": as_json}},
-        "handlers": {"stderr": {"class": "logging.StreamHandler", "formatter": "line"}},
-        "root": {"handlers": ["stderr"], "level": level},
+        "handlers": {
+            "stderr": {"class": "logging.StreamHandler", "formatter": "line"},
+            **({"reports": reports} if has_reports else {}),
+        },
+        "root": {"handlers": ["stderr", *(["reports"] if has_reports else [])], "level": level},
         "loggers": {
             # Their own handlers would say everything twice.
             "django": {"handlers": [], "level": level, "propagate": True},

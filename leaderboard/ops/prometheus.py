@@ -1,7 +1,7 @@
 """Figures for Prometheus, read from the database when they are asked for.
 
-So they are the same from every process on every machine, and a restart loses nothing. Five statements a
-scrape; the counters are counts of rows that never change again.
+So they are the same from every process on every machine, and a restart loses nothing. Six statements a
+scrape; the counters are counts of rows that never change again. Figures of HTTP alone are a process's own.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -16,8 +16,8 @@ from prometheus_client import CollectorRegistry, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
 
-from leaderboard.models import AuditEvent, Evaluation, Status, SweepBeat
-from leaderboard.ops import health
+from leaderboard.models import AuditEvent, Evaluation, Mail, Status, SweepBeat
+from leaderboard.ops import health, http_figures
 
 PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
 BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
@@ -27,7 +27,7 @@ def exposition() -> bytes:
     """All figures in Prometheus' text format. Raises the database's error if it does not answer."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(DatabaseCollector())
-    return generate_latest(registry)
+    return generate_latest(registry) + generate_latest(http_figures.registry())
 
 
 class DatabaseCollector(Collector):
@@ -38,7 +38,7 @@ class DatabaseCollector(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Every figure, from five statements."""
+        """Every figure, from six statements."""
         yield from _queue(list(_by_status()))
         yield from _durations(list(_by_bucket()))
         yield _gauge(
@@ -48,6 +48,7 @@ class DatabaseCollector(Collector):
         )
         yield from _cleaning()
         yield from _sealing()
+        yield from _mails()
 
 
 # --- the queue and the states ---------------------------------------------------------------------------
@@ -122,6 +123,16 @@ def _cleaning() -> Iterator[Metric]:
         yield _counter(
             f"tsttc_unnamed_{what}_removed", f"Of such files, the {what} that were removed.", {(): n}
         )
+
+
+def _mails() -> Iterator[Metric]:
+    waiting = Mail.objects.filter(ended_at=None).aggregate(n=Count("pk"), age=Now() - Min("queued_at"))
+    yield _gauge("tsttc_mails_waiting", "Mails that are not sent yet.", {(): waiting["n"]})
+    yield _gauge(
+        "tsttc_mails_oldest_age_seconds",
+        "How long the oldest of them waits; 0 if none does.",
+        {(): waiting["age"].total_seconds() if waiting["age"] else 0.0},
+    )
 
 
 def _sealing() -> Iterator[Metric]:

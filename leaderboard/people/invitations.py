@@ -173,7 +173,11 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
             noun="Team",
             noun_id=team.pk,
             actor=user,
-            details={**_named(invitation), "left": str(former.pk) if former else None, "brought": moved},
+            details={
+                **_named(invitation),
+                "left": str(former.pk) if former else None,
+                "brought": sorted(moved),
+            },
         )
         versions.changed_by_methods(
             Method.objects.shown().filter(pk__in=list(moved)).values_list("pk", flat=True)

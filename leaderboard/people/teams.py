@@ -56,18 +56,24 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
         if row.name == name:
             return row
         require_rename_possible(renamed_at=row.renamed_at, now=now)
-        _require_free(name, but=row)
-        before, row.name, row.look, row.renamed_at = row.name, name, skeleton(name), now
-        try:
-            with transaction.atomic():
-                row.save(update_fields=["name", "look", "renamed_at"])
-        except IntegrityError:
-            raise _taken(name) from None
+        before = row.name
+        set_name(team=row, name=name, now=now)
         audit.record(
-            verb="renamed", noun="Team", noun_id=row.pk, actor=actor, details={"from": before, "to": name}
+            verb="renamed", noun="Team", noun_id=row.pk, actor=actor, names={"from": before, "to": name}
         )
         versions.changed_by_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
     return row
+
+
+def set_name(*, team: Team, name: str, now: datetime) -> None:
+    """Give a team that the caller has locked a clean name. Raises `Refused` for one that is taken."""
+    _require_free(name, but=team)
+    team.name, team.look, team.renamed_at = name, skeleton(name), now
+    try:
+        with transaction.atomic():
+            team.save(update_fields=["name", "look", "renamed_at"])
+    except IntegrityError:
+        raise _taken(name) from None
 
 
 def show_name(team: Team) -> None:
@@ -93,8 +99,9 @@ def show_name_in_any_case(team: Team) -> None:
     before, team.name = team.name, name
     show_name(team)
     if name != before:
-        details = {"from": before, "to": name, "reason": "another team used this name on the boards first"}
-        audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details)
+        details = {"reason": "another team used this name on the boards first"}
+        names = {"from": before, "to": name}
+        audit.record(verb="renamed", noun="Team", noun_id=team.pk, details=details, names=names)
 
 
 def require_showable(team: Team) -> None:

@@ -74,7 +74,8 @@ def create(
             noun="ApiToken",
             noun_id=row.token_key,
             actor=actor or user,
-            details={"name": name, "scopes": list(row.scopes), "split": split_name or None, "days": days},
+            details={"scopes": list(row.scopes), "split": split_name or None, "days": days},
+            names={"name": name},
         )
     return secret
 
@@ -108,9 +109,9 @@ def _check(*, scopes: Collection[str], days: int) -> None:
 def _split(name: str) -> Split | None:
     if not name:
         return None
-    split = Split.objects.filter(pk=name).first()
+    split = Split.objects.shown().filter(pk=name).first()
     if split is None:
-        known = ", ".join(Split.objects.values_list("pk", flat=True))
+        known = ", ".join(Split.objects.shown().values_list("pk", flat=True))
         raise Refused(
             "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
         )
@@ -175,7 +176,8 @@ def revoke(*, token: ApiToken, now: datetime, actor: User | None, how: str = "")
                 noun="ApiToken",
                 noun_id=token.token_key,
                 actor=actor,
-                details={"name": token.name, "how": how} if how else {"name": token.name},
+                details={"how": how} if how else {},
+                names={"name": token.name},
             )
     return bool(changed)
 

@@ -12,8 +12,13 @@ def refusal_of(split: Split, *, now: datetime) -> Refused | None:
     """Why a split takes nothing from anybody now; None if it does."""
     code, sentence = "", ""
     opens_at, closes_at = split.times
-    if not split.has_ground_truth:
-        code, sentence = "split-not-open", "are not open yet: it has no ground truth."
+    if split.is_archived:
+        code, sentence = "split-closed", "are closed: the split is archived."
+    elif not split.has_ground_truth:
+        code, sentence = (
+            "split-not-open",
+            "are not open yet: this site does not have the ground truth of the split.",
+        )
     elif opens_at and now < opens_at:
         code, sentence = "split-not-open", f"open at {opens_at:%Y-%m-%d %H:%M} UTC."
     elif closes_at and now >= closes_at:

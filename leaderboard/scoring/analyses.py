@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 import evaluator
 from evaluator.metrics.protocol import PRIMARY, Protocol
 from evaluator.scoring import uncertainty
+from evaluator.scoring.breakdown import CURVE_EDGES_S
 from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
 from leaderboard.scoring import aligned
 from leaderboard.storage import truth_values
@@ -21,8 +22,6 @@ from leaderboard.storage import truth_values
 Floats = NDArray[np.float64]
 Errors = Mapping[str, Floats]  # of every sequence, by metric
 
-# Edges of the true time to contact in seconds: finer where it matters, the intervals' own ends among them.
-CURVE_EDGES_S = (-20, -15, -10, -8, -6, -4, -3, -2, -1, 0, 0.5, 1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 15, 20)
 QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
 N_BINS = 24
 MAX_POINTS = 500
@@ -103,16 +102,11 @@ def content_of(
     a thousandth of a second.
     """
     report = evaluator.evaluate(predictions, truth, protocol=rules, keep_sequences=True)
-    assert report.sequences is not None  # noqa: S101 - they were asked for
+    assert report.sequences is not None and report.details is not None  # noqa: S101, PT018 - asked for
     errors, decimals = report.sequences, rules.decimals
     rng = np.random.default_rng(0)
     drawn = np.sort(rng.permutation(truth.n_sequences)[:MAX_POINTS])
-    predicted_s = np.clip(predictions.ttc_s[drawn], -rules.limit_s, rules.limit_s)
-    if rules.near_zero_s is not None:
-        low_s, high_s = rules.near_zero_s
-        predicted_s = np.where(
-            predicted_s < 0, np.minimum(predicted_s, low_s), np.maximum(predicted_s, high_s)
-        )
+    predicted_s = report.details.predicted_ttc_s[drawn]
     return {
         "n_sequences": truth.n_sequences,
         "n_recordings": truth.manifest.n_recordings,

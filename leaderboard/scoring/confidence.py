@@ -12,13 +12,14 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from typing import NamedTuple
 from uuid import UUID
 
 import numpy as np
 import structlog
 from django.db import connection, transaction
-from django.db.models import Exists, OuterRef, Q
+from django.db.models import Exists, OuterRef, Q, QuerySet
 from numpy.typing import NDArray
 
 from evaluator import published
@@ -59,8 +60,7 @@ Ends = dict[UUID, list[tuple[float | None, float | None, int]]]
 Ranges = dict[str, list[list[int] | None]]
 
 
-@dataclass(frozen=True)
-class ScoredEntry:
+class ScoredEntry(NamedTuple):
     """A scored submission in an edition that its team has not withdrawn."""
 
     evaluation_id: UUID
@@ -84,13 +84,7 @@ def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
 
 def active_entries(edition: Edition) -> list[ScoredEntry]:
     """Everything that stands in an edition, private methods included: one query."""
-    rows = Score.objects.filter(
-        evaluation__edition=edition,
-        evaluation__status=Status.SCORED,
-        evaluation__submission__withdrawn_at=None,
-        metric=PRIMARY,
-        interval=OVERALL,
-    ).values_list(
+    rows = _standing(edition).values_list(
         "evaluation_id",
         "evaluation__submission__digest",
         "evaluation__submission__manifest_digest",
@@ -105,6 +99,16 @@ def active_entries(edition: Edition) -> list[ScoredEntry]:
     ]
 
 
+def _standing(edition: Edition) -> "QuerySet[Score]":
+    return Score.objects.filter(
+        evaluation__edition=edition,
+        evaluation__status=Status.SCORED,
+        evaluation__submission__withdrawn_at=None,
+        metric=PRIMARY,
+        interval=OVERALL,
+    )
+
+
 def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
     """What everybody sees ranked: of each shown method its best, the earlier one of two that are as good."""
     best: dict[UUID, ScoredEntry] = {}
@@ -114,22 +118,13 @@ def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
     return list(best.values())
 
 
-def ranked_digest(edition: Edition, rivals: Sequence[ScoredEntry]) -> str:
-    """Names what ranges are made of: nothing that is private is in it."""
-    return _digest(edition, [str(row.evaluation_id) for row in rivals])
-
-
 def digest_of(edition: Edition, rows: Sequence[ScoredEntry]) -> str:
     """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
-    rivals = {row.evaluation_id for row in ranked(rows)}
-    lines = [f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in rows]
-    return _digest(edition, lines)
+    return Entries(edition, tuple(rows), _printed_lines(edition)).digest
 
 
-def _digest(edition: Edition, lines: Sequence[str]) -> str:
-    printed = sorted(map(repr, _printed(edition)))
-    text = "\n".join([edition.ground_truth_id, edition.protocol, *printed, *sorted(lines)])
-    return f"{METHOD} sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+def _printed_lines(edition: Edition) -> tuple[str, ...]:
+    return tuple(sorted(map(repr, _printed(edition))))
 
 
 def _printed(edition: Edition) -> list[tuple[float, ...]]:
@@ -145,13 +140,45 @@ class Entries:
 
     edition: Edition
     rows: tuple[ScoredEntry, ...]
-    digest: str
+    printed: tuple[str, ...]
 
     @classmethod
     def of(cls, edition: Edition) -> "Entries":
         """As they are now."""
-        rows = active_entries(edition)
-        return cls(edition, tuple(rows), digest_of(edition, rows))
+        return cls(edition, tuple(active_entries(edition)), _printed_lines(edition))
+
+    @cached_property
+    def ranked(self) -> list[ScoredEntry]:
+        """Those that everybody sees ranked."""
+        return ranked(self.rows)
+
+    @cached_property
+    def digest(self) -> str:
+        """Names what intervals and ranges are made of; see `digest_of`."""
+        rivals = {row.evaluation_id for row in self.ranked}
+        return self._digest([f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in self.rows])
+
+    @cached_property
+    def ranked_digest(self) -> str:
+        """Names what ranges are made of: nothing that is private is in it."""
+        return self._digest([str(row.evaluation_id) for row in self.ranked])
+
+    def _digest(self, lines: Sequence[str]) -> str:
+        edition = self.edition
+        text = "\n".join([edition.ground_truth_id, edition.protocol, *self.printed, *sorted(lines)])
+        return f"{METHOD} sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+    def are_those_of(self, present: Edition) -> bool:
+        """Whether the edition has the same ones now."""
+        # All else of an entry never changes, and takes longer to read.
+        found = _standing(present).values_list(
+            "evaluation_id",
+            "evaluation__submission__method_id",
+            "evaluation__submission__method__visibility",
+        )
+        now = {(pk, method, visibility != Visibility.PRIVATE) for pk, method, visibility in found}
+        before = {(row.evaluation_id, row.method_id, row.is_shown) for row in self.rows}
+        return now == before and _printed_lines(present) == self.printed
 
     @property
     def have_ranges(self) -> bool:
@@ -266,8 +293,7 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> Ends:
 
 def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Ranges] | None:
     """The rank ranges and the digest of what they are made of; None where those that are there hold."""
-    edition, rivals = entries.edition, ranked(entries.rows)
-    digest = ranked_digest(edition, rivals)
+    edition, rivals, digest = entries.edition, entries.ranked, entries.ranked_digest
     if EditionRanges.objects.filter(edition=edition, digest=digest).exists():
         return None
     found = kept_ranges.ranges_of(
@@ -329,10 +355,7 @@ def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, n
             .select_related("ground_truth", "split")
             .get(pk=edition.pk)
         )
-        if (
-            present.inference_digest != edition.inference_digest
-            or Entries.of(present).digest != entries.digest
-        ):
+        if present.inference_digest != edition.inference_digest or not entries.are_those_of(present):
             return False
         bulk.update(Score, ("low", "high"), [row for rows in ends.values() for row in rows])
         if ranges is not None:

@@ -38,9 +38,14 @@ from leaderboard.ops import broker
 log = structlog.get_logger(__name__)
 
 MAX_BACKOFF_S = 60.0
-# Large enough that a batch's round trips and COMMITs are nothing beside its arithmetic; small enough that the
-# workers of an edition end together, and that a live submission waits for a fraction of a second.
-RESCORE_BATCH = 100
+# Large enough that round trips and COMMITs are nothing beside the arithmetic; small enough that a live
+# submission waits for a fraction of a second. Of the last a worker takes half, so that two end together.
+RESCORE_BATCH, SMALL_BATCH = 100, 25
+
+
+def batch_of(n_waiting: int) -> int:
+    """How many of an edition's waiting evaluations a worker takes at once."""
+    return min(RESCORE_BATCH, max(SMALL_BATCH, -(-n_waiting // 2)))
 
 
 class LostRace(Exception):
@@ -120,8 +125,10 @@ def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> No
         [(pk, edition.pk, Evaluation.PRIORITY_RESCORE, now, just_before(now)) for pk in submission_ids],
         ignore_conflicts=True,
     )
-    for _ in range(0, len(submission_ids), RESCORE_BATCH):
+    n_waiting = len(submission_ids)
+    while n_waiting > 0:
         transaction.on_commit(broker.nudge, robust=True)
+        n_waiting -= batch_of(n_waiting)
 
 
 # --- workers ---------------------------------------------------------------------------------------------
@@ -132,29 +139,29 @@ def claim(
     lease_s: float,
     wall_s: float,
     limit: int = 1,
-    batch: int = 1,
+    in_batches: bool = False,
     token: uuid.UUID | None = None,
     held: Collection[str] | None = None,
 ) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
     With `held`, only those whose ground truth is among these digests: what this worker can score at all.
-    If the first is one of an edition's re-scoring, up to `batch` of that edition's. Two workers never get the
-    same one. Whoever brings a new `token` can find what it got if the answer is lost.
+    If the first is one of an edition's re-scoring, with `in_batches` some more of that edition's. Two workers
+    never get the same one. Whoever brings a new `token` can find what it got if the answer is lost.
     """
     token = token or uuid.uuid4()
     with transaction.atomic():
         # SQLite has one writer, and skips nothing.
         due = Evaluation.objects.due().select_for_update(skip_locked=True, no_key=True)
-        due = due if held is None else due.scorable(held)
-        waiting = due.values_list("pk", "attempt", "priority", "edition")
-        rows = list(waiting[:limit])
-        if not rows:
+        scorable = due if held is None else due.scorable(held)
+        waiting = scorable.values_list("pk", "attempt", "priority", "edition")
+        if not (rows := list(waiting[:limit])):
             return []
-        _, _, priority, edition = rows[0]
-        if priority == Evaluation.PRIORITY_RESCORE and batch > limit:
-            more = waiting.filter(edition=edition, priority=priority).exclude(pk__in=[row[0] for row in rows])
-            rows += more[: batch - limit]
+        alike = {"priority": rows[0][2], "edition": rows[0][3]}
+        if alike["priority"] == Evaluation.PRIORITY_RESCORE and in_batches:
+            n_waiting = Evaluation.objects.due().filter(**alike)[: 2 * RESCORE_BATCH].count()
+            more = waiting.filter(**alike).exclude(pk__in=[row[0] for row in rows])
+            rows += more[: max(batch_of(n_waiting) - len(rows), 0)]
         Evaluation.objects.filter(pk__in=[row[0] for row in rows], status=Status.QUEUED).update(
             status=Status.RUNNING,
             attempt=F("attempt") + 1,
@@ -279,8 +286,8 @@ def release(leases: Sequence[Lease]) -> int:
     """
     with transaction.atomic():
         held = _locked(leases)
-        rows = Evaluation.objects.filter(pk__in=held, status=Status.RUNNING)
-        return rows.update(status=Status.QUEUED, leased_until=None)
+        running = Evaluation.objects.filter(pk__in=held, status=Status.RUNNING)
+        return running.update(status=Status.QUEUED, leased_until=None)
 
 
 # --- the sweep -------------------------------------------------------------------------------------------
@@ -358,7 +365,7 @@ def cancel_edition(*, edition: Edition) -> int:
     return _cancel(Evaluation.objects.filter(edition=edition))
 
 
-def cancel(*, submission: Submission, actor: User) -> int:
+def cancel(*, submission: Submission, actor: User | None) -> int:
     """Cancel what is not decided yet of a submission. Returns how many evaluations that were."""
     with transaction.atomic():
         n_cancelled = _cancel(Evaluation.objects.filter(submission=submission))

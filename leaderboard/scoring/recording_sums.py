@@ -7,7 +7,7 @@ from the submission's values.
 
 import math
 import os
-import tempfile
+import uuid
 from functools import lru_cache
 from pathlib import Path
 
@@ -44,11 +44,13 @@ def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> Non
         return
     target = path(edition, file=file)
     try:
-        target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        handle, temporary = tempfile.mkstemp(dir=target.parent)
+        if not target.parent.exists():
+            target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        temporary = target.with_name(f"tmp{uuid.uuid4().hex}")
+        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
         with os.fdopen(handle, "wb") as out:
-            out.write(bags.sums.astype("<f8").tobytes())
-        Path(temporary).replace(target)
+            out.write(np.ascontiguousarray(bags.sums, dtype="<f8").data)
+        temporary.replace(target)
     except OSError as fault:
         log.warning("bags_not_kept", digest=file.digest, reason=str(fault)[:200])
 
@@ -87,8 +89,13 @@ def counts_of(edition: Edition) -> Floats:
 
 def floor_of(edition: Edition) -> dict[str, float | None]:
     """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
-    floor = floors.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
+    floor = _floor(edition.ground_truth_id, edition.protocol)
     return {name: published(value, decimals=edition.decimals) for name, value in floor.items()}
+
+
+@lru_cache(maxsize=4)
+def _floor(truth_digest: str, protocol: str) -> dict[str, float | None]:
+    return floors.floor_of(truth_values.load(truth_digest), protocol=protocol)
 
 
 @lru_cache(maxsize=2)

@@ -2,6 +2,7 @@
 
 import hashlib
 import random
+import threading
 import time
 import uuid
 from collections import deque
@@ -54,6 +55,39 @@ PAUSES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0)
 MAX_STORED_PROBLEMS = 100
 
 
+class _InHand:
+    """How many threads of this process decide evaluations at this moment."""
+
+    def __init__(self) -> None:
+        self._n = 0
+        self._changed = threading.Condition()
+
+    def __enter__(self) -> None:
+        with self._changed:
+            self._n += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._changed:
+            self._n -= 1
+            self._changed.notify_all()
+
+    def wait(self, *, timeout_s: float) -> bool:
+        """Wait until there is none, but not longer than `timeout_s`. Whether there was one."""
+        with self._changed:
+            if not self._n:
+                return False
+            self._changed.wait(timeout_s)
+            return True
+
+
+_in_hand = _InHand()
+
+
+def others_decide(*, timeout_s: float) -> bool:
+    """Whether another thread of this process decides an evaluation. Waits for its end, up to `timeout_s`."""
+    return _in_hand.wait(timeout_s=timeout_s)
+
+
 def run_next(*, rng: random.Random) -> bool:
     """Claim what is most urgent and decide it: one live submission, or a batch of an edition's re-scoring.
 
@@ -63,6 +97,12 @@ def run_next(*, rng: random.Random) -> bool:
     leases = _claimed()
     if not leases:
         return False
+    with _in_hand:
+        _decide(leases, claimed_s=claimed_s, rng=rng)
+    return True
+
+
+def _decide(leases: list[Lease], *, claimed_s: float, rng: random.Random) -> None:
     first = _retry_on_disconnect(lambda: _evaluations(leases[:1]))[0]
     if first.priority == Evaluation.PRIORITY_RESCORE:
         leases = rescore(leases, edition=first.edition)
@@ -71,7 +111,6 @@ def run_next(*, rng: random.Random) -> bool:
         run(waiting.popleft(), rng=rng, waiting=waiting)
         if time.monotonic() - claimed_s > settings.LEASE_S / 2:
             _release(waiting)
-    return True
 
 
 def _claimed() -> list[Lease]:
@@ -84,7 +123,7 @@ def _claimed() -> list[Lease]:
         return lifecycle.claim(
             lease_s=settings.LEASE_S,
             wall_s=settings.WALL_S,
-            batch=lifecycle.RESCORE_BATCH,
+            in_batches=True,
             token=token,
             held=truth_values.readable_digests(),
         )
@@ -122,11 +161,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     rejects, so that the problem is worded from the file itself. A store that does not answer is theirs to
     report as well.
     """
-    ids = [lease.evaluation_id for lease in leases]
-    rows = Evaluation.objects.filter(pk__in=ids).values_list(
-        "pk", "submission__digest", "submission__manifest_digest"
-    )
-    sent = _retry_on_disconnect(lambda: {pk: SentFile(*digests) for pk, *digests in rows})
+    sent, warned = _retry_on_disconnect(lambda: _sent(leases, edition))
     try:
         truth = _truth(edition)
     except (OSError, TruthDamaged):
@@ -148,7 +183,9 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
             if predictions is not None:
                 report = scorer.report(predictions, keep_bags=True)
                 recording_sums.save(edition, file=file, bags=report.bags)
-                warnings = warnings_of(predictions)
+                warnings = warned.get(lease.evaluation_id)
+                if warnings is None:
+                    warnings = warnings_of(predictions)
                 outcomes.append((lease, scored(report, decimals=edition.decimals, warnings=warnings)))
                 continue
         except (Rejected, *FAULTS_OF_THE_FILE) as fault:
@@ -159,6 +196,33 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         _retry_on_disconnect(lambda: lifecycle.finalise_many(outcomes))
     log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
     return rest
+
+
+def _sent(
+    leases: Sequence[Lease], edition: Edition
+) -> tuple[dict[uuid.UUID, SentFile], dict[uuid.UUID, list[FileWarning]]]:
+    """The files of these evaluations, and the warnings of those that were scored with this manifest before.
+
+    Warnings come of a file and its manifest alone; to find them takes longer than to score the file.
+    """
+    evaluation_of: dict[uuid.UUID, uuid.UUID] = {}
+    sent: dict[uuid.UUID, SentFile] = {}
+    rows = Evaluation.objects.filter(pk__in=[lease.evaluation_id for lease in leases])
+    for pk, submission, *digests in rows.values_list(
+        "pk", "submission", "submission__digest", "submission__manifest_digest"
+    ):
+        evaluation_of[submission], sent[pk] = pk, SentFile(*digests)
+    before = Evaluation.objects.filter(
+        submission__in=evaluation_of,
+        status=Status.SCORED,
+        edition__ground_truth__manifest_digest=edition.ground_truth.manifest_digest,
+        report__has_key="warnings",
+    )
+    warned = {
+        evaluation_of[submission]: [FileWarning(**warning) for warning in warnings]
+        for submission, warnings in before.values_list("submission", "report__warnings")
+    }
+    return sent, warned
 
 
 def run(lease: Lease, *, rng: random.Random, waiting: deque[Lease] | None = None) -> None:

@@ -125,7 +125,11 @@ def replacing(target: Path) -> Iterator[Path]:
     target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
     handle, temporary = tempfile.mkstemp(dir=target.parent, suffix=target.suffix)
     os.close(handle)
-    yield Path(temporary)
+    try:
+        yield Path(temporary)
+    except BaseException:
+        Path(temporary).unlink(missing_ok=True)
+        raise
     # Else a power cut could leave a file that is never made anew, because it is there.
     with Path(temporary).open("rb") as written:
         os.fsync(written.fileno())

@@ -215,8 +215,8 @@ def _queue(submission: Submission, *, split: Split) -> None:
 
 def _open_split(name: str, *, now: datetime) -> Split:
     # Looked up here and not there: not every text is one that a database can be asked for.
-    splits = {split.name: split for split in Split.objects.select_related("published_edition__ground_truth")}
-    split = splits.get(name)
+    rows = Split.objects.shown().select_related("published_edition__ground_truth")
+    split = (splits := {split.name: split for split in rows}).get(name)
     if split is None:
         known = ", ".join(splits)
         raise Refused(

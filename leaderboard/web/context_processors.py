@@ -6,6 +6,7 @@ from urllib.parse import urlsplit
 from django.conf import settings
 from django.core.exceptions import DisallowedHost
 from django.http import Http404, HttpRequest
+from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
 from django.utils.http import url_has_allowed_host_and_scheme
 
@@ -32,6 +33,7 @@ _SECTIONS = {
     "join_team": "account",
     "invite": "account",
     "tokens": "account",
+    "account_data": "account",
     "docs": "docs",
     "docs_search": "docs",
     "guide": "docs",
@@ -39,7 +41,7 @@ _SECTIONS = {
     "api_reference": "api",
     "api_operation": "api",
 }
-_PREFIXES = {"account_": "account", "maintain": "maintain"}
+_PREFIXES = {"account_": "account", "published": "published", "maintain": "maintain"}
 
 
 def split_or_404(request: HttpRequest, name: str) -> Split:
@@ -69,11 +71,30 @@ def site(request: HttpRequest) -> dict[str, Any]:
             _SECTIONS.get(name, ""),
         ),
         "splits": SimpleLazyObject(lambda: splits_of(request)),
+        "announcements": _announcements(request),
         # Only the pages of errors ask for it, which nobody remembers.
         "came_from": SimpleLazyObject(lambda: _came_from(request)),
         # Views of pages that are about a board without its name in their address say it themselves.
         "board_split": _board_split(request),
     }
+
+
+def _announcements(request: HttpRequest) -> list[tuple[str, str]]:
+    """The lines to show, each with the title of its split, or without where all splits have it.
+
+    Only pages that are about splits have them: no other page asks the database for it. A page of one split
+    has the lines of that one.
+    """
+    if not hasattr(request, "splits"):
+        return []
+    now, splits, only = timezone.now(), splits_of(request), _board_split(request)
+    titles: dict[str, list[str]] = {}
+    for split in splits:
+        titles.setdefault(split.announcement_at(now), []).append(split.title)
+    if len(titles) == 1:
+        return [("", line) for line in titles if line]
+    own = {split.announcement_at(now) for split in splits if only in {"", split.pk}}
+    return [(", ".join(named), line) for line, named in titles.items() if line and line in own]
 
 
 def _came_from(request: HttpRequest) -> str:

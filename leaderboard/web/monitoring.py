@@ -25,7 +25,8 @@ FORWARDED = (
     "HTTP_X_REAL_IP",
 )
 
-readiness = health.Recent(health.checks, keep_s=1.0)
+readiness = health.Recent(health.ready, keep_s=1.0)
+healthiness = health.Recent(health.checks, keep_s=1.0)
 
 
 @never_cache
@@ -38,16 +39,15 @@ def healthz(request: HttpRequest) -> HttpResponse:
 @never_cache
 @require_safe
 def readyz(request: HttpRequest) -> HttpResponse:
-    """Database, broker, sweep and what it found; 503 if one fails without which nothing works."""
-    checks = readiness()
-    is_ready = all(check.is_ok for check in checks if check.is_vital)
-    return JsonResponse(
-        {
-            "status": "ready" if is_ready else "not ready",
-            "checks": {check.name: {"ok": check.is_ok, "detail": check.detail} for check in checks},
-        },
-        status=200 if is_ready else 503,
-    )
+    """The database answers, so this process can serve; for a balancer that sends visitors elsewhere."""
+    return _told(readiness(), well="ready")
+
+
+@never_cache
+@require_safe
+def healthy(request: HttpRequest) -> HttpResponse:
+    """Database, broker, sweep and what it found; 503 if one fails that somebody has to look after."""
+    return _told(healthiness(), well="healthy")
 
 
 @never_cache
@@ -63,6 +63,17 @@ def exposition(request: HttpRequest) -> HttpResponse:
     except DatabaseProblem as fault:
         log.warning("metrics_unavailable", reason=str(fault)[:200])
         return _sentence("The database does not answer.", status=503)
+
+
+def _told(checks: tuple[health.Check, ...], *, well: str) -> JsonResponse:
+    is_well = all(check.is_ok for check in checks if check.is_vital)
+    return JsonResponse(
+        {
+            "status": well if is_well else f"not {well}",
+            "checks": {check.name: {"ok": check.is_ok, "detail": check.detail} for check in checks},
+        },
+        status=200 if is_well else 503,
+    )
 
 
 def _sentence(text: str, *, status: int) -> HttpResponse:

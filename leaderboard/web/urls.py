@@ -3,7 +3,7 @@
 from django.urls import include, path, register_converter
 
 from leaderboard.http import cacheable, takes
-from leaderboard.web.account import team_views, token_views
+from leaderboard.web.account import data_views, mail_views, team_views, token_views
 from leaderboard.web.boards import (
     badge_and_feed_views,
     board_query,
@@ -13,6 +13,7 @@ from leaderboard.web.boards import (
     compare_views,
     edition_views,
     export_views,
+    paper_views,
 )
 from leaderboard.web.docs import docs_views, page_views, wheel_views
 from leaderboard.web.landing import crawler_views, landing_views
@@ -20,8 +21,11 @@ from leaderboard.web.maintain import (
     audit_views,
     edited_page_views,
     maintainer_views,
+    moderation_views,
+    published_views,
     queue_views,
     quota_views,
+    split_views,
 )
 from leaderboard.web.methods import method_views
 from leaderboard.web.submissions import analysis_views, receipt_views, submission_views
@@ -101,13 +105,22 @@ urlpatterns = [
     path("team/leave/", team_views.leave, name="leave_team"),
     path("team/members/<uuid:handle>/hand-over/", team_views.hand_over, name="hand_over_team"),
     path("team/members/<uuid:handle>/remove/", team_views.remove, name="remove_member"),
+    path("account/data/", data_views.data, name="account_data"),
+    path("account/data.json", data_views.download, name="account_data_download"),
     path("tokens/", token_views.token_page, name="tokens"),
+    path("mails/", mail_views.mails, name="mails"),
     path("tokens/revoke/", token_views.revoke, name="revoke_token"),
     path("docs/", docs_views.docs, name="docs"),
     path("docs/api/", docs_views.api_page, name="api_reference"),
     path("docs/api/<slug:operation_id>/", docs_views.api_operation, name="api_operation"),
     path("docs/search/", takes(docs_views.find, docs_views.SEARCH_PARAMETERS), name="docs_search"),
     path("docs/<path:guide_name>/", docs_views.guide, name="guide"),
+    path("published/", cacheable(paper_views.published_page), name="published"),
+    path(
+        "published/<slug:table_name>.<slug:suffix>",
+        cacheable(paper_views.published_table),
+        name="published_table",
+    ),
     path("dist/", wheel_views.dist, name="dist"),
     path("dist/<str:wheel_name>", wheel_views.dist_file, name="dist_file"),
     path("<page:page_name>/", page_views.site_page, name="site_page"),
@@ -128,6 +141,13 @@ urlpatterns = [
         quota_views.end_override,
         name="maintain_quota_end",
     ),
+    path("maintain/teams/<uuid:team_id>/", moderation_views.team, name="maintain_team"),
+    path("maintain/deeds/<slug:deed_name>/<uuid:subject_id>/", moderation_views.deed, name="maintain_deed"),
+    path("maintain/published/", published_views.published, name="maintain_published"),
+    path("maintain/splits/", split_views.splits, name="maintain_splits"),
+    path("maintain/announcement/", split_views.announcement, name="maintain_announcement"),
+    path("maintain/splits/add/", split_views.add, name="maintain_split_add"),
+    path("maintain/splits/<slug:split>/", split_views.change, name="maintain_split"),
     path("maintain/<slug:split>/open/", maintainer_views.open_edition, name="maintain_open"),
     path("maintain/<slug:split>/editions/<int:number>/", include(MAINTAINED_EDITION)),
 ]

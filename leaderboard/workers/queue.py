@@ -18,6 +18,7 @@ from django.db.models.functions import Now
 from leaderboard import audit, versions
 from leaderboard.boards import snapshots
 from leaderboard.db import clock
+from leaderboard.mails import notices, outbox
 from leaderboard.methods import visibility
 from leaderboard.models import Evaluation, SweepBeat
 from leaderboard.ops import health, rate_limits
@@ -67,6 +68,17 @@ def draw_cards_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
     """Draw the cards that are missing, unless somebody has begun to within `SWEEP_S`."""
     if _begun("cards_begun_at", every_s=settings.SWEEP_S):
         pictures.draw(now=clock.database_now(), is_stopping=stopping.is_set)
+
+
+def send_mails_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
+    """Queue notices and send what waits, unless somebody has begun to within `SWEEP_S`.
+
+    A worker that has no mail server leaves it to others.
+    """
+    if settings.SENDS_MAIL and _begun("mails_begun_at", every_s=settings.SWEEP_S):
+        now = clock.database_now()
+        notices.queue_due(now=now)
+        outbox.work_off(now=now, is_stopping=stopping.is_set)
 
 
 def _begun(field: str, *, every_s: float) -> bool:
@@ -138,7 +150,7 @@ class Poller(threading.Thread):
 
 
 def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
-    """Let this process look for work, sweep, clean and draw cards by itself.
+    """Let this process look for work, sweep, clean, draw cards and send mails by itself.
 
     One for each, so that neither a long run nor a slow store keeps the queue from being swept.
     """
@@ -147,6 +159,7 @@ def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
         Poller(sweep_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
         Poller(clean_if_due, every_s=min(settings.CLEAN_S, 60.0), rng=rng),
         Poller(draw_cards_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
+        Poller(send_mails_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
     )
     for poller in pollers:
         poller.start()

@@ -6,6 +6,7 @@ from datetime import datetime
 import structlog
 from django.db.models import F
 
+from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
 from leaderboard.scoring import questions
 from leaderboard.storage import orphans
@@ -32,6 +33,7 @@ def clean(*, now: datetime) -> Cleaned:
     """
     n_keys = idempotency.purge(now=now)
     n_questions = questions.delete_expired(now=now)
+    outbox.purge(now=now)
     n_files = n_bytes = n_leftovers = 0
     for orphan in orphans.orphans(now=now):
         if orphans.remove(orphan, now=now):

@@ -6,10 +6,12 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
+from django.core.management.base import CommandError
 from django.utils import timezone
 
 from evaluator.metrics.protocol import PROTOCOLS
-from leaderboard.editions import corrections, history
+from evaluator.tables.formats import csv_lines
+from leaderboard.editions import corrections, history, label_changes
 from leaderboard.management.refusing import RefusingCommand
 from leaderboard.models import Edition, Split
 
@@ -33,10 +35,22 @@ class Command(RefusingCommand):
             choices=[1, 2],
             help="with how many decimals it publishes; default: as the split says now",
         )
+        parser.add_argument(
+            "--dry-run", action="store_true", help="only say what --truth would change; keep nothing"
+        )
+        parser.add_argument(
+            "--diff",
+            type=Path,
+            metavar="FILE.csv",
+            help="with --dry-run: a row for each recording that changes",
+        )
         parser.add_argument("--wait", action="store_true", help="show progress until all are decided")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Open, and follow the progress if asked."""
+        if options["dry_run"] or options["diff"]:
+            self._look(options)
+            return
         edition = corrections.open_edition(
             split_name=options["split"],
             path=options["truth"],
@@ -62,6 +76,26 @@ class Command(RefusingCommand):
         self.stdout.write(
             f"Inspect the preview first: manage.py preview_edition {edition.split_id} {edition.number}"
         )
+
+    def _look(self, options: dict[str, Any]) -> None:
+        """Say what the labels of a file would change, and write it down by recording if asked."""
+        if not options["dry_run"] or options["truth"] is None:
+            raise CommandError("--dry-run needs --truth PATH, and --diff needs --dry-run.")
+        found = label_changes.look(split_name=options["split"], path=options["truth"])
+        counts, rows = found.counts, found.recordings
+        self.stdout.write(
+            f"Against {found.edition}: {counts.n_added} sequences added, {counts.n_removed} removed, "
+            f"{counts.n_changed} changed; {counts.n_renumbered} with another anno_id; in "
+            f"{len(rows)} recordings. Nothing was kept."
+        )
+        for row in rows[:10]:
+            self.stdout.write(
+                f"  {row.recording}: {row.n_added} added, {row.n_removed} removed, {row.n_changed} changed "
+                f"by up to {row.largest_change_s:.3f} s"
+            )
+        if options["diff"]:
+            lines = csv_lines((row.as_row for row in rows), columns=label_changes.COLUMNS)
+            options["diff"].write_text("".join(lines), encoding="utf-8", newline="")
 
     def _follow(self, edition: Edition) -> None:
         """One line that renews itself on a terminal, one line a change elsewhere."""

@@ -13,12 +13,16 @@ from urllib.parse import urlsplit, urlunsplit
 
 from allauth.account import forms
 from allauth.account.adapter import DefaultAccountAdapter
+from allauth.core import context as allauth_context
 from allauth.core.internal import ratelimit
 from django.conf import settings
 from django.contrib.auth.hashers import make_password
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
 from django.http import HttpRequest
+from django.utils import timezone
+
+from leaderboard.mails import outbox
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 
@@ -36,9 +40,13 @@ class AccountAdapter(DefaultAccountAdapter):
     """Sends mails, and decides whether somebody may try a password."""
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
-        """Send a mail whose links lead to the configured site."""
+        """Send a mail whose links lead to the configured site, now or, if no server takes it, later."""
         links = {name: _on_our_site(value) for name, value in context.items() if _is_address(value)}
-        super().send_mail(template_prefix, email, {**context, "current_site": ConfiguredSite(), **links})
+        given = {"request": allauth_context.request, "email": email, **context}
+        message = self.render_mail(
+            template_prefix, email, {**given, "current_site": ConfiguredSite(), **links}
+        )
+        outbox.send_or_keep(message=message, now=timezone.now())
 
     def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
         """Count one try. Raises allauth's validation error once there were too many wrong ones."""

@@ -10,7 +10,7 @@ from leaderboard.web.forms import SiteForm
 
 
 def _splits() -> list[tuple[str, str]]:
-    names = Split.objects.values_list("pk", flat=True)
+    names = Split.objects.shown().values_list("pk", flat=True)
     return [("", "all splits"), *((name, f"{name} only") for name in names)]
 
 

@@ -228,7 +228,7 @@ class Frame:
             "useUTC": True,
             "textStyle": {"color": "--ink"},
             "xAxis": [
-                *({**axis, "gridIndex": i} for i, axis in enumerate(self.x_axes)),
+                *({**axis, "id": f"x{i}", "gridIndex": i} for i, axis in enumerate(self.x_axes)),
                 *({**axis, "gridIndex": n_panels - 1, "position": "bottom"} for axis in self.further_x_axes),
             ],
             "yAxis": [{**axis, "gridIndex": i} for i, axis in enumerate(self.y_axes)],
@@ -244,6 +244,10 @@ class Frame:
         left = self.left[is_narrow]
         top = 38 + self.top + 22 * self._n_legend_lines(320 if is_narrow else NARROW_PX)
         layout = {"legend": self._legend(), "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow)}
+        if n_panels > 1:  # one above the other, only the last has room for a name below it
+            shown = [not is_narrow or number == n_panels - 1 for number in range(n_panels)]
+            names = [axis["name"] if keeps else "" for axis, keeps in zip(self.x_axes, shown, strict=True)]
+            layout["xAxis"] = [{"id": f"x{number}", "name": name} for number, name in enumerate(names)]
         if left == _LEFT_PX:
             return layout
         return layout | {"yAxis": [{"axisLabel": {"width": left - 16}} for _ in self.y_axes]}

@@ -138,14 +138,14 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
     if not quoted and not sent:
         return empty("progress")
     moments = [at for _, _, at in sent]
-    is_short = not quoted and max(moments) - min(moments) < _SHORT
+    # Within a short span the axis has hours, unless a method is anonymous: of these only the day is told.
+    is_anonymous = any(entry.visibility == Visibility.ANONYMOUS for entry, *_ in sent)
+    is_short = not (quoted or is_anonymous) and max(moments) - min(moments) < _SHORT
     told = _minute if is_short else _day
     placed = [
         (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
     ]
-    placed += [
-        (_ms(told(at)), value, entry, _time_words(entry, at, is_short=is_short)) for entry, value, at in sent
-    ]
+    placed += [(_ms(told(at)), value, entry, _time_words(at, is_short=is_short)) for entry, value, at in sent]
     found = _with_front(placed)
     first, last = _time_range([told(at) for at in moments], [year for *_, year in quoted])
     series, names = _front_series(found, line="Best so far", praise="the best when it came", end=_ms(last))
@@ -205,10 +205,9 @@ def _minute(at: datetime) -> datetime:
     return at.replace(second=0, microsecond=0)
 
 
-def _time_words(entry: Entry, at: datetime, *, is_short: bool) -> str:
-    """When it came: the day; within a short span the minute as well, but of anonymous methods."""
-    is_exact = is_short and entry.visibility != Visibility.ANONYMOUS
-    return f"{at:%Y-%m-%d %H:%M} UTC" if is_exact else f"{at:%Y-%m-%d}"
+def _time_words(at: datetime, *, is_short: bool) -> str:
+    """When it came: the day; within a short span the minute as well."""
+    return f"{at:%Y-%m-%d %H:%M} UTC" if is_short else f"{at:%Y-%m-%d}"
 
 
 def _time_range(moments: Sequence[datetime], years: Sequence[int]) -> tuple[datetime, datetime]:

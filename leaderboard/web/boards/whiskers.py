@@ -110,7 +110,7 @@ def whisker(scale: WhiskerScale, value: float, ends: Ends | None) -> SafeString:
     else:
         css = "ring" if ends is None else "dot"
         parts.append(
-            format_html('<circle class="{}" cx="{}%" cy="50%" r="2.6"/>', css, f"{scale.percent(value):g}")
+            format_html('<circle class="{}" cx="{}%" cy="50%" r="3.4"/>', css, f"{scale.percent(value):g}")
         )
     return _svg("whisker", parts)
 

@@ -101,8 +101,19 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         "tsttc board val --edition 1",
         'client.board("val", edition=1)',
     ),
+    "list_published_tables": Example(
+        _get("published"), _send("GET", "published", bearer="wrong"), "tsttc published --json"
+    ),
+    "published_table": Example(
+        _get("published/ablation-frame-gap"),
+        _get("published/nowhere"),
+        "tsttc published ablation-frame-gap",
+    ),
     "manifest": Example(
-        _get("splits/val/manifest"), _get("splits/nowhere/manifest"), "", 'client.manifest("val")'
+        _get("splits/val/manifest"),
+        _get("splits/nowhere/manifest"),
+        "tsttc manifest --split val",
+        'client.manifest("val")',
     ),
     "compare": Example(
         _get("compare", ("split", "val"), ("m", METHOD), ("m", OTHER)),
@@ -113,9 +124,17 @@ EXAMPLES: Final[Mapping[str, Example]] = {
     "method": Example(
         _get(f"methods/{METHOD}"), _get(f"methods/{NOBODYS}"), "", f'client.method("{METHOD}")'
     ),
-    "list_methods": Example(_own("methods", ("limit", "1")), _get("methods")),
+    "list_methods": Example(
+        _own("methods", ("limit", "1")), _get("methods"), "tsttc methods", "list(client.methods())"
+    ),
+    "account": Example(_own("account"), _get("account"), "tsttc whoami", "client.account()"),
     "quota": Example(_own("quota"), _get("quota"), "tsttc quota", "client.quota()"),
-    "list_submissions": Example(_own("submissions", ("limit", "1")), _own("submissions", ("after", "x"))),
+    "list_submissions": Example(
+        _own("submissions", ("limit", "1")),
+        _own("submissions", ("after", "x")),
+        "tsttc submissions",
+        "list(client.submissions())",
+    ),
     "submission": Example(
         _own(f"submissions/{SUBMISSION}", ("wait", "60")),
         _own(f"submissions/{SUBMISSION}", ("wait", "100")),
@@ -127,6 +146,12 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         _own(f"submissions/{SUBMISSION}/receipt", ("edition", "99")),
         f"tsttc receipt {SUBMISSION}",
         f'client.receipt("{SUBMISSION}")',
+    ),
+    "submission_file": Example(
+        _own(f"submissions/{SUBMISSION}/file"),
+        _own(f"submissions/{NOBODYS}/file"),
+        f"tsttc download {SUBMISSION} -o predictions.json",
+        f'client.file("{SUBMISSION}")',
     ),
     "foresee_method": Example(
         _own(f"methods/{DRAFT}/visibility", ("as", "ANONYMOUS")),
@@ -161,7 +186,10 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         '    client.submit(file, filename="predictions.json", split="val", method="Deep TTC")',
     ),
     "withdraw": Example(
-        _send("POST", f"submissions/{SUBMISSION}/withdraw"), _send("POST", f"submissions/{NOBODYS}/withdraw")
+        _send("POST", f"submissions/{SUBMISSION}/withdraw"),
+        _send("POST", f"submissions/{NOBODYS}/withdraw"),
+        f"tsttc withdraw {SUBMISSION}",
+        f'client.withdraw("{SUBMISSION}")',
     ),
     "edition_progress": Example(
         _own("splits/val/editions/2/progress"), _get("splits/val/editions/2/progress"), by="maintainer"

@@ -9,9 +9,11 @@ from typing import Any, Final
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import render
 from django.urls import reverse
+from django.utils import timezone
 from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
+from leaderboard.boards.snapshots import splits_of
 from leaderboard.http import ANYTHING, Parameters
 from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
 
@@ -22,7 +24,8 @@ SEARCH_PARAMETERS: Final[Parameters] = {"q": ANYTHING}
 @require_safe
 def docs(request: HttpRequest) -> HttpResponse:
     """How to submit, the file's format, the errors, the API."""
-    context = {"navigation": guides.navigation(), "wheel": wheels.current(), **reference.docs()}
+    facts = reference.docs(splits_of(request), now=timezone.now())
+    context = {"navigation": guides.navigation(), "wheel": wheels.current(), **facts}
     return render(request, "docs/docs.html", context)
 
 

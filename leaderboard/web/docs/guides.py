@@ -22,6 +22,9 @@ _REPOSITORY: Final = Path(settings.BASE_DIR)
 _DOCS: Final = _REPOSITORY / "docs"
 _EXAMPLES: Final = _REPOSITORY / "examples"
 _REFERENCE: Final = _DOCS / "api-reference.md"
+# Its place in the navigation, and where it is.
+_CHANGELOG: Final = "changelog.md"
+_CHANGELOG_FILE: Final = _REPOSITORY / "CHANGELOG.md"
 # By file: the name in the address where the file's own would say nothing, or stand for another page.
 _NAMES: Final = {"index": "overview", "api": "api-guide", "adr/README": "decisions"}
 _SCHEMES: Final = {"http", "https", "mailto"}
@@ -57,7 +60,7 @@ def files() -> dict[str, Path]:
         for path in (*_DOCS.glob("*.md"), *_DOCS.glob("adr/*.md"))
         for name in [path.relative_to(_DOCS).with_suffix("").as_posix()]
     }
-    return {**found, "examples": _EXAMPLES / "README.md"}
+    return {**found, "examples": _EXAMPLES / "README.md", "changelog": _CHANGELOG_FILE}
 
 
 @cache
@@ -83,7 +86,7 @@ def navigation() -> tuple[Section, ...]:
 def _entry(title: str, file: str) -> GuideLink:
     if _DOCS / file == _REFERENCE:
         return GuideLink(title, reverse("api_reference"))
-    name = _names()[_DOCS / file]
+    name = _names()[_CHANGELOG_FILE if file == _CHANGELOG else _DOCS / file]
     return GuideLink(title, reverse("guide", args=[name]), name)
 
 

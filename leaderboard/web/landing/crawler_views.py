@@ -20,10 +20,20 @@ from leaderboard.pages import pages
 from leaderboard.web.docs import api_examples, guides
 
 # Public pages that are about no board.
-_NAMED: Final = ("home", "docs", "api_reference")
+_NAMED: Final = ("home", "published", "docs", "api_reference")
 # Pages of one's own, and views of a page that the page itself offers: its orders, filters and days.
 _NOT_FOR_CRAWLERS: Final = (
-    *("/accounts/", "/admin/", "/api/", "/maintain/", "/submissions/", "/team/", "/tokens/", "/*?"),
+    *(
+        "/account/",
+        "/accounts/",
+        "/admin/",
+        "/api/",
+        "/maintain/",
+        "/submissions/",
+        "/team/",
+        "/tokens/",
+        "/*?",
+    ),
 )
 
 
@@ -61,7 +71,7 @@ def _of_boards(splits: Sequence[Split]) -> Iterator[SitemapEntry]:
     for split in splits:
         for name in ("board", "charts", "editions"):
             yield SitemapEntry(_absolute(name, split.pk))
-    editions = Edition.objects.exclude(published_at=None).order_by("split", "number")
+    editions = Edition.objects.filter(split__in=splits).exclude(published_at=None).order_by("split", "number")
     for split_id, number, published_at in editions.values_list("split", "number", "published_at"):
         yield SitemapEntry(_absolute("edition", split_id, number), published_at)
     methods: dict[str, datetime | None] = {}

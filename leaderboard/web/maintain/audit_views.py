@@ -1,7 +1,8 @@
 """The audit trail for maintainers: a page and two exports."""
 
+import itertools
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from django.core.paginator import Paginator
@@ -16,7 +17,7 @@ from leaderboard.web.maintain.audit_forms import AuditFilter
 from leaderboard.web.maintain.maintainer_views import maintainers_only
 
 PER_PAGE = 100
-COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "previous_hash", "hash")
+COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "names", "previous_hash", "hash")
 
 
 @maintainers_only
@@ -29,31 +30,43 @@ def events(request: HttpRequest, kind: str = "") -> HttpResponse | StreamingHttp
     if kind:
         return _download(asked, kind=kind)
     page = Paginator(audit.events(**asked.wanted()), PER_PAGE).get_page(request.GET.get("page"))
-    context = {"form": asked, "page": page, "query": asked.query(), "rows": [(e, _told(e)) for e in page]}
+    names = audit.names_in(page)
+    rows = [(event, _told(event, names)) for event in page]
+    context = {"form": asked, "page": page, "query": asked.query(), "rows": rows}
     return render(request, "maintain/audit.html", context)
 
 
-def _told(event: AuditEvent) -> list[tuple[str, str]]:
+def _told(event: AuditEvent, names: Mapping[str, str]) -> list[tuple[str, str]]:
     """The details as a person reads them; what is empty says nothing."""
     told = {
         name: ", ".join(map(str, value)) if isinstance(value, list) else value
         for name, value in event.details.items()
-    }
+    } | {name: text or "(blanked)" for name, text in _named(event, names).items()}
     return [(name, str(value)) for name, value in told.items() if value not in ("", None)]
 
 
 def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
     """Every event that fits, a few at a time: a trail is as long as the site is old."""
-    return (_row(event) for event in audit.events(**asked.wanted()).iterator(chunk_size=1000))
+    events = audit.events(**asked.wanted()).iterator(chunk_size=1000)
+    while some := list(itertools.islice(events, 1000)):
+        names = audit.names_in(some)
+        yield from (_row(event, names) for event in some)
 
 
-def _row(event: AuditEvent) -> dict[str, Any]:
-    """One event, column by column."""
+def _named(event: AuditEvent, names: Mapping[str, str]) -> dict[str, str]:
+    """What stands for a name among the details, and the name."""
+    texts = {name: value for name, value in event.details.items() if isinstance(value, str)}
+    return {name: names[value] for name, value in texts.items() if value in names}
+
+
+def _row(event: AuditEvent, names: Mapping[str, str]) -> dict[str, Any]:
+    """One event, column by column; `details` as the hash has them."""
     return {
         "id": event.pk,
         "at": event.at.isoformat(),
         "actor": event.actor.email if event.actor else None,
-        **{name: getattr(event, name) for name in COLUMNS[3:]},
+        **{name: getattr(event, name) for name in COLUMNS[3:] if name != "names"},
+        "names": _named(event, names),
     }
 
 
@@ -70,7 +83,10 @@ def _download(asked: AuditFilter, *, kind: str) -> StreamingHttpResponse:
     rows, content_type = _rows(asked), "application/json"
     lines = _json_list(rows)
     if kind == "csv":
-        cells = ({**row, "details": json.dumps(row["details"], ensure_ascii=False)} for row in rows)
+        cells = (
+            row | {name: json.dumps(row[name], ensure_ascii=False) for name in ("details", "names")}
+            for row in rows
+        )
         lines, content_type = csv_lines(cells, columns=COLUMNS), "text/csv"
     return StreamingHttpResponse(
         lines,

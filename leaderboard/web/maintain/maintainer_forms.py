@@ -5,7 +5,7 @@ from typing import Any, Final
 from django import forms
 
 from evaluator.metrics.protocol import PROTOCOLS
-from leaderboard.models import Split
+from leaderboard.models import GroundTruth, Split
 from leaderboard.web.forms import SiteForm
 
 _STALE: Final = "The form lacks the current edition; reload the page."
@@ -42,7 +42,7 @@ class OpenForm(SiteForm):
     def __init__(self, data: Any = None, *, split: Split) -> None:
         """`split` decides what there is to choose from."""
         published = split.published_edition
-        self.truths = list(split.ground_truths.order_by("-imported_at"))
+        self.truths = list(GroundTruth.objects.filter(split=split.truth_split_id).order_by("-imported_at"))
         initial = {"digest": published.ground_truth_id, "protocol": published.protocol} if published else {}
         super().__init__(data, initial=initial)
         self.fields["digest"].choices = [(truth.pk, truth.pk) for truth in self.truths]  # type: ignore[attr-defined]  # a ChoiceField

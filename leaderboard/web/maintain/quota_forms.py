@@ -1,25 +1,18 @@
 """Forms of quotas: find a team, override its rules, end the override."""
 
-import re
 from datetime import timedelta
 from typing import Any, Final
 
 from django import forms
 
-from leaderboard.models.quotas import MAX_SPAN, QuotaRules
-from leaderboard.quotas import quotas
+from leaderboard.errors.refusals import Refused
+from leaderboard.models.quotas import QuotaRules
+from leaderboard.quotas import quotas, spans
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 
 MAX_COUNT: Final = 1_000_000
 _FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The team does not see it."
-_UNITS: Final = {
-    "day": timedelta(days=1),
-    "hour": timedelta(hours=1),
-    "minute": timedelta(minutes=1),
-    "second": timedelta(seconds=1),
-}
-_SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s+({'|'.join(_UNITS)})s?\s*", re.ASCII | re.IGNORECASE)
 
 
 class TeamLookup(SiteForm):
@@ -32,9 +25,7 @@ class SpanField(forms.CharField):
     """A span of time in the words in which `quotas.span` says it."""
 
     default_error_messages = {
-        "not_a_span": "%(given)s is no span of time; expected one like 30 days, 24 hours or 90 minutes.",
         "too_short": "The window is empty; expected one like 30 days or 24 hours.",
-        "too_long": f"That is longer than ten years; expected at most {quotas.span(MAX_SPAN)}.",
     }
 
     def __init__(self, *, may_be_none: bool, **options: Any) -> None:
@@ -47,19 +38,17 @@ class SpanField(forms.CharField):
         text: str = super().clean(value)
         if not text:
             return timedelta(0)
-        found = _SPAN.fullmatch(text)
-        number = found[1].replace(",", "") if found else ""
-        if found is None or not number:
-            raise forms.ValidationError(self.error_messages["not_a_span"], params={"given": repr(text)})
-        n, unit = int(number), _UNITS[found[2].lower()]
-        if n > MAX_SPAN // unit:
-            raise forms.ValidationError(self.error_messages["too_long"])
-        if n == 0 and not self._may_be_none:
+        try:
+            span = spans.parse(text)
+        except Refused as refusal:
+            raise forms.ValidationError(str(refusal)) from refusal
+        if not span and not self._may_be_none:
             raise forms.ValidationError(self.error_messages["too_short"])
-        return n * unit
+        return span
 
 
-def _count(label: str, help_text: str) -> forms.IntegerField:
+def count_field(label: str, help_text: str) -> forms.IntegerField:
+    """A limit that may be left out."""
     return forms.IntegerField(
         label=label,
         required=False,
@@ -78,7 +67,7 @@ def _count(label: str, help_text: str) -> forms.IntegerField:
 class OverrideForm(SiteForm):
     """Four limits and why this team has them. The names are those of `quotas.override`."""
 
-    limit = _count("Submissions", "Within the window. Empty: no limit; 0: none.")
+    limit = count_field("Submissions", "Within the window. Empty: no limit; 0: none.")
     window = SpanField(
         may_be_none=False,
         help_text="Length of the rolling window, for example 30 days or 24 hours.",
@@ -89,7 +78,7 @@ class OverrideForm(SiteForm):
         may_be_none=True,
         help_text="Minimum time between two submissions. Empty: none.",
     )
-    rejected_limit = _count("Rejected or cancelled files", "Within 24 hours. Empty: no limit.")
+    rejected_limit = count_field("Rejected or cancelled files", "Within 24 hours. Empty: no limit.")
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)
 
     @staticmethod

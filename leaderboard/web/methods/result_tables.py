@@ -3,11 +3,11 @@
 import itertools
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from textwrap import shorten
 from typing import Any, Final
 from urllib.parse import urlencode
 
 from django.urls import reverse
-from django.utils.text import Truncator
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY
 from evaluator.scoring.report import format_published
@@ -124,5 +124,7 @@ def _reason(evaluation: Evaluation) -> str:
     if evaluation.status != Status.REJECTED or not evaluation.problems:
         return ""
     # What was found says enough here; what was expected stands on the submission's page.
-    first = Truncator(evaluation.problems[0]["message"].partition("; expected")[0]).chars(_MAX_REASON)
+    found = evaluation.problems[0]["message"].partition("; expected")[0]
+    # Cut between words: the half of a number is another number.
+    first = shorten(found, _MAX_REASON, placeholder=" …")
     return f"{evaluation.n_problems:,} problems: {first}" if evaluation.n_problems > 1 else first

@@ -10,6 +10,9 @@ what else an address names is dropped before the view is asked, so that no page 
 can make up any number of (a search, a limit, a time) are answered and not remembered, and answers to queries
 have a shelf of their own: however many are asked for, they push out no plain page.
 
+Most answers need no other layer at all: once one has been out through all of them, with the headers that each
+adds, `ReadyAnswerMiddleware`, which stands before them, repeats it (see ADR 53).
+
 Answers carry a strong ETag, the digest of their bytes, and are compressed for whoever takes gzip. There is no
 secret of the reader in them, so that their compressed length betrays none.
 """
@@ -19,10 +22,10 @@ import hashlib
 import re
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from functools import lru_cache
-from typing import Final
+from typing import Final, NamedTuple
 from urllib.parse import urlencode
 
 from django.conf import settings
@@ -33,7 +36,7 @@ from django.utils import timezone
 
 from leaderboard import versions
 from leaderboard.boards.snapshot_store import BoundedCache
-from leaderboard.boards.snapshots import splits_of
+from leaderboard.boards.snapshots import state_of
 from leaderboard.http import Parameters, is_cacheable, is_known, parameters_of
 
 Next = Callable[[HttpRequest], HttpResponse]
@@ -43,8 +46,8 @@ MAX_QUERIES_BYTES: Final = 16_000_000
 # What is remembered of an address is what view answers it; a longer one is looked up each time.
 MAX_PATHS: Final = 4096
 MAX_PATH: Final = 200
-# What an answer costs beside its bytes: its headers, and its place in memory.
-OVERHEAD_BYTES: Final = 2000
+# What an answer costs beside its bytes: its headers, in each of its forms, and its place in memory.
+OVERHEAD_BYTES: Final = 5000
 MIN_COMPRESSED_BYTES: Final = 1000
 # "gzip;q=0" asks for anything but that.
 _GZIP = re.compile(r"\bgzip\b(?!\s*;\s*q=0(?:\.0*)?\s*(?:,|$))")
@@ -71,14 +74,26 @@ def is_anybodys(request: HttpRequest) -> bool:
     )
 
 
+class Form(NamedTuple):
+    """In which of its forms an answer is given: what of a request changes the headers."""
+
+    is_compressed: bool
+    is_304: bool
+    is_secure: bool
+
+
 @dataclass(frozen=True)
 class CachedResponse:
-    """An answer's bytes, as they are and compressed, with the headers that its view gave it."""
+    """An answer's bytes, as they are and compressed, with the headers that its view gave it.
+
+    `ready` has the headers of each form as it left the outermost layer, once it has.
+    """
 
     body: bytes
     compressed: bytes
     etag: str
     headers: tuple[tuple[str, str], ...]
+    ready: dict[Form, dict[str, str]] = field(default_factory=dict, compare=False)
 
     @property
     def n_bytes(self) -> int:
@@ -98,27 +113,45 @@ class CachedResponse:
             headers=tuple((name, response[name]) for name in SHARED_HEADERS if response.has_header(name)),
         )
 
-    def to(self, request: HttpRequest) -> HttpResponse:
-        """The response to one reader: 304 if it is known there, compressed if that is taken."""
+    def form_for(self, request: HttpRequest) -> Form:
+        """The form for one reader: 304 if it is known there, compressed if that is taken."""
         accepted = request.META.get("HTTP_ACCEPT_ENCODING", "")
-        takes_gzip = bool(self.compressed) and _GZIP.search(accepted) is not None
-        etag = f'"{self.etag}-gz"' if takes_gzip else f'"{self.etag}"'
-        body = self.compressed if takes_gzip else self.body
-        response = HttpResponse(b"" if request.method == "HEAD" else body)
-        is_304 = is_known(request, etag)
-        if is_304:
-            response = HttpResponseNotModified()
+        is_compressed = bool(self.compressed) and _GZIP.search(accepted) is not None
+        is_304 = is_known(request, self._etag_of(is_compressed=is_compressed))
+        return Form(is_compressed, is_304, request.is_secure())
+
+    def to(self, request: HttpRequest) -> HttpResponse:
+        """The response to one reader, with the headers that are this answer's own."""
+        form = self.form_for(request)
+        response = HttpResponseNotModified() if form.is_304 else HttpResponse(self._body_of(form))
+        if request.method == "HEAD":
+            response.content = b""
         for name, value in self.headers:
-            if not is_304 or name in HEADERS_OF_304:
+            if not form.is_304 or name in HEADERS_OF_304:
                 response[name] = value
-        if not is_304:
-            response["Content-Length"] = str(len(body))
-            if takes_gzip:
+        if not form.is_304:
+            response["Content-Length"] = str(len(self._body_of(form)))
+            if form.is_compressed:
                 response["Content-Encoding"] = "gzip"
-        response["ETag"] = etag
+        response["ETag"] = self._etag_of(is_compressed=form.is_compressed)
         response["Cache-Control"] = ANYBODYS
         response["Vary"] = VARY
         return response
+
+    def ready_for(self, form: Form) -> HttpResponse | None:
+        """The response with the headers of every layer; None if this form never went through them."""
+        headers = self.ready.get(form)
+        if headers is None:
+            return None
+        if form.is_304:
+            return HttpResponseNotModified(headers=headers)
+        return HttpResponse(self._body_of(form), headers=headers)
+
+    def _body_of(self, form: Form) -> bytes:
+        return self.compressed if form.is_compressed else self.body
+
+    def _etag_of(self, *, is_compressed: bool) -> str:
+        return f'"{self.etag}-gz"' if is_compressed else f'"{self.etag}"'
 
 
 # The boards' number, and the day in UTC: rows are new for some days, and ranks have moved since a day.
@@ -127,6 +160,15 @@ State = tuple[int, date]
 
 def _today(number: int) -> State:
     return number, timezone.now().date()
+
+
+def _state(request: HttpRequest) -> State:
+    """The state as of which this request is answered, read once: it was asked no earlier."""
+    found: State | None = getattr(request, "state_of_boards", None)
+    if found is None:
+        found = _today(versions.state())
+        request.state_of_boards = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
+    return found
 
 
 def _cost(address: str, remembered: tuple[State, CachedResponse]) -> int:
@@ -192,6 +234,36 @@ def _normalise(request: HttpRequest, parameters: Parameters) -> bool:
     return is_worth_it
 
 
+# Marks a response that is of nobody but of what was remembered. A first answer may bear what is its reader's,
+# such as what is left of their rate.
+_REPEATS: Final = "repeats"
+
+
+class ReadyAnswerMiddleware:
+    """Repeats to anybody what has left through every layer before, without asking them again.
+
+    It knows only addresses as they are remembered, which `PageCacheMiddleware` has found to be in order. The
+    layers between the two look at nothing of the request but its form and at what makes it somebody's.
+    """
+
+    def __init__(self, get_response: Next) -> None:
+        self._get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponse:
+        """Answer, or ask the layers, and remember their headers for the next time."""
+        found = memory.get(request.get_full_path_info()) if request.method == "GET" else None
+        if found is None or not is_anybodys(request) or found[0] != _state(request):
+            return self._get_response(request)
+        form = found[1].form_for(request)
+        ready = found[1].ready_for(form)
+        if ready is not None:
+            return ready
+        response = self._get_response(request)
+        if getattr(response, _REPEATS, None) is found[1] and not response.cookies:
+            found[1].ready[form] = {sys.intern(name): sys.intern(value) for name, value in response.items()}
+        return response
+
+
 class PageCacheMiddleware:
     """Answers anybody from memory where that holds, and remembers what views of that kind answer."""
 
@@ -213,14 +285,16 @@ class PageCacheMiddleware:
             return self._get_response(request)
         address = request.get_full_path_info()
         found = memory.get(address)
-        if found is None or found[0] != _today(versions.state()):
+        if found is None or found[0] != _state(request):
             return self._made(request, address)
-        return found[1].to(request)
+        response = found[1].to(request)
+        setattr(response, _REPEATS, found[1])
+        return response
 
     def _made(self, request: HttpRequest, address: str) -> HttpResponse:
         """Ask the view, and remember what it answers if it says so."""
         # Before the view looks: what it finds may be newer than this state, and is never older.
-        state = _today(versions.state_of(splits_of(request)))
+        state = _today(state_of(request))
         response = self._get_response(request)
         if not _is_cacheable(response) or request.method == "HEAD":
             return response

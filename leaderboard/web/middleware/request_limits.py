@@ -46,7 +46,7 @@ class RateLimitMiddleware:
     """
 
     # The API counts by itself, and monitoring is not limited.
-    ELSEWHERE: Final = ("/api/", "/healthz", "/readyz", "/metrics")
+    ELSEWHERE: Final = ("/api/", "/healthz", "/readyz", "/healthy", "/metrics")
     drawn = rate_limits.InMemory()
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:

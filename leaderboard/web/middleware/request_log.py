@@ -1,24 +1,36 @@
 """Logging of requests: one line each, with an id that the response carries as well."""
 
 import re
+import time
 
 import structlog
 from django.http import HttpRequest, HttpResponse
 from django.utils.functional import SimpleLazyObject
 from django_structlog.middlewares import RequestMiddleware
 
+from leaderboard.ops import http_figures
+
 # Asked every few seconds by machines; worth a line only when they fail.
-QUIET = frozenset({"/healthz", "/readyz", "/metrics"})
+QUIET = frozenset({"/healthz", "/readyz", "/healthy", "/metrics"})
 
 # What comes behind this is the secret of an invitation.
 SECRET_PATH = re.compile(r"^(/team/join/).+", re.DOTALL)
 
 
 class RequestLogMiddleware(RequestMiddleware):
-    """Binds `request_id` to every line, says nothing of what people type, and never asks the database."""
+    """Binds `request_id` to every line, says nothing of what people type, and never asks the database.
+
+    Outermost, so it also counts every answer.
+    """
+
+    def prepare(self, request: HttpRequest) -> None:
+        """Begin, and note when."""
+        request.META["tsttc.begun_s"] = time.perf_counter()
+        super().prepare(request)
 
     def handle_response(self, request: HttpRequest, response: HttpResponse) -> None:
         """Write the line, and tell the id to whoever asked."""
+        _count(request, response)
         response["X-Request-ID"] = structlog.contextvars.get_contextvars().get("request_id", "")
         if request.path in QUIET and response.status_code < 500:
             structlog.contextvars.clear_contextvars()
@@ -38,3 +50,13 @@ class RequestLogMiddleware(RequestMiddleware):
         # By type: asking a lazy object for its class would make it ask the database.
         if user is not None and type(user) is not SimpleLazyObject and user.pk is not None:
             structlog.contextvars.bind_contextvars(user_id=user.pk)
+
+
+def _count(request: HttpRequest, response: HttpResponse) -> None:
+    """Count the answer under the name of its route; what was answered from memory has none."""
+    if request.path in QUIET:
+        return
+    found = request.resolver_match
+    route = (found.view_name or "unnamed") if found else ("memory" if response.status_code < 400 else "none")
+    took_s = time.perf_counter() - request.META.get("tsttc.begun_s", time.perf_counter())
+    http_figures.count(method=request.method or "", route=route, status=response.status_code, took_s=took_s)

@@ -29,6 +29,7 @@ class SplitChoice:
     split: Split
     is_open: bool
     sentence: str
+    announcement: str = ""
 
 
 def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
@@ -36,17 +37,19 @@ def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
     team = teams.current_team_of(user=user)
     return [
         _offer(split, team=team, user=user, now=now)
-        for split in Split.objects.select_related("published_edition")
+        for split in Split.objects.shown().select_related("published_edition")
     ]
 
 
 def _offer(split: Split, *, team: Team | None, user: User, now: datetime) -> SplitChoice:
     refusal = deadlines.refusal_of(split, now=now) or admissions.refusal_of(team=team, split=split)
     if refusal is not None:
-        return SplitChoice(split=split, is_open=False, sentence=str(refusal))
+        return SplitChoice(
+            split, is_open=False, sentence=str(refusal), announcement=split.announcement_at(now)
+        )
     quota = quotas.state(team=team, user=user, split=split, now=now)
     sentence = f"{quota.sentence} {deadlines.closing_of(split)}".strip()
-    return SplitChoice(split=split, is_open=True, sentence=sentence)
+    return SplitChoice(split, is_open=True, sentence=sentence, announcement=split.announcement_at(now))
 
 
 class SubmissionForm(DetailsForm):
@@ -68,7 +71,10 @@ class SubmissionForm(DetailsForm):
             "empty": EMPTY_MESSAGE,
         },
         widget=forms.FileInput(
-            attrs={"accept": ".json,application/json", "aria-describedby": "id_file_helptext id_file_error"}
+            attrs={
+                "accept": ".json,.gz,.csv,application/json,application/gzip,text/csv",
+                "aria-describedby": "id_file_helptext id_file_error",
+            }
         ),
     )
 
@@ -156,7 +162,7 @@ def parse_uuid(text: str) -> UUID | None:
 
 
 def _splits() -> list[tuple[str, str]]:
-    return [("", "all"), *((name, name) for name in Split.objects.values_list("pk", flat=True))]
+    return [("", "all"), *((name, name) for name in Split.objects.shown().values_list("pk", flat=True))]
 
 
 class SearchForm(forms.Form):

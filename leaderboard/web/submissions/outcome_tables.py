@@ -133,7 +133,7 @@ def rejected_sentence(quota: Quota | None) -> str:
     >>> from leaderboard.quotas.quotas import Rules
     >>> rules = Rules(limit=3, window=timedelta(days=30), min_gap=timedelta(0), rejected_limit=20)
     >>> rejected_sentence(Quota("test", rules, 0, 3, True, None, ""))
-    'Your quota is not used (17 of 20 rejections left within 24 hours).'
+    'Your quota is not used. Up to 20 files may be rejected within 24 hours; 17 are left.'
     """
     if quota is None:
         return ""
@@ -141,4 +141,7 @@ def rejected_sentence(quota: Quota | None) -> str:
     if limit is None:
         return "Your quota is not used."
     n_left = max(0, limit - quota.n_rejected)
-    return f"Your quota is not used ({n_left} of {limit} rejections left within 24 hours)."
+    verb = "is" if n_left == 1 else "are"
+    return (
+        f"Your quota is not used. Up to {limit} files may be rejected within 24 hours; {n_left} {verb} left."
+    )

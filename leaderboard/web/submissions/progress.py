@@ -131,4 +131,4 @@ def listing(*, n_problems: int, n_points: int) -> str:
     """
     if n_points == n_problems <= MAX_POINTS:
         return ""
-    return f"Missing, unknown and duplicate keys share one point; at most {MAX_POINTS} points are listed."
+    return f"Equal problems share a point; at most {MAX_POINTS} points are listed."

@@ -25,7 +25,7 @@ def receipt_keys(request: HttpRequest) -> HttpResponse:
 @require_safe
 def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """The receipt of a score as a file, for the submission's own team."""
-    rows = Submission.objects.filter(method__team__memberships__user=cast("User", request.user))
+    rows = Submission.objects.of(cast("User", request.user))
     found = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
     try:
         document = receipts.receipt(submission=found)

@@ -90,7 +90,7 @@ def submission_list(request: HttpRequest) -> HttpResponse:
     """What the reader's own team has sent."""
     evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
     sent = (
-        Submission.objects.filter(method__team__memberships__user=cast("User", request.user))
+        Submission.objects.of(cast("User", request.user))
         .select_related("method", "split", "submitted_by")
         .prefetch_related(Prefetch("evaluations", evaluations))
     )

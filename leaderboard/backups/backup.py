@@ -1,0 +1,111 @@
+"""Make a backup: the tables of one moment first, then every file that they name.
+
+Files are written before the rows that name them and are never changed, so the files of a later moment have
+all that the rows name. Nothing has to be stopped. A folder that has a backup already is brought up to date:
+only files that are not there yet are copied.
+"""
+
+import os
+import shutil
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import IO
+
+from django.db import connection
+
+from leaderboard import audit
+from leaderboard.backups import contents, database
+from leaderboard.backups.contents import Contents, NoBackup
+from leaderboard.ops import environment
+from leaderboard.storage import files
+from leaderboard.submissions import receipts
+
+_KEY = "TSTTC_RECEIPT_KEY"
+
+
+def make(*, into: str, now: datetime) -> Contents:
+    """Write a backup of the whole site into a folder that is empty or has an earlier one.
+
+    What rows name and nobody has any more is in `missing`; everything else is there. Raises `NoBackup`, and
+    `OSError` where a file cannot be read or written: an earlier backup in the folder then stays as it was.
+    """
+    contents.require_variables()
+    if environment.PRODUCTION and not os.environ.get(_KEY):
+        raise NoBackup(f"{_KEY} is not set; expected it here too, since its public half is in the backup.")
+    folder = contents.folder_of(into)
+    former = _former(folder)
+    folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+    rows = folder / f"database-{now:%Y%m%dT%H%M%S%f}"
+    rows.mkdir(mode=0o700)
+    try:
+        with database.one_moment():
+            parts = database.save(rows)
+            needed, anew = contents.named_files()
+            missing = contents.missing_values()
+            migrations, boards = contents.applied_migrations(), contents.board_digests()
+            tip = audit.verify().tip
+        kept = {name: keep(folder, name, former) for name in [*needed, *anew]}
+        private = {
+            path.name: _copy(folder / contents.GROUND_TRUTH / path.name, path.open)
+            for path in contents.private_files()
+        }
+        made = Contents(
+            format=contents.FORMAT,
+            made_at=now.isoformat(),
+            vendor=connection.vendor,
+            migrations=migrations,
+            database=rows.name,
+            parts=parts,
+            files={name: digest for name, digest in kept.items() if digest},
+            ground_truth=private,
+            missing=[*missing, *(name for name in needed if not kept[name])],
+            keys=receipts.public_keys(),
+            boards=boards,
+            audit=tip,
+        )
+        made.write(folder)
+    except BaseException:
+        shutil.rmtree(rows)
+        raise
+    for old in folder.glob("database-*"):
+        if old != rows:
+            shutil.rmtree(old)
+    return made
+
+
+def _former(folder: Path) -> Mapping[str, str]:
+    """The digests of the files of an earlier backup there. Raises `NoBackup` for another folder."""
+    if (folder / contents.LIST).exists():
+        return Contents.read(folder).files
+    ours = {contents.FILES, contents.GROUND_TRUTH}
+    try:
+        names = sorted(path.name for path in folder.iterdir())
+    except FileNotFoundError:
+        return {}
+    except NotADirectoryError:
+        raise NoBackup(f"{folder} is a file; expected a folder.") from None
+    # What a backup that was interrupted left is gone on with.
+    others = [name for name in names if name not in ours and not name.startswith("database-")]
+    if others:
+        raise NoBackup(
+            f"{folder} holds {others[0]!r}; expected an empty folder, or one of an earlier backup."
+        )
+    return {}
+
+
+def keep(folder: Path, name: str, former: Mapping[str, str]) -> str:
+    """Copy a file of the store unless it is there. Returns its SHA-256, or "" where it is gone."""
+    target = folder / contents.FILES / name
+    if name in former and contents.digest_at(target) == former[name]:
+        return former[name]
+    try:
+        return _copy(target, lambda mode: files.store().open(name, mode))
+    except FileNotFoundError:
+        return ""
+
+
+def _copy(target: Path, opened: Callable[[str], IO[bytes]]) -> str:
+    with opened("rb") as source, files.replacing(target) as unfinished, unfinished.open("wb") as out:
+        shutil.copyfileobj(source, out, files.CHUNK_BYTES)
+    return contents.digest_at(target)

@@ -1,0 +1,188 @@
+"""What a backup holds beside the tables, and how a folder says what is in it."""
+
+import hashlib
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO, Any, Final
+
+from django.conf import settings
+from django.contrib.auth.models import AnonymousUser
+from django.db import connection
+from django.db.migrations.recorder import MigrationRecorder
+
+from evaluator.tables import formats
+from leaderboard.boards import boards
+from leaderboard.exports import tables
+from leaderboard.models import Edition, GroundTruth, Submission
+from leaderboard.storage import files, truth_values
+from leaderboard.storage.files import CHUNK_BYTES
+
+LIST: Final = "backup.json"
+FILES: Final = "files"
+GROUND_TRUTH: Final = "ground-truth"
+FORMAT: Final = 1
+# Sums and manifests that workers make anew, and files that somebody writes at this moment.
+_MADE_ANEW: Final = "bags"
+_DIRECTORIES: Final = ("TSTTC_DATA_DIR", "TSTTC_FILES_DIR", "TSTTC_GROUND_TRUTH_DIR")
+_SHOWN: Final = 10
+_CSV: Final = next(each for each in formats.FORMATS if each.name == "csv")
+
+
+class NoBackup(Exception):
+    """The backup or the restoration cannot be made; the text says why, and what to do."""
+
+
+@dataclass(frozen=True)
+class RowFile:
+    """One file with rows: a table of PostgreSQL, or a whole SQLite database."""
+
+    name: str
+    columns: list[str]
+    sha256: str
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What a backup says of itself, in `backup.json`; digests are of the bytes, by path."""
+
+    format: int
+    made_at: str
+    vendor: str
+    migrations: list[list[str]]
+    database: str
+    parts: list[RowFile]
+    files: dict[str, str]
+    ground_truth: dict[str, str]
+    missing: list[str]
+    keys: dict[str, Any]
+    boards: dict[str, str]
+    audit: str
+
+    def write(self, folder: Path) -> None:
+        """Put it into the folder, which is a backup from this moment on."""
+        with files.replacing(folder / LIST) as path:
+            path.write_text(json.dumps(asdict(self), indent=1) + "\n", encoding="utf-8")
+
+    @classmethod
+    def read(cls, folder: Path) -> "Contents":
+        """What a folder holds. Raises `NoBackup`."""
+        path = folder / LIST
+        try:
+            document = json.loads(path.read_text(encoding="utf-8"))
+            if document["format"] != FORMAT:
+                raise NoBackup(f"{path} has the format {document['format']!r}; expected {FORMAT}.")
+            return cls(**{**document, "parts": [RowFile(**part) for part in document["parts"]]})
+        except OSError as fault:
+            raise NoBackup(
+                f"{path} cannot be read ({fault.strerror}); expected the folder of a backup."
+            ) from fault
+        except (ValueError, KeyError, TypeError) as fault:
+            raise NoBackup(f"{path} is damaged; expected the list that `manage.py backup` wrote.") from fault
+
+
+def require_variables() -> None:
+    """Refuse a variable that is set and empty: it would name the folder in which the command runs.
+
+    Raises `NoBackup`.
+    """
+    for name in _DIRECTORIES:
+        if os.environ.get(name) == "":
+            raise NoBackup(f"{name} is empty; expected a directory, or the variable not set at all.")
+
+
+def folder_of(text: str) -> Path:
+    """The folder that a command names. Raises `NoBackup` for none, and for one of the site's own."""
+    if not text.strip():
+        raise NoBackup("The folder has no name (an empty variable?); expected a path such as /srv/backup.")
+    folder = Path(text).resolve()
+    for name, own in (("file store", settings.FILES_DIR), ("ground truth", settings.GROUND_TRUTH_DIR)):
+        kept = Path(own).resolve()
+        if folder.is_relative_to(kept) or kept.is_relative_to(folder):
+            raise NoBackup(f"{folder} and the {name}, {kept}, lie in each other; expected a folder apart.")
+    return folder
+
+
+def digest_of(file: IO[bytes]) -> str:
+    """The SHA-256 of what is left to read, from whatever store it comes."""
+    digest = hashlib.sha256()
+    while chunk := file.read(CHUNK_BYTES):
+        digest.update(chunk)
+    return digest.hexdigest()
+
+
+def digest_at(path: Path) -> str:
+    """The SHA-256 of a file's bytes; "" where there is none."""
+    try:
+        with path.open("rb") as file:
+            return digest_of(file)
+    except FileNotFoundError:
+        return ""
+
+
+def named_files() -> tuple[list[str], list[str]]:
+    """Files of the store that rows name: those that must be there, and those that can be made anew."""
+    sent = list(Submission.objects.order_by().values_list("digest", "manifest_digest").distinct())
+    manifests = {digest for _, digest in sent} | set(
+        GroundTruth.objects.order_by().values_list("manifest_digest", flat=True)
+    )
+    needed = {files.predictions_name(digest) for digest, _ in sent} | {*map(files.manifest_name, manifests)}
+    aligned = {files.aligned_name(manifest_digest=manifest, digest=digest) for digest, manifest in sent}
+    return sorted(needed), sorted(aligned)
+
+
+def private_files() -> Iterator[Path]:
+    """What the ground-truth directory holds: values, manifests, marks and the secret of hidden splits."""
+    try:
+        found = sorted(Path(settings.GROUND_TRUTH_DIR).iterdir())
+    except FileNotFoundError:
+        return
+    except OSError as fault:
+        raise NoBackup(
+            f"The ground truth at {settings.GROUND_TRUTH_DIR} cannot be read ({fault.strerror}); "
+            "expected to run where workers run."
+        ) from fault
+    for path in found:
+        if path.name != _MADE_ANEW and path.is_file() and not path.name.startswith("tmp"):
+            yield path
+
+
+def missing_values() -> list[str]:
+    """Ground truths of the database whose values are not in the directory, by file name."""
+    digests = GroundTruth.objects.order_by("pk").values_list("pk", flat=True)
+    paths = (truth_values.values_path(digest) for digest in digests)
+    return [f"{GROUND_TRUTH}/{path.name}" for path in paths if not path.exists()]
+
+
+def board_digests() -> dict[str, str]:
+    """The SHA-256 of every published edition's board, as its CSV with intervals, by split and number."""
+    found = {}
+    editions = Edition.objects.exclude(published_at=None).select_related("split", "ground_truth")
+    for edition in editions.order_by("split", "number"):
+        shown = boards.board(split=edition.split, edition=edition, viewer=AnonymousUser())
+        text = _CSV.write(tables.export(shown, address="", has_intervals=True))
+        found[f"{edition.split_id}/{edition.number}"] = hashlib.sha256(text.encode()).hexdigest()
+    return found
+
+
+def applied_migrations() -> list[list[str]]:
+    """The migrations that the database has, as app and name."""
+    return sorted([app, name] for app, name in MigrationRecorder(connection).applied_migrations())
+
+
+def counted(n: int, noun: str) -> str:
+    """How many there are, as "1 board" or "2,000 boards"."""
+    return f"{n:,} {noun}{'s' if n != 1 else ''}"
+
+
+def listed(names: list[str]) -> str:
+    """The first few, one a line, and how many more."""
+    rest = [f"… and {len(names) - _SHOWN:,} more"] if len(names) > _SHOWN else []
+    return "\n".join(f"  {line}" for line in [*names[:_SHOWN], *rest])
+
+
+def same_boards(kept: Mapping[str, str], found: Mapping[str, str]) -> list[str]:
+    """The boards that are not those of the backup, byte for byte."""
+    return sorted(name for name in {*kept, *found} if kept.get(name) != found.get(name))

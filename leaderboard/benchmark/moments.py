@@ -1,0 +1,76 @@
+"""Moments as maintainers write them: a date, a time and always a zone."""
+
+import re
+from datetime import UTC, datetime, timedelta, timezone, tzinfo
+from typing import Final
+from zoneinfo import ZoneInfo
+
+from leaderboard.errors.refusals import Refused
+
+EXAMPLE: Final = "2027-03-01 23:59 UTC"
+# "Anywhere on Earth": a day is over when it is over everywhere. Deadlines of conferences are given in it.
+_ANYWHERE: Final = timezone(timedelta(hours=-12), "AoE")
+_FORM: Final = re.compile(r"(\d{4}-\d\d-\d\d)[ T](\d\d:\d\d)(?::00)?\s*(\S.*)?", re.ASCII)
+_OFFSET: Final = re.compile(r"([+-])(\d\d):?(\d\d)", re.ASCII)
+_ZONES: Final = "UTC, AoE, a place like Europe/Berlin, or an offset like +01:00"
+
+
+def parse(text: str, *, field: str = "") -> datetime:
+    """The moment that a text like `2027-03-01 23:59 Europe/Berlin` names, in UTC. Raises `Refused`.
+
+    A time without a zone is refused, and so is one that the clocks of the place skip or show twice.
+    """
+    text = text.strip()
+    found = _FORM.fullmatch(text)
+    if found is None:
+        raise _refused(f"{text[:60]!r} is no date with a time", f"one like {EXAMPLE}", field)
+    if not found[3]:
+        raise _refused(f"{text[:60]!r} has no time zone", f"{_ZONES} behind it", field)
+    try:
+        local = datetime.fromisoformat(f"{found[1]} {found[2]}")
+    except ValueError:
+        raise _refused(
+            f"{found[1]} {found[2]} is not in the calendar", f"one like {EXAMPLE}", field
+        ) from None
+    zone = _zone(found[3], field)
+    try:
+        moments = {local.replace(tzinfo=zone, fold=fold).astimezone(UTC) for fold in (0, 1)}
+        there = {moment for moment in moments if moment.astimezone(zone).replace(tzinfo=None) == local}
+    except OverflowError:
+        raise _refused(f"{text[:60]!r} is outside of the calendar", f"one like {EXAMPLE}", field) from None
+    if len(there) != 1:
+        how = "twice, because" if there else "never:"
+        what = f"The clocks of {found[3]} show {found[1]} {found[2]} {how} they are changed then"
+        raise _refused(what, "an offset like +01:00, or UTC", field)
+    return there.pop()
+
+
+def written(moment: datetime | None) -> str:
+    """A moment as `parse` reads it; empty without one.
+
+    >>> written(datetime(2027, 3, 1, 23, 59, tzinfo=UTC)), written(None)
+    ('2027-03-01 23:59 UTC', '')
+    """
+    return f"{moment.astimezone(UTC):%Y-%m-%d %H:%M} UTC" if moment else ""
+
+
+def _zone(name: str, field: str) -> tzinfo:
+    if name.upper() in {"UTC", "Z"}:
+        return UTC
+    if name.lower() == "aoe":
+        return _ANYWHERE
+    offset = _OFFSET.fullmatch(name)
+    if offset and int(offset[2]) <= 14 and int(offset[3]) < 60:
+        ahead = timedelta(hours=int(offset[2]), minutes=int(offset[3]))
+        return timezone(ahead if offset[1] == "+" else -ahead)
+    # A place, and no abbreviation: CST is in three parts of the world.
+    if "/" in name:
+        try:
+            return ZoneInfo(name)
+        except (ValueError, OSError, LookupError):
+            pass  # a path, a folder, or a place that is not there
+    raise _refused(f"There is no time zone {name[:40]!r}", _ZONES, field)
+
+
+def _refused(found: str, expected: str, field: str) -> Refused:
+    return Refused("bad-value", f"{found}; expected {expected}.", field=field)

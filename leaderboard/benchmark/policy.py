@@ -1,0 +1,123 @@
+"""The policy of a split: what maintainers decide about it."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields, replace
+from datetime import datetime, timedelta
+from typing import Any, Final
+
+from django.core.exceptions import ValidationError
+from django.db import transaction
+
+from leaderboard import audit, versions
+from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
+from leaderboard.models import Split, User
+from leaderboard.models.benchmark import Listing
+
+MAX_DESCRIPTION: Final = 1000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Policy:
+    """All that can be changed about a split, under the names of its columns."""
+
+    title: str
+    description: str = ""
+    position: int = 0
+    listing: str = Listing.LISTED
+    needs_admission: bool = False
+    how_to_be_admitted: str = ""
+    opens_at: datetime | None = None
+    closes_at: datetime | None = None
+    announcement: str = ""
+    announcement_ends_at: datetime | None = None
+    decimals: int = 1
+    quota_limit: int | None = None
+    quota_window: timedelta = timedelta(days=1)
+    quota_min_gap: timedelta = timedelta(0)
+    quota_rejected_limit: int | None = 20
+
+
+NAMES: Final = tuple(field.name for field in fields(Policy))
+
+
+def policy_of(split: Split) -> Policy:
+    """The policy that a split has."""
+    return Policy(**{name: getattr(split, name) for name in NAMES})
+
+
+def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
+    """Give a split another policy, from now on. `actor` None is the command line.
+
+    Raises `NotMaintainer`, and `Refused` for an unknown split and for what makes no sense; nothing is changed
+    then.
+    """
+    require_maintainer(actor, to="change splits")
+    with transaction.atomic():
+        split = Split.objects.select_for_update(no_key=True).filter(pk=split_name).first()
+        if split is None:
+            known = ", ".join(Split.objects.values_list("name", flat=True))
+            raise Refused("unknown-split", f"There is no split {split_name[:80]!r}; expected one of {known}.")
+        before = policy_of(split)
+        checked(split, policy)
+        after = policy_of(split)
+        changes = changed(before, after)
+        if changes:
+            split.save(update_fields=list(NAMES))
+            audit.record(
+                verb="changed",
+                noun="Split",
+                noun_id=split.pk,
+                actor=actor,
+                details={name: f"{old} → {new}" for name, (old, new) in changes.items()},
+            )
+            versions.changed(split.pk)
+    return split
+
+
+def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User | None) -> None:
+    """Show one line on the pages of every split until it ends; without a text and an end, none.
+
+    Raises `NotMaintainer`, and `Refused` for a text without an end and for an end that is over.
+    """
+    if ends_at is not None and ends_at <= now:
+        raise Refused(
+            "bad-value",
+            f"The announcement would end at {ends_at:%Y-%m-%d %H:%M} UTC, which is in the past; expected a "
+            "later time.",
+            field="announcement_ends_at",
+        )
+    with transaction.atomic():
+        for split in Split.objects.order_by("name"):
+            wanted = replace(policy_of(split), announcement=text, announcement_ends_at=ends_at)
+            change(split_name=split.pk, policy=wanted, actor=actor)
+
+
+def checked(split: Split, policy: Policy) -> Split:
+    """The split with this policy, which is not written yet. Raises `Refused` at the first field at fault."""
+    values = asdict(policy) | {
+        "title": clean_text("title", policy.title, limit=80),
+        "description": clean_text("description", policy.description, limit=MAX_DESCRIPTION, required=False),
+        "how_to_be_admitted": clean_text(
+            "how_to_be_admitted", policy.how_to_be_admitted, limit=300, required=False
+        ),
+    }
+    values["announcement"] = " ".join(
+        clean_text("announcement", policy.announcement, limit=300, required=False).split()
+    )
+    for name, value in values.items():
+        setattr(split, name, value)
+    try:
+        # Its name is checked where it is given; an edition has its own ways.
+        split.full_clean(exclude=["published_edition", "name"], validate_unique=False)
+    except ValidationError as error:
+        [field, *_] = error.message_dict
+        raise Refused(
+            "bad-value", error.message_dict[field][0], field=field if field in NAMES else ""
+        ) from None
+    return split
+
+
+def changed(before: Policy, after: Policy) -> Mapping[str, tuple[Any, Any]]:
+    """What differs between two policies: by name, the old value and the new one."""
+    pairs = {name: (getattr(before, name), getattr(after, name)) for name in NAMES}
+    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}

@@ -1,0 +1,103 @@
+"""What a correction of labels would change, before anything is kept: recording by recording.
+
+For maintainers where the ground truth is: differences of hidden values are as private as the values.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+import evaluator
+from evaluator.predictions.revisions import Comparison, compare, rows_in
+from leaderboard.errors.refusals import Refused
+from leaderboard.models import Edition, Split
+from leaderboard.storage import truth_values
+
+COLUMNS = (
+    "recording",
+    "n_added",
+    "n_removed",
+    "n_changed",
+    "largest_change_s",
+    "mean_change_s",
+    "n_sign_changed",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class RecordingChange:
+    """What changes of one recording: sequences, and by how many seconds the true values differ."""
+
+    recording: str
+    n_added: int
+    n_removed: int
+    n_changed: int
+    largest_change_s: float
+    mean_change_s: float
+    n_sign_changed: int
+
+    @property
+    def as_row(self) -> Mapping[str, object]:
+        """The same by column, times to the microsecond."""
+        rounded = {name: round(getattr(self, name), 6) for name in ("largest_change_s", "mean_change_s")}
+        return vars(self) | rounded
+
+
+@dataclass(frozen=True)
+class LabelChanges:
+    """What a file would change of a board, and the recordings with any change, the greatest first."""
+
+    edition: Edition
+    counts: Comparison
+    recordings: Sequence[RecordingChange]
+
+
+def look(*, split_name: str, path: Path) -> LabelChanges:
+    """Compare a ground truth with that of the board. Nothing is kept or queued.
+
+    Raises `evaluator.Rejected` if the file is at fault, `Refused` if the split has no board, `OSError` if
+    the board's values are not here.
+    """
+    split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
+    if split is None or split.published_edition is None:
+        raise Refused(
+            "edition-refused", f"The split {split_name!r} has no published edition to compare with."
+        )
+    new = evaluator.read_truth(path)
+    old = truth_values.load(split.published_edition.ground_truth_id)
+    return LabelChanges(split.published_edition, compare(old, new), _by_recording(old, new))
+
+
+def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> list[RecordingChange]:
+    rows = rows_in(old.manifest, new.manifest)
+    is_common = rows >= 0
+    # Sequences that the new one has are named by it, the others by the old one.
+    names = np.asarray(new.manifest.bag_stamp).astype(str)
+    gone = np.ones(old.n_sequences, dtype=bool)
+    gone[rows[is_common]] = False
+    names_gone = np.asarray(old.manifest.bag_stamp).astype(str)[gone]
+    before = np.full(new.n_sequences, np.nan)
+    before[is_common] = old.ttc_s[rows[is_common]]
+    change_s = np.where(is_common, np.abs(new.ttc_s - before), 0.0)
+    found = []
+    for name in sorted({*names.tolist(), *names_gone.tolist()}):
+        here = names == name
+        changed = here & is_common & (change_s > 0)
+        n_added, n_removed = int(np.sum(here & ~is_common)), int(np.sum(names_gone == name))
+        if n_added or n_removed or changed.any():
+            found.append(
+                RecordingChange(
+                    recording=name,
+                    n_added=n_added,
+                    n_removed=n_removed,
+                    n_changed=int(np.sum(changed)),
+                    largest_change_s=float(np.max(change_s[changed], initial=0.0)),
+                    mean_change_s=float(np.mean(change_s[changed])) if changed.any() else 0.0,
+                    n_sign_changed=int(np.sum(changed & (np.sign(new.ttc_s) != np.sign(before)))),
+                )
+            )
+    return sorted(
+        found, key=lambda each: (-each.n_added - each.n_removed, -each.largest_change_s, each.recording)
+    )

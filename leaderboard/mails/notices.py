@@ -1,0 +1,212 @@
+"""Notices: what people are told by mail, unless they have switched it off.
+
+They are found in the tables, as all other work of workers is, and each is told once: nothing that happens on
+a page or in a run has to know of mails. A notice goes to members of the team that owns what it is about, and
+names nothing of any other team, so a private or anonymous method is told to nobody else.
+"""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator
+from datetime import datetime, timedelta
+from typing import Final
+
+from allauth.account.models import EmailAddress
+from django.conf import settings
+from django.db.models import Exists, F, OuterRef, QuerySet
+from django.urls import reverse
+
+from leaderboard.mails import outbox
+from leaderboard.models import (
+    ApiToken,
+    Evaluation,
+    Mail,
+    MailKind,
+    MutedKind,
+    Publication,
+    Split,
+    Status,
+    Submission,
+    SweepBeat,
+    User,
+)
+
+TOKEN_ENDS_WITHIN: Final = timedelta(days=7)
+CLOSES_WITHIN: Final = timedelta(days=3)
+# What is committed late is older than the last look; what is older than a day was told, or is no news.
+_OVERLAP: Final = timedelta(minutes=10)
+_NEWS: Final = timedelta(days=1)
+_OUTCOMES: Final = {
+    Status.SCORED: "is scored",
+    Status.REJECTED: "is rejected: the file has problems, which the page lists",
+    Status.SYSTEM_ERROR: "could not be scored: the fault is ours, and the maintainers see it",
+}
+
+
+def queue_due(*, now: datetime) -> None:
+    """Queue a mail for everything that has happened since the last look, or will happen soon."""
+    last = SweepBeat.objects.values_list("notices_at", flat=True).first()
+    # Without a last look there is nothing that anybody waits to be told.
+    since = max(last - _OVERLAP, now - _NEWS) if last else now
+    outbox.queue([*_scored(since, now), *_editions(since, now), *_tokens(now), *_deadlines(now)])
+    SweepBeat.objects.bulk_create(
+        [SweepBeat(id=SweepBeat.THE_ONE, notices_at=now)],
+        update_conflicts=True,
+        unique_fields=["id"],
+        update_fields=["notices_at"],
+    )
+
+
+def announce(*, split: Split, subject: str, text: str, name: str, now: datetime) -> int:
+    """Queue a mail to everybody whose team has sent a file to a split. Returns to how many.
+
+    `name` says which announcement it is: nobody gets one of the same name twice.
+    """
+    people = list(readers(MailKind.ANNOUNCEMENT).filter(_has_sent_to(split)))
+    mails = [
+        _mail(
+            MailKind.ANNOUNCEMENT,
+            user,
+            key=f"announcement:{split.pk}:{name}",
+            subject=subject,
+            text=text,
+            now=now,
+        )
+        for user in people
+    ]
+    outbox.queue(mails)
+    return len(mails)
+
+
+def readers(kind: MailKind) -> QuerySet[User]:
+    """Who gets mails of a kind: active accounts with a proved address that have not switched it off."""
+    people = User.objects.filter(is_active=True)
+    if settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory":
+        proved = EmailAddress.objects.filter(
+            user=OuterRef("pk"), email__iexact=OuterRef("email"), verified=True
+        )
+        people = people.filter(Exists(proved))
+    muted = MutedKind.objects.filter(user=OuterRef("pk"), kind=kind)
+    return people.filter(~Exists(muted)).order_by("pk")
+
+
+def muted_by(user: User) -> set[str]:
+    """The kinds that a person has switched off."""
+    return set(MutedKind.objects.filter(user=user).values_list("kind", flat=True))
+
+
+def choose(*, user: User, wanted: Iterable[str]) -> None:
+    """Send this person mails of these kinds, and of no others but those about the account."""
+    unwanted = set(MailKind.values) - {MailKind.ACCOUNT.value} - set(wanted)
+    MutedKind.objects.filter(user=user).exclude(kind__in=unwanted).delete()
+    MutedKind.objects.bulk_create(
+        [MutedKind(user=user, kind=kind) for kind in sorted(unwanted)], ignore_conflicts=True
+    )
+
+
+# --- what there is to tell -------------------------------------------------------------------------------
+
+
+def _scored(since: datetime, now: datetime) -> Iterator[Mail]:
+    """Outcomes of files that people sent on the site; a program asks for its own."""
+    decided = (
+        Evaluation.objects.filter(
+            finished_at__gt=since,
+            status__in=_OUTCOMES,
+            priority=Evaluation.PRIORITY_LIVE,
+            edition=F("submission__split__published_edition"),
+            submission__withdrawn_at=None,
+            submission__via=Submission.Via.WEB,
+            submission__submitted_by__in=readers(MailKind.SCORED),
+            # Whoever has left the team is told nothing of it any more.
+            submission__method__team__members=F("submission__submitted_by"),
+        )
+        .select_related("submission__method", "submission__submitted_by")
+        .order_by("finished_at")
+    )
+    for evaluation in decided:
+        submission = evaluation.submission
+        outcome = _OUTCOMES[Status(evaluation.status)]
+        text = (
+            f"Your submission of {submission.method.name} to {submission.split_id} {outcome}.\n\n"
+            f"{_link('submission', submission.pk)}"
+        )
+        subject = f"{submission.method.name} on {submission.split_id} {outcome.partition(':')[0]}"
+        key = f"scored:{submission.pk}"
+        yield _mail(MailKind.SCORED, submission.submitted_by, key=key, subject=subject, text=text, now=now)
+
+
+def _editions(since: datetime, now: datetime) -> Iterator[Mail]:
+    """Boards that moved to another edition, for the teams that have an entry there."""
+    for publication in Publication.objects.filter(at__gt=since, at__lte=now).exclude(replaced=None):
+        scored = Submission.objects.filter(
+            withdrawn_at=None, evaluations__edition=publication.replaced, evaluations__status=Status.SCORED
+        )
+        rows = scored.filter(method__team__members__in=readers(MailKind.EDITION)).values_list(
+            "method__team__members", "method__name"
+        )
+        names: defaultdict[int, set[str]] = defaultdict(set)
+        for user_id, name in rows.distinct():
+            names[user_id].add(name)
+        for user in readers(MailKind.EDITION).filter(pk__in=names):
+            listed = "\n".join(f"  {name}" for name in sorted(names[user.pk]))
+            text = (
+                f"The board of {publication.split_id} is now edition {publication.edition.number}.\n"
+                f"Reason: {publication.reason}\n\nYour team has these entries there:\n{listed}\n\n"
+                f"What changed, and what became of each: {_link('editions', publication.split_id)}"
+            )
+            subject = f"The board of {publication.split_id} has a new edition"
+            key = f"edition:{publication.pk}"
+            yield _mail(MailKind.EDITION, user, key=key, subject=subject, text=text, now=now)
+
+
+def _tokens(now: datetime) -> Iterator[Mail]:
+    """Tokens that end soon and still work."""
+    ending = ApiToken.objects.filter(
+        revoked_at=None,
+        expiry__gt=now,
+        expiry__lte=now + TOKEN_ENDS_WITHIN,
+        # One that is meant for days ends when it is meant to.
+        created__lte=now - TOKEN_ENDS_WITHIN,
+        user__in=readers(MailKind.TOKEN),
+    )
+    for token in ending.select_related("user"):
+        text = (
+            f"Your API token {token.name} ends on {token.expiry:%Y-%m-%d at %H:%M} UTC. Programs that use it "
+            f"are refused from then on. Make a new one before: {_link('tokens')}"
+        )
+        subject = f"Your API token {token.name} ends on {token.expiry:%Y-%m-%d}"
+        key = f"token:{token.digest[:40]}"
+        yield _mail(MailKind.TOKEN, token.user, key=key, subject=subject, text=text, now=now)
+
+
+def _deadlines(now: datetime) -> Iterator[Mail]:
+    """Splits that close soon, for the teams that have sent a file to them."""
+    for split in Split.objects.filter(closes_at__gt=now, closes_at__lte=now + CLOSES_WITHIN):
+        at = f"{split.closes_at:%Y-%m-%d at %H:%M} UTC"
+        text = f"{split.pk} closes on {at}. After that no file is taken.\n\n{_link('board', split.pk)}"
+        for user in readers(MailKind.DEADLINE).filter(_has_sent_to(split)):
+            key = f"deadline:{split.pk}:{split.closes_at:%Y%m%d%H%M}"
+            subject = f"{split.pk} closes on {at}"
+            yield _mail(MailKind.DEADLINE, user, key=key, subject=subject, text=text, now=now)
+
+
+def _has_sent_to(split: Split) -> Exists:
+    sent = Submission.objects.filter(split=split, withdrawn_at=None, method__team__members=OuterRef("pk"))
+    return Exists(sent)
+
+
+def _mail(kind: MailKind, user: User, *, key: str, subject: str, text: str, now: datetime) -> Mail:
+    """A mail of this site, with the way to switch it off below."""
+    footer = f"--\n{settings.SITE_NAME}\n{settings.SITE_URL}\nChoose which mails you get: {_link('mails')}"
+    return outbox.tell(
+        kind=kind,
+        user=user,
+        key=f"{key}:{user.pk}",
+        subject=f"[{settings.SITE_NAME}] {subject}",
+        text=f"{text}\n\n{footer}\n",
+        now=now,
+    )
+
+
+def _link(name: str, *arguments: object) -> str:
+    return f"{settings.SITE_URL}{reverse(name, args=arguments)}"

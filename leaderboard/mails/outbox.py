@@ -1,0 +1,121 @@
+"""The outbox: a mail that the server does not take is kept, and sent later.
+
+A mail that somebody waits for, as the link that opens an account, is tried at once, within the time-out of
+`TSTTC_EMAIL_TIMEOUT_S`. Everything else waits for the workers' sweep, or for `manage.py send_mails`. A mail
+is sent at least once: who dies between sending and writing it down sends it again.
+"""
+
+import smtplib
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from typing import Final
+
+import structlog
+from django.core.mail import EmailMessage
+from django.db.models import F, Q
+
+from leaderboard.models import Mail, MailKind, User
+from leaderboard.ops.broker import CircuitBreaker
+
+log = structlog.get_logger(__name__)
+
+FAULTS: Final = (OSError, smtplib.SMTPException)
+"""What a mail server that is away, or does not want a mail, raises."""
+REST_S: Final = 30.0
+MAX_AT_ONCE: Final = 50
+PATIENCE: Final = timedelta(days=3)
+_FIRST_WAIT: Final = timedelta(seconds=30)
+_LONGEST_WAIT: Final = timedelta(hours=1)
+# Kept so long to know what was told already.
+KEPT: Final = timedelta(days=30)
+
+_rest = CircuitBreaker(rest_s=REST_S)
+
+
+def send_or_keep(*, message: EmailMessage, now: datetime) -> bool:
+    """Send a mail to one person now, or keep it for later. Returns whether it was sent; never fails for it.
+
+    After a failure the server is left alone for half a minute, so that nobody else waits for it in turn.
+    """
+    is_sent = not _rest and _sent(message)
+    if not is_sent:
+        [recipient] = message.to
+        Mail.objects.create(
+            kind=MailKind.ACCOUNT,
+            recipient=recipient,
+            subject=message.subject[:250],
+            text=str(message.body),
+            queued_at=now,
+            due_at=now + _FIRST_WAIT,
+        )
+    return is_sent
+
+
+def tell(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: datetime) -> Mail:
+    """A notice to be queued with `queue`; the subject is one line whatever names are in it."""
+    return Mail(
+        kind=kind,
+        user=user,
+        recipient=user.email,
+        key=key,
+        subject=" ".join(subject.split())[:250],
+        text=text,
+        queued_at=now,
+        due_at=now,
+    )
+
+
+def queue(mails: list[Mail]) -> None:
+    """Queue notices; what was told already, by its key, is not told again."""
+    Mail.objects.bulk_create(mails, ignore_conflicts=True)
+
+
+def waiting() -> int:
+    """How many mails wait to be sent."""
+    return Mail.objects.filter(ended_at=None).count()
+
+
+def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
+    """Send what is due, the oldest first. Returns how many were sent.
+
+    After the first that fails, the rest waits for the next time. What could not be sent for three days is
+    given up.
+    """
+    n_sent = 0
+    for mail in Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE]:
+        if is_stopping():
+            break
+        wait = min(_FIRST_WAIT * 2**mail.n_tries, _LONGEST_WAIT)
+        mine = Mail.objects.filter(pk=mail.pk, n_tries=mail.n_tries, ended_at=None)
+        if not mine.update(n_tries=F("n_tries") + 1, due_at=now + wait):
+            continue  # somebody else sends it
+        is_sent = _sent(EmailMessage(mail.subject, mail.text, to=[mail.recipient]))
+        n_sent += is_sent
+        if is_sent or mail.queued_at <= now - PATIENCE:
+            _end(mail, now=now, is_sent=is_sent)
+        if not is_sent:
+            break
+    return n_sent
+
+
+def purge(*, now: datetime) -> int:
+    """Forget what was told long ago. Returns how many."""
+    return Mail.objects.filter(Q(ended_at__lt=now - KEPT)).delete()[0]
+
+
+def _end(mail: Mail, *, now: datetime, is_sent: bool) -> None:
+    """Nothing of a mail stays: links in it open accounts, and addresses are nobody's business."""
+    ended = {"recipient": "", "subject": "", "text": "", "ended_at": now, "is_sent": is_sent}
+    Mail.objects.filter(pk=mail.pk).update(**ended)
+    if not is_sent:
+        log.error("mail_given_up", mail_id=mail.pk, kind=mail.kind, n_tries=mail.n_tries + 1)
+
+
+def _sent(message: EmailMessage) -> bool:
+    try:
+        message.send()
+    except FAULTS as fault:
+        _rest.begin()
+        log.warning("mail_not_sent", reason=f"{type(fault).__name__}: {fault}"[:200])
+        return False
+    return True

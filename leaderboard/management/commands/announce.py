@@ -1,0 +1,47 @@
+"""`manage.py announce SPLIT --subject TEXT FILE`."""
+
+import hashlib
+import sys
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+from django.utils import timezone
+
+from leaderboard import audit
+from leaderboard.mails import notices
+from leaderboard.models import Split
+
+
+class Command(BaseCommand):
+    """Mails everybody whose team has sent a file to a split."""
+
+    help = "Mail an announcement to the teams of a split; people who switched announcements off get none."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """To whom, and what."""
+        parser.add_argument("split", metavar="SPLIT")
+        parser.add_argument("file", metavar="FILE", help="the text of the mail; - for standard input")
+        parser.add_argument("--subject", required=True, metavar="TEXT")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Queue it, once for each person whatever happens, and say for how many."""
+        split = Split.objects.filter(pk=options["split"]).first()
+        if split is None:
+            raise CommandError(f"There is no split {options['split']!r}.")
+        try:
+            text = sys.stdin.read() if options["file"] == "-" else Path(options["file"]).read_text("utf-8")
+        except (OSError, UnicodeDecodeError) as fault:
+            raise CommandError(f"{options['file']} cannot be read as text: {fault}") from fault
+        if not text.strip() or not options["subject"].strip():
+            raise CommandError("The announcement is empty; expected a subject and a text.")
+        name = hashlib.sha256(f"{options['subject']}\n{text}".encode()).hexdigest()[:16]
+        n_people = notices.announce(
+            split=split, subject=options["subject"], text=text.strip(), name=name, now=timezone.now()
+        )
+        audit.record(
+            verb="announced", noun="Split", noun_id=split.pk, details={"subject": options["subject"]}
+        )
+        people = "1 person" if n_people == 1 else f"{n_people:,} people"
+        self.stdout.write(f"Queued for {people}. The same text again reaches only those who have not got it.")

@@ -1,0 +1,53 @@
+"""`manage.py export_submissions FILE`."""
+
+from argparse import ArgumentParser
+from pathlib import Path
+from typing import Any
+
+from django.core.management.base import BaseCommand, CommandError
+
+from evaluator.tables.formats import csv_lines
+from leaderboard.exports import submission_tables
+from leaderboard.models import Split
+from leaderboard.storage import files
+
+
+class Command(BaseCommand):
+    """Writes every submission with its published numbers into a table."""
+
+    help = "Write all submissions with all numbers into FILE.csv, or FILE.parquet (needs pandas and pyarrow)."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """Where to, and of what."""
+        parser.add_argument("file", metavar="FILE", type=Path)
+        parser.add_argument("--split", default="", help="only this one")
+        parser.add_argument("--addresses", action="store_true", help="e-mail addresses instead of numbers")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Write it, whole or not at all, readable by its owner only."""
+        path: Path = options["file"]
+        if options["split"] and not Split.objects.filter(pk=options["split"]).exists():
+            raise CommandError(f"There is no split {options['split']!r}.")
+        if path.suffix not in {".csv", ".parquet"}:
+            raise CommandError(f"{path.name} ends in {path.suffix!r}; expected .csv or .parquet.")
+        rows = list(submission_tables.rows(split=options["split"], has_addresses=options["addresses"]))
+        try:
+            with files.replacing(path) as unfinished:
+                _write(unfinished, rows)
+        except OSError as fault:
+            raise CommandError(f"{path} cannot be written: {fault.strerror}") from fault
+        self.stdout.write(f"{path}: {len(rows):,} evaluations.")
+
+
+def _write(path: Path, rows: list[dict[str, object]]) -> None:
+    columns = submission_tables.columns()
+    if path.suffix == ".csv":
+        with path.open("w", encoding="utf-8", newline="") as out:
+            out.writelines(csv_lines(rows, columns=columns))
+        return
+    try:
+        import pandas as pd  # noqa: PLC0415 - an extra
+
+        pd.DataFrame(rows, columns=list(columns)).to_parquet(path, index=False)
+    except ImportError as missing:
+        raise CommandError("Parquet needs pandas and pyarrow: pip install pandas pyarrow.") from missing

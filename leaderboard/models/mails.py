@@ -1,0 +1,58 @@
+"""Mails that wait to be sent, and those that a person does not want."""
+
+from django.db import models
+from django.db.models import Q
+from django.utils import timezone
+
+from leaderboard.models.people import User
+
+
+class MailKind(models.TextChoices):
+    """What a mail is about. Every kind but the first can be switched off by the person."""
+
+    ACCOUNT = "account", "Your account"
+    SCORED = "scored", "A file that I sent on the site is scored or rejected"
+    EDITION = "edition", "A new edition of a board that has an entry of my team"
+    TOKEN = "token", "An API token of mine ends within a week"
+    DEADLINE = "deadline", "A split that my team has sent files to closes within three days"
+    ANNOUNCEMENT = "announcement", "Announcements to the teams of a split"
+
+
+class Mail(models.Model):
+    """One mail to one person: to be sent, or sent. Once it is, nothing of it stays but that it was."""
+
+    kind = models.CharField(max_length=16, choices=MailKind)
+    user = models.ForeignKey(User, null=True, blank=True, on_delete=models.CASCADE, related_name="+")
+    recipient = models.EmailField(blank=True)
+    subject = models.CharField(max_length=250, blank=True)
+    text = models.TextField(blank=True)
+    key = models.CharField(  # noqa: DJ001 - mails about an account have none, and there may be many
+        max_length=120,
+        null=True,
+        unique=True,
+        help_text="What it tells whom, so that it is told once.",
+    )
+    queued_at = models.DateTimeField(default=timezone.now)
+    due_at = models.DateTimeField(default=timezone.now)
+    n_tries = models.PositiveSmallIntegerField(default=0)
+    ended_at = models.DateTimeField(null=True, blank=True, help_text="When it was sent or given up.")
+    is_sent = models.BooleanField(default=False)
+
+    class Meta:
+        indexes = [models.Index(fields=["due_at"], condition=Q(ended_at=None), name="mails_that_wait")]
+
+    def __str__(self) -> str:
+        return f"{self.kind} mail of {self.queued_at:%Y-%m-%d}"
+
+
+class MutedKind(models.Model):
+    """That a person wants no mails of a kind."""
+
+    user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="muted_kinds")
+    kind = models.CharField(max_length=16, choices=MailKind)
+
+    class Meta:
+        constraints = [models.UniqueConstraint(fields=["user", "kind"], name="kind_is_muted_once")]
+
+    def __str__(self) -> str:
+        return f"{self.user}: no {self.kind}"

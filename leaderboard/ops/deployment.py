@@ -1,0 +1,102 @@
+"""What `check --deploy` sees of a production: its variables, and the services that they name.
+
+Each finding is one sentence; all of them come at once. None has an address or a password in it.
+"""
+
+import difflib
+import os
+from collections.abc import Iterable, Iterator
+from typing import Any, Final
+from urllib.parse import urlsplit
+
+from django.conf import settings
+from django.core.checks import CheckMessage, Error
+from django.core.checks import Warning as Caution
+from django.core.files.storage import storages
+from django.http.request import validate_host
+
+from leaderboard.ops import environment, health
+
+# What others read: gunicorn, the proxy, the command `tsttc` and the tests.
+_OF_OTHERS: Final = frozenset(
+    {
+        "TSTTC_WEB_BIND",
+        "TSTTC_WEB_THREADS",
+        "TSTTC_SITE_HOST",
+        "TSTTC_MAX_REQUEST_SIZE",
+        "TSTTC_URL",
+        "TSTTC_TOKEN",
+        "TSTTC_TOKEN_FILE",
+        "TSTTC_REQUIRE_SERVICES",
+        "TSTTC_SHARED_DATA",
+        "TSTTC_DATABASE_ALONE",
+        "TSTTC_SCHEMATHESIS",
+    }
+)
+_OF_TESTS: Final = "TSTTC_TEST_"
+_BROKERS: Final = ("redis://", "rediss://", "redis+socket://", "amqp://", "amqps://")
+
+
+def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
+    """What is wrong with the variables, as far as they can be read."""
+    found: list[CheckMessage] = [
+        Caution(sentence, id="leaderboard.W002") for sentence in misspelt(os.environ)
+    ]
+    if not environment.PRODUCTION:
+        return found
+    found += [Error(sentence, id="leaderboard.E002") for sentence in _addresses()]
+    if environment.PROCESS == "web" and not settings.SENDS_MAIL:
+        message = (
+            "TSTTC_EMAIL_URL is not set: mails are printed to the log, and nobody has to prove an address."
+        )
+        found.append(Caution(message, id="leaderboard.W003"))
+    return found
+
+
+def check_services(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
+    """The services that a production needs and that do not answer; each is given some seconds."""
+    if not environment.PRODUCTION:
+        return []
+    found = []
+    if not health.database().is_ok:
+        found.append("The database of TSTTC_DATABASE_URL does not answer, or does not know the account.")
+    if environment.PROCESS in {"web", "worker", "maintainer"}:
+        if settings.CELERY_BROKER_URL.startswith(_BROKERS) and not health.broker().is_ok:
+            found.append("The broker of TSTTC_BROKER_URL does not answer.")
+        try:
+            storages["files"].exists("manifests/none.csv")
+        except Exception as fault:  # noqa: BLE001 - whatever the store of somebody else raises
+            found.append(f"The file store does not answer: {type(fault).__name__}.")
+        if not settings.FILES_URL and not _can_be_written(str(settings.FILES_DIR)):
+            found.append(f"TSTTC_FILES_DIR is {settings.FILES_DIR}, which this account cannot write to.")
+    return [Error(sentence, id="leaderboard.E003") for sentence in found]
+
+
+def misspelt(names: Iterable[str]) -> list[str]:
+    """A sentence for each `TSTTC_…` among these that nobody reads, with the name that may be meant."""
+    known = environment.ASKED | _OF_OTHERS
+    sentences = []
+    for name in sorted(names):
+        if name.startswith("TSTTC_") and name not in known and not name.startswith(_OF_TESTS):
+            near = difflib.get_close_matches(name, known, n=1)
+            sentences.append(f"{name} is read by nothing" + (f"; did you mean {near[0]}?" if near else "."))
+    return sentences
+
+
+def _addresses() -> Iterator[str]:
+    site = urlsplit(settings.SITE_URL)
+    if site.scheme not in {"http", "https"} or not site.hostname or site.path:
+        yield f"TSTTC_SITE_URL is {settings.SITE_URL!r}; expected an address such as https://board.example.org."
+    elif not validate_host(site.hostname, settings.ALLOWED_HOSTS):
+        yield f"TSTTC_ALLOWED_HOSTS lacks {site.hostname}, the host of TSTTC_SITE_URL."
+    if environment.PROCESS in {"web", "worker", "maintainer"} and not settings.CELERY_BROKER_URL.startswith(
+        _BROKERS
+    ):
+        yield "TSTTC_BROKER_URL is not understood; expected redis://:password@host:6379/0."
+
+
+def _can_be_written(folder: str) -> bool:
+    """Whether files can be made in a folder, or the folder in the first one above it that is there."""
+    while folder and not os.path.exists(folder):  # noqa: PTH110 - a name that may be of nothing
+        folder = os.path.dirname(folder)  # noqa: PTH120 - the same
+    return os.path.isdir(folder) and os.access(folder, os.W_OK)  # noqa: PTH112 - the same

@@ -1,0 +1,66 @@
+"""A person's own data: what is kept about them, to download, and its deletion."""
+
+from typing import cast
+
+from django import forms
+from django.contrib import messages
+from django.contrib.auth import logout
+from django.contrib.auth.decorators import login_required
+from django.http import HttpRequest, HttpResponse, JsonResponse
+from django.shortcuts import redirect, render
+from django.utils import timezone
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_safe
+
+from leaderboard.errors.refusals import Refused
+from leaderboard.models import User
+from leaderboard.submissions import forgetting
+from leaderboard.web.forms import SiteForm
+
+
+class DeleteForm(SiteForm):
+    """The address of the account once more, so that nobody deletes it by accident."""
+
+    email = forms.CharField(
+        label="Email address of this account",
+        max_length=254,
+        help_text="Type it to confirm.",
+        error_messages={"required": "No address was typed; expected the address of this account."},
+        widget=forms.EmailInput(attrs={"autocomplete": "off"}),
+    )
+
+    def require(self, user: User) -> None:
+        """Raise `Refused` for another address."""
+        if self.cleaned_data["email"].strip().lower() != user.email:
+            raise Refused(
+                "bad-value", "That is another address; expected the address of this account.", field="email"
+            )
+
+
+@login_required
+@never_cache
+@require_http_methods(["GET", "HEAD", "POST"])
+def data(request: HttpRequest) -> HttpResponse:
+    """What is kept, how to download it, and the form that deletes it."""
+    user = cast("User", request.user)
+    form = DeleteForm.asked(request)
+    if form.is_valid():
+        with form.refusals():
+            form.require(user)
+            forgetting.forget(user=user, reason="on their own page", actor=user, now=timezone.now())
+            logout(request)
+            messages.success(request, "Your account is deleted.")
+            return redirect("home")
+    return render(request, "account/data.html", {"form": form}, status=422 if form.errors else 200)
+
+
+@login_required
+@never_cache
+@require_safe
+def download(request: HttpRequest) -> HttpResponse:
+    """All of it as JSON."""
+    return JsonResponse(
+        forgetting.export(user=cast("User", request.user)),
+        json_dumps_params={"indent": 1, "ensure_ascii": False},
+        headers={"Content-Disposition": 'attachment; filename="tsttc-my-data.json"'},
+    )

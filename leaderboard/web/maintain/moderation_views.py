@@ -1,0 +1,176 @@
+"""Moderation for maintainers: a team with its people, methods and entries, and each deed on its own page."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+from uuid import UUID
+
+from django.contrib import messages
+from django.db.models import Q
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import get_object_or_404, redirect, render
+from django.utils import timezone
+from django.views.decorators.http import require_safe
+
+from leaderboard.errors.refusals import Refused
+from leaderboard.models import Membership, Method, Submission, Team
+from leaderboard.submissions import forgetting, moderation
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+from leaderboard.web.maintain.moderation_forms import DeedForm, MoveForm, RenameForm
+from leaderboard.web.submissions.forms import parse_uuid
+
+MAX_ENTRIES: Final = 200
+_RENAMED: Final = (
+    "The new name replaces the old one on all boards, also as of earlier dates, in exports, feeds, pictures "
+    "and search."
+)
+
+
+@dataclass(frozen=True)
+class Deed:
+    """Something that a maintainer does to an object of others: what the page says, and what is done."""
+
+    model: type[Team | Method | Submission | Membership]
+    heading: str
+    lead: str
+    button: str
+    form: type[DeedForm]
+    do: Callable[..., object]
+
+
+def _move(*, subject: Method, name: str, now: object, **told: Any) -> None:
+    by_id = Q(pk=parse_uuid(name)) if parse_uuid(name) else Q()
+    found = list(Team.objects.filter(Q(name=name) | by_id)[:2]) if name else []
+    if len(found) != 1:
+        how = "Several teams are" if found else "No team is"
+        raise Refused(
+            "bad-value", f"{how} called {name!r}; expected the name or the id of one team.", field="name"
+        )
+    moderation.move_method(method=subject, to=found[0], **told)
+
+
+DEEDS: Final[Mapping[str, Deed]] = {
+    "rename-team": Deed(
+        Team,
+        "Rename the team",
+        _RENAMED,
+        "Rename",
+        RenameForm,
+        lambda subject, **told: moderation.rename_team(team=subject, **told),
+    ),
+    "rename-method": Deed(
+        Method,
+        "Rename the method",
+        _RENAMED,
+        "Rename",
+        RenameForm,
+        lambda subject, **told: moderation.rename_method(method=subject, **told),
+    ),
+    "clear-texts": Deed(
+        Method,
+        "Delete the texts of the method",
+        "Description, paper link and code link are deleted. The team can write new ones.",
+        "Delete texts",
+        DeedForm,
+        lambda subject, now, **told: moderation.clear_texts(method=subject, **told),
+    ),
+    "move-method": Deed(
+        Method,
+        "Move the method to another team",
+        "The method, its submissions and its history belong to the other team from now on.",
+        "Move",
+        MoveForm,
+        _move,
+    ),
+    "withdraw": Deed(
+        Submission,
+        "Withdraw the submission",
+        "Its values leave the board; its row stays, marked with the date. This cannot be undone.",
+        "Withdraw",
+        DeedForm,
+        lambda subject, **told: moderation.withdraw_entry(submission=subject, is_hidden=False, **told),
+    ),
+    "hide": Deed(
+        Submission,
+        "Hide the submission",
+        "It leaves all boards, also those as of earlier dates. Its team still sees it as withdrawn. "
+        "This cannot be undone.",
+        "Hide",
+        DeedForm,
+        lambda subject, **told: moderation.withdraw_entry(submission=subject, is_hidden=True, **told),
+    ),
+    "close-account": Deed(
+        Membership,
+        "Close the account",
+        "Nobody can sign in to it or use its tokens. Its entries stay.",
+        "Close account",
+        DeedForm,
+        lambda subject, now, **told: moderation.set_active(user=subject.user, is_active=False, **told),
+    ),
+    "open-account": Deed(
+        Membership,
+        "Open the account again",
+        "The person can sign in again.",
+        "Open account",
+        DeedForm,
+        lambda subject, now, **told: moderation.set_active(user=subject.user, is_active=True, **told),
+    ),
+    "forget-person": Deed(
+        Membership,
+        "Forget the person",
+        "The account, its addresses, tokens and invitations are deleted, also file names and notes. "
+        "A team without other members loses its name. Scores stay. This cannot be undone.",
+        "Forget person",
+        DeedForm,
+        lambda subject, **told: forgetting.forget(user=subject.user, **told),
+    ),
+}
+
+
+@maintainers_only
+@require_safe
+def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
+    """A team: its people, methods and submissions, and what can be done about each."""
+    found = get_object_or_404(Team, pk=team_id)
+    sent = Submission.objects.filter(method__team=found).select_related("method")
+    context = {
+        "team": found,
+        "members": found.memberships.select_related("user").order_by("joined_at"),
+        "methods": Method.objects.existing().filter(team=found).order_by("name"),
+        "sent": sent.order_by("-submitted_at")[:MAX_ENTRIES],
+    }
+    return render(request, "maintain/team.html", context)
+
+
+@maintainers_only
+@asks_first
+def deed(request: HttpRequest, deed_name: str, subject_id: UUID) -> HttpResponse:
+    """Say what a deed does, ask for the reason, and do it."""
+    if deed_name not in DEEDS:
+        raise Http404
+    chosen = DEEDS[deed_name]
+    key = "handle" if chosen.model is Membership else "pk"
+    subject: Any = get_object_or_404(chosen.model, **{key: subject_id})
+    form: SiteForm = chosen.form.asked(request)
+    team_id = _team_of(subject).pk
+    if form.is_valid():
+        with form.refusals():
+            told = {**form.cleaned_data, "actor": maintainer_of(request), "now": timezone.now()}
+            chosen.do(subject=subject, **told)
+            messages.success(request, f"Done: {chosen.heading[:1].lower()}{chosen.heading[1:]}.")
+            return redirect("maintain_team", team_id)
+    about = {"deed": chosen, "subject": _name_of(subject), "team": _team_of(subject)}
+    return form_page(request, "maintain/deed.html", form, **about)
+
+
+def _team_of(subject: Team | Method | Submission | Membership) -> Team:
+    if isinstance(subject, Team):
+        return subject
+    return subject.method.team if isinstance(subject, Submission) else subject.team
+
+
+def _name_of(subject: Team | Method | Submission | Membership) -> str:
+    if isinstance(subject, Submission):
+        return f"{subject.method.name} on {subject.split_id}, {subject.submitted_at:%Y-%m-%d %H:%M} UTC"
+    return subject.user.email if isinstance(subject, Membership) else subject.name

@@ -1,0 +1,72 @@
+"""Rows quoted from papers, for maintainers: those on the boards, and a form that adds a paper's."""
+
+from typing import Any
+
+from django import forms
+from django.contrib import messages
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import redirect
+from django.utils import timezone
+
+from leaderboard.benchmark import papers, splits
+from leaderboard.benchmark.papers import BadDocument
+from leaderboard.errors.refusals import Refused
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+
+
+class PaperForm(SiteForm):
+    """A document with the rows of a paper."""
+
+    file = forms.FileField(
+        label="Document",
+        help_text="JSON with source, columns, methods and results.",
+        widget=forms.FileInput(attrs={"accept": ".json,application/json"}),
+        error_messages={
+            "required": "No document was sent; expected a JSON file.",
+            "empty": "The document is empty; expected JSON.",
+        },
+    )
+    is_replacing = forms.BooleanField(
+        label="Replace",
+        required=False,
+        help_text="Put the new row in the place of one with the same slug and other content.",
+    )
+
+    def __init__(self, request: HttpRequest) -> None:
+        """The form with what this request sends."""
+        sent: tuple[Any, Any] = (None, None)
+        super().__init__(*((request.POST, request.FILES) if request.method == "POST" else sent))
+
+    def refuse(self, refusal: Exception) -> None:
+        """Put every problem of the document at its field."""
+        for problem in refusal.problems if isinstance(refusal, BadDocument) else ():
+            self.add_error("file", problem)
+        if not isinstance(refusal, BadDocument):
+            super().refuse(refusal)
+
+    def document(self) -> dict[str, Any]:
+        """What was sent. Raises `BadDocument`."""
+        return papers.parse(self.cleaned_data["file"].read(papers.MAX_BYTES + 1))
+
+
+@maintainers_only
+@asks_first
+def published(request: HttpRequest) -> HttpResponse:
+    """The quoted rows with the day since which they stand; more of them."""
+    form = PaperForm(request)
+    if form.is_valid():
+        try:
+            done = splits.import_published(
+                document=form.document(),
+                now=timezone.now(),
+                is_replacing=form.cleaned_data["is_replacing"],
+                actor=maintainer_of(request),
+            )
+        except Refused as refusal:
+            form.refuse(refusal)
+        else:
+            words = (f"{len(names)} {outcome}" for outcome, names in vars(done).items())
+            messages.success(request, f"Rows: {', '.join(words)}.")
+            return redirect("maintain_published")
+    return form_page(request, "maintain/published.html", form, rows=splits.quoted())

@@ -1,0 +1,165 @@
+"""Forms of splits: add one, change what can be changed about it."""
+
+from dataclasses import asdict
+from datetime import datetime
+from typing import Any, Final
+
+from django import forms
+
+from leaderboard.benchmark import moments
+from leaderboard.benchmark.policy import MAX_DESCRIPTION, NAMES, Policy
+from leaderboard.errors.refusals import Refused
+from leaderboard.models import Split
+from leaderboard.models.benchmark import Listing
+from leaderboard.quotas import quotas
+from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.quota_forms import SpanField, count_field
+
+_LISTINGS: Final = [
+    (Listing.LISTED, "listed"),
+    (Listing.ARCHIVED, "archived: the board stays, submissions are closed"),
+    (Listing.OFF, "switched off: on no page, in no form, in no list of the API"),
+]
+
+
+class MomentField(forms.CharField):
+    """A date with time and zone, or nothing."""
+
+    def __init__(self, label: str, help_text: str) -> None:
+        attrs = {"placeholder": moments.EXAMPLE, "autocomplete": "off"}
+        super().__init__(
+            label=label,
+            required=False,
+            max_length=60,
+            help_text=f"{help_text} With a zone: UTC, AoE, Europe/Berlin or +01:00.",
+            widget=forms.TextInput(attrs=attrs),
+        )
+
+    def clean(self, value: Any) -> datetime | None:
+        """The moment. Raises `ValidationError`."""
+        text: str = super().clean(value)
+        try:
+            return moments.parse(text) if text else None
+        except Refused as refusal:
+            raise forms.ValidationError(str(refusal)) from refusal
+
+
+class PolicyForm(SiteForm):
+    """What maintainers decide about a split. The names are those of `Policy`."""
+
+    title = forms.CharField(
+        max_length=80, error_messages={"required": "No title was given; expected one like Validation."}
+    )
+    description = forms.CharField(
+        required=False,
+        max_length=MAX_DESCRIPTION,
+        help_text="One or two sentences, plain text.",
+        widget=forms.Textarea(attrs={"rows": 3}),
+    )
+    listing = forms.ChoiceField(choices=_LISTINGS)
+    position = forms.IntegerField(
+        min_value=0,
+        max_value=32767,
+        initial=0,
+        help_text="Splits are listed by this number.",
+        widget=forms.NumberInput(attrs={"inputmode": "numeric"}),
+    )
+    opens_at = MomentField("Opens", "Empty: as soon as it has ground truth.")
+    closes_at = MomentField("Closes", "Empty: never.")
+    announcement = forms.CharField(
+        required=False,
+        max_length=300,
+        help_text="One line of plain text on the pages of the split and in the API. Empty: none.",
+    )
+    announcement_ends_at = MomentField("Announcement ends", "Needed for an announcement.")
+    decimals = forms.TypedChoiceField(
+        choices=[(1, "one"), (2, "two")],
+        coerce=int,
+        help_text="Decimals of its next edition. Each decimal reveals more of hidden values.",
+    )
+    quota_limit = count_field("Submissions", "Of a team, within the window. Empty: no limit; 0: none.")
+    quota_window = SpanField(
+        label="Window",
+        may_be_none=False,
+        help_text="Length of the rolling window, for example 30 days or 24 hours.",
+        error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
+    )
+    quota_min_gap = SpanField(
+        label="Min. interval",
+        may_be_none=True,
+        help_text="Minimum time between two submissions of a team. Empty: none.",
+    )
+    quota_rejected_limit = count_field("Rejected or cancelled files", "Within 24 hours. Empty: no limit.")
+    needs_admission = forms.BooleanField(
+        label="By admission", required=False, help_text="Only admitted teams submit to it."
+    )
+    how_to_be_admitted = forms.CharField(
+        label="How a team asks for admission",
+        required=False,
+        max_length=300,
+        help_text="The end of a sentence, such as: write to board@example.org.",
+    )
+
+    @staticmethod
+    def filled_with(policy: Policy) -> dict[str, Any]:
+        """What stands in the form at first."""
+        gap = policy.quota_min_gap
+        return asdict(policy) | {
+            "opens_at": moments.written(policy.opens_at),
+            "closes_at": moments.written(policy.closes_at),
+            "announcement_ends_at": moments.written(policy.announcement_ends_at),
+            "quota_window": quotas.span(policy.quota_window),
+            "quota_min_gap": quotas.span(gap) if gap else "",
+        }
+
+    def policy(self) -> Policy:
+        """What was filled in."""
+        return Policy(**{name: self.cleaned_data[name] for name in NAMES})
+
+
+class NewSplitForm(PolicyForm):
+    """The same, and what stays as it is: its name, and where its ground truth comes from."""
+
+    name = forms.CharField(
+        max_length=32,
+        help_text="Small letters, digits and hyphens. It stands in addresses and cannot be changed.",
+        error_messages={"required": "No name was given; expected one like challenge-2027."},
+        widget=forms.TextInput(attrs={"autocomplete": "off"}),
+    )
+    truth = forms.ChoiceField(
+        label="Ground truth",
+        error_messages={"required": "No ground truth was chosen; expected one of those listed."},
+    )
+
+    field_order = ("name", "title", "truth")
+
+    def __init__(self, data: Any = None, *, initial: Any = None) -> None:
+        super().__init__(data, initial=initial)
+        able = Split.objects.filter(same_truth_as=None).exclude(published_edition=None)
+        self.fields["truth"].choices = [  # type: ignore[attr-defined]  # a ChoiceField
+            ("hidden", "its own, hidden"),
+            ("open", "its own, open"),
+            *((f"as {split.pk}", f"that of {split.pk}, shared: a challenge") for split in able),
+        ]
+
+    def wanted(self) -> dict[str, Any]:
+        """What was filled in, under the names of `new_splits.add_split`."""
+        truth = self.cleaned_data["truth"]
+        is_own = not truth.startswith("as ")
+        return {
+            "name": self.cleaned_data["name"],
+            "policy": self.policy(),
+            "is_hidden": truth == "hidden" if is_own else None,
+            "same_truth_as": "" if is_own else truth.removeprefix("as "),
+        }
+
+
+class AnnouncementForm(SiteForm):
+    """A line for all splits, and when it ends. The names are those of `policy.announce`."""
+
+    announcement = forms.CharField(
+        required=False,
+        max_length=300,
+        help_text="One line of plain text, such as: Maintenance on 3 March, 8:00 to 9:00 UTC. Empty: none.",
+    )
+    announcement_ends_at = MomentField("Ends", "Needed for an announcement.")
