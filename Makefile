@@ -37,7 +37,7 @@ demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew from rendered f
 test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
 	@$(PY) -m tests.everything
 
-test-fast: $(DEV_STAMP) ## what takes less than a minute: no services, no browser, nothing slow
+test-fast: $(DEV_STAMP) ## what takes about a minute: no services, no browser, nothing slow
 	$(PY) -m pytest -q $(SPREAD) -m "not slow and not services and not browser"
 
 chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
@@ -73,7 +73,7 @@ LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra server --extra fr
 lock: ## pin the dependencies of pyproject.toml anew
 	@$(call find_python) && "$$python" -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip install --quiet uv
 	$(LOCK) --output-file requirements.lock
-	$(LOCK) --extra baselines --group dev --constraint requirements.lock --output-file requirements-dev.lock
+	$(LOCK) --extra baselines --extra plots --group dev --constraint requirements.lock --output-file requirements-dev.lock
 
 # The parts of Apache ECharts that the charts use. Needs node and the npm registry; the digest of what comes out
 # stands in static/vendored/README.md.

@@ -1,4 +1,4 @@
-"""Fills the `test` board of the database that the environment names with a thousand entries."""
+"""Fills the `test` board of the database that the environment names with entries, and changes it."""
 
 import sys
 import tempfile
@@ -16,3 +16,17 @@ def main() -> None:
     user = User.objects.create_user("owner@example.org", "correct horse", name="Owls")
     teams.team_of(user=user)
     board_rows.fill(edition, n=int(sys.argv[1]), user=user)
+
+
+def change() -> None:
+    """Change one value that everybody sees, as a verb would, and tell the workers."""
+    from django.db import transaction  # noqa: PLC0415 - needs Django, which is configured only now
+    from django.db.models import F  # noqa: PLC0415
+
+    from leaderboard import versions  # noqa: PLC0415
+    from leaderboard.models import Score  # noqa: PLC0415
+
+    with transaction.atomic():
+        first = Score.objects.order_by("pk").values("pk")[:1]
+        Score.objects.filter(pk__in=first).update(value=F("value") + 0.01)
+        versions.changed("test")

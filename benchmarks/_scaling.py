@@ -1,9 +1,13 @@
 """The measurement of `benchmarks/scale_out.py`, run in a process that has the site's settings.
 
-200 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued, not yet due.
+100 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued, not yet due.
 Once every worker is up they become due at once, and the clock runs, by the database, until the last is
 decided. The workers share the database, the broker and the files, and nothing else, as those on other
 machines do.
+
+Here PostgreSQL and this process, which asks whether all are decided, have the same processors as the workers.
+So each line says what every party took of them: where their sum is near the number of processors, no worker
+more can be of use on this machine.
 """
 
 import os
@@ -18,7 +22,7 @@ import numpy as np
 from django.conf import settings
 from django.core.files.base import ContentFile
 from django.core.management import call_command
-from django.db import connections
+from django.db import connection, connections
 from django.db.models import Max, Sum
 from django.db.models.functions import Now
 from django.utils import timezone
@@ -33,7 +37,7 @@ from leaderboard.submissions import submissions
 from tests.journeys.production import BIN, REPOSITORY, await_that
 
 N_WORKERS = (1, 2, 4)
-N_SUBMISSIONS = 200
+N_SUBMISSIONS = 100
 N_SEQUENCES = 28_600
 SEED = 20230901
 PATIENCE_S = 600.0
@@ -53,11 +57,17 @@ def main() -> None:
             # What else the machine is doing, without which the rates cannot be read.
             print(f"{name}_load_before = {os.getloadavg()[0]:.1f} processes", flush=True)
             with workers(n) as processes:
-                before_s = sum(map(processor_s, processes))
+                parties = {"processor": processes, "postgres": database_server(), "client": [os.getpid()]}
+                before_s = {party: sum(map(processor_s, pids)) for party, pids in parties.items()}
                 per_s = rate(ids)
-                used_s = sum(map(processor_s, processes)) - before_s
+                used_s = {
+                    party: sum(map(processor_s, pids)) - before_s[party] for party, pids in parties.items()
+                }
             print(f"{name} = {per_s:.2f} submissions/s", flush=True)
-            print(f"{name}_processor = {used_s / len(ids):.3f} s/submission", flush=True)
+            for party, seconds in used_s.items():
+                print(f"{name}_{party} = {seconds / len(ids):.4f} s/submission", flush=True)
+            busy = sum(used_s.values()) / len(ids) * per_s
+            print(f"{name}_busy = {busy:.2f} of {os.cpu_count()} processors", flush=True)
     finally:
         connections.close_all()
 
@@ -120,6 +130,17 @@ def workers(n: int) -> Iterator[list[int]]:
             processes.append(worker.pid)
         await_that(lambda: all(b" ready." in path.read_bytes() for path in logs), what="the workers are up")
         yield processes
+
+
+def database_server() -> list[int]:
+    """The process that all of PostgreSQL's are children of; none where it runs on another machine."""
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT pg_backend_pid()")
+        (backend,) = cursor.fetchone()
+    folder = Path("/proc", str(backend))
+    if not folder.exists() or not (folder / "comm").read_text().startswith("postgres"):
+        return []
+    return [int((folder / "stat").read_text().rpartition(")")[2].split()[1])]
 
 
 def processor_s(process: int) -> float:

@@ -21,19 +21,32 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
+import psycopg
 
 from tests.journeys.production import REPOSITORY, await_that, free_port, settings_for
 from tests.services import throwaway_database, throwaway_redis
 
 N_ENTRIES = int(os.environ.get("BENCH_ENTRIES", "1000"))
-N_ROUNDS = int(os.environ.get("BENCH_ROUNDS", "5"))
-ROUND_S = int(os.environ.get("BENCH_ROUND_S", "2"))
+N_ROUNDS = int(os.environ.get("BENCH_ROUNDS", "4"))
+ROUND_S = int(os.environ.get("BENCH_ROUND_S", "1"))
+N_CHANGES = 3
 API = "/api/v1/splits/test/board"
 GZIP = {"Accept-Encoding": "gzip"}
 
 
 def main() -> None:
     """Print one line per figure, `name = value unit`."""
+    with filled(N_ENTRIES) as (environment, url):
+        with serving(environment, url) as process:
+            measure(url)
+            print_memory(url, process.pid, name="board")
+        with serving(environment, url):
+            print_first_readers(environment, url)
+
+
+@contextmanager
+def filled(n: int) -> Iterator[tuple[dict[str, str], str]]:
+    """The settings and the address of a site whose board has `n` entries."""
     with (
         throwaway_database() as postgres_url,
         throwaway_redis() as redis_url,
@@ -46,22 +59,87 @@ def main() -> None:
             "TSTTC_LOG_LEVEL": "WARNING",
             "WEB_CONCURRENCY": "1",
         }
-        for command in (
-            ["manage.py", "migrate", "--no-input", "-v0"],
-            ["manage.py", "collectstatic", "--no-input", "-v0"],
-            [
-                "-c",
-                "import django; django.setup(); from benchmarks import _board_rows; _board_rows.main()",
-                str(N_ENTRIES),
-            ],
+        run(environment, "manage.py", "migrate", "--no-input", "-v0")
+        run(environment, "manage.py", "collectstatic", "--no-input", "-v0")
+        run(environment, "-c", _ROWS.format("main"), str(n))
+        yield environment, url
+
+
+_ROWS = "import django; django.setup(); from benchmarks import _board_rows; _board_rows.{}()"
+
+
+def run(environment: dict[str, str], *arguments: str) -> None:
+    """Python, in the checkout, with these settings."""
+    subprocess.run([sys.executable, *arguments], cwd=REPOSITORY, env=environment, check=True)
+
+
+def print_first_readers(environment: dict[str, str], url: str) -> None:
+    """How long the first reader after a change waits, without a worker and after one has drawn the board."""
+    with httpx.Client(base_url=url, trust_env=False, timeout=60) as http:
+        http.get(API)
+        alone_ms = []
+        for _ in range(N_CHANGES):
+            run(environment, "-c", _ROWS.format("change"))
+            alone_ms.append(asked_ms(http))
+        print(f"board_first_reader_without_workers = {statistics.median(alone_ms):.0f} ms", flush=True)
+        command = [sys.executable, "-m", "celery", "--app=leaderboard", "worker", "--concurrency=1"]
+        worker = subprocess.Popen(
+            command, cwd=REPOSITORY, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        try:
+            await_that(lambda: is_drawn(environment), what="the worker has drawn the board")
+            drawn_ms, after_ms = [], []
+            for _ in range(N_CHANGES):
+                run(environment, "-c", _ROWS.format("change"))
+                began_s = time.perf_counter()
+                await_that(lambda: is_drawn(environment), what="the worker has drawn the board")
+                drawn_ms.append(1e3 * (time.perf_counter() - began_s))
+                after_ms.append(asked_ms(http))
+        finally:
+            worker.terminate()
+            worker.wait()
+    print(f"board_drawn_by_a_worker_after = {statistics.median(drawn_ms):.0f} ms")
+    print(f"board_first_reader_after_a_change = {statistics.median(after_ms):.0f} ms")
+
+
+def asked_ms(http: httpx.Client) -> float:
+    """How long the board's JSON takes, compressed."""
+    began_s = time.perf_counter()
+    http.get(API, headers=GZIP).raise_for_status()
+    return 1e3 * (time.perf_counter() - began_s)
+
+
+def is_drawn(environment: dict[str, str]) -> bool:
+    """Whether what is kept of the board is of its last version."""
+    with psycopg.connect(environment["TSTTC_DATABASE_URL"]) as database:
+        row = database.execute(
+            "SELECT s.version = v.number FROM leaderboard_snapshot s JOIN leaderboard_edition e"
+            " ON e.id = s.edition_id JOIN leaderboard_boardversion v ON v.split_id = e.split_id"
+        ).fetchone()
+    return bool(row and row[0])
+
+
+def print_memory(url: str, master: int, *, name: str) -> None:
+    """The most memory that the web process has had, once all that it shows of a board was asked for."""
+    with httpx.Client(base_url=url, trust_env=False, timeout=60) as http:
+        for path in (
+            "/board/test/",
+            API,
+            f"{API}?intervals=1",
+            "/board/test.csv",
+            "/",
+            "/board/test/charts/",
         ):
-            subprocess.run([sys.executable, *command], cwd=REPOSITORY, env=environment, check=True)
-        with serving(environment, url):
-            measure(url)
+            for headers in (GZIP, {}):
+                http.get(path, headers=headers)
+    children = Path(f"/proc/{master}/task/{master}/children").read_text().split()
+    lines = Path(f"/proc/{children[0]}/status").read_text().splitlines()
+    peak_kb = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
+    print(f"{name}_web_peak_memory = {peak_kb / 1e3:.0f} MB", flush=True)
 
 
 @contextmanager
-def serving(environment: dict[str, str], url: str) -> Iterator[None]:
+def serving(environment: dict[str, str], url: str) -> Iterator["subprocess.Popen[bytes]"]:
     """A gunicorn, until the context ends."""
     command = [
         sys.executable,
@@ -81,7 +159,7 @@ def serving(environment: dict[str, str], url: str) -> Iterator[None]:
 
     try:
         await_that(answers, what="gunicorn answers")
-        yield
+        yield process
     finally:
         process.terminate()
         process.wait()
@@ -90,16 +168,13 @@ def serving(environment: dict[str, str], url: str) -> Iterator[None]:
 def measure(url: str) -> None:
     """Sizes and first answers, then the rates in turns."""
     with httpx.Client(base_url=url, trust_env=False, timeout=60) as http:
-        began_s = time.perf_counter()
-        http.get(API)
-        print(f"board_first_reader_after_a_change = {(time.perf_counter() - began_s) * 1e3:.0f} ms")
         sizes(http)
         tag = http.get(API, headers=GZIP).headers["ETag"]
     if shutil.which("wrk") is None:
         print("board: the rates are left out, because wrk is not installed; on Debian: apt install wrk")
         return
     targets = {
-        "empty": ("/empty", GZIP),
+        "board_empty": ("/empty", GZIP),
         "board_json": (API, GZIP),
         "board_json_uncompressed": (API, {}),
         "board_json_unchanged": (API, {**GZIP, "If-None-Match": tag}),
@@ -113,7 +188,7 @@ def measure(url: str) -> None:
     for name, found in rates.items():
         print(f"{name} = {statistics.median(found):.0f} requests/s")
     for name in list(targets)[1:]:
-        ratios = [one / empty for one, empty in zip(rates[name], rates["empty"], strict=True)]
+        ratios = [one / empty for one, empty in zip(rates[name], rates["board_empty"], strict=True)]
         print(
             f"{name}_of_empty = {statistics.median(ratios):.2f} (from {min(ratios):.2f} to {max(ratios):.2f})"
         )
@@ -127,7 +202,9 @@ def sizes(http: httpx.Client) -> None:
     parts = {"page": len(page)}
     for address in dict.fromkeys(re.findall(r'(?:href|src)="(/static/[^"]+)"', text)):
         with http.stream("GET", address, headers=GZIP) as response:
-            parts[address.rpartition("/")[2]] = len(b"".join(response.iter_raw()))
+            parts[re.sub(r"\.[0-9a-f]{12}", "", address.rpartition("/")[2])] = len(
+                b"".join(response.iter_raw())
+            )
     for name, n_bytes in parts.items():
         print(f"board_first_visit_{name} = {n_bytes / 1e3:.1f} KB")
     print(

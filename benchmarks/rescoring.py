@@ -2,9 +2,14 @@
 
 Real PostgreSQL, real Redis, and a Celery worker with two processes, as in production. The clock runs from the
 call that opens the edition, which reads and checks the new ground truth, to the moment at which the last
-submission is decided in the database. Beside it the dataset's own way over the same work: the plain Python
-loop of `benchmarks.evaluator` from the file to the means, measured on twenty of the submissions before each
-round, and multiplied. Figures are medians of the rounds.
+submission is decided in the database. Intervals and rank ranges are made later, and not here. `extra_memory`
+is what a worker process has at the peak of a correction beyond what it had before. `processor` is the time of
+the workers and of this process, which opens the edition, without PostgreSQL's; it can be compared even where
+the machine does something else.
+
+Beside it the dataset's own way over the same work: the plain Python loop of `benchmarks.evaluator` from the
+file to the means, measured on twenty of the submissions before each round, and multiplied. Figures are
+medians of the rounds.
 """
 
 import os
@@ -67,15 +72,17 @@ def _measure(site: Site) -> None:
         _correction.open_split(split=split, truth=truths[split], n=n, directory=site.directory)
     rounds: dict[str, list[Corrected]] = {split: [] for split in SIZES}
     contents = [crowd.contents(truths["test"], number) for number in range(N_IN_THE_LOOP)]
-    loops_s = []
+    loops_s, extra_mb = [], []
+    _correction.leave_intervals()
     with _worker(site) as pids:
-        before_mb = [_memory_mb(pid, "VmRSS") for pid in pids]
         for number in range(N_ROUNDS):
             loops_s.append(_loop_s(contents, truth))
             for split, own in truths.items():
                 new = _correction.perturbed(own, seed=10_000 + number)
-                rounds[split].append(_correction.correct(split=split, truth=new, directory=site.directory))
-        extra_mb = [_memory_mb(pid, "VmHWM") - mb for pid, mb in zip(pids, before_mb, strict=True)]
+                before = [_at_rest(pid) for pid in pids]
+                corrected = _correction.correct(split=split, truth=new, directory=site.directory, pids=pids)
+                extra_mb += [_memory_mb(pid, "VmHWM") - mb for pid, mb in zip(pids, before, strict=True)]
+                rounds[split].append(corrected)
     _correction.check(rounds["test"][-1], first=truths["test"], n=N_IN_THE_LOOP)
     for split, n in SIZES.items():
         new = _correction.perturbed(truths[split], seed=20_000)
@@ -90,6 +97,7 @@ def _measure(site: Site) -> None:
 def _tell(n: int, rounds: "Sequence[Corrected]", loops_s: Sequence[float], shares: dict[str, float]) -> None:
     figure("rescoring", n, "open_to_stored", median(one.total_s for one in rounds), "s")
     figure("rescoring", n, "opening", median(one.open_s for one in rounds), "s")
+    figure("rescoring", n, "processor", min(one.processor_s for one in rounds) / n * 1e3, "ms/submission")
     figure("rescoring", n, "rate", median(n / one.total_s for one in rounds), "submissions/s")
     figure("rescoring", n, "speedup_over_plain_loop", _speedup(n, rounds, loops_s), "x")
     for part, share in shares.items():
@@ -110,6 +118,12 @@ def _worker(site: Site) -> Iterator[list[int]]:
         await_that(lambda: "ready" in log.read_text(), what="the worker is ready")
         children = Path(f"/proc/{main.pid}/task/{main.pid}/children")
         yield [int(pid) for pid in children.read_text().split()]
+
+
+def _at_rest(pid: int) -> float:
+    """The memory of a process in MB; its peak is counted from here on."""
+    Path(f"/proc/{pid}/clear_refs").write_text("5", encoding="ascii")
+    return _memory_mb(pid, "VmRSS")
 
 
 def _memory_mb(pid: int, name: str) -> float:

@@ -15,7 +15,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -38,7 +38,7 @@ from tests.services import ServiceMissing, throwaway_database, throwaway_redis
 
 N_WAITERS = 500
 N_ROWS = 100
-READ_S = 30.0
+READ_S = 15.0
 PAUSE_S = 0.03
 
 
@@ -75,25 +75,34 @@ def _measure(site: Site) -> None:
         before = _read(site.url, reader, stop=_for(READ_S))
         with _waiting(site, waiters) as clients:
             arriving = _read(site.url, reader, stop=_has_said(clients))
-            during = _read(site.url, reader, stop=_for(2 * READ_S))
+            during = _read(site.url, reader, stop=_for(READ_S))
             connections = _connections()
             cancelled_s = _cancel()
             counts = json.loads(clients.communicate(timeout=120)[0].splitlines()[-1])
         after = _read(site.url, reader, stop=_for(READ_S))
+    phases = (("unloaded", _joined(before, after)), ("arriving", arriving), ("waiting", during))
     for kind in before:
-        unloaded = [*before[kind], *after[kind]]
-        for name, values in (("unloaded", unloaded), ("arriving", arriving[kind]), ("waiting", during[kind])):
-            figure("waiting", N_WAITERS, f"{kind}_{name}_p50", float(np.percentile(values, 50)) * 1e3, "ms")
-            figure("waiting", N_WAITERS, f"{kind}_{name}_p99", float(np.percentile(values, 99)) * 1e3, "ms")
-        ratio = np.percentile(during[kind], 99) / np.percentile(unloaded, 99)
-        figure("waiting", N_WAITERS, f"{kind}_p99_ratio", float(ratio), "x")
-    everything = [np.concatenate(list(times.values())) for times in (before, after, during)]
-    whole = np.percentile(everything[2], 99) / np.percentile(np.concatenate(everything[:2]), 99)
-    figure("waiting", N_WAITERS, "board_p99_ratio", float(whole), "x")
+        for name, times in phases:
+            figure(
+                "waiting", N_WAITERS, f"{kind}_{name}_p50", float(np.percentile(times[kind], 50)) * 1e3, "ms"
+            )
+            figure("waiting", N_WAITERS, f"{kind}_{name}_p99", _p99(times[kind]) * 1e3, "ms")
+    unloaded_s = _p99(np.concatenate(list(phases[0][1].values())))
+    for name, times in phases[1:]:
+        ratio = _p99(np.concatenate(list(times.values()))) / unloaded_s
+        figure("waiting", N_WAITERS, f"board_{name}_p99_ratio", ratio, "x")
     figure("waiting", N_WAITERS, "turned_away", 100 * counts["n_turned_away"] / counts["n_requests"], "%")
     figure("waiting", N_WAITERS, "failed", counts["n_failed"], "requests")
     figure("waiting", N_WAITERS, "last_told_after", counts["told_s"] - cancelled_s, "s")
     figure("waiting", N_WAITERS, "database_connections", connections, "")
+
+
+def _joined(one: "Times", other: "Times") -> "Times":
+    return {kind: [*one[kind], *other[kind]] for kind in one}
+
+
+def _p99(times_s: Sequence[float]) -> float:
+    return float(np.percentile(times_s, 99))
 
 
 def _is_up(url: str) -> bool:

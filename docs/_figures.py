@@ -1,12 +1,15 @@
 """`python -m docs._figures`: draw the figures of docs/baselines.md and of the landing page from sequences of
-examples/baseline, the picture that links to the site show, and the icon.
+examples/baseline, those of docs/annotation.md, the picture that links to the site show, and the icon.
 """
 
 import struct
 from pathlib import Path
 from typing import Final
 
+from baselines.annotation.figures import choice_figure, consensus_figure
 from baselines.clips import Clip
+from baselines.deep_scale.estimator import DeepScale
+from baselines.deep_scale.figures import confidence_figure
 from baselines.drawing import JPEG_QUALITY, PNG_SCALE, THEMES, Figure, Line, Picture, Text, encoded, outline
 from baselines.figures import search_figure, task_figure
 from baselines.folders import read_folder
@@ -42,6 +45,14 @@ def figures() -> dict[Path, Figure]:
         **{
             FIGURES / f"baseline-{name}.svg": search_figure(
                 clip, estimator=PixelMse(), frame_gap=5, true_ttc_s=ttc_s
+            )
+            for name, clip, ttc_s in (("near", near, near_s), ("far", far, far_s))
+        },
+        FIGURES / "annotation-consensus.svg": consensus_figure(),
+        FIGURES / "annotation-choice.svg": choice_figure(),
+        **{
+            FIGURES / f"deep-scale-{name}.svg": confidence_figure(
+                clip, estimator=DeepScale(), frame_gap=5, true_ttc_s=ttc_s
             )
             for name, clip, ttc_s in (("near", near, near_s), ("far", far, far_s))
         },

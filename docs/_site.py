@@ -1,5 +1,5 @@
 """What the site needs in addition to the pages: the examples, to which pages link as files of the repository,
-and the API reference, from the same templates as the leaderboard's own page.
+the changelog, and the API reference, from the same templates as the leaderboard's own page.
 """
 
 import os
@@ -15,6 +15,7 @@ from mkdocs.structure.toc import AnchorLink
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 API_REFERENCE = "api-reference.md"
+CHANGELOG = "changelog.md"
 INTRODUCTION = """# API reference
 
 Every operation, parameter and field, from the schema that a leaderboard serves at `/api/v1/schema`.
@@ -29,11 +30,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             name = path.relative_to(REPOSITORY).as_posix()
             files.append(File.generated(config, name, abs_src_path=str(path)))
     files.append(File.generated(config, API_REFERENCE, content=INTRODUCTION))
+    files.append(File.generated(config, CHANGELOG, abs_src_path=str(REPOSITORY / "CHANGELOG.md")))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Point to the examples where the site has them: beside the pages instead of beside their folder."""
+    if page.file.src_uri == CHANGELOG:
+        return markdown.replace("](docs/", "](").replace("](../examples/", "](examples/")
     if page.file.src_uri.startswith("examples/"):
         return markdown.replace("](../docs/", "](../")
     return markdown.replace("](../examples/", "](examples/")

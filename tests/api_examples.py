@@ -27,6 +27,7 @@ PSEUDONYM = re.compile(r"Anonymous [0-9a-f]{6}")
 MEASURED = {"estimate_s": 12.5, "rate_per_s": 3.6, "signature": "3x…Q", "key_id": "kPrK…o4"}
 HEADERS = ("Location", "Link")
 MAX_LINES = 4
+MAX_WIDTH = 200
 
 
 def answers(
@@ -88,10 +89,10 @@ def shortened(value: Any, name: str = "") -> Any:
 
 
 def first_lines(text: str) -> str:
-    """The beginning of a table."""
-    lines = text.splitlines()
+    """The beginning of a table, or of a file."""
+    lines = [f"{line[:MAX_WIDTH]} …" if len(line) > MAX_WIDTH else line for line in text.splitlines()]
     if len(lines) <= MAX_LINES:
-        return text
+        return "\n".join([*lines, *[""] * text.endswith("\n")])
     return "\n".join([*lines[:MAX_LINES], f"… {len(lines) - MAX_LINES} more lines"])
 
 

@@ -74,7 +74,7 @@ def roll_back(*, replaces: int = 2) -> Publication:
 
 
 def paper(slug: str = "later", *, split: str = "test", mid: float = 1.0) -> dict[str, Any]:
-    """A document of one row that a paper prints, such as those in leaderboard/benchmark/published/."""
+    """A document of one row that a paper prints, as docs/maintainers.md shows it."""
     method = {"slug": slug, "name": slug.title(), "description": "", "uses_nerf": False, "latency_ms": None}
     return {
         "source": {

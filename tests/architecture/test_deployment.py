@@ -48,7 +48,7 @@ READ = names_in(
 
 def test_compose_has_the_processes_of_production() -> None:
     assert {"web", "worker", "db", "redis"} <= set(SERVICES)
-    assert set(OURS) == {"web", "worker", "migrate", "maintainer"}
+    assert set(OURS) == {"web", "worker", "mailer", "migrate", "maintainer", "restore"}
 
 
 def test_only_the_worker_and_the_maintainer_see_the_ground_truth() -> None:
@@ -57,9 +57,9 @@ def test_only_the_worker_and_the_maintainer_see_the_ground_truth() -> None:
         for name, service in SERVICES.items()
         if any(target == GROUND_TRUTH or GROUND_TRUTH.startswith(f"{target}/") for target in mounts(service))
     }
-    assert seeing == {"worker", "maintainer"}
+    assert seeing == {"worker", "maintainer", "restore"}
     assert mounts(SERVICES["worker"])[GROUND_TRUTH].endswith(":ro")
-    assert SERVICES["maintainer"]["profiles"] == ["maintenance"]
+    assert SERVICES["maintainer"]["profiles"] == SERVICES["restore"]["profiles"] == ["maintenance"]
 
 
 @pytest.mark.parametrize("name", sorted(OURS))
@@ -69,10 +69,11 @@ def test_our_processes_are_those_of_production_and_write_to_volumes_only(name: s
     assert service["environment"]["TSTTC_PROFILE"] == "production"
 
 
-@pytest.mark.parametrize("name", sorted(set(SERVICES) - {"proxy", "migrate", "maintainer"}))
+@pytest.mark.parametrize("name", sorted(set(SERVICES) - {"proxy", "migrate", "maintainer", "restore"}))
 def test_what_runs_for_ever_is_watched_and_restarted(name: str) -> None:
     assert SERVICES[name]["restart"] == "unless-stopped"
-    assert SERVICES[name]["healthcheck"]["test"]
+    # The mailer answers nobody; the figures say whether mails go out.
+    assert name == "mailer" or SERVICES[name]["healthcheck"]["test"]
 
 
 @pytest.mark.parametrize("name", sorted(SERVICES))
@@ -93,8 +94,10 @@ def test_networks_are_for_one_purpose_each_and_workers_have_no_way_out() -> None
         "proxy": {"pages"},
         "web": {"pages", "database", "broker"},
         "worker": {"database", "broker"},
+        "mailer": {"pages", "database"},
         "migrate": {"database"},
         "maintainer": {"database", "broker"},
+        "restore": {"database"},
         "db": {"database"},
         "redis": {"broker"},
     }
@@ -112,11 +115,14 @@ KEYS = {
     "TSTTC_EMAIL_URL",
     "TSTTC_METRICS_TOKEN",
 }
+RECEIPT_KEYS = {"TSTTC_RECEIPT_KEY", "TSTTC_RECEIPT_OLD_KEYS"}
 S3_KEYS = {"AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"}
 HAVE: dict[str, set[str]] = {
     "web": KEYS | S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
     "worker": S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
-    "maintainer": S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
+    "maintainer": RECEIPT_KEYS | S3_KEYS | {"TSTTC_DATABASE_URL", "TSTTC_BROKER_URL"},
+    "restore": RECEIPT_KEYS | S3_KEYS | {"TSTTC_DATABASE_URL"},
+    "mailer": {"TSTTC_EMAIL_URL", "TSTTC_DATABASE_URL"},
     "migrate": {"TSTTC_DATABASE_URL", "TSTTC_APPLICATION_PASSWORD"},
 }
 
@@ -126,17 +132,21 @@ def test_each_service_has_the_secrets_that_it_uses_and_no_others(name: str) -> N
     secret = {*KEYS, *S3_KEYS, "TSTTC_DATABASE_URL", "TSTTC_BROKER_URL", "TSTTC_APPLICATION_PASSWORD"}
     environment = OURS[name]["environment"]
     assert set(environment) & secret == HAVE[name]
-    assert environment["TSTTC_PROCESS"] == name
-    # Only what brings the tables up to date signs in as their owner.
+    assert environment["TSTTC_PROCESS"] == ("migrate" if name == "restore" else name)
+    # Only what makes the tables, or fills empty ones, signs in as their owner.
     is_owner = "//tsttc:${POSTGRES_PASSWORD" in environment.get("TSTTC_DATABASE_URL", "")
-    assert is_owner == (name == "migrate")
+    assert is_owner == (name in {"migrate", "restore"})
+
+
+_DEFAULT = re.compile(r"\$\{\w+:-([^}]*)\}$")
 
 
 @pytest.mark.parametrize("name", sorted(OURS))
 def test_each_process_starts_with_the_variables_that_compose_gives_it(name: str) -> None:
-    given = dict.fromkeys(OURS[name]["environment"], "x" * 43) | {
+    defaults = {key: _DEFAULT.search(str(text)) for key, text in OURS[name]["environment"].items()}
+    given = {key: found[1] if found else "x" * 43 for key, found in defaults.items()} | {
         "TSTTC_PROFILE": "production",
-        "TSTTC_PROCESS": name,
+        "TSTTC_PROCESS": OURS[name]["environment"]["TSTTC_PROCESS"],
         "TSTTC_DATABASE_URL": "postgres://u:p@db/tsttc",
         "TSTTC_BROKER_URL": "redis://redis/0",
         "TSTTC_EMAIL_URL": "smtp://mail",
@@ -234,6 +244,17 @@ def test_the_image_runs_as_nobody_in_particular() -> None:
 
 def test_every_variable_of_the_deployment_is_read_by_something() -> None:
     assert names_in("docker-compose.yml", "Dockerfile", "deploy/env.example") - READ == set()
+
+
+def test_compose_passes_every_documented_variable() -> None:
+    """But for those of tests and of the command line, and for places within the image."""
+    page = (REPOSITORY / "docs/operations.md").read_text()
+    documented = page.partition("## Every variable")[2].partition("### Tests and the command line")[0]
+    names = set(re.findall(r"^\| `(TSTTC_\w+)`", documented, flags=re.MULTILINE))
+    within = {"TSTTC_DATA_DIR", "TSTTC_FILES_DIR", "TSTTC_GROUND_TRUTH_DIR", "TSTTC_STATIC_ROOT"}
+    within |= {"TSTTC_DIST_DIR", "TSTTC_WEB_BIND", "TSTTC_HTTPS", "TSTTC_DEBUG"}
+    assert len(names) > 40
+    assert names - names_in("docker-compose.yml") == within
 
 
 def test_no_secret_has_a_default() -> None:

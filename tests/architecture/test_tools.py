@@ -1,5 +1,6 @@
 """The tools that hold the house's style: each must have nothing to say."""
 
+import re
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from tests.services import environment_of_its_own
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
+DEPLOYMENT_CHECK = ("manage.py", "check", "--deploy", "--fail-level", "WARNING")
 
 
 def says(*command: str, environment: dict[str, str] | None = None) -> str:
@@ -52,8 +54,33 @@ def test_every_change_of_a_model_has_its_migration() -> None:
 
 @pytest.mark.slow
 def test_the_production_profile_passes_the_deployment_checks(production: dict[str, str]) -> None:
-    command = ("manage.py", "check", "--deploy", "--fail-level", "WARNING")
-    assert says(sys.executable, *command, environment=production) == ""
+    said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production)
+    # Its services are nowhere, and that is all.
+    assert re.findall(r"\(leaderboard\.(\w+)\) (.*)", said) == [
+        ("E003", "The broker of TSTTC_BROKER_URL does not answer."),
+        ("E003", "The database of TSTTC_DATABASE_URL does not answer, or does not know the account."),
+        ("I001", "The pages give the sender of mails, leaderboard@localhost, as the contact."),
+    ]
+
+
+@pytest.mark.slow
+def test_all_that_is_wrong_with_a_deployment_is_said_at_once(production: dict[str, str]) -> None:
+    wrong = {
+        "TSTTC_SECRET_KEY": "",
+        "TSTTC_MAX_PREDICTIONS_BYTES": "20MB",
+        "TSTTC_DATABASE_URL": "swordfish",
+        "TSTTC_METRICS_NETWORKS": "home",
+    }
+    said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
+    assert [name for name in wrong if name not in said] == []
+    assert "Traceback" not in said
+    assert "swordfish" not in said
+    wrong = {"TSTTC_SITE_URL": "foo", "TSTTC_BROKER_URL": "bar", "TSTTC_EMAIL_URL": "", "TSTTC_QUOTA": "1"}
+    wrong |= {"TSTTC_FILES_DIR": str(REPOSITORY / "manage.py" / "files")}
+    said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
+    assert [name for name in wrong if name not in said] == []
+    assert "TSTTC_QUOTA is read by nothing; did you mean TSTTC_QUOTAS?" in said
+    assert "Traceback" not in said
 
 
 @pytest.mark.slow

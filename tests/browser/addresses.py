@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from tests.security.routes import routes
 
 # What serves no pages: programs' doors, the administration (Django's own pages), and what monitoring asks.
-NOT_PAGES = ("api/v1/", "admin/", "healthz", "readyz", "metrics")
+NOT_PAGES = ("api/v1/", "admin/", "healthz", "readyz", "healthy", "metrics")
 
 
 def named_addresses(samples: Mapping[str, str]) -> dict[str, str]:

@@ -54,6 +54,9 @@ SAMPLES: Final = {
     "operation_id": "submit",
     "page_name": "rules",
     "wheel_name": "none.whl",
+    "table_name": "main-results",
+    "suffix": "csv",
+    "deed_name": "rename-team",
     "chosen": "csv",
     "secret": "none",
     "handle": NO_ID,
@@ -83,6 +86,7 @@ known = {SAMPLES!r} | {{
     "submission_id": str(scored.pk),
     "method_id": str(scored.method_id),
     "team_id": str(scored.method.team_id),
+    "subject_id": str(scored.method.team_id),
 }}
 print(json.dumps([known, named_addresses(known)]))
 """

@@ -50,6 +50,15 @@ NAMES = """figure => [...figure.querySelectorAll(".drawing svg text[stroke]")].m
   const {x, y, width, height} = text.getBoundingClientRect(); return [x, y, x + width, y + height];
 }).filter(box => box[2] > 0)"""
 
+# The labels below a level axis: what is written in one line above the axis' title, and from where to where.
+TIMES = """figure => {
+  const texts = [...figure.querySelectorAll(".drawing svg text")]
+    .map(text => [text.textContent, text.getBoundingClientRect()]);
+  const title = texts.find(([words]) => words.startsWith("Date"))[1];
+  return texts.filter(([, box]) => box.top > title.top - 30 && box.bottom < title.top + 4)
+    .map(([words, box]) => [words, box.left, box.right]);
+}"""
+
 
 @pytest.fixture(scope="module")
 def board(site: Site) -> None:
@@ -158,6 +167,30 @@ def test_names_at_the_front_do_not_overlap(new_page: NewPage, board: None) -> No
 
 def overlaps(a: list[float], b: list[float]) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
+
+
+@pytest.mark.parametrize("address", [CHARTS, "/board/test/charts/"])
+def test_no_two_labels_of_a_time_axis_are_equal_and_none_is_cut(
+    page: Page, board: None, address: str
+) -> None:
+    page.goto(address)
+    figure = drawn(page, "progress")
+    labels = figure.evaluate(TIMES)
+    words = [each[0] for each in labels]
+    assert len(words) > 1
+    assert len(set(words)) == len(words)
+    frame = figure.locator(".drawing").bounding_box()
+    assert frame is not None
+    assert all(frame["x"] <= left and right <= frame["x"] + frame["width"] for _, left, right in labels)
+
+
+def test_a_method_of_another_board_leads_back_to_that_board(page: Page, board: None) -> None:
+    page.goto(f"/board/{SPLIT}/")
+    page.locator("table.board .name a").first.click()
+    page.wait_for_url("**/methods/*/")
+    assert page.locator(".trail a").get_attribute("href") == f"/board/{SPLIT}/"
+    page.get_by_role("navigation", name="Main").get_by_role("link", name="Board").click()
+    page.wait_for_url(f"**/board/{SPLIT}/")
 
 
 def test_library_comes_with_the_first_chart_in_view_and_nothing_moves(page: Page, board: None) -> None:

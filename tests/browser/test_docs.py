@@ -5,10 +5,13 @@ import re
 import pytest
 from playwright.sync_api import Page, expect
 
-from tests.browser.chromium import NARROW
+from tests.browser.chromium import NARROW, OVERFLOW_PX
 from tests.browser.conftest import NewPage
 
 pytestmark = pytest.mark.browser
+
+BOXES = "all => all.map(each => each.getBoundingClientRect()).map(({width, height}) => [width, height])"
+MIN_TYPE_PX = 80
 
 
 def test_a_search_by_keyboard_leads_to_the_part_that_was_looked_for(page: Page) -> None:
@@ -46,6 +49,20 @@ def test_on_a_phone_the_navigation_is_folded_above_the_text_and_opens_by_keyboar
     page.get_by_text("All pages").focus()
     page.keyboard.press("Enter")
     expect(link).to_be_visible()
+
+
+def test_on_a_phone_no_name_of_a_field_breaks(new_page: NewPage) -> None:
+    page = new_page(viewport=NARROW)
+    page.goto("/docs/api/submit/")
+    names, types = (
+        page.locator(f".fields-of td{part}").evaluate_all(BOXES)
+        for part in (":nth-child(1) code", ":nth-child(2)")
+    )
+    heights = [height for _, height in names]
+    assert len(heights) > 1
+    assert max(heights) < 2 * min(heights)
+    assert min(width for width, _ in types) > MIN_TYPE_PX
+    assert page.evaluate(OVERFLOW_PX) <= 0
 
 
 def test_without_a_script_the_search_finds_as_well(new_page: NewPage) -> None:

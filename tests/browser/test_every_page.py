@@ -1,5 +1,6 @@
 """What holds of every page that the site has: light and dark, wide and narrow, with scripts and without."""
 
+import re
 from uuid import UUID
 
 import pytest
@@ -22,6 +23,9 @@ OTHERS = {
     "operation_id": "submit",
     "page_name": "privacy",
     "wheel_name": "none.whl",
+    "table_name": "main-results",
+    "suffix": "csv",
+    "deed_name": "rename-team",
     "chosen": "csv",
     "secret": "none",
     "handle": str(UUID(int=0)),
@@ -43,15 +47,34 @@ DEAD = """() => [...document.querySelectorAll("button[type=button], .tray, .mess
 SCROLLING = """() => [...document.querySelectorAll(".scroll")]
   .filter(box => box.scrollWidth > box.clientWidth).map(box => box.getAttribute("aria-label"))"""
 MAX_LINE_PX = 40
+MIN_GAP_PX = 8
 CUT_OFF = """() => [...document.querySelectorAll("td, th")].filter(cell => cell.checkVisibility()
     && (cell.getBoundingClientRect().right > innerWidth + 1 || cell.scrollWidth > cell.clientWidth + 4))
   .map(cell => cell.textContent.trim())"""
+
+# Of each error axis of the figure's charts: its title, and its numbers.
+ERROR_AXES = """figure => {
+  const texts = [...figure.querySelectorAll(".drawing svg text")]
+    .map(text => [text.textContent, text.getBoundingClientRect()]);
+  return texts.filter(([words]) => /^(MiD|RTE),/.test(words)).map(([title, head]) => [title, texts
+    .filter(([words, box]) => /^[0-9.]+$/.test(words) && Math.abs(box.right - head.left - 20) < 45)
+    .map(([words]) => words)]);
+}"""
+# How far the permalink stands below what is above it, and what sticks out of the tables of numbers.
+PERMALINK_GAP_PX = """() => {
+  const address = document.querySelector(".address");
+  return address.getBoundingClientRect().top - address.previousElementSibling.getBoundingClientRect().bottom;
+}"""
+STICKING_OUT = """() => [...document.querySelectorAll("table.numbers")].flatMap(table =>
+  [...table.querySelectorAll("td *")].map(part => [part.textContent, part.getBoundingClientRect().right])
+    .filter(([, right]) => right > table.getBoundingClientRect().right + 0.5))"""
 
 
 @pytest.fixture(scope="module")
 def known(site: Site, truth: evaluator.GroundTruth) -> dict[str, str]:
     """One of each kind of thing, to fill addresses with."""
-    return {**OTHERS, "split": world.SPLIT, "number": "1", **world.populated(site)}
+    made = world.populated(site)
+    return {**OTHERS, "split": world.SPLIT, "number": "1", "subject_id": made["team_id"], **made}
 
 
 @pytest.fixture(scope="module")
@@ -180,3 +203,34 @@ def test_comparison_of_five_is_printed_on_one_sheet_and_nothing_is_cut_off(
     page.set_viewport_size({"width": 703, "height": 1000})
     assert page.evaluate(OVERFLOW_PX) <= 0
     assert page.evaluate(CUT_OFF) == []
+
+
+def test_error_axes_of_a_comparison_begin_at_zero_or_say_that_they_do_not(
+    page: Page, known: dict[str, str]
+) -> None:
+    page.goto(f"/compare/?split=val&m={known['method_id']}&m={known['second_method_id']}")
+    draw_all(page)
+    axes = page.locator("figure.chart").first.evaluate(ERROR_AXES)
+    assert [title[:3] for title, _ in axes] == ["MiD", "RTE"]
+    assert [title for title, numbers in axes if "log scale" not in title and "0" not in numbers] == []
+    assert all(numbers for _, numbers in axes)
+
+
+def test_permalink_stands_apart_and_no_interval_sticks_out_of_its_table(
+    new_page: NewPage, known: dict[str, str]
+) -> None:
+    for viewport in (NARROW, WIDE):
+        page = new_page(viewport=viewport)
+        page.goto(f"/methods/{known['method_id']}/")
+        assert page.evaluate(PERMALINK_GAP_PX) >= MIN_GAP_PX
+        assert page.evaluate(STICKING_OUT) == []
+
+
+def test_attempts_say_whose_they_are_without_a_pointer(new_page: NewPage, known: dict[str, str]) -> None:
+    page = new_page(viewport=NARROW, has_touch=True)
+    page.goto("/board/val/")
+    attempts = page.locator("table.board .attempts")
+    expect(attempts.first).to_have_text(re.compile("team attempts?$"))
+    assert attempts.evaluate_all("all => all.filter(each => each.closest('[title]')).length") == 0
+    page.locator(".legend summary").tap()
+    expect(page.get_by_text("Team attempts: scored submissions of all public methods")).to_be_visible()

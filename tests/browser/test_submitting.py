@@ -177,7 +177,9 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
     with page.expect_download() as taken:
         page.get_by_role("link", name="Template of test").click()
     field.set_input_files(taken.value.path())
-    expect(page.locator("#checked")).to_contain_text("The value is null; expected a number of seconds.")
+    expect(page.locator("#checked li")).to_have_count(1)
+    expect(page.locator("#checked")).to_contain_text("1,200 problems in the file.")
+    expect(page.locator("#checked")).to_contain_text("1,199 more places have this problem: /")
     expect(page.get_by_role("button", name="Submit anyway")).to_be_visible()
     good = {"name": "p.json", "mimeType": "application/json", "buffer": predictions(truth, factor=1.7)}
     field.set_input_files(good)
@@ -238,9 +240,7 @@ def test_the_check_in_the_browser_has_the_codes_and_words_of_the_server(page: Pa
     assert told == {name: answer_of(data, faulty_files.MANIFEST) for name, data in files.items()}
 
 
-def test_the_check_in_the_browser_warns_of_shuffled_values_as_the_server_does(
-    page: Page, site: Site, tmp_path: Path
-) -> None:
+def test_the_check_in_the_browser_warns_as_the_server_does(page: Page, site: Site, tmp_path: Path) -> None:
     truth = evaluator.read_truth(driving_folder(tmp_path / "annotations"))
     keys, ttc_s = truth.manifest.anno_id_keys, truth.ttc_s
     shuffled = np.random.default_rng(3).permutation(ttc_s)
@@ -257,13 +257,17 @@ def test_the_check_in_the_browser_warns_of_shuffled_values_as_the_server_does(
         "shuffled, by natural key": flat(
             dict(zip(truth.manifest.natural_keys, shuffled.tolist(), strict=True))
         ),
+        "milliseconds": flat(dict(zip(keys, (1000 * ttc_s).tolist(), strict=True))),
+        "no unit": flat(dict(zip(keys, np.clip(np.abs(ttc_s) / 4, 0.5, 1.5).tolist(), strict=True))),
+        "flipped": flat(dict(zip(keys, (truth.manifest.ts_ns % 10**10 / 1.1e9).tolist(), strict=True))),
         "ratios": envelope(ttc_s),
         "shuffled ratios": envelope(shuffled),
     }
     page.goto("/docs/")
     expected = {name: answer_of(data, truth.manifest) for name, data in files.items()}
     assert [name for name, answer in expected.items() if answer["warnings"]] == [
-        *("few values", "shuffled", "shuffled, by natural key", "shuffled ratios"),
+        *("few values", "shuffled", "shuffled, by natural key", "milliseconds", "no unit", "flipped"),
+        "shuffled ratios",
     ]
     assert told_in_the_browser(page, site, files, truth.manifest) == expected
 

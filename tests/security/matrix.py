@@ -72,6 +72,8 @@ LINES: dict[str, Line] = {
     "editions": line(GET=OPEN),
     "edition": line(GET=OPEN),
     "compare": line(GET=OPEN),
+    "published": line(GET=OPEN),
+    "published_table": line(GET=OPEN, at={"table_name": "main-results", "suffix": "csv"}),
     "export": line(GET=OPEN, at={"chosen": "csv"}),
     "edition_export": line(GET=OPEN, at={"chosen": "tex"}),
     "feed": line(GET=OPEN),
@@ -119,8 +121,11 @@ LINES: dict[str, Line] = {
     "leave_team": line(POST="in 302 302 422 404 in in"),
     "hand_over_team": line(POST="in 404 422 302 404 in in"),
     "remove_member": line(POST="in 404 422 302 404 in in"),
+    "mails": line(GET=SIGNED_IN, POST="in 302 302 302 302 in in"),
     "tokens": line(GET=SIGNED_IN, POST="in 422 422 422 422 in in"),
     # Everybody has tokens of their own, the one of nobody that is named here is not there.
+    "account_data": line(GET=SIGNED_IN, POST="in 422 422 422 422 in in"),
+    "account_data_download": line(GET=SIGNED_IN),
     "revoke_token": line(POST="in 404 404 404 404 in in"),
     # --- maintainers' pages: to everybody else they are not there ---
     "maintain": line(GET=KEEPERS),
@@ -138,6 +143,14 @@ LINES: dict[str, Line] = {
     "maintain_team_quotas": line(GET=KEEPERS),
     "maintain_quota": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_quota_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_splits": line(GET=KEEPERS),
+    "maintain_team": line(GET=KEEPERS),
+    "maintain_deed": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"deed_name": "rename-team"}),
+    "maintain_published": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    # An empty form takes the line away.
+    "maintain_announcement": line(GET=KEEPERS, POST="in 404 404 404 302 in in"),
+    "maintain_split_add": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_split": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_open": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_edition": line(GET=KEEPERS),
     "maintain_progress": line(GET="in 404 404 404 286 in in"),
@@ -149,6 +162,7 @@ LINES: dict[str, Line] = {
     # --- the API ---
     "api-submissions": line(GET=API_SIGNED_IN, POST="401 422 422 422 422 403 401"),
     "api-submission": line(GET=API_OWN),
+    "api-file": line(GET=API_TEAM),
     "api-receipt": line(GET=API_TEAM),
     # Without two methods there is nothing to compare; who may see which is the methods' own affair.
     "api-compare": line(GET="404 404 404 404 404 403 401"),
@@ -170,6 +184,7 @@ LINES: dict[str, Line] = {
         is_json=True,
     ),
     # Who may only submit has to know when.
+    "api-account": line(GET="401 200 200 200 200 200 401"),
     "api-quota": line(GET="401 200 200 200 200 200 401"),
     "api-revoke-token": line(POST=API_BLIND, sends={"token": "nonsense"}, is_json=True),
     "api-splits": line(GET=API_OPEN),
@@ -178,6 +193,8 @@ LINES: dict[str, Line] = {
     "api-edition-board": line(GET=API_OPEN),
     "api-changelog": line(GET=API_OPEN),
     "manifest": line(GET=API_OPEN),
+    "api-published-tables": line(GET=API_OPEN),
+    "api-published-table": line(GET=API_OPEN, at={"name": "main-results"}),
     "api-edition-progress": line(GET=API_KEEPERS),
     "api-edition-preview": line(GET=API_KEEPERS),
     "api-schema": line(GET=API_OPEN),
@@ -203,6 +220,7 @@ LINES: dict[str, Line] = {
     "^api(/|$)": line(GET=all_of("404")),
     # --- monitoring: figures are for the operator's own network ---
     "healthz": line(GET=OPEN),
-    "readyz": line(GET=all_of("503")),  # nothing has swept this database
+    "readyz": line(GET=all_of("200")),
+    "healthy": line(GET=all_of("503")),  # nothing has swept this database
     "metrics": line(GET=all_of("403")),
 }

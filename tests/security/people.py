@@ -49,6 +49,7 @@ class World:
             "submission_id": self.submission.pk,
             "method_id": self.method.pk,
             "team_id": self.method.team_id,
+            "subject_id": self.method.team_id,
             "handle": self.users["teammate"].membership.handle,
             "invitation_id": self.invitation.pk,
             "secret": self.secret,

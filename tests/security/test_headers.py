@@ -28,7 +28,7 @@ ALWAYS = {
 # What somebody who is nobody in particular may get: asked for anew each time, or for a while.
 ANYBODYS = re.compile(r"public, (?:no-cache|max-age=\d+)|max-age=\d+, public")
 # Pages that are about one visitor even if nobody has signed in: forms with a token of their own, and figures.
-PERSONAL = re.compile(r"^/(?:accounts|admin|healthz|readyz|metrics)")
+PERSONAL = re.compile(r"^/(?:accounts|admin|healthz|healthy|readyz|metrics)")
 
 
 ROLES = ("anonymous", "stranger", "owner", "maintainer", "token without scope", "expired token")

@@ -42,6 +42,7 @@ def addresses(shown: Submission) -> list[str]:
         "number": 1,
         "method_id": shown.method_id,
         "submission_id": shown.pk,
+        "name": "main-results",
     }
     described = schema()["paths"]
     found = [path.format(**values) for path, operations in described.items() if "get" in operations]

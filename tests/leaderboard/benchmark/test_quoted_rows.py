@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from django.core.files.uploadedfile import SimpleUploadedFile
 from django.core.management import CommandError, call_command
 from django.db import IntegrityError, transaction
 from django.test import Client
@@ -16,9 +17,11 @@ from leaderboard.models import AuditEvent, Edition, PublishedResult, Snapshot, S
 from leaderboard.models.benchmark import SINCE_EVER
 from leaderboard.scoring import confidence
 from tests.editions import board_now, corrected, open_edition, paper, publish, quote, roll_back
+from tests.leaderboard.web.test_every_page import assert_sound
 
 FORMS = ("/board/test/editions/1/", "/board/test/editions/1.csv", "/board/test/editions/1.tex")
 A_DAY = timedelta(days=1)
+PAGE = "/maintain/published/"
 
 
 def representations(client: Client, at: datetime) -> dict[str, bytes]:
@@ -116,13 +119,25 @@ def test_a_document_is_imported_once_and_another_content_replaces_only_when_told
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"results": {"nowhere": {"later": [1.0] * 10}}}, "There is no split 'nowhere'"),
-        ({"results": {"test": {"later": [1.0] * 9}}}, "has it in another form"),
-        ({"results": {"test": {"later": [float("nan")] * 10}}}, "are no numbers from 0, one for each name"),
-        ({"results": {"test": {"other": [1.0] * 10}}}, "lacks 'other'"),
-        ({"results": {}}, "has no rows"),
-        ({"columns": ["mid"] * 10}, "are no numbers from 0, one for each name"),
-        ({"methods": "none"}, "has it in another form"),
+        ({"results": {"nowhere": {"later": [1.0] * 10}}}, "/results/nowhere: no split of this site"),
+        ({"results": {"test": {"later": [1.0] * 9}}}, "/results/test/later: 9 values; expected a list of 10"),
+        ({"results": {"test": {"later": [1.0, float("nan"), *[1.0] * 8]}}}, "/results/test/later/1: nan;"),
+        ({"results": {"test": {"other": [1.0] * 10}}}, "/results/test/other: no method of this slug"),
+        ({"results": {}}, "/results: no rows"),
+        ({"columns": ["mid"] * 10}, "/columns: not the scores of a protocol"),
+        ({"methods": "none"}, "/methods: 'none'; expected a list"),
+        (
+            {"methods": [{"slug": "A B", "name": ""}]},
+            "/methods/0/slug: 'A B'; expected(.|\\n)*/methods/0/name: ''",
+        ),
+        (
+            {"source": {"title": "T", "url": "ftp://x"}},
+            "/source/authors: nothing(.|\\n)*/source/url: 'ftp://x'",
+        ),
+        (
+            {"methods": [{"slug": "later", "name": "L", "latency_ms": 3}]},
+            "/methods/0/hardware: nothing; expected what the latency",
+        ),
     ],
 )
 def test_a_document_that_is_none_is_refused_in_words(
@@ -134,6 +149,42 @@ def test_a_document_that_is_none_is_refused_in_words(
     with pytest.raises(CommandError, match=sentence):
         call_command("import_published", str(path))
     assert PublishedResult.objects.count() == n_before
+
+
+def test_the_page_imports_a_paper_with_missing_values_and_says_every_problem_with_its_place(
+    keeper: Client, edition: Edition
+) -> None:
+    def send(text: bytes, **more: str) -> Any:
+        file = SimpleUploadedFile("paper.json", text, content_type="application/json")
+        return keeper.post(PAGE, {"file": file, **more})
+
+    document = paper("later", mid=1.0)
+    document["results"]["test"]["later"][3] = None
+    assert send(json.dumps(document).encode()).status_code == 302
+    page = assert_sound(keeper.get(PAGE)).one("main").text
+    assert "the start of the split" in page
+    assert "Later" in page
+    assert "Later" in keeper.get("/board/test/").text
+    assert "@misc{ater2026later," in keeper.get("/board/test.bib").text
+    assert "import" in AuditEvent.objects.filter(noun="PublishedResult").latest("pk").verb
+    document["results"]["test"]["later"][0] = 2.0
+    refused = send(json.dumps(document).encode())
+    assert refused.status_code == 422
+    assert "is there with another scores" in assert_sound(refused).one("div", class_="wrong").text
+    assert send(json.dumps(document).encode(), is_replacing="on").status_code == 302
+    bad = {**document, "columns": ["mid"], "source": {"year": "2026"}}
+    sentences = [
+        (json.dumps(bad).encode(), "/source/year: '2026'; expected a year like 2026."),
+        (b"{\n  x", "line 2, column 3: no JSON"),
+        (b"\xff", "byte 1: not UTF-8"),
+        (b"[]", "/: a list; expected an object"),
+        (b"[" * 100_000, "too long to read"),
+    ]
+    for text, sentence in sentences:
+        answer = send(text)
+        assert answer.status_code == 422
+        assert sentence in assert_sound(answer).one("div", class_="wrong").text
+    assert on_board()["Later"] == 2.0
 
 
 @pytest.mark.usefixtures("benchmark")

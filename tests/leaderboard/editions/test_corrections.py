@@ -1,9 +1,11 @@
 """`rescoring`: open an edition, follow it, publish it, go back."""
 
+import hashlib
 import json
 import random
 from pathlib import Path
 
+import numpy as np
 import pytest
 from django.core.management import CommandError, call_command
 from django.utils import timezone
@@ -22,7 +24,7 @@ from leaderboard.models import (
     Submission,
     User,
 )
-from leaderboard.scoring import lifecycle, worker
+from leaderboard.scoring import lifecycle, recording_sums, worker
 from leaderboard.storage import files, truth_values
 from tests import builders
 from tests.editions import FACTORS, board_now, corrected, open_edition, publish, roll_back
@@ -56,9 +58,17 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
     truth = read_truth(path)
     old = truth_values.load(Split.objects.get(pk="test").published_edition.ground_truth_id)
     for submission, factor in zip(entries, FACTORS, strict=True):
-        found = boards.flat_scores(Evaluation.objects.get(submission=submission, edition=edition))
-        values = Predictions.from_arrays(ttc_s=old.ttc_s * factor, manifest=truth.manifest)
-        assert found == {name: published(v, decimals=1) for name, v in evaluate(values, truth).flat().items()}
+        found = Evaluation.objects.get(submission=submission, edition=edition)
+        values = Predictions.from_arrays(
+            ttc_s=old.ttc_s * factor, manifest=truth.manifest, digest=submission.digest
+        )
+        report = evaluate(values, truth, keep_bags=True)
+        expected = {name: published(value, decimals=1) for name, value in report.flat().items()}
+        assert boards.flat_scores(found) == expected
+        # To the last bit, also of what is not published.
+        assert found.report_digest == f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}"
+        assert report.bags is not None
+        assert np.array_equal(recording_sums.load(edition, file=submission.sent_file), report.bags.sums)
 
 
 def test_new_uploads_meanwhile_are_scored_in_both(

@@ -1,4 +1,4 @@
-"""`/healthz` and `/readyz`: alive without a database, ready only with database, broker and a recent sweep."""
+"""`/healthz`, `/readyz` and `/healthy`: alive without a database, ready with one, healthy with all."""
 
 import random
 import re
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 def _no_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
     """No answer from an earlier test, and no hurry."""
     monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 60)
-    monitoring.readiness.forget()
+    monitoring.healthiness.forget()
 
 
 @pytest.fixture
@@ -57,9 +57,9 @@ def test_alive_with_a_session_cookie_needs_no_database() -> None:
 @pytest.mark.django_db(transaction=True)
 def test_ready_when_database_broker_and_sweep_are_well() -> None:
     queue.sweep(rng=random.Random(0))
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert response.status_code == 200
-    assert response.json()["status"] == "ready"
+    assert response.json()["status"] == "healthy"
     assert {name: check["ok"] for name, check in response.json()["checks"].items()} == {
         "database": True,
         "sweep": True,
@@ -73,7 +73,7 @@ def test_ready_when_database_broker_and_sweep_are_well() -> None:
 @pytest.mark.parametrize(("seconds_ago", "is_ok"), [(1, True), (30, True), (65, False), (3600, False)])
 def test_sweep_older_than_a_minute_is_not_ready(seconds_ago: float, is_ok: bool) -> None:
     _swept(seconds_ago=seconds_ago)
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert response.json()["checks"]["sweep"]["ok"] is is_ok
     assert response.status_code == (200 if is_ok else 503)
 
@@ -84,7 +84,7 @@ def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: 
     _swept(seconds_ago=1)
     at = timezone.now() - timedelta(seconds=seconds_ago)
     AuditEvent.objects.create(at=at, verb="opened", noun="Door", noun_id="1")
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert (response.status_code, response.json()["checks"]["audit trail"]["ok"]) == (200, is_ok)
     figures = prometheus.exposition().decode()
     assert "tsttc_audit_unsealed 1.0" in figures
@@ -93,9 +93,16 @@ def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: 
 
 @pytest.mark.django_db(transaction=True)
 def test_installation_that_was_never_swept_is_not_ready() -> None:
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert response.status_code == 503
     assert response.json()["checks"]["sweep"] == {"ok": False, "detail": "there was none yet"}
+
+
+@pytest.mark.django_db(transaction=True)
+def test_the_balancer_is_told_of_the_database_alone(settings: Settings) -> None:
+    settings.CELERY_BROKER_URL = "redis://127.0.0.1:1/0"  # and nobody has swept
+    response = Client().get("/readyz")
+    assert (response.status_code, list(response.json()["checks"])) == (200, ["database"])
 
 
 @pytest.mark.django_db(transaction=True)
@@ -113,7 +120,7 @@ def test_every_sweep_moves_the_one_beat() -> None:
 def test_broker_that_is_down_is_not_ready(settings: Settings) -> None:
     _swept(seconds_ago=1)
     settings.CELERY_BROKER_URL = "redis://127.0.0.1:1/0"
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert response.status_code == 503
     assert response.json()["checks"]["broker"] == {"ok": False, "detail": "does not answer"}
 
@@ -126,7 +133,7 @@ def test_broker_that_accepts_but_never_answers_is_given_up(
     settings.CELERY_BROKER_URL = f"redis://:swordfish@127.0.0.1:{silent_port}/0"
     settings.CELERY_BROKER_TRANSPORT_OPTIONS = {"socket_timeout": 300}
     _swept(seconds_ago=1)
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert response.status_code == 503
     assert response.json()["checks"]["broker"]["ok"] is False
     assert "swordfish" not in response.text
@@ -147,7 +154,7 @@ def test_database_that_accepts_but_never_answers_is_given_up(
     }
     monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 2)
     monkeypatch.setitem(connections.settings, "default", elsewhere)
-    response = Client().get("/readyz")
+    response = Client().get("/healthy")
     assert response.status_code == 503
     checks = response.json()["checks"]
     assert checks["database"] == {"ok": False, "detail": "does not answer"}

@@ -145,7 +145,12 @@ def test_secret_of_an_invitation_is_in_no_line_of_any_logger(
     assert secret not in text
 
 
-def test_every_handler_of_the_real_configurations_takes_secrets_out() -> None:
+def test_every_handler_of_the_real_configurations_takes_secrets_out(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(
+        "PROMETHEUS_MULTIPROC_DIR", str(tmp_path)
+    )  # else it makes one, and all tests after share it
     gunicorn = runpy.run_path(str(Path(settings.BASE_DIR) / "deploy/gunicorn.conf.py"))
     assert gunicorn["accesslog"] is None
     for configuration in (settings.LOGGING, gunicorn["logconfig_dict"]):
@@ -268,9 +273,9 @@ def test_probes_that_succeed_are_no_news(db: None, lines: Lines) -> None:
 
 
 def test_probe_that_fails_is_news(db: None, lines: Lines) -> None:
-    assert Client().get("/readyz").status_code == 503
+    assert Client().get("/healthy").status_code == 503
     [line] = [line for line in lines() if line["event"] == "request_finished"]
-    assert (line["request"], line["code"], line["level"]) == ("GET /readyz", 503, "error")
+    assert (line["request"], line["code"], line["level"]) == ("GET /healthy", 503, "error")
 
 
 def test_request_is_written_without_its_query(db: None, lines: Lines) -> None:
@@ -301,7 +306,7 @@ def test_failure_of_a_page_is_one_line_with_its_traceback(
     db: None, lines: Lines, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("leaderboard.web.monitoring.health.Recent.__call__", lambda self: 1 / 0)
-    response = Client(raise_request_exception=False).get("/readyz")
+    response = Client(raise_request_exception=False).get("/healthy")
     assert response.status_code == 500
     [line] = [line for line in lines() if line["level"] == "error"]
     assert line["event"] == "request_failed"

@@ -123,13 +123,13 @@ def test_age_of_the_last_sweep_is_there(db: None) -> None:
     assert 0 <= figures()["tsttc_last_sweep_age_seconds"] < 30
 
 
-def test_a_scrape_is_five_statements(
+def test_a_scrape_is_six_statements(
     edition: Edition, owner: User, django_assert_num_queries: DjangoAssertNumQueries
 ) -> None:
     for _ in range(3):
         queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.SCORED)
-    with django_assert_num_queries(5):
+    with django_assert_num_queries(6):
         prometheus.exposition()
 
 
@@ -189,10 +189,29 @@ def test_figures_have_no_names_of_people(edition: Edition, owner: User) -> None:
     assert owner.name not in text
 
 
-def test_every_figure_is_documented_and_nothing_else(db: None) -> None:
+def test_every_figure_is_documented_and_nothing_else(client: Client, db: None) -> None:
+    client.get("/healthz")  # of answers, there are figures once there was one
     documented = set(re.findall(r"\btsttc_[a-z_]+", (REPOSITORY / "docs" / "operations.md").read_text()))
     documented -= {"tsttc_application"}  # a role of the database
     families = list(text_string_to_metric_families(prometheus.exposition().decode()))
     given = {f"{family.name}_total" if family.type == "counter" else family.name for family in families}
     assert len(given) >= 9
     assert documented == given
+
+
+@pytest.mark.django_db
+def test_answers_are_counted_by_route_and_never_by_what_somebody_typed(client: Client) -> None:
+    def n_of(route: str, status: str) -> float:
+        name = f'tsttc_http_requests_total{{method="GET",route="{route}",status="{status}"}} '
+        lines = prometheus.exposition().decode().splitlines()
+        return sum(float(line.removeprefix(name)) for line in lines if line.startswith(name))
+
+    before = n_of("none", "4xx"), n_of("healthz", "2xx"), n_of("login", "2xx"), n_of("account_login", "2xx")
+    client.get("/no/such-place-as-swordfish/")
+    client.get("/healthz")
+    client.get("/accounts/login/")
+    after = n_of("none", "4xx"), n_of("healthz", "2xx"), n_of("login", "2xx"), n_of("account_login", "2xx")
+    assert [now - then for now, then in zip(after, before, strict=True)] == [1, 0, 0, 1]
+    text = prometheus.exposition().decode()
+    assert "swordfish" not in text
+    assert 'tsttc_http_request_seconds_bucket{le="0.005",route="account_login"}' in text

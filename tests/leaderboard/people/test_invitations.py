@@ -159,7 +159,9 @@ def test_a_team_of_one_comes_along_with_its_methods(
     hidden.method.refresh_from_db()
     assert hidden.method.visibility == "PRIVATE"
     (event,) = AuditEvent.objects.filter(verb="joined")
-    assert sorted(event.details["brought"].values()) == ["Bar", "fοo 2"]
+    assert event.details["brought"] == sorted(
+        str(m.pk) for m in Method.objects.filter(name__in=["Bar", "fοo 2"])
+    )
 
 
 def test_who_is_not_alone_leaves_what_was_sent_behind(

@@ -52,9 +52,17 @@ def split_form(**fields: str) -> dict[str, str]:
     """The administration's form of the split `test` as a browser sends it."""
     split = Split.objects.get(pk="test")
     sent = {"title": split.title, "description": split.description, "position": "0", "decimals": "1"}
-    sent |= {"quota_limit": "3", "quota_rejected_limit": "20"}
+    sent |= {"quota_limit": "3", "quota_rejected_limit": "20", "listing": "LISTED"}
     sent |= {"quota_window": "30 00:00:00", "quota_min_gap": "1 00:00:00"}
-    return sent | {f"{name}_{part}": "" for name in ("opens_at", "closes_at") for part in "01"} | fields
+    return (
+        sent
+        | {
+            f"{name}_{part}": ""
+            for name in ("opens_at", "closes_at", "announcement_ends_at")
+            for part in "01"
+        }
+        | fields
+    )
 
 
 @pytest.mark.parametrize(("field", "value", "sentence"), BAD_SPANS)

@@ -21,7 +21,7 @@ RNG = random.Random(0)
 @pytest.fixture
 def waiting(edition: Edition, owner: User) -> Submission:
     """A submission that waits."""
-    monitoring.readiness.forget()
+    monitoring.healthiness.forget()
     return builders.submit(owner, builders.predictions(edition))
 
 
@@ -67,19 +67,19 @@ def test_what_a_process_holds_is_what_it_can_read(edition: Edition, settings: Se
 
 
 @pytest.mark.django_db(transaction=True)
-def test_the_sweep_says_so_in_the_log_and_readyz_to_whoever_watches(
+def test_the_sweep_says_so_in_the_log_and_healthy_to_whoever_watches(
     waiting: Submission, settings: Settings, caplog: pytest.LogCaptureFixture
 ) -> None:
     aside = take_away(settings)
     queue.sweep(rng=RNG)
     assert "ground_truth_out_of_reach" in caplog.text
-    assert readiness() == (503, False)
+    assert healthiness() == (503, False)
     shutil.move(aside, settings.GROUND_TRUTH_DIR)
     queue.sweep(rng=RNG)
-    assert readiness() == (200, True)
+    assert healthiness() == (200, True)
 
 
-def readiness() -> tuple[int, bool]:
-    monitoring.readiness.forget()
-    response = Client().get("/readyz")
+def healthiness() -> tuple[int, bool]:
+    monitoring.healthiness.forget()
+    response = Client().get("/healthy")
     return response.status_code, response.json()["checks"]["ground truth"]["ok"]

@@ -17,7 +17,8 @@ from django.utils import timezone
 from leaderboard.boards import snapshots
 from leaderboard.models import Edition, Evaluation, Status, SweepBeat, User
 from leaderboard.ops import health
-from leaderboard.workers import queue, upkeep
+from leaderboard.scoring import worker
+from leaderboard.workers import backlog, queue, upkeep
 from leaderboard.workers.queue import Poller
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
@@ -159,6 +160,23 @@ def polling(act: Callable[..., object]) -> Iterator[Poller]:
     yield poller
     queue.stop_pollers([poller], patience_s=PATIENCE_S)
     assert not poller.is_alive()
+
+
+def test_what_waits_behind_submissions_lets_the_other_thread_finish(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker, "run_next", lambda **_: False)
+    steps: list[str] = []
+
+    def go_on() -> None:
+        backlog._yield_to_live_work(rng=random.Random(0), is_stopping=lambda: False)
+        steps.append("gone on")
+
+    behind = threading.Thread(target=go_on)
+    with worker._in_hand:
+        behind.start()
+        behind.join(2 * backlog.PATIENCE_S)
+        steps.append("decided")
+    behind.join(30)
+    assert steps == ["decided", "gone on"]
 
 
 def test_poller_looks_again_after_a_look_that_broke(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,7 +24,8 @@ def test_sign_up_signs_in_and_goes_on_to_submitting(client: Client, edition: Edi
     assert response.status_code == 302
     assert response.headers["Location"] == "/submit/"
     assert User.objects.get(email="new@example.org").name == "Lapwings"
-    assert client.get("/submit/").status_code == 200
+    said = pages.get(client, "/submit/").one("p", class_="message").text
+    assert said.startswith("Your account is ready, and you are signed in. Next: send a prediction file")
 
 
 def test_sign_up_goes_back_to_where_one_came_from(client: Client, edition: Edition) -> None:

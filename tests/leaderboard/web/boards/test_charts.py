@@ -2,14 +2,20 @@
 
 import json
 import re
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
 
 import pytest
+from django.contrib.auth.models import AnonymousUser
 from django.test import Client
+from django.utils import timezone
 
+from leaderboard.boards import snapshots
+from leaderboard.boards.current import Attempt
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User
+from leaderboard.web.boards import charts
 from tests import builders, pages
 from tests.pages import get
 
@@ -104,6 +110,22 @@ def test_every_attempt_has_its_own_day_in_the_table(
     builders.score_all()
     days = [row[0] for row in rows(client, "progress") if row[1] == method.name]
     assert days == [f"{attempt.submitted_at:%Y-%m-%d}" for attempt in (first, later)]
+
+
+def test_with_an_anonymous_method_the_progress_tells_days_alone(
+    edition: Edition, entries: list[Submission]
+) -> None:
+    def dates(visibility: str) -> list[str]:
+        board = snapshots.board(split=Split.objects.get(pk="test"), viewer=AnonymousUser())
+        sent = [entry for entry in board.entries if entry.method_id]
+        attempts = [
+            Attempt(entry.method_id, entry.submission_id, timezone.now(), entry.scores) for entry in sent
+        ]
+        shown = [replace(entry, visibility=visibility) for entry in sent]
+        return [row[0] for row in charts.progress(shown, attempts).rows]
+
+    assert all(date.endswith(" UTC") for date in dates("PUBLIC"))
+    assert {len(date) for date in dates("ANONYMOUS")} == {len("2026-11-20")}
 
 
 def test_the_front_is_what_nothing_beats_in_both(client: Client, entries: list[Submission]) -> None:

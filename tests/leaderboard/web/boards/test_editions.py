@@ -227,8 +227,11 @@ def test_changelog_counts_what_was_left_out_and_names_nobody(
     assert str(entries[0].pk) not in said
 
 
-def test_split_without_an_edition_says_so(client: Client, benchmark: None) -> None:
-    assert "No edition of val has been published yet" in get(client, "/board/val/editions/").one("main").text
+def test_split_without_an_edition_says_so_and_leads_onward(client: Client, edition: Edition) -> None:
+    main = get(client, "/board/val/editions/").one("main")
+    assert "No edition of val has been published yet. When one is, this page will say" in main.text
+    onward = [a.attributes["href"] for a in main.one("ul").all("a")]
+    assert onward == ["/board/val/", "/board/test/editions/", "/docs/editions/", "/docs/changelog/"]
     assert client.get("/board/nowhere/editions/").status_code == 404
 
 

@@ -108,6 +108,15 @@ def test_submitting_says_what_to_send_and_that_it_needs_an_account(client: Clien
     assert others == ["401", "403", "404", "406", "415", "503"]
 
 
+def test_an_operation_lists_its_parts(client: Client, benchmark: None) -> None:
+    for operation in ("submit", "board"):
+        article = operation_page(client, operation)
+        contents = [a.attributes["href"][1:] for a in article.one("ul", class_="contents").all("a")]
+        anchors = [each.attributes.get("id") for each in article.everything()]
+        assert contents == [each for each in anchors if each in contents]
+        assert {"request", "parameters", "answer", "errors"} < set(contents)
+
+
 def test_every_code_has_a_place_that_errors_lead_to(client: Client, benchmark: None) -> None:
     ids = {e.attributes["id"] for e in get(client).everything() if "id" in e.attributes}
     assert {f"problem-{code}" for code in (*API_CODES, *PROBLEM_CODES)} <= ids

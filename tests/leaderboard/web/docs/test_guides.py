@@ -1,12 +1,15 @@
 """The guides of `docs/` are pages of the site, with navigation and search, and their links lead somewhere."""
 
+import re
 from urllib.parse import unquote, urlsplit
 
 import pytest
 from django.contrib.staticfiles import finders
 from django.test import Client
+from django.utils import timezone
 from pytest_django import DjangoAssertNumQueries
 
+from leaderboard.models import Edition, Split
 from leaderboard.web.docs import guides, search
 from tests import pages
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -132,6 +135,11 @@ def found(client: Client, query: str) -> list[tuple[str, str]]:
         ("quota-exceeded", "/docs/api/#problem-quota-exceeded"),
         ("restore backup", "/docs/maintainers/#back-up-and-restore"),
         ("bootstr", "/docs/uncertainty/"),
+        ("how to submit", "/docs/cli/#submit"),
+        ("how to submit from ci", "/docs/ci/"),
+        ("scale ratio to ttc", "/docs/cli/#convert"),
+        ("how to get an API token", "/docs/access/#tokens"),
+        ("box", "/docs/baselines/"),
     ],
 )
 def test_what_people_look_for_is_among_the_first_five(
@@ -163,6 +171,43 @@ def test_without_words_there_is_a_form_and_without_a_find_there_is_advice(
 ) -> None:
     assert found(client, "") == []
     assert "Try fewer words" in client.get("/docs/search/?q=xyzzyq").text
+
+
+def test_a_short_word_stands_for_itself_and_its_plural() -> None:
+    marked = {m.lower() for hit in search.find("to") for m in re.findall("<mark>(.*?)</mark>", hit.snippet)}
+    assert marked == {"to"}
+    assert "boxes" in "".join(hit.snippet.lower() for hit in search.find("box"))
+    assert search.find("xyz toke")
+
+
+def test_the_changelog_of_the_software_is_a_page_that_every_page_links(
+    client: Client, benchmark: None
+) -> None:
+    root = pages.get(client, "/docs/changelog/")
+    assert root.one("article").one("h1").text == "Changelog"
+    footer = pages.get(client, "/board/test/").one("footer")
+    assert "/docs/changelog/" in [a.attributes["href"] for a in footer.all("a")]
+
+
+def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(
+    client: Client, benchmark: None, edition: Edition
+) -> None:
+    def commands() -> str:
+        root = pages.get(client, "/docs/")
+        hrefs = [a.attributes["href"] for a in root.one("article").all("a")]
+        asked = [href for href in hrefs if "/api/v1/splits/" in href]
+        for href in asked:
+            answer = client.get(href)
+            answer.close()
+            assert answer.status_code == 200
+        return root.one("article").text
+
+    assert "--split test --method" in commands()
+    Split.objects.filter(pk="test").update(closes_at=timezone.now())
+    assert "No split takes submissions now. The dates say" in commands()
+    Split.objects.update(published_edition=None)
+    assert "Put the name of a split in place of SPLIT" in commands()
+    assert "--split SPLIT --method" in commands()
 
 
 def test_where_no_part_has_all_words_those_with_some_are_shown() -> None:

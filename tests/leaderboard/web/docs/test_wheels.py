@@ -22,6 +22,8 @@ from tests.leaderboard.web.test_every_page import assert_sound
 pytestmark = pytest.mark.slow
 
 SITE = "https://board.example.org"
+# Code, tables of the paper, weights, and the mark of typed packages.
+SUFFIXES = {"py", "json", "npz", "typed"}
 
 
 @pytest.fixture(scope="module")
@@ -61,7 +63,7 @@ def test_the_wheel_has_the_evaluator_and_the_baselines_and_nothing_of_the_site(
         assert archive.testzip() is None
     packages = {name.partition("/")[0] for name in names if ".dist-info/" not in name}
     assert packages == set(build_wheel.PACKAGES)
-    assert {name.rpartition(".")[2] for name in names if ".dist-info/" not in name} <= {"py", "json", "typed"}
+    assert {name.rpartition(".")[2] for name in names if ".dist-info/" not in name} <= SUFFIXES
 
 
 def test_the_wheel_installs_into_an_empty_environment_and_prints_its_version(

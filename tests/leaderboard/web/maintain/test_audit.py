@@ -105,6 +105,7 @@ def test_the_exports_hold_every_column_and_the_chain(keeper: Client, trail: None
         "noun": "Window",
         "noun_id": "b-2",
         "details": {},
+        "names": {},
         "previous_hash": event.previous_hash,
         "hash": event.hash,
     }

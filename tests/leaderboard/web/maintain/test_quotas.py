@@ -145,7 +145,7 @@ def test_team_is_found_by_name_by_look_and_by_its_people(
 ) -> None:
     teams.team_of(user=stranger)
     root = pages.page(keeper.get(QUOTAS, {"team": text}))
-    assert cells(root, "Teams") == [["Owls", "owner@example.org teammate@example.org"]]
+    assert cells(root, "Teams") == [["Owls", "owner@example.org teammate@example.org", "Moderate"]]
     assert address(team) in [a.attributes["href"] for a in root.all("a")]
 
 

@@ -1,8 +1,11 @@
 """What an address may add to what is remembered: nothing but what its view reads, spelt in one way."""
 
 from datetime import timedelta
+from typing import Any
 
 import pytest
+from django.http import HttpRequest, HttpResponse
+from django.http.response import HttpResponseBase
 from django.test import Client
 from django.utils import timezone
 
@@ -122,3 +125,58 @@ def test_answers_to_queries_push_out_no_plain_page(
             client.get(f"/board/test/?sort={sort}&frames={frames}")
     assert len(small.queries) < 40
     assert [page for page in PAGES if small.get(page) is None] == []
+
+
+def without_id(response: HttpResponseBase) -> dict[str, str]:
+    """The headers, but for the request's id, which no two answers share."""
+    assert len(response["X-Request-ID"]) == 36
+    return {name: value for name, value in response.items() if name != "X-Request-ID"}
+
+
+def test_a_repeated_answer_has_every_header_of_one_that_went_through_all_layers(
+    filled: list[Method], client: Client, settings: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings.API_RATES = settings.API_RATES | {"visitor": "1000/min"}
+    gzipped = {"Accept-Encoding": "gzip"}
+    for page in (*PAGES, "/board/test/?sort=-mid"):
+        tag = client.get(page, headers=gzipped)["ETag"]
+        forms: tuple[dict[str, str], ...] = (
+            {},
+            gzipped,
+            gzipped | {"If-None-Match": tag},
+            {"If-None-Match": f'W/{tag}, "else"'},
+        )
+        through = [client.get(page, headers=form) for form in forms]
+        with monkeypatch.context() as inner:
+            inner.delattr(page_cache.PageCacheMiddleware, "__call__")
+            repeated = [client.get(page, headers=form) for form in forms]
+        assert [found.status_code for found in repeated] == [found.status_code for found in through]
+        assert [without_id(found) for found in repeated] == [without_id(found) for found in through]
+        assert [found.content for found in repeated] == [found.content for found in through]
+        # What is left of its first reader's rate is nobody else's.
+        assert not any(found.has_header("RateLimit") for found in repeated)
+
+
+def test_nothing_is_repeated_to_who_says_who_they_are_nor_over_another_scheme(
+    filled: list[Method], client: Client, owner: User, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for _ in range(3):
+        anybodys = client.get("/board/test/", headers={"Accept-Encoding": "gzip"})
+    layers: list[str] = []
+    asked = page_cache.PageCacheMiddleware.__call__
+
+    def ask(self: page_cache.PageCacheMiddleware, request: HttpRequest) -> HttpResponse:
+        layers.append(request.path)
+        return asked(self, request)
+
+    monkeypatch.setattr(page_cache.PageCacheMiddleware, "__call__", ask)
+    assert client.get("/board/test/", headers={"Accept-Encoding": "gzip"}).content == anybodys.content
+    assert layers == []
+    client.get("/board/test/", secure=True, headers={"Accept-Encoding": "gzip"})
+    client.get("/board/test/", headers={"Authorization": "Bearer nothing"})
+    client.get("/board/test/", headers={"HX-Request": "true"})
+    client.head("/board/test/")
+    client.force_login(owner)
+    own = client.get("/board/test/", headers={"Accept-Encoding": "gzip"})
+    assert len(layers) == 5
+    assert own["Cache-Control"] == "private, no-store"

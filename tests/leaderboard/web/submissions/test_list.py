@@ -36,6 +36,16 @@ def test_list_has_my_teams_submissions_with_state_and_errors(
     assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
 
 
+def test_a_long_reason_ends_between_two_words(signed_in: Client, edition: Edition, owner: User) -> None:
+    sent = builders.submit(owner, b"{}")
+    builders.score_all()
+    (problem,) = sent.evaluations.get().problems
+    reason = pages.page(signed_in.get("/submissions/")).one("span", class_="reason").text
+    words = reason.partition(": ")[2].removesuffix(" …").split()
+    assert reason.endswith(" …")
+    assert problem["message"].split()[: len(words)] == words
+
+
 def test_maintainers_list_is_their_own_teams(client: Client, edition: Edition, maintainer: User) -> None:
     client.force_login(maintainer)
     assert "You have no submissions yet" in pages.page(client.get("/submissions/")).one("main").text

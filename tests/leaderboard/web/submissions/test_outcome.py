@@ -237,7 +237,7 @@ def test_hostile_name_stays_text_in_the_latex_row(signed_in: Client, edition: Ed
 
 
 @pytest.mark.parametrize(
-    ("limit", "left"), [(20, " (19 of 20 rejections left within 24 hours)."), (None, ".")]
+    ("limit", "left"), [(20, ". Up to 20 files may be rejected within 24 hours; 19 are left."), (None, ".")]
 )
 def test_rejected_file_uses_no_quota_and_page_says_how_many_more_are_taken(
     signed_in: Client, edition: Edition, owner: User, limit: int | None, left: str
@@ -263,7 +263,7 @@ def test_maintainer_reads_what_the_team_has_left(keeper: Client, edition: Editio
         quota_rejected_limit=2,
         reason="A test.",
     )
-    assert "1 of 2 rejections left" in look(keeper, sent).one("main").text
+    assert "Up to 2 files may be rejected within 24 hours; 1 is left." in look(keeper, sent).one("main").text
 
 
 # --- cost ------------------------------------------------------------------------------------------------

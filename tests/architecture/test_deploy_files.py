@@ -1,0 +1,86 @@
+"""The example files in deploy/ name what there is: programs, addresses, figures."""
+
+import configparser
+import json
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+DEPLOY = REPOSITORY / "deploy"
+UNITS = sorted((DEPLOY / "systemd").glob("*.service"))
+
+
+def figures() -> set[str]:
+    """The names of all figures, as their sources have them."""
+    sources = [REPOSITORY / "leaderboard/ops" / name for name in ("prometheus.py", "http_figures.py")]
+    text = "".join(path.read_text() for path in sources)
+    # The names that are put together from parts.
+    made = {"tsttc_run_seconds", "tsttc_turnaround_seconds"}
+    return made | set(re.findall(r"\"(tsttc_\w+)\"", text))
+
+
+def named(text: str) -> set[str]:
+    """The figures that an expression names, without what Prometheus adds."""
+    return {re.sub(r"_(bucket|total)$", "", name) for name in re.findall(r"tsttc_\w+", text)}
+
+
+def test_alarms_ask_for_figures_that_there_are_and_say_what_is_wrong() -> None:
+    [group] = yaml.safe_load((DEPLOY / "prometheus/rules.yml").read_text())["groups"]
+    rules = group["rules"]
+    assert len({rule["alert"] for rule in rules}) == len(rules) > 8
+    assert set().union(*(named(rule["expr"]) for rule in rules)) <= figures()
+    assert all(rule["annotations"]["summary"].endswith(".") for rule in rules)
+    scrape = yaml.safe_load((DEPLOY / "prometheus/scrape.yml").read_text())
+    assert scrape["rule_files"] == ["rules.yml"]
+
+
+def test_the_board_of_grafana_shows_figures_that_there_are() -> None:
+    panels = json.loads((DEPLOY / "grafana.json").read_text())["panels"]
+    shown = set().union(*(named(target["expr"]) for panel in panels for target in panel["targets"]))
+    assert shown <= figures()
+    assert len(shown) > 8
+    assert len({panel["id"] for panel in panels}) == len(panels)
+
+
+@pytest.mark.parametrize("path", UNITS, ids=lambda path: path.stem)
+def test_units_start_programs_that_there_are_without_privileges(path: Path) -> None:
+    unit = configparser.RawConfigParser(strict=False)
+    unit.optionxform = str  # type: ignore[assignment]  # systemd's own letters
+    unit.read(path)
+    service = unit["Service"]
+    program, *arguments = service["ExecStart"].split()
+    assert program.startswith("/opt/tsttc/bin/")
+    assert Path(program).name in {"gunicorn", "celery", "python"}
+    if arguments[0] == "manage.py":
+        assert (REPOSITORY / f"leaderboard/management/commands/{arguments[1]}.py").exists()
+    if "--config" in arguments:
+        assert (REPOSITORY / arguments[arguments.index("--config") + 1]).exists()
+    assert service["NoNewPrivileges"] == "yes"
+    assert service["ProtectSystem"] == "strict"
+    assert service["User"] == "tsttc"
+
+
+def test_only_the_worker_can_read_the_ground_truth() -> None:
+    web = (DEPLOY / "systemd/tsttc-web.service").read_text()
+    worker = (DEPLOY / "systemd/tsttc-worker.service").read_text()
+    assert "InaccessiblePaths=-/var/lib/tsttc/ground-truth" in web
+    assert "ReadOnlyPaths=/var/lib/tsttc/ground-truth" in worker
+
+
+@pytest.mark.parametrize(
+    ("name", "header"),
+    [
+        ("nginx.conf", "proxy_set_header X-Forwarded-Proto https;"),
+        ("Caddyfile.host", "request_buffers 64KB"),
+    ],
+)
+def test_proxies_take_uploads_and_hide_the_figures(name: str, header: str) -> None:
+    text = (DEPLOY / name).read_text()
+    assert text.count("{") == text.count("}")
+    assert header in text
+    assert "/submit/" in text
+    assert "/api/v1/submissions" in text
+    assert re.search(r"/metrics \{\s+(return|respond) 404", text)

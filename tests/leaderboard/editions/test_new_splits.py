@@ -1,0 +1,332 @@
+"""Splits and challenges without code: made, changed, archived and switched off, from a page or a command."""
+
+from datetime import UTC, datetime, timedelta
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+from django.core.management import CommandError, call_command
+from django.db import IntegrityError, transaction
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import versions
+from leaderboard.benchmark import moments, policy
+from leaderboard.benchmark.policy import Policy
+from leaderboard.editions import new_splits
+from leaderboard.errors.refusals import NotMaintainer, Refused
+from leaderboard.models import AuditEvent, Edition, Split, Submission, User
+from tests import builders, pages
+from tests.leaderboard.web.maintain.desk import get
+from tests.leaderboard.web.test_every_page import assert_sound
+
+pytestmark = pytest.mark.slow
+
+SPLITS, ADD = "/maintain/splits/", "/maintain/splits/add/"
+NEW = {
+    "name": "challenge-2027",
+    "title": "Challenge 2027",
+    "truth": "as test",
+    "listing": "LISTED",
+    "position": "0",
+    "opens_at": "",
+    "closes_at": "2099-03-01 23:59 AoE",
+    "decimals": "1",
+    "quota_limit": "2",
+    "quota_window": "7 days",
+    "quota_min_gap": "",
+    "quota_rejected_limit": "5",
+}
+PUBLIC = (
+    *("/", "/board/val/", "/board/val/charts/", "/board/val.csv", "/board/val/editions/", "/sitemap.xml"),
+    *("/feed.atom", "/docs/", "/compare/", "/api/v1/splits", "/board/val/feed.atom"),
+    *("/api/v1/splits/val/board", "/api/v1/splits/val/editions"),
+)
+
+
+def change(name: str, **values: Any) -> Split:
+    wanted = Policy(**{**vars(policy.policy_of(Split.objects.get(pk=name))), **values})
+    return policy.change(split_name=name, policy=wanted, actor=None)
+
+
+@pytest.fixture
+def challenge(edition: Edition) -> Split:
+    """A challenge on the ground truth of the test split."""
+    call_command(
+        *("add_split", "challenge", "--title", "Challenge", "--same-truth-as", "test"),
+        *("--closes", "2099-03-01 23:59 Europe/Berlin", "--limit", "1", "--window", "7 days"),
+        stdout=StringIO(),
+    )
+    return Split.objects.get(pk="challenge")
+
+
+# --- making one ------------------------------------------------------------------------------------------
+
+
+def test_a_challenge_shares_ground_truth_and_has_its_own_deadline_quota_and_board(
+    challenge: Split, edition: Edition, owner: User, client: Client
+) -> None:
+    board = challenge.published_edition
+    assert board is not None
+    assert (board.number, board.ground_truth_id) == (1, edition.ground_truth_id)
+    assert challenge.is_hidden
+    assert challenge.closes_at == datetime(2099, 3, 1, 22, 59, tzinfo=UTC)
+    builders.submit(owner, builders.predictions(edition), split="challenge")
+    assert builders.score_all() == 1
+    rows = client.get("/api/v1/splits/challenge/board").json()["entries"]
+    assert [row["method"] for row in rows] == ["Foo"]
+    # The method is on one board, and the slot was one of the challenge's.
+    test_rows = client.get("/api/v1/splits/test/board").json()["entries"]
+    assert "Foo" not in [row["method"] for row in test_rows]
+    with pytest.raises(Exception, match="Your team has used 1 submission to challenge, its quota for 7 days"):
+        builders.send(owner, builders.predictions(edition, factor=1.2), split="challenge")
+    builders.send(owner, builders.predictions(edition, factor=1.2), split="test")
+    told = {each["split"]: each["same_truth_as"] for each in client.get("/api/v1/splits").json()}
+    assert (told["challenge"], told["test"]) == ("test", None)
+
+
+def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Client, edition: Edition) -> None:
+    assert_sound(keeper.get(ADD))
+    answer = keeper.post(ADD, NEW)
+    assert (answer.status_code, answer.headers["Location"]) == (302, SPLITS)
+    made = Split.objects.get(pk="challenge-2027")
+    assert made.closes_at == datetime(2099, 3, 2, 11, 59, tzinfo=UTC)
+    assert (made.quota_limit, made.quota_window, made.position) == (2, timedelta(days=7), 3)
+    assert "Challenge 2027" in get(keeper, SPLITS).one("main").text
+    [event] = AuditEvent.objects.filter(noun="Split", verb="added")
+    assert (event.noun_id, event.details["same_truth_as"]) == ("challenge-2027", "test")
+    bad = {
+        "name": ("Test 2", "The name 'Test 2' cannot be used"),
+        "title": ("", "No title was given"),
+        "closes_at": ("2099-03-01", "is no date with a time"),
+        "opens_at": ("2099-03-01 10:00", "has no time zone"),
+        "quota_window": ("-3 days", "'-3 days' is no span of time"),
+        "quota_limit": ("-1", "The number is negative"),
+        "position": ("99999", "less than or equal to 32767"),
+    }
+    for field, (value, sentence) in bad.items():
+        refused = keeper.post(ADD, {**NEW, "name": "other", field: value})
+        assert refused.status_code == 422, field
+        wrong = assert_sound(refused).one("div", class_="wrong")
+        assert sentence in wrong.text
+    assert keeper.post(ADD, NEW).status_code == 422  # the name is taken
+    assert Split.objects.count() == 4
+
+
+def test_command_makes_a_split_that_opens_with_its_import_and_refuses_in_a_sentence(benchmark: None) -> None:
+    out = StringIO()
+    call_command("add_split", "night", "--title", "Night", "--open", "--decimals", "2", stdout=out)
+    assert "manage.py import_truth night PATH" in out.getvalue()
+    assert not Split.objects.get(pk="night").is_hidden
+    for arguments, sentence in (
+        (("night", "--title", "N", "--open"), "There is a split 'night' already"),
+        (("audit", "--title", "N", "--open"), "and none of add, announcement"),
+        (("a", "--title", "", "--open"), "The field 'title' is empty"),
+        (("a", "--title", "N", "--same-truth-as", "val"), "expected one of: none, because none has"),
+        (("a", "--title", "N", "--open", "--closes", "2020-01-01 00:00 UTC"), "is in the past"),
+        (("a", "--title", "N", "--open", "--window", "0 days"), "The window is 0:00:00"),
+        (("a", "--title", "N", "--open", "--limit", "-2"), "'-2' is not a whole number"),
+    ):
+        with pytest.raises(CommandError, match=sentence):
+            call_command("add_split", *arguments)
+    assert Split.objects.count() == 4
+
+
+def test_a_challenge_reveals_no_more_decimals_of_hidden_values(challenge: Split) -> None:
+    with pytest.raises(Refused, match=r"2 decimals of the hidden values of 'test'.*at most 1"):
+        change("challenge", decimals=2)
+
+
+def test_only_maintainers_add_and_change(owner: User, benchmark: None) -> None:
+    with pytest.raises(NotMaintainer):
+        policy.change(split_name="val", policy=Policy(title="Mine"), actor=owner)
+    with pytest.raises(NotMaintainer):
+        new_splits.add_split(
+            name="mine",
+            policy=Policy(title="Mine"),
+            is_hidden=False,
+            same_truth_as="",
+            now=timezone.now(),
+            actor=owner,
+        )
+
+
+@pytest.mark.parametrize(
+    "values", [{"title": ""}, {"listing": "GONE"}, {"announcement": "No end"}, {"same_truth_as": "val"}]
+)
+def test_database_keeps_out_what_makes_no_sense(benchmark: None, values: dict[str, str]) -> None:
+    with pytest.raises(IntegrityError), transaction.atomic():
+        Split.objects.filter(pk="val").update(**values)
+
+
+# --- changing one ----------------------------------------------------------------------------------------
+
+
+def test_page_changes_a_policy_and_the_audit_trail_has_both_values(keeper: Client, edition: Edition) -> None:
+    address = f"{SPLITS}test/"
+    form = get(keeper, address).one("main").one("form")
+    sent = {e.attributes["name"]: e.attributes.get("value", "") for e in form.all("input")}
+    for select in form.all("select"):
+        [chosen] = [e for e in select.all("option") if "selected" in e.attributes]
+        sent[select.attributes["name"]] = chosen.attributes["value"]
+    del sent["needs_admission"]
+    assert keeper.post(address, {**sent, "title": "Test set", "quota_limit": "4"}).status_code == 302
+    split = Split.objects.get(pk="test")
+    assert (split.title, split.quota_limit, split.quota_window) == ("Test set", 4, timedelta(days=30))
+    [event] = AuditEvent.objects.filter(noun="Split", verb="changed")
+    assert event.details["title"] == "Test → Test set"
+    assert set(event.details) == {"title", "description", "quota_limit"}
+    assert "Test set" in keeper.get("/board/test/").text
+
+
+def test_command_changes_what_is_given_and_nothing_else(benchmark: None) -> None:
+    out = StringIO()
+    call_command("change_split", "val", "--closes", "2099-01-01 00:00 UTC", "--limit", "none", stdout=out)
+    split = Split.objects.get(pk="val")
+    assert (split.quota_limit, split.title, split.quota_window) == (None, "Validation", timedelta(days=1))
+    assert "quota_limit: 50 → None" in out.getvalue()
+    call_command("change_split", "val", "--closes", "none", stdout=out)
+    assert Split.objects.get(pk="val").closes_at is None
+    with pytest.raises(CommandError, match="There is no split 'nope'; expected one of test, val, demo"):
+        call_command("change_split", "nope", "--title", "N")
+    with pytest.raises(CommandError, match="expected to open before it closes"):
+        call_command("change_split", "val", "--opens", "2099-01-02 00:00 Z", "--closes", "2099-01-01 00:00 Z")
+
+
+# --- archived, and switched off --------------------------------------------------------------------------
+
+
+@pytest.fixture
+def val_entry(benchmark: None, owner: User, tmp_path: Path) -> Submission:
+    """A scored public entry of the open split."""
+    edition = builders.import_truth(tmp_path, split="val")
+    return builders.submit(owner, builders.predictions(edition), split="val")
+
+
+def test_an_archived_split_keeps_its_board_and_takes_no_file(
+    client: Client, val_entry: Submission, owner: User
+) -> None:
+    builders.score_all()
+    change("val", listing="ARCHIVED", position=0)
+    with pytest.raises(Refused, match="Submissions to val are closed: the split is archived"):
+        builders.send(owner, b"{}", split="val")
+    assert "Submissions to val are closed: the split is archived." in client.get("/board/val/").text
+    told = client.get("/api/v1/splits").json()
+    assert [each["split"] for each in told] == ["test", "demo", "val"]
+    assert (told[-1]["is_open"], told[-1]["is_archived"]) == (False, True)
+
+
+def test_a_split_that_is_switched_off_is_on_no_page_form_list_or_sitemap(
+    client: Client, val_entry: Submission, owner: User
+) -> None:
+    builders.score_all()
+    submission = f"/submissions/{val_entry.pk}/"
+    assert all(client.get(address).status_code == 200 for address in PUBLIC)  # and remembered
+    change("val", listing="OFF")
+    for address in PUBLIC:
+        answer = client.get(address)
+        if "/val" in address:
+            assert answer.status_code == 404, address
+        else:
+            assert answer.status_code == 200
+            assert "/board/val" not in answer.text, address
+            assert '"val"' not in answer.text, address
+    for address in (
+        "/board/val/editions/1/",
+        "/board/val/card.png",
+        "/api/v1/splits/val/changelog",
+        "/api/v1/splits/val/manifest",
+        "/compare/?split=val",
+    ):
+        assert client.get(address).status_code == 404, address
+    assert "/board/val" not in client.get(f"/methods/{val_entry.method_id}/").text
+    client.force_login(owner)
+    for address in ("/submit/", "/submissions/", "/tokens/", "/api/v1/quota", "/api/v1/submissions"):
+        assert "val" not in client.get(address).text.replace("value", "").replace("interval", ""), address
+    assert client.get(submission).status_code == 404
+    with pytest.raises(Refused, match="There is no split 'val'; expected one of test, demo"):
+        builders.send(owner, b"{}", split="val")
+    change("val", listing="LISTED")
+    assert all(client.get(address).status_code == 200 for address in (*PUBLIC, submission))
+
+
+def test_maintainers_still_find_a_split_that_is_switched_off(keeper: Client, benchmark: None) -> None:
+    change("demo", listing="OFF")
+    assert "switched off" in get(keeper, "/maintain/").one("section", class_="off").text
+    assert "switched off" in get(keeper, SPLITS).one("main").text
+
+
+# --- a line with an end ----------------------------------------------------------------------------------
+
+
+def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client, edition: Edition) -> None:
+    page, text = "/maintain/announcement/", "Maintenance <b>today</b>, 8:00 UTC."
+    visitor = Client()
+    assert text not in visitor.get("/board/test/").text
+    assert_sound(keeper.get(page))
+    for sent, sentence in (
+        ({"announcement": text}, "The announcement has no end; expected an end beside its text."),
+        ({"announcement": text, "announcement_ends_at": "2020-01-01 00:00 UTC"}, "is in the past"),
+    ):
+        refused = keeper.post(page, sent)
+        assert sentence in assert_sound(refused).one("div", class_="wrong").text
+    sent = {"announcement": text, "announcement_ends_at": "2099-01-01 00:00 UTC"}
+    assert keeper.post(page, sent).status_code == 302
+    for address in ("/", "/board/test/", "/board/val/", "/compare/?split=test"):
+        [line] = pages.page(visitor.get(address)).all("p", class_="announcement")
+        assert line.text == text
+    assert text in pages.page(keeper.get("/submit/")).one("main").text
+    told = visitor.get("/api/v1/splits").json()
+    assert {each["announcement"] for each in told} == {text}
+    change("val", announcement="Val only", announcement_ends_at=timezone.now() + timedelta(hours=1))
+    assert "Validation: Val only" in pages.page(visitor.get("/board/val/")).one("main").text
+    assert "Val only" not in visitor.get("/board/test/").text
+    # Its end comes: the next sweep tells remembered pages.
+    later = timezone.now() - timedelta(seconds=1)
+    Split.objects.update(announcement_ends_at=later)
+    assert versions.times_passed(now=timezone.now()) == 3
+    assert "Val only" not in visitor.get("/board/val/").text
+    assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
+    call_command("set_announcement", "Known error", "--until", "2099-01-01 00:00 AoE", stdout=StringIO())
+    assert "Known error" in visitor.get("/board/test/").text
+    call_command("set_announcement", stdout=StringIO())
+    assert Split.objects.exclude(announcement="").count() == 0
+
+
+# --- moments ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "moment"),
+    [
+        ("2027-03-01 23:59 UTC", "2027-03-01 23:59"),
+        ("2027-03-01T23:59Z", "2027-03-01 23:59"),
+        ("2027-03-01 23:59 AoE", "2027-03-02 11:59"),
+        ("2027-03-01 23:59 Europe/Berlin", "2027-03-01 22:59"),
+        ("2027-07-01 23:59 Europe/Berlin", "2027-07-01 21:59"),
+        ("2027-03-01 23:59+05:30", "2027-03-01 18:29"),
+    ],
+)
+def test_a_moment_has_a_zone(text: str, moment: str) -> None:
+    assert moments.parse(text) == datetime.fromisoformat(f"{moment}+00:00")
+    assert moments.parse(moments.written(moments.parse(text))) == moments.parse(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "fault"),
+    [
+        ("2027-03-01", "is no date with a time"),
+        ("2027-03-01 23:59", "has no time zone"),
+        ("2027-02-30 23:59 UTC", "is not in the calendar"),
+        ("2027-03-01 23:59 CST", "There is no time zone 'CST'"),
+        ("2027-03-01 23:59 Europe/Nowhere", "There is no time zone"),
+        ("2027-03-01 23:59 ../../etc/passwd", "There is no time zone"),
+        ("2027-03-28 02:30 Europe/Berlin", "show 2027-03-28 02:30 never"),
+        ("2027-10-31 02:30 Europe/Berlin", "show 2027-10-31 02:30 twice"),
+        ("9999-12-31 23:59 AoE", "is outside of the calendar"),
+    ],
+)
+def test_a_moment_that_is_none_is_refused_in_words(text: str, fault: str) -> None:
+    with pytest.raises(Refused, match=fault):
+        moments.parse(text)

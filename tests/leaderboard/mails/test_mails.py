@@ -1,0 +1,237 @@
+"""Mails may fail: nobody gets an error for it, and what could not be sent is sent later, once."""
+
+import logging
+from datetime import timedelta
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from allauth.account.models import EmailAddress
+from django.core import mail
+from django.core.mail import EmailMessage
+from django.core.management import call_command
+from django.test import Client
+from django.utils import timezone
+from pytest_django import Settings
+
+from leaderboard.editions import ground_truth
+from leaderboard.mails import fault_reports, notices, outbox
+from leaderboard.models import (
+    ApiToken,
+    Edition,
+    Mail,
+    MailKind,
+    Publication,
+    Split,
+    Submission,
+    SweepBeat,
+    User,
+)
+from leaderboard.ops.broker import CircuitBreaker
+from tests import builders
+
+pytestmark = pytest.mark.django_db
+
+HOUR = timedelta(hours=1)
+DAY = timedelta(days=1)
+
+
+@pytest.fixture(autouse=True)
+def no_rest(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No test remembers the server of another one."""
+    monkeypatch.setattr(outbox, "_rest", CircuitBreaker(rest_s=outbox.REST_S))
+
+
+@pytest.fixture
+def away(settings: Settings) -> Settings:
+    """A mail server that is not there."""
+    settings.EMAIL_BACKEND = "django.core.mail.backends.smtp.EmailBackend"
+    settings.EMAIL_HOST, settings.EMAIL_PORT = "127.0.0.1", 1
+    return settings
+
+
+def back(settings: Settings) -> None:
+    settings.EMAIL_BACKEND = "django.core.mail.backends.locmem.EmailBackend"
+
+
+def look_back() -> None:
+    """Notices were last looked for an hour ago."""
+    SweepBeat.objects.update_or_create(id=1, defaults={"notices_at": timezone.now() - HOUR})
+
+
+def told() -> list[tuple[str, str]]:
+    """Queue what is due, and say whom it told of what."""
+    notices.queue_due(now=timezone.now())
+    return sorted(Mail.objects.filter(ended_at=None).values_list("recipient", "kind"))
+
+
+# --- the outbox ------------------------------------------------------------------------------------------
+
+
+def test_a_mail_that_no_server_takes_is_kept_and_sent_later(away: Settings) -> None:
+    now = timezone.now()
+    for _ in range(2):  # the second does not ask the server
+        assert not outbox.send_or_keep(message=EmailMessage("S", "T", to=["a@example.org"]), now=now)
+    assert outbox.work_off(now=now) == 0
+    assert outbox.work_off(now=now + HOUR) == 0
+    back(away)
+    assert outbox.work_off(now=now + 3 * HOUR) == 2
+    assert [(sent.subject, sent.body, sent.to) for sent in mail.outbox] == [("S", "T", ["a@example.org"])] * 2
+    # Nothing of them stays.
+    assert set(Mail.objects.values_list("recipient", "text", "is_sent")) == {("", "", True)}
+    assert outbox.work_off(now=now + DAY) == 0
+    outbox.purge(now=now + 40 * DAY)
+    assert not Mail.objects.exists()
+
+
+def test_what_cannot_be_sent_for_three_days_is_given_up(away: Settings) -> None:
+    now = timezone.now()
+    outbox.send_or_keep(message=EmailMessage("S", "T", to=["a@example.org"]), now=now)
+    outbox.work_off(now=now + 4 * DAY)
+    assert Mail.objects.values_list("text", "is_sent", "ended_at").get() == ("", False, now + 4 * DAY)
+    assert outbox.waiting() == 0
+
+
+@pytest.mark.parametrize("path", ["/accounts/signup/", "/accounts/password/reset/", "/accounts/login/"])
+def test_a_page_that_sends_a_mail_works_without_a_server(away: Settings, client: Client, path: str) -> None:
+    away.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
+    word = "a-long-enough-word"
+    if path != "/accounts/signup/":
+        User.objects.create_user("ada@example.org", word)
+    fields = {"email": "ada@example.org", "login": "ada@example.org", "name": "Ada", "password": word}
+    answer = client.post(path, {**fields, "password1": word, "password2": word})
+    assert answer.status_code == 302
+    assert Mail.objects.get(ended_at=None).recipient == "ada@example.org"
+    back(away)
+    outbox.work_off(now=timezone.now() + HOUR)
+    assert "/accounts/" in mail.outbox[0].body
+
+
+def test_a_superuser_can_sign_in_without_a_mail(away: Settings, client: Client) -> None:
+    away.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
+    user = User.objects.create_user("old@example.org", "x", is_superuser=True)
+    call_command("createsuperuser", email="Root@example.org", interactive=False, stdout=StringIO())
+    proved = EmailAddress.objects.filter(verified=True, primary=True)
+    assert set(proved.values_list("email", flat=True)) == {"root@example.org", user.email}
+    root = User.objects.get(email="root@example.org")
+    root.set_password("a-long-enough-word")
+    root.save()
+    answer = client.post("/accounts/login/", {"login": root.email, "password": "a-long-enough-word"})
+    assert answer["Location"] == "/submit/"
+    assert not Mail.objects.exists()
+
+
+# --- notices ---------------------------------------------------------------------------------------------
+
+
+def test_whoever_sends_a_file_on_the_site_is_told_once_what_it_came_to(edition: Edition, owner: User) -> None:
+    look_back()
+    submission = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
+    assert told() == []
+    builders.score_all()
+    assert told() == [(owner.email, "scored")]
+    outbox.work_off(now=timezone.now())
+    [sent] = mail.outbox
+    assert sent.subject == "[TSTTC leaderboard] Foo on test is scored"
+    assert f"/submissions/{submission.pk}/" in sent.body
+    assert "Choose which mails you get: http://127.0.0.1:8000/mails/" in sent.body
+    assert told() == []
+
+
+def test_nobody_is_told_what_they_switched_off_nor_after_they_left_the_team(
+    edition: Edition, owner: User, signed_in: Client
+) -> None:
+    look_back()
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    answer = signed_in.post("/mails/", {"wanted": ["edition", "token"]})
+    assert answer.status_code == 302
+    assert told() == []
+    assert notices.muted_by(owner) == {"scored", "deadline", "announcement"}
+    page = signed_in.get("/mails/").content.decode()
+    assert page.count(" checked") == 2
+    assert signed_in.post("/mails/", {"wanted": ["account"]}).status_code == 422
+    notices.choose(user=owner, wanted=MailKind.values)
+    owner.membership.delete()
+    look_back()
+    assert told() == []
+
+
+def test_the_teams_of_a_board_are_told_of_its_new_edition(
+    rescored: Edition, owner: User, stranger: User
+) -> None:
+    look_back()
+    # The same moment as the database's clock in a publication.
+    ground_truth.make_board(
+        edition=rescored, kind=Publication.Kind.PUBLISHED, reason="A label.", now=timezone.now(), actor=None
+    )
+    of_edition = {row for row in told() if row[1] == "edition"}
+    assert (owner.email, "edition") in of_edition
+    assert stranger.email not in {recipient for recipient, _ in of_edition}
+    text = Mail.objects.get(kind="edition", user=owner).text
+    assert "Reason: A label." in text
+    assert "/board/test/editions/" in text
+
+
+def test_tokens_that_end_and_splits_that_close_are_told_to_those_whom_it_concerns(
+    edition: Edition, owner: User, stranger: User
+) -> None:
+    now = timezone.now()
+    for user, created, ends in ((owner, 60, 6), (owner, 60, 9), (stranger, 1, 5)):
+        builders.token(user)
+        row = ApiToken.objects.order_by("-created").first()
+        ApiToken.objects.filter(pk=row.pk).update(created=now - created * DAY, expiry=now + ends * DAY)
+    assert told() == [(owner.email, "token")]
+    builders.submit(owner, builders.predictions(edition))
+    Split.objects.filter(pk="test").update(closes_at=now + 2 * DAY)
+    assert told() == [(owner.email, "deadline"), (owner.email, "token")]
+    assert "closes on" in Mail.objects.get(kind="deadline").subject
+
+
+def test_an_announcement_reaches_the_teams_of_a_split_once(
+    edition: Edition, owner: User, stranger: User, tmp_path: Path
+) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    text = tmp_path / "text"
+    text.write_text("The server moves.")
+    for _ in range(2):
+        out = StringIO()
+        call_command("announce", "test", str(text), subject="Maintenance\nBcc: x@example.org", stdout=out)
+    assert "Queued for 1 person." in out.getvalue()
+    assert told() == [(owner.email, "announcement")]
+    assert "\n" not in Mail.objects.get().subject
+
+
+def test_only_proved_addresses_get_notices_where_addresses_are_proved(
+    settings: Settings, edition: Edition, owner: User
+) -> None:
+    settings.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
+    look_back()
+    builders.submit(owner, builders.predictions(edition))
+    builders.score_all()
+    assert told() == []
+    EmailAddress.objects.create(user=owner, email=owner.email, verified=True, primary=True)
+    look_back()
+    assert told() == [(owner.email, "scored")]
+
+
+def test_a_program_asks_for_its_own_outcome(edition: Edition, owner: User) -> None:
+    look_back()
+    submission = builders.submit(owner, builders.predictions(edition))
+    Submission.objects.filter(pk=submission.pk).update(via="API")
+    builders.score_all()
+    assert told() == []
+
+
+# --- faults of ours --------------------------------------------------------------------------------------
+
+
+def test_a_fault_is_reported_once_an_hour_to_each(settings: Settings) -> None:
+    settings.ERROR_EMAILS = ["a@example.org", "b@example.org"]
+    handler = fault_reports.FaultReportHandler(level=logging.ERROR)
+    for text in ("It broke.", "It broke again."):
+        handler.handle(logging.LogRecord("web", logging.ERROR, "x.py", 7, text, (), None))
+    assert sorted(Mail.objects.values_list("recipient", "text")) == [
+        ("a@example.org", "It broke."),
+        ("b@example.org", "It broke."),
+    ]

@@ -1,0 +1,208 @@
+"""Moderation and forgetting: a name is gone wherever it stood, and nothing that is left names the person."""
+
+import json
+from io import StringIO
+
+import pytest
+from allauth.account.models import EmailAddress
+from django.contrib.admin.models import LogEntry
+from django.core import serializers
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.utils import timezone
+
+from leaderboard import audit
+from leaderboard.errors.refusals import NotMaintainer, Refused
+from leaderboard.models import (
+    AuditEvent,
+    AuditText,
+    Edition,
+    Mail,
+    Membership,
+    Method,
+    Submission,
+    Team,
+    User,
+)
+from leaderboard.people import teams
+from leaderboard.submissions import forgetting, moderation
+from tests import builders
+from tests.leaderboard.web.maintain.desk import get
+from tests.leaderboard.web.test_every_page import assert_sound
+
+pytestmark = pytest.mark.slow
+
+PUBLIC = (
+    *("/", "/board/test/", "/board/test.csv", "/board/test.tex", "/board/test.bib", "/board/test/feed.atom"),
+    *("/feed.atom", "/api/v1/splits/test/board", "/board/test/?q=rude", "/board/test/charts/", "/compare/"),
+    *("/board/test/editions/1/", "/board/test/editions/1.csv", "/board/test.json"),
+)
+
+
+def published(edition: Edition, owner: User, *, method: str = "Rude Name") -> Submission:
+    made = builders.submit(owner, builders.predictions(edition), method=method)
+    builders.score_all()
+    return made
+
+
+def places(client: Client, name: str, *more: str) -> list[str]:
+    """Where visitors read this text."""
+    return [
+        address for address in (*PUBLIC, *more) if name in client.get(address).text.replace("?q=rude", "")
+    ]
+
+
+def do(keeper: Client, deed: str, subject: object, **fields: str) -> None:
+    address = f"/maintain/deeds/{deed}/{subject}/"
+    assert_sound(keeper.get(address))
+    refused = keeper.post(address, {**fields, "reason": ""})
+    assert refused.status_code == 422
+    assert "No reason was given" in assert_sound(refused).one("div", class_="wrong").text
+    answer = keeper.post(address, {"reason": "A complaint.", **fields})
+    assert answer.status_code == 302, assert_sound(answer).one("main").text
+
+
+def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_the_past(
+    keeper: Client, edition: Edition, owner: User, teammate: User
+) -> None:
+    sent = published(edition, owner)
+    visitor, at = Client(), f"{timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}"
+    past = (f"/board/test/?at={at}", f"/board/test.csv?at={at}", f"/methods/{sent.method_id}/")
+    assert len(places(visitor, "Rude Name", *past)) >= 10
+    assert len(places(visitor, "Owls", *past)) >= 8
+    do(keeper, "rename-method", sent.method_id, name="")
+    do(keeper, "rename-team", sent.method.team_id, name="Polite Owls 2")
+    assert places(visitor, "Rude Name", *past) == []
+    assert places(visitor, f"Method {sent.method_id.hex[:6]}", *past) != []
+    assert "Polite Owls 2" in visitor.get("/board/test/").text
+    # The audit trail has the names beside it, for maintainers.
+    page = get(keeper, f"/maintain/audit/?noun_id={sent.method_id}").one("main").text
+    assert "Rude Name" in page
+    assert "Rude" not in json.dumps(list(AuditEvent.objects.values_list("details", flat=True)))
+    assert "A complaint." in page
+    team = get(keeper, f"/maintain/teams/{sent.method.team_id}/").one("main").text
+    assert "teammate@example.org" in team
+
+
+def test_a_hidden_entry_leaves_boards_of_all_times_and_a_withdrawn_one_its_values(
+    keeper: Client, edition: Edition, owner: User
+) -> None:
+    sent = published(edition, owner, method="Kept")
+    at = f"{timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}"
+    do(keeper, "withdraw", sent.pk)
+    assert "Kept" in Client().get("/board/test.json").text or "Kept" in Client().get("/board/test/").text
+    do(keeper, "hide", sent.pk)
+    assert "Kept" not in Client().get("/board/test/").text
+    assert "Kept" not in Client().get(f"/board/test.csv?at={at}").text
+    with pytest.raises(Refused, match="withdrawn already"):
+        moderation.withdraw_entry(submission=sent, reason="R", actor=None, now=timezone.now(), is_hidden=True)
+    assert set(
+        AuditEvent.objects.filter(noun="Submission", noun_id=sent.pk).values_list("verb", flat=True)
+    ) >= {
+        "withdrawn",
+        "hidden",
+    }
+
+
+def test_a_method_moves_to_another_team_with_its_submissions(
+    keeper: Client, edition: Edition, owner: User, stranger: User
+) -> None:
+    sent = published(edition, owner, method="Moves")
+    other = teams.team_of(user=stranger)
+    refused = keeper.post(
+        f"/maintain/deeds/move-method/{sent.method_id}/", {"name": "Nobody", "reason": "They asked."}
+    )
+    assert "No team is called 'Nobody'" in assert_sound(refused).one("div", class_="wrong").text
+    do(keeper, "move-method", sent.method_id, name=other.name)
+    assert Method.objects.get(pk=sent.method_id).team == other
+    row = next(
+        e for e in Client().get("/api/v1/splits/test/board").json()["entries"] if e["method"] == "Moves"
+    )
+    assert row["team"] == other.name
+    do(keeper, "clear-texts", sent.method_id)
+
+
+def test_a_closed_account_signs_in_nowhere_until_it_is_opened(
+    keeper: Client, client: Client, team: Team, teammate: User, maintainer: User
+) -> None:
+    member = Membership.objects.get(user=teammate)
+    do(keeper, "close-account", member.handle)
+    assert not Client().login(email=teammate.email, password="correct horse")
+    do(keeper, "open-account", member.handle)
+    assert Client().login(email=teammate.email, password="correct horse")
+    with pytest.raises(Refused, match="your own account"):
+        moderation.set_active(user=maintainer, is_active=False, reason="R", actor=maintainer)
+
+
+def test_only_maintainers_moderate(owner: User, stranger: User, team: Team) -> None:
+    with pytest.raises(NotMaintainer):
+        moderation.rename_team(team=team, name="X", reason="R", actor=stranger, now=timezone.now())
+    with pytest.raises(NotMaintainer):
+        forgetting.forget(user=owner, reason="R", actor=stranger, now=timezone.now())
+
+
+# --- forgetting ------------------------------------------------------------------------------------------
+
+
+def everything() -> str:
+    """All rows of all tables that could name somebody."""
+    tables = [User, Team, Mail, Submission, AuditEvent, AuditText, EmailAddress, LogEntry, Method]
+    return "".join(serializers.serialize("json", model._base_manager.all()) for model in tables)
+
+
+def test_a_forgotten_person_is_named_nowhere_and_their_scores_stay(
+    edition: Edition, owner: User, client: Client
+) -> None:
+    sent = published(edition, owner, method="Stays")
+    Submission.objects.filter(pk=sent.pk).update(note="by ada", filename="ada.json")
+    EmailAddress.objects.create(user=owner, email="second@example.org")
+    team = teams.team_of(user=owner)
+    teams.rename(team=team, name="Ada Lovelace", actor=owner, now=timezone.now())
+    builders.token(owner)
+    Mail.objects.create(kind="scored", recipient="second@example.org", subject="Ada Lovelace", text="T")
+    audit.seal()
+    client.force_login(owner)
+    out = StringIO()
+    call_command("forget_person", "owner@example.org", "--reason", "They asked.", stdout=out)
+    assert str(owner.pk) in out.getvalue()
+    left = everything()
+    assert [
+        text for text in ("owner@", "second@", "Lovelace", "Owls", "ada.json", "by ada") if text in left
+    ] == []
+    assert audit.verify().breaks == ()
+    audit.seal()
+    assert audit.verify().breaks == ()
+    board = Client().get("/board/test/").text
+    assert "Stays" in board
+    assert "Lovelace" not in board
+    assert client.get("/submissions/").status_code == 302  # the session has ended
+    assert not Membership.objects.filter(user=owner).exists()
+    with pytest.raises(CommandError, match="no account with that address"):
+        call_command("forget_person", "owner@example.org", "--reason", "R")
+
+
+def test_a_team_goes_on_without_its_owner(team: Team, owner: User, teammate: User) -> None:
+    forgetting.forget(user=owner, reason="R", actor=owner, now=timezone.now())
+    team.refresh_from_db()
+    assert team.name == "Owls"
+    assert Membership.objects.get(team=team, is_owner=True).user == teammate
+
+
+def test_the_account_page_exports_and_deletes(signed_in: Client, edition: Edition, owner: User) -> None:
+    published(edition, owner)
+    answer = signed_in.get("/account/data.json")
+    told = answer.json()
+    assert told["account"]["email"] == "owner@example.org"
+    assert [row["method"] for row in told["submissions"]] == ["Rude Name"]
+    assert "attachment" in answer.headers["Content-Disposition"]
+    assert_sound(signed_in.get("/account/data/"))
+    wrong = signed_in.post("/account/data/", {"email": "other@example.org"})
+    assert "another address" in assert_sound(wrong).one("div", class_="wrong").text
+    assert signed_in.post("/account/data/", {"email": "Owner@example.org"}).status_code == 302
+    assert not User.objects.filter(email="owner@example.org").exists()
+    assert signed_in.get("/account/data.json").status_code == 302
+
+
+def test_a_maintainer_is_not_forgotten_by_accident(maintainer: User) -> None:
+    with pytest.raises(Refused, match="another maintainer ends the role first"):
+        forgetting.forget(user=maintainer, reason="R", actor=maintainer, now=timezone.now())

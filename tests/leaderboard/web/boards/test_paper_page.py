@@ -1,0 +1,81 @@
+"""The page of the tables of the paper: every value, charts of sweeps, downloads, the rows of the boards."""
+
+import json
+
+import pytest
+from django.test import Client
+
+from evaluator.papers.tables import published_tables
+from evaluator.tables.published import printed, printed_tables
+from leaderboard.models import PublishedResult
+from leaderboard.web.boards.paper_charts import sweep
+from tests.leaderboard.web.test_every_page import assert_sound
+
+pytestmark = pytest.mark.usefixtures("benchmark")
+
+
+def test_the_page_has_every_value_and_marks_the_defaults(client: Client) -> None:
+    answer = client.get("/published/")
+    root = assert_sound(answer)
+    tables = root.all("table")
+    assert len(tables) == 12
+    for shown, drawn in zip(printed_tables(), tables, strict=True):
+        found = [
+            [cell.text.removesuffix(" (default)") for cell in row.all("th") + row.all("td")]
+            for row in drawn.all("tr")
+        ]
+        assert found == [
+            [heading or "Name" for heading in shown.headings],
+            *(list(row.cells) for row in shown.rows),
+        ]
+    assert answer.text.count("(default)</span>") == sum(
+        row.is_default for table in published_tables().tables for row in table.rows
+    )
+    assert "15.5 fits" in answer.text
+
+
+def test_sweeps_have_a_chart_with_every_number_of_their_table() -> None:
+    charts = {shown.table.name: sweep(shown) for shown in printed_tables()}
+    assert [name.removeprefix("ablation-") for name, chart in charts.items() if chart] == [
+        *("scale-bins-pixel-mse", "scale-bins-deep-scale", "frame-gap"),
+        *("nerf-sequences", "target-size", "kernel-size"),
+    ]
+    gap = charts["ablation-frame-gap"].options["baseOption"]["series"]
+    drawn = [mark["value"][1] for each in gap if each["type"] == "scatter" for mark in each["data"]]
+    rows = published_tables().table("ablation-frame-gap").rows
+    assert sorted(drawn) == sorted(value for row in rows for value in row.values)
+    told = [mark["read"] for each in gap if each["type"] == "scatter" for mark in each["data"]]
+    assert ["MiD 41.0", "the paper's default"] in told
+
+
+def test_tables_are_downloaded_and_the_api_has_their_numbers(client: Client) -> None:
+    for suffix, start in (("csv", '"split","method"'), ("tex", "% Frame gap."), ("md", "| Method |")):
+        answer = client.get(f"/published/ablation-frame-gap.{suffix}")
+        assert answer.text.startswith(start)
+        assert answer["Content-Disposition"].endswith(f'"tsttc-paper-ablation-frame-gap.{suffix}"')
+    for address in ("/published/nowhere.csv", "/published/ablation-frame-gap.bib"):
+        assert client.get(address).status_code == 404
+    found = json.loads(client.get("/api/v1/published/ablation-frame-gap").content)
+    assert found["rows"][4]["values"] == [41.0, 29.9]
+    assert found["rows"][4]["is_default"]
+    assert len(json.loads(client.get("/api/v1/published").content)) == 12
+
+
+def test_the_rows_of_the_boards_are_those_of_the_main_table() -> None:
+    table = published_tables().table("main-results")
+    shown = {
+        (row.split_id, row.slug): [row.scores[name] for name in table.columns]
+        for row in PublishedResult.objects.all()
+    }
+    assert shown == {(row.split, row.method): list(row.values) for row in table.rows}
+    latency = {
+        row.method: row.values[2]
+        for name in ("ablation-scale-bins-pixel-mse", "ablation-scale-bins-deep-scale")
+        for row in published_tables().table(name).rows
+        if row.is_default
+    }
+    quoted: dict[str | None, float | None] = dict(
+        PublishedResult.objects.filter(split="val").values_list("slug", "latency_ms")
+    )
+    assert {name: quoted[name] for name in latency} == latency
+    assert printed(table).rows[3].cells[2] == "14.4"
