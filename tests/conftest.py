@@ -31,7 +31,7 @@ os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
-    """Bytes are named by their argument: all processes must agree on a name, and a gzip header holds the time."""
+    """Bytes are named by their argument: all processes agree on it, and a gzip header holds the time."""
     return argname if isinstance(val, bytes) else None
 
 
