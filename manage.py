@@ -8,6 +8,9 @@ import sys
 def main() -> None:
     """Run a management command with the project's settings."""
     os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
+    if sys.argv[1:2] == ["make_receipt_key"]:
+        make_receipt_key()
+        return
     from django.core.exceptions import ImproperlyConfigured  # noqa: PLC0415 - settings come first
     from django.core.management import execute_from_command_line  # noqa: PLC0415 - settings come first
 
@@ -16,6 +19,16 @@ def main() -> None:
     except ImproperlyConfigured as fault:
         # A sentence for each variable; where in the code it was read helps nobody.
         sys.exit(f"The settings are wrong:\n{fault}")
+
+
+def make_receipt_key() -> None:
+    """Run the one command that makes a required variable: without the settings, which would ask for it."""
+    from django.conf import settings  # noqa: PLC0415 - only here are there no settings to wait for
+
+    settings.configure()
+    from leaderboard.management.commands.make_receipt_key import Command  # noqa: PLC0415 - settings come first
+
+    Command().run_from_argv(sys.argv)
 
 
 if __name__ == "__main__":

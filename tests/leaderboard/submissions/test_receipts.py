@@ -1,6 +1,10 @@
 """Score receipts: for the team alone, and true for ever."""
 
 import json
+import os
+import re
+import subprocess
+import sys
 from io import StringIO
 from pathlib import Path
 
@@ -17,6 +21,7 @@ from leaderboard.submissions import receipts, submissions
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of
+from tests.services import REPOSITORY
 
 pytestmark = pytest.mark.slow
 
@@ -155,6 +160,15 @@ def test_command_makes_a_key_that_signs(settings: Settings) -> None:
     assert published["kid"] in err.getvalue()
     assert published["x"] in err.getvalue()
     assert key not in json.dumps(published) + err.getvalue()
+
+
+def test_command_makes_the_key_before_any_variable_is_set(tmp_path: Path) -> None:
+    command = [sys.executable, str(REPOSITORY / "manage.py"), "make_receipt_key"]
+    var = tmp_path / "var"
+    bare = {"PATH": os.environ["PATH"], "TSTTC_PROFILE": "production", "TSTTC_DATA_DIR": str(var)}
+    said = subprocess.run(command, env=bare, capture_output=True, text=True, check=True)
+    assert re.fullmatch(r"TSTTC_RECEIPT_KEY=[\w-]{43}\n", said.stdout)
+    assert not var.exists()
 
 
 @pytest.mark.parametrize("key", ["", "x", "A" * 42, "A" * 44, "A" * 42 + "B", "Ä" * 43])
