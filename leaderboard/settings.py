@@ -12,12 +12,12 @@ from pathlib import Path
 from secrets import token_urlsafe
 from typing import Any
 
-from csp.constants import NONE, SELF
 from django.core.management.utils import get_random_secret_key
 
 from leaderboard.api import settings
 from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
+from leaderboard.web.middleware import frame
 
 BASE_DIR = Path(__file__).resolve().parent.parent
 env = environment.env
@@ -75,34 +75,7 @@ INSTALLED_APPS = [
     "knox",
     "rest_framework",
 ]
-MIDDLEWARE = [
-    # First, so that every line that a request causes carries its id.
-    "leaderboard.web.middleware.request_log.RequestLogMiddleware",
-    # What went through everything below before is answered here.
-    "leaderboard.web.middleware.page_cache.ReadyAnswerMiddleware",
-    # What anything below answers, from memory or from a view, gets the same headers.
-    "leaderboard.web.middleware.response_headers.HeadersMiddleware",
-    "django.middleware.security.SecurityMiddleware",
-    "whitenoise.middleware.WhiteNoiseMiddleware",
-    "csp.middleware.CSPMiddleware",
-    "django.middleware.clickjacking.XFrameOptionsMiddleware",
-    # Before what is kept, which knows clean addresses alone.
-    "leaderboard.web.middleware.clean_addresses.CleanAddressMiddleware",
-    # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
-    "leaderboard.api.middleware.ApiHeadersMiddleware",
-    # Before sessions and accounts, which somebody without either should not pay for.
-    "leaderboard.web.middleware.page_cache.PageCacheMiddleware",
-    "django.contrib.sessions.middleware.SessionMiddleware",
-    "django.middleware.common.CommonMiddleware",
-    "django.middleware.csrf.CsrfViewMiddleware",
-    "django.contrib.auth.middleware.AuthenticationMiddleware",
-    "django.contrib.messages.middleware.MessageMiddleware",
-    "allauth.account.middleware.AccountMiddleware",
-    "django_htmx.middleware.HtmxMiddleware",
-    # Last on the way in: their pages need the rest, and nothing before them reads the body.
-    "leaderboard.web.middleware.request_limits.RateLimitMiddleware",
-    "leaderboard.web.middleware.request_limits.UploadLimitMiddleware",
-]
+MIDDLEWARE = frame.MIDDLEWARE
 ROOT_URLCONF = "leaderboard.urls"
 WSGI_APPLICATION = "leaderboard.wsgi.application"
 TEMPLATES = [
@@ -365,19 +338,7 @@ METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.
 
 # --- security --------------------------------------------------------------------------------------------
 
-CONTENT_SECURITY_POLICY = {
-    "DIRECTIVES": {
-        "default-src": [NONE],
-        "script-src": [SELF],
-        "style-src": [SELF],
-        "img-src": [SELF, "data:"],
-        "font-src": [SELF],
-        "connect-src": [SELF],
-        "form-action": [SELF],
-        "base-uri": [NONE],
-        "frame-ancestors": [NONE],
-    }
-}
+CONTENT_SECURITY_POLICY = frame.CONTENT_SECURITY_POLICY
 X_FRAME_OPTIONS = "DENY"
 SECURE_CONTENT_TYPE_NOSNIFF = True
 SECURE_REFERRER_POLICY = "same-origin"

@@ -1,0 +1,47 @@
+"""What each request passes, and what browsers may load: settings that no variable changes."""
+
+from typing import Any, Final
+
+from csp.constants import NONE, SELF
+
+MIDDLEWARE: Final = [
+    # First, so that every line that a request causes carries its id.
+    "leaderboard.web.middleware.request_log.RequestLogMiddleware",
+    # What went through everything below before is answered here.
+    "leaderboard.web.middleware.page_cache.ReadyAnswerMiddleware",
+    # What anything below answers, from memory or from a view, gets the same headers.
+    "leaderboard.web.middleware.response_headers.HeadersMiddleware",
+    "django.middleware.security.SecurityMiddleware",
+    "whitenoise.middleware.WhiteNoiseMiddleware",
+    "csp.middleware.CSPMiddleware",
+    "django.middleware.clickjacking.XFrameOptionsMiddleware",
+    # Before what is kept, which knows clean addresses alone.
+    "leaderboard.web.middleware.clean_addresses.CleanAddressMiddleware",
+    # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
+    "leaderboard.api.middleware.ApiHeadersMiddleware",
+    # Before sessions and accounts, which somebody without either should not pay for.
+    "leaderboard.web.middleware.page_cache.PageCacheMiddleware",
+    "django.contrib.sessions.middleware.SessionMiddleware",
+    "django.middleware.common.CommonMiddleware",
+    "django.middleware.csrf.CsrfViewMiddleware",
+    "django.contrib.auth.middleware.AuthenticationMiddleware",
+    "django.contrib.messages.middleware.MessageMiddleware",
+    "allauth.account.middleware.AccountMiddleware",
+    "django_htmx.middleware.HtmxMiddleware",
+    # Last on the way in: their pages need the rest, and nothing before them reads the body.
+    "leaderboard.web.middleware.request_limits.RateLimitMiddleware",
+    "leaderboard.web.middleware.request_limits.UploadLimitMiddleware",
+]
+CONTENT_SECURITY_POLICY: Final[dict[str, Any]] = {
+    "DIRECTIVES": {
+        "default-src": [NONE],
+        "script-src": [SELF],
+        "style-src": [SELF],
+        "img-src": [SELF, "data:"],
+        "font-src": [SELF],
+        "connect-src": [SELF],
+        "form-action": [SELF],
+        "base-uri": [NONE],
+        "frame-ancestors": [NONE],
+    }
+}
