@@ -24,6 +24,8 @@ graceful_timeout = 30
 # The application writes a line for each request, with its id and without what people type; gunicorn's own
 # would have the keys of mailed links in it.
 accesslog = None
+# Nobody steers it from outside; it would want a folder in the home of an account that has none.
+control_socket_disable = True
 logconfig_dict = logging_settings(as_json=True, level="INFO")
 
 

@@ -73,7 +73,8 @@ def _parsed(name: str, text: str, parse: Callable[[str], dict[str, Any]], exampl
 def require_sound() -> None:
     """Say everything that is wrong with the variables. Raises `ImproperlyConfigured`."""
     if FAULTS:
-        raise ImproperlyConfigured("\n".join(FAULTS))
+        # Django may read the settings twice; each fault is said once.
+        raise ImproperlyConfigured("\n".join(dict.fromkeys(FAULTS)))
 
 
 env = Environment()

@@ -16,7 +16,12 @@ ONLY: Final = {
     "leaderboard_auditevent": "SELECT, INSERT, UPDATE (seal_number, previous_hash, hash)",
     "django_migrations": "SELECT",
 }
-_ROLE: Final = "SELECT 1 FROM pg_roles WHERE rolname = %s"
+_ROLE: Final = (
+    "SELECT rolsuper, rolreplication, rolbypassrls, "
+    "(SELECT rolsuper FROM pg_roles WHERE rolname = current_user) FROM pg_roles WHERE rolname = %s"
+)
+# What only a superuser may take from a role.
+_ABOVE_THE_OWNER: Final = ("SUPERUSER", "REPLICATION", "BYPASSRLS")
 _MAY: Final = "SELECT, INSERT, UPDATE, DELETE"
 
 
@@ -45,11 +50,24 @@ def make_role(role: str, *, password: str) -> None:
         raise CommandError("TSTTC_APPLICATION_PASSWORD is not set; expected the password of the role.")
     with connection.cursor() as cursor:
         cursor.execute(_ROLE, [role])
-        verb = "ALTER" if cursor.fetchone() else "CREATE"
-        # It is in no group, and takes no rights that somebody gave it before.
-        options = "LOGIN NOSUPERUSER NOCREATEDB NOCREATEROLE NOREPLICATION NOBYPASSRLS"
+        found = cursor.fetchone()
+        rights = [name for name, has in zip(_ABOVE_THE_OWNER, found or (), strict=False) if has]
+        if found and rights and not found[-1]:
+            raise CommandError(
+                f"The role {role} has {' and '.join(rights)}; expected neither of "
+                f"{', '.join(_ABOVE_THE_OWNER)}. "
+                f"Only a superuser of the database can take them: ALTER ROLE {role} WITH "
+                f"{' '.join(f'NO{name}' for name in rights)}."
+            )
+        # It is in no group, and takes no rights that somebody gave it before. An owner who is no superuser
+        # may make a role without these three rights, and may not name them in a change.
+        named = rights if found else _ABOVE_THE_OWNER
+        options = " ".join(("LOGIN", *(f"NO{name}" for name in ("CREATEDB", "CREATEROLE", *named))))
         statement = sql.SQL("{} ROLE {} WITH {} PASSWORD {}").format(
-            sql.SQL(verb), sql.Identifier(role), sql.SQL(options), sql.Literal(password)
+            sql.SQL("ALTER" if found else "CREATE"),
+            sql.Identifier(role),
+            sql.SQL(options),
+            sql.Literal(password),
         )
         cursor.execute(statement.as_string(cursor.connection))
 

@@ -13,6 +13,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from leaderboard import audit
+from leaderboard.management.commands.grant import make_role
 from leaderboard.methods import visibility
 from leaderboard.models import Edition, Status, Submission, User
 from tests import builders
@@ -44,6 +45,29 @@ def as_application(db: None, settings: Settings) -> Iterator[None]:
         cursor.execute("RESET ROLE")
         cursor.execute(f"DROP OWNED BY {role}")
         cursor.execute(f"DROP ROLE {role}")
+
+
+@POSTGRESQL_ONLY
+def test_an_owner_who_is_no_superuser_grants_again_after_each_migration(db: None, settings: Settings) -> None:
+    mark = secrets.token_hex(4)
+    role = settings.APPLICATION_ROLE = f"tsttc_application_{mark}"
+    settings.APPLICATION_PASSWORD = "changed"
+    with connection.cursor() as cursor:
+        cursor.execute(f"CREATE ROLE tsttc_owner_{mark} CREATEROLE")
+        cursor.execute(f"SET LOCAL ROLE tsttc_owner_{mark}")
+        for _ in range(2):
+            make_role(role, password="changed")
+        cursor.execute("RESET ROLE")
+        cursor.execute(f"ALTER ROLE {role} WITH SUPERUSER BYPASSRLS")
+        cursor.execute(f"SET LOCAL ROLE tsttc_owner_{mark}")
+        with pytest.raises(CommandError) as caught:
+            make_role(role, password="changed")
+        assert f"The role {role} has SUPERUSER and BYPASSRLS; expected neither" in str(caught.value)
+        assert str(caught.value).endswith(f"ALTER ROLE {role} WITH NOSUPERUSER NOBYPASSRLS.")
+        cursor.execute("RESET ROLE")
+        make_role(role, password="changed")
+        cursor.execute("SELECT rolsuper, rolbypassrls FROM pg_roles WHERE rolname = %s", [role])
+        assert cursor.fetchone() == (False, False)
 
 
 @POSTGRESQL_ONLY
