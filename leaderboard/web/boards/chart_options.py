@@ -117,13 +117,15 @@ def _round_numbers(low: float, high: float) -> list[float]:
     return [float(f"{factor}e{power}") for power in powers for factor in (1, 2, 5)]
 
 
-def log_axis(values: Iterable[float], *, room: float = 1.0) -> Option:
+def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
     """A logarithmic axis around positive values, with numbers that can be read.
 
-    With `room` below 1 it begins lower, so that names have a place below the least value.
+    `room` is the part of its length that stays free below the least value, at least: a place for names.
     """
     known = list(values)
-    low, high = round_range(room * min(known), max(known))
+    low, high = round_range(min(known), max(known))
+    while room and math.log(min(known) / low) < room * math.log(high / low):
+        low, _ = round_range(0.9 * low, high)
     within = [step for step in _round_numbers(low, high) if low <= step <= high]
     if len(within) > 8:  # several decades: their beginnings are enough
         within = [step for step in within if math.log10(step) % 1 < 1e-9]
@@ -131,7 +133,7 @@ def log_axis(values: Iterable[float], *, room: float = 1.0) -> Option:
     return {"type": "log", "min": low, "max": high, "axisLabel": ticks, "axisTick": ticks}
 
 
-def error_axis(metric: Metric, values: Iterable[float], *, room: float = 1.0) -> Option:
+def error_axis(metric: Metric, values: Iterable[float], *, room: float = 0.0) -> Option:
     """An axis of errors that exaggerates nothing: straight from 0, or logarithmic and saying so."""
     known = list(values) or [1.0]
     name = f"{metric.symbol}, {metric.unit}"

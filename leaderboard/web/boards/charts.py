@@ -39,8 +39,8 @@ from leaderboard.web.boards.chart_series import (
     staircase,
 )
 
-# Below the front, where its names are.
-_ROOM: Final = 0.75
+# Below the front, where its names are: this part of the whole height.
+_ROOM: Final = 0.15
 SUBMITTED, QUOTED = "Submissions", "Published results"
 
 

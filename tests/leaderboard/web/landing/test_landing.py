@@ -15,7 +15,7 @@ from leaderboard.web.middleware import page_cache
 from tests import board_rows, builders, pages
 from tests.editions import publish, roll_back
 
-DOORS = ["Get the data", "Submit", "Read the docs", "Paper"]
+DOORS = ["Get the data", "Submit", "Read the docs", "Read the paper"]
 
 
 def landing(client: Client) -> pages.Element:
