@@ -73,7 +73,7 @@ LOCK := $(VENV)-lock/bin/uv pip compile pyproject.toml --extra server --extra fr
 lock: ## pin the dependencies of pyproject.toml anew
 	@$(call find_python) && "$$python" -m venv $(VENV)-lock && $(VENV)-lock/bin/python -m pip install --quiet uv
 	$(LOCK) --output-file requirements.lock
-	$(LOCK) --extra baselines --extra plots --group dev --constraint requirements.lock --output-file requirements-dev.lock
+	$(LOCK) --extra baselines --extra plots --extra parquet --group dev --constraint requirements.lock --output-file requirements-dev.lock
 
 # The parts of Apache ECharts that the charts use. Needs node and the npm registry; the digest of what comes out
 # stands in static/vendored/README.md.

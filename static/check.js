@@ -18,6 +18,7 @@ const KINDS = [
   [[0x50, 0x4b, 0x03, 0x04], "a ZIP archive or a NumPy .npz file; send the JSON file itself"],
   [[0x93, 0x4e, 0x55, 0x4d, 0x50, 0x59], "a NumPy .npy file"],
   [[0x89, 0x48, 0x44, 0x46], "an HDF5 file"],
+  [[0x50, 0x41, 0x52, 0x31], "a Parquet table; tsttc submit sends one, and tsttc convert makes JSON of it"],
   [[0x80], "a Python pickle"],
 ];
 

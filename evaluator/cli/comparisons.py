@@ -16,7 +16,7 @@ from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.gates import named
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units
 from evaluator.cli.options import json_option, sendable, slug, url_option
-from evaluator.cli.reading import TABLE, bytes_of, naming
+from evaluator.cli.reading import TABLE, naming, predictions_of
 from evaluator.cli.tokens import has_token
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.significance import Difference
@@ -108,7 +108,7 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
     read, reports = [], []
     for path in (first, second):
         with naming(path):
-            predictions = read_predictions(bytes_of(path), manifest=truth.manifest)
+            predictions = read_predictions(predictions_of(path), manifest=truth.manifest)
             read.append(predictions)
             reports.append(evaluate(predictions, truth))
     found = compare_predictions(read[0], read[1], truth)

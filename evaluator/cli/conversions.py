@@ -8,7 +8,7 @@ from typing import Literal
 import click
 
 from evaluator.cli.options import output_option, predictions_argument
-from evaluator.cli.reading import FOLDER, bytes_of, naming, write_bytes
+from evaluator.cli.reading import FOLDER, naming, predictions_of, write_bytes
 
 GAP = click.IntRange(1, 5)
 RATE = click.FloatRange(min=0, min_open=True)
@@ -47,7 +47,7 @@ def convert(
     annotations: Path | None,
     output: Path | None,
 ) -> None:
-    """Convert PREDICTIONS, a JSON file or - for standard input, to another unit, rate, or kind of keys.
+    """Convert PREDICTIONS, a prediction file or - for standard input, to another unit, rate, or kind of keys.
 
     An envelope states the kind of its values. A flat file, from key to number, contains scale ratios if
     --frame-gap or --fps is given, and seconds otherwise.
@@ -78,7 +78,7 @@ def convert(
 
         with naming(annotations):
             natural_keys = read_numbering(annotations).natural_keys
-    data = bytes_of(predictions)
+    data = predictions_of(predictions)
     with naming(predictions):
         try:
             found = converted(

@@ -13,7 +13,7 @@ from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
 from evaluator.cli.options import json_option, output_option, predictions_argument, slug, url_option
-from evaluator.cli.reading import FOLDER, TABLE, bytes_of, name_of, naming, write_bytes
+from evaluator.cli.reading import FOLDER, TABLE, name_of, naming, predictions_of, write_bytes
 from evaluator.cli.warnings_in_words import (
     echo_warnings,
     numbering_in_words,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
 )
 @json_option
 def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | None, as_json: bool) -> None:
-    """Check whether PREDICTIONS, a JSON file or - for standard input, is complete and well-formed.
+    """Check whether PREDICTIONS, a prediction file or - for standard input, is complete and well-formed.
 
     The command uses the rules of the server and sends nothing. A warning is not an error: the values probably
     belong to other sequences. Without --manifest, --annotations defines the sequences.
@@ -57,7 +57,7 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
 
     sequences, numbering = _sequences(manifest_path, annotations)
     with naming(predictions):
-        found = read_predictions(bytes_of(predictions), manifest=sequences)
+        found = read_predictions(predictions_of(predictions), manifest=sequences)
     warnings = warnings_of(found)
     if numbering is not None and annotations is not None:
         warnings += numbering_warnings(numbering, found, predictions=predictions, annotations=annotations)

@@ -10,7 +10,8 @@ from typing import Final
 
 import click
 
-from evaluator.cli.failures import rejected
+from evaluator.cli.exits import Exit
+from evaluator.cli.failures import Failure, rejected
 from evaluator.problems import Rejected
 
 TABLE: Final = click.Path(exists=True, path_type=Path)
@@ -39,6 +40,32 @@ def bytes_of(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
+
+
+def predictions_of(path: Path) -> bytes:
+    """A prediction file, or standard input, in a form that the leaderboard takes."""
+    return as_sent(bytes_of(path), path)
+
+
+def as_sent(data: bytes, path: Path) -> bytes:
+    """The same predictions as the leaderboard takes them: a Parquet table becomes JSON."""
+    from evaluator.predictions import parquet  # noqa: PLC0415 -- few files need it
+
+    with naming(path):
+        try:
+            return parquet.as_sent(data)
+        except ModuleNotFoundError:
+            raise without_pyarrow(f"Reading {name_of(path)}, a Parquet table,") from None
+
+
+def without_pyarrow(what: str) -> Failure:
+    """The failure for a table that this machine cannot read or write."""
+    return Failure(
+        f"{what} needs pyarrow, which is not installed.",
+        exit_code=Exit.USAGE,
+        code="not-installed",
+        hint="Install it with: pip install pyarrow",
+    )
 
 
 def write_bytes(path: Path, data: bytes, *, option: str = "-o") -> None:

@@ -14,7 +14,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, result_in_words, short_name, units
 from evaluator.cli.options import json_option
-from evaluator.cli.reading import TABLE, bytes_of, name_of, naming, write_bytes
+from evaluator.cli.reading import TABLE, name_of, naming, predictions_of, without_pyarrow, write_bytes
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 from evaluator.tables.results import WRITERS, ResultRow, names_of
@@ -79,7 +79,7 @@ class _Scored:
     "per_sequence",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Write the errors of every sequence to this CSV file.",
+    help="Write the errors of every sequence to this file: CSV, or Parquet if its name ends so.",
 )
 @click.option(
     "--format",
@@ -103,7 +103,7 @@ def score(
     fail_if: list[gates.Condition],
     as_json: bool,
 ) -> None:
-    """Score PREDICTIONS, one or more JSON files or - for standard input, against your ground truth.
+    """Score PREDICTIONS, one or more files or - for standard input, against your ground truth.
 
     The scores equal those of the server: two decimals as on the board, full float64 with --json. If you have
     the dataset, give its annotation folder. Several files make one table. A warning means that the
@@ -126,7 +126,7 @@ def score(
         for one in found:
             _warn(one, alone=len(found) == 1)
     if per_sequence is not None:
-        write_bytes(per_sequence, _per_sequence(found).encode(), option="--per-sequence")
+        write_bytes(per_sequence, _per_sequence(found, per_sequence), option="--per-sequence")
     if with_intervals and not as_json and not any(any(row.intervals.values()) for row in rows):
         click.echo(f"There are no confidence intervals: {FEW}.", err=True)
     tabular = by is not None or with_intervals or len(found) > 1
@@ -167,7 +167,7 @@ def plot(
     output: Path,
     as_json: bool,
 ) -> None:
-    """Draw a figure of PREDICTIONS, one or more JSON files or - for standard input. Needs matplotlib.
+    """Draw a figure of PREDICTIONS, one or more files or - for standard input. Needs matplotlib.
 
     Several files are drawn into one figure: name the files as the legend is to name the methods.
 
@@ -222,7 +222,7 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iter
     names = [path.name for path in paths]
     for path in paths:
         with naming(path):
-            read = read_predictions(bytes_of(path), manifest=truth.manifest)
+            read = read_predictions(predictions_of(path), manifest=truth.manifest)
             report = evaluate(read, truth, protocol=protocol, keep_sequences=True)
         yield _Scored(
             path.name if names.count(path.name) == 1 and path.name != "-" else name_of(path),
@@ -343,8 +343,9 @@ def _counts_in_words(report: Report) -> str:
     return f"{report.n_sequences:,} sequences, protocol {report.protocol}, truth {report.truth_digest}"
 
 
-def _per_sequence(found: Sequence[_Scored]) -> str:
+def _per_sequence(found: Sequence[_Scored], path: Path) -> bytes:
     from evaluator.tables.formats import csv_lines  # noqa: PLC0415 -- needed here alone
+    from evaluator.tables.parquet_tables import parquet_of  # noqa: PLC0415 -- needed here alone
 
     tables = [one.report.records() for one in found]
     columns = ["file", *tables[0]]
@@ -353,7 +354,12 @@ def _per_sequence(found: Sequence[_Scored]) -> str:
         for one, table in zip(found, tables, strict=True)
         for values in zip(*table.values(), strict=True)
     )
-    return "".join(csv_lines(records, columns=columns))
+    if path.suffix.lower() != ".parquet":
+        return "".join(csv_lines(records, columns=columns)).encode()
+    try:
+        return parquet_of(records, columns=columns)
+    except ModuleNotFoundError:
+        raise without_pyarrow("Writing a Parquet table") from None
 
 
 def _judge(conditions: list[gates.Condition], found: Sequence[_Scored]) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import sys
@@ -9,13 +10,15 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO
+from typing import TYPE_CHECKING, BinaryIO, cast
 
 import click
 
 from evaluator.cli.failures import rejected
 from evaluator.cli.paths import cache_folder
+from evaluator.cli.reading import as_sent
 from evaluator.cli.warnings_in_words import echo_warnings
+from evaluator.predictions.parquet import N_MAGIC_BYTES, is_parquet
 from evaluator.problems import Rejected
 
 if TYPE_CHECKING:
@@ -28,13 +31,22 @@ LARGEST_CHECKED_BYTES = 64_000_000
 
 @contextmanager
 def opened(path: Path) -> Iterator[BinaryIO]:
-    """The file to send. What can be read only once is kept first, so that sending can be repeated."""
+    """The file to send. What can be read only once is kept first, so that sending can be repeated.
+
+    In place of a Parquet table stands the JSON of the same predictions.
+    """
     try:
         source = nullcontext(sys.stdin.buffer) if str(path) == "-" else path.open("rb")
         with source as file, tempfile.TemporaryFile() as kept:
             if not file.seekable():
                 shutil.copyfileobj(file, kept)
-            yield file if file.seekable() else kept
+            found = cast("BinaryIO", file if file.seekable() else kept)
+            found.seek(0)
+            if is_parquet(found.read(N_MAGIC_BYTES)):
+                found.seek(0)
+                found = io.BytesIO(as_sent(found.read(), path))
+            found.seek(0)
+            yield found
     except OSError as error:
         raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
 

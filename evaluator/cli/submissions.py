@@ -100,7 +100,7 @@ def submit(
     as_json: bool,
     **details: str | None,
 ) -> None:
-    """Submit PREDICTIONS, a JSON file or - for standard input, to the leaderboard.
+    """Submit PREDICTIONS, a prediction file or - for standard input, to the leaderboard.
 
     The command first checks the file with the code of the server. Submitting the same file again is safe:
     the server answers with the first submission. If the method is public or anonymous, the command says so
@@ -220,6 +220,8 @@ def _warn(notice: str, *, err: bool) -> None:
 
 
 def _name_to_send(path: Path) -> str:
+    if path.suffix.lower() == ".parquet":  # JSON is sent in its place
+        path = path.with_suffix(".json")
     return path.name if str(path) != "-" and is_utf8(path.name) else "predictions.json"
 
 

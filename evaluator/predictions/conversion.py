@@ -27,6 +27,7 @@ from evaluator.predictions.alignment import (
 )
 from evaluator.predictions.documents import Document, Members, Unit, parse, read_document
 from evaluator.predictions.packages import json_of
+from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import write_predictions
 from evaluator.problems import Findings, listed, quoted
 
@@ -51,7 +52,7 @@ def convert(
 
     Raises `Rejected` for what no prediction file may hold, `ValueError` for rates that do not fit together.
     """
-    document = read_document(parse(json_of(data_of(source))))
+    document = read_document(parse(json_of(as_sent(data_of(source)))))
     _require_one_rate(document, fps_hz, frame_gap)
     findings = Findings()
     names = [name for name, _ in document.predictions]

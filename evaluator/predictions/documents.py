@@ -38,6 +38,7 @@ _LOOKS_LIKE: Final = {
     b"PK\x03\x04": "a ZIP archive or a NumPy .npz file; send the JSON file itself",
     b"\x93NUMPY": "a NumPy .npy file",
     b"\x89HDF": "an HDF5 file",
+    b"PAR1": "a Parquet table; tsttc submit sends one, and tsttc convert makes JSON of it",
     b"\x80": "a Python pickle",
 }
 

@@ -11,7 +11,7 @@ import io
 import json
 import re
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Final
 
 from evaluator.problems import quoted, reject
@@ -87,7 +87,7 @@ def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
     rows = csv.reader(io.StringIO(text.lstrip(), newline=""), strict=True)
     try:
         header = [name.strip() for name in next(rows)]
-        return _document(header, _checked(rows, n_fields=len(header), max_rows=max_rows))
+        return document_of(header, _checked(rows, n_fields=len(header), max_rows=max_rows))
     except csv.Error as error:
         message = f"This is not a CSV table: {error}."
         raise reject("bad-csv", message, f"line {rows.line_num}") from None
@@ -104,38 +104,52 @@ def _checked(rows: Iterator[list[str]], *, n_fields: int, max_rows: int | None) 
         yield row
 
 
-def _document(header: list[str], rows: Iterator[list[str]]) -> bytes:
-    """The flat form for seconds, an envelope for scale ratios; keys that appear twice stay there twice."""
-    columns = {name: header.index(name) for name in header}
-    keys = NATURAL_KEY if set(NATURAL_KEY) <= set(columns) else ("anno_id",)
-    values = [name for name in VALUES if name in columns]
-    rates = [name for name in RATES if name in columns]
-    is_ratio = values == ["scale_ratio"]
-    if not set(keys) <= set(columns) or len(values) != 1 or len(rates) != is_ratio:
+def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
+    """Of the columns of a table, those of the key, that of the value and, of scale ratios, that of the rate.
+
+    Raises `Rejected` for a table without the columns that it needs.
+    """
+    keys = NATURAL_KEY if set(NATURAL_KEY) <= set(header) else ("anno_id",)
+    values = [name for name in VALUES if name in header]
+    rates = [name for name in RATES if name in header]
+    if not set(keys) <= set(header) or len(values) != 1 or len(rates) != (values == ["scale_ratio"]):
         message = f"The table has the columns {quoted(','.join(header))}; {_EXPECTED}."
         raise reject("missing-columns", message, "line 1")
-    places, value = [columns[name] for name in keys], columns[values[0]]
+    return keys, values[0], rates[0] if rates else None
+
+
+def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> bytes:
+    """The JSON text of a table: the flat form for seconds, an envelope for scale ratios.
+
+    Keys that appear twice stay there twice. A field of None has no value; those of keys have one. Raises
+    `Rejected` for a table without the columns that it needs.
+    """
+    keys, value, rate = columns_of(header)
+    columns = {name: header.index(name) for name in header}
+    places = [columns[name] for name in keys]
     members, ratios = list[str](), list[str]()
     for row in rows:
-        name = json.dumps("/".join(row[place].strip() for place in places))
-        members.append(f"{name}:{_number(row[value])}")
-        if is_ratio:
-            ratios.append(f"{name}:{_number(row[columns[rates[0]]])}")
-    if not is_ratio:
+        name = json.dumps("/".join((row[place] or "").strip() for place in places))
+        members.append(f"{name}:{_number(row[columns[value]])}")
+        if rate is not None:
+            ratios.append(f"{name}:{_number(row[columns[rate]])}")
+    if rate is None:
         return _object(members)
-    rate = _object(ratios).decode()
-    return f'{{"unit":"scale_ratio","{rates[0]}":{rate},"predictions":{_object(members).decode()}}}'.encode()
+    rates = _object(ratios).decode()
+    return f'{{"unit":"scale_ratio","{rate}":{rates},"predictions":{_object(members).decode()}}}'.encode()
 
 
 def _object(members: Sequence[str]) -> bytes:
     return f"{{{','.join(members)}}}".encode()
 
 
-def _number(text: str) -> str:
+def _number(text: str | None) -> str:
     """A field as JSON: the nearest float64 of a number, else the text, which the reader refuses.
 
-    >>> _number(" 5.31"), _number("inf"), _number("")
-    ('5.31', 'Infinity', '""')
+    >>> _number(" 5.31"), _number("inf"), _number(""), _number(None)
+    ('5.31', 'Infinity', '""', 'null')
     """
+    if text is None:
+        return "null"
     text = text.strip()
     return json.dumps(float(text)) if _NUMBER.fullmatch(text) else json.dumps(text)

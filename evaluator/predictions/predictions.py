@@ -1,6 +1,6 @@
 """Prediction files: bytes in, values aligned with a manifest out, or a `Rejected` that says why.
 
-The format is described in docs/file-format.md. Nothing but `Rejected` leaves `read_predictions`, whatever
+The format is described in docs/file-format.md. Nothing but `Rejected` leaves `read_sent`, whatever
 the bytes; every sequence of the manifest ends up with exactly one finite or infinite value that is neither 0
 nor NaN.
 """
@@ -20,6 +20,7 @@ from evaluator.predictions.alignment import KeyKind, read_slowly
 from evaluator.predictions.columns import read_column
 from evaluator.predictions.documents import Unit
 from evaluator.predictions.packages import json_of
+from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import rate_of, require_values
 from evaluator.problems import pointer, reject
 from evaluator.truth.truth import Manifest
@@ -93,12 +94,18 @@ def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | Non
     """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault of the file.
 
     `source` is a path, the bytes of the file or the file itself, open, in any form of docs/file-format.md;
-    larger than `max_bytes` it is not looked at.
+    larger than `max_bytes` it is not looked at. The digest is that of the bytes, of a Parquet table that of
+    the JSON that is sent in its place; such a table needs pyarrow (`ModuleNotFoundError` without).
     """
     require(manifest, Manifest, name="manifest")
     data = data_of(source)
     if max_bytes is not None and len(data) > max_bytes:
         raise reject("too-large", f"The file has {len(data):,} bytes; expected at most {max_bytes:,}.")
+    return read_sent(as_sent(data), manifest=manifest)
+
+
+def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
+    """As `read_predictions`, in the forms that a leaderboard takes: bytes of strangers come here."""
     text = json_of(data, max_rows=2 * manifest.n_sequences + 100_000)
     found = read_column(text, manifest) or read_slowly(text, manifest)
     found.ttc_s.setflags(write=False)

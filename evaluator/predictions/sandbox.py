@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, limit, obey_the_parent_alone
-from evaluator.predictions.predictions import read_predictions
+from evaluator.predictions.predictions import read_sent
 from evaluator.problems import Rejected
 from evaluator.truth.truth import Manifest
 
@@ -33,11 +33,12 @@ def warm_up(manifest: Manifest) -> None:
         b"\xff",
         b'{"a":"b"}',
         b"\x1f\x8b",
+        b"PAR1",
         b"anno_id,ttc\n\xff",
         b"anno_id,ttc\n0,x\n",
     ):
         try:
-            read_predictions(sample, manifest=manifest)
+            read_sent(sample, manifest=manifest)
         except Rejected:
             continue
 
@@ -45,7 +46,7 @@ def warm_up(manifest: Manifest) -> None:
 def answer(data: bytes, *, manifest: Manifest) -> bytes:
     """The header line for these bytes, and the values behind it if they are good."""
     try:
-        predictions = read_predictions(data, manifest=manifest)
+        predictions = read_sent(data, manifest=manifest)
     except Rejected as rejected:
         return json.dumps({"verdict": "rejected", **rejected.as_dict()}).encode() + b"\n"
     header = {

@@ -57,6 +57,13 @@ CASES: dict[str, tuple[Any, ...]] = {
         "The file looks like a PNG image.",
         "byte 0",
     ),
+    "a Parquet table": (
+        b"PAR1",
+        "not-json",
+        'The text is not JSON: expecting value, found "PAR1". '
+        "The file looks like a Parquet table; tsttc submit sends one, and tsttc convert makes JSON of it.",
+        "line 1, column 1",
+    ),
     "a ZIP archive": (
         b"PK\x03\x04",
         "not-json",

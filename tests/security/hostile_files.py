@@ -103,6 +103,7 @@ WHOLE: dict[str, bytes] = {
     + b"&b;" * 1000
     + b"</a>",
     "a picture": b"\x89PNG\r\n\x1a\n" + bytes(200),
+    "Parquet": b"PAR1" + bytes(200) + b"PAR1",
     "a program": b"\x7fELF" + bytes(500),
     "a document": b"%PDF-1.7\n" + bytes(200),
     "a pickle": pickle.dumps({"0": 1.0}),

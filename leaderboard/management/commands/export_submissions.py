@@ -7,6 +7,7 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 
 from evaluator.tables.formats import csv_lines
+from evaluator.tables.parquet_tables import parquet_of
 from leaderboard.exports import submission_tables
 from leaderboard.models import Split
 from leaderboard.storage import files
@@ -15,7 +16,7 @@ from leaderboard.storage import files
 class Command(BaseCommand):
     """Writes every submission with its published numbers into a table."""
 
-    help = "Write all submissions with all numbers into FILE.csv, or FILE.parquet (needs pandas and pyarrow)."
+    help = "Write all submissions with all numbers into FILE.csv, or FILE.parquet (needs pyarrow)."
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """Where to, and of what."""
@@ -46,8 +47,6 @@ def _write(path: Path, rows: list[dict[str, object]]) -> None:
             out.writelines(csv_lines(rows, columns=columns))
         return
     try:
-        import pandas as pd  # noqa: PLC0415 - an extra
-
-        pd.DataFrame(rows, columns=list(columns)).to_parquet(path, index=False)
-    except ImportError as missing:
-        raise CommandError("Parquet needs pandas and pyarrow: pip install pandas pyarrow.") from missing
+        path.write_bytes(parquet_of(rows, columns=columns))
+    except ModuleNotFoundError as missing:
+        raise CommandError(f"{missing}.") from missing

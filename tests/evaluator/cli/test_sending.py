@@ -10,6 +10,7 @@ import pytest
 from click.testing import Result
 
 from evaluator import read_manifest
+from evaluator.tables.parquet_tables import parquet_of
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
 from tests.evaluator.worlds import EXAMPLES, Tsttc, on_terminal, process
 
@@ -54,6 +55,18 @@ def test_bad_file_is_told_in_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc
     assert (document["code"], document["n_problems"]) == ("rejected", 7)
     assert submit(tsttc, "broken.json", "--no-check").exit_code == 0
     assert len(site.posts) == 1
+
+
+def test_parquet_is_sent_as_json(tsttc: Tsttc, site: RecordedSite, tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    put_manifest(site)
+    path = tmp_path / "mine.parquet"
+    rows = [{"anno_id": row, "ttc": 1.5 + row} for row in range(60)]
+    path.write_bytes(parquet_of(rows, columns=["anno_id", "ttc"]))
+    assert tsttc("submit", path, "--split", "val", "--method", "Foo++").exit_code == 0
+    name, content = site.posts[0].parts()["file"]
+    assert name == "mine.json"
+    assert json.loads(content) == {str(row): 1.5 + row for row in range(60)}
 
 
 def test_manifest_is_fetched_once_as_anybody_and_kept_under_its_digest(

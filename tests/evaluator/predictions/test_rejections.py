@@ -6,6 +6,7 @@ import pytest
 
 from evaluator import PROBLEM_CODES, Manifest, Problem, Rejected, read_predictions
 from evaluator.predictions.documents import parse
+from evaluator.predictions.predictions import read_sent
 from tests.evaluator.faulty_files import CASES, GOOD, MANIFEST
 from tests.evaluator.worlds import flat, make_truth
 
@@ -19,9 +20,10 @@ def rejection(data: bytes, *, manifest: Manifest = MANIFEST, max_bytes: int | No
 @pytest.mark.parametrize("name", CASES)
 def test_a_faulty_file_is_rejected_in_these_words(name: str) -> None:
     data, *problem = CASES[name]
-    rejected = rejection(data)
-    assert rejected.problems[0] == Problem(*problem)
-    assert all(found.code in PROBLEM_CODES for found in rejected.problems)
+    with pytest.raises(Rejected) as rejected:
+        read_sent(data, manifest=MANIFEST)
+    assert rejected.value.problems[0] == Problem(*problem)
+    assert all(found.code in PROBLEM_CODES for found in rejected.value.problems)
 
 
 def test_an_empty_object_misses_everything() -> None:

@@ -48,6 +48,15 @@ def test_addresses_and_other_splits_are_there_only_if_asked_for(
     assert read(path) == []
 
 
+def test_parquet_has_the_rows_of_csv(entries: list[Submission], tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet", reason="pyarrow is not installed")
+    for name in ("all.csv", "all.parquet"):
+        call_command("export_submissions", str(tmp_path / name), stdout=StringIO())
+    found = parquet.read_table(tmp_path / "all.parquet").to_pylist()
+    assert [row["submission"] for row in found] == [row["submission"] for row in read(tmp_path / "all.csv")]
+    assert [row["mid"] for row in found] == [float(row["mid"]) for row in read(tmp_path / "all.csv")]
+
+
 @pytest.mark.parametrize(
     ("name", "split", "message"),
     [
