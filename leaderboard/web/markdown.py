@@ -32,10 +32,11 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """What stands below one heading, as plain text: what a search looks through."""
+    """What stands below one heading, as plain text, its blocks of code apart: what a search looks through."""
 
     heading: TextHeading
     text: str
+    code: str
 
 
 @dataclass(frozen=True)
@@ -96,15 +97,16 @@ def _inline(tokens: Sequence[Token]) -> list[Token]:
 def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     """Give headings their anchors and tables their classes, and take the plain text of each part."""
     parts: list[Part] = []
-    heading, texts, anchors = TextHeading(0, "", ""), list[str](), set[str]()
+    heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
-            parts.append(Part(heading, " ".join(texts)))
+            parts.append(Part(heading, " ".join(texts), " ".join(code)))
             words = _plain(tokens[at + 1])
             heading, texts = TextHeading(int(token.tag[1]), words, _anchor(words, anchors)), []
+            code = []
             token.attrSet("id", heading.anchor)
         elif token.type in {"fence", "code_block"}:
-            texts.append(token.content)
+            code.append(token.content)
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
             texts.append(_plain(token))
         elif token.type in {"th_open", "td_open"}:
@@ -112,12 +114,12 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
                 token.attrSet("class", "number")
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
-    parts.append(Part(heading, " ".join(texts)))
+    parts.append(Part(heading, " ".join(texts), " ".join(code)))
     html = parser.renderer.render(tokens, parser.options, {})
     html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)
-    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
+    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text or part.code))
 
 
 def _plain(token: Token) -> str:

@@ -2,32 +2,29 @@
 
 A word also finds what begins with it, as "quot" finds "quota"; a short one only itself and its plural.
 
-On the server, so that it works without a script and needs nothing that the site's policy forbids. The pages
-are few enough to be kept as words in memory.
+On the server, so that it works without a script and needs nothing that the site's policy forbids.
 """
 
 import math
 import re
-from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection
 from dataclasses import dataclass
-from functools import cache
 from operator import mul
 from typing import Final
 
-from django.urls import reverse
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-from leaderboard.web.docs import api_reference, guides
+from leaderboard.web.docs.findable import Place, places, words
 
 MAX_QUERY: Final = 100
 MAX_HITS: Final = 20
 _MAX_WORDS: Final = 8
-_WORD: Final = re.compile(r"[^\W_]+")
-# What a word in a title, and in a heading, counts beside one in the text.
+# What a word in a title, in a heading, and among what is defined there, counts beside one in the text.
 _IN_TITLE: Final = 2.0
 _IN_HEADING: Final = 3.0
+_IN_TERMS: Final = 3.0
+_OF_BEGINNING: Final = 0.5
 _SNIPPET: Final = 200
 _BEFORE: Final = 60
 # A shorter word stands for itself: "to" is not the beginning of "token".
@@ -35,46 +32,12 @@ _MIN_BEGINNING: Final = 4
 _ENDINGS: Final = ("es", "s", "")
 # What people write around the words that they look for.
 _FILLERS: Final = frozenset(
-    [
-        *(
-            "a",
-            "an",
-            "and",
-            "are",
-            "be",
-            "by",
-            "can",
-            "do",
-            "does",
-            "for",
-            "from",
-            "how",
-            "i",
-            "if",
-            "in",
-            "is",
-        ),
-        *("it", "my", "of", "on", "or", "that", "the", "this", "to", "what", "when", "where", "which", "who"),
-        *("why", "will", "with"),
-    ]
+    re.findall(
+        "[a-z]+",
+        "a an and are be by can do does for from get have how i if in is it me my of on or that the there "
+        "this to we what when where which who why will with you your",
+    )
 )
-# What explains why something is as it is counts less than what explains how to use it.
-_BACKGROUND: Final = ("adr/", "changelog")
-_OF_BACKGROUND: Final = 0.4
-
-
-@dataclass(frozen=True)
-class _Findable:
-    """A part of a page that can be found."""
-
-    title: str
-    heading: str
-    address: str
-    text: str
-    factor: float
-    words: Counter[str]
-    heading_words: frozenset[str]
-    title_words: frozenset[str]
 
 
 @dataclass(frozen=True)
@@ -89,16 +52,16 @@ class Hit:
 
 def find(query: str) -> list[Hit]:
     """At most `MAX_HITS` parts; those with some of the words where none has all of them."""
-    words = _words(query[:MAX_QUERY])
-    asked = ([word for word in words if word not in _FILLERS] or words)[:_MAX_WORDS]
+    typed = words(query[:MAX_QUERY])
+    asked = ([word for word in typed if word not in _FILLERS] or typed)[:_MAX_WORDS]
     if not asked:
         return []
-    places = _places()
-    weights = [[_weight(place, word) for word in asked] for place in places]
-    rare = [math.log(1 + len(places) / (1 + sum(row[n] > 0 for row in weights))) for n in range(len(asked))]
+    known = places()
+    weights = [[_weight(place, word) for word in asked] for place in known]
+    rare = [math.log(1 + len(known) / (1 + sum(row[n] > 0 for row in weights))) for n in range(len(asked))]
     found = [
-        (all(row), place.factor * sum(map(mul, row, rare)), place)
-        for row, place in zip(weights, places, strict=True)
+        (all(row), place.part.factor * sum(map(mul, row, rare)), place)
+        for row, place in zip(weights, known, strict=True)
         if any(row)
     ]
     if any(has_all for has_all, _, _ in found):
@@ -107,19 +70,30 @@ def find(query: str) -> list[Hit]:
     return [_hit(place, asked) for _, _, place in found[:MAX_HITS]]
 
 
-def _weight(place: _Findable, word: str) -> float:
-    n_times = sum(n for known, n in place.words.items() if _fits(known, word))
-    weight = 1 + math.log(n_times) if n_times else 0.0
-    weight += _IN_HEADING * any(_fits(known, word) for known in place.heading_words)
-    return weight + _IN_TITLE * any(_fits(known, word) for known in place.title_words)
+def _weight(place: Place, word: str) -> float:
+    n_times = sum(n * _share((known,), word) for known, n in place.words.items() if _fits(known, word))
+    weight = math.log(math.e * n_times + 1) if n_times else 0.0
+    weight += _IN_TERMS * _share(place.term_words, word)
+    weight += _IN_HEADING * _share(place.heading_words, word)
+    return weight + _IN_TITLE * _share(place.title_words, word)
+
+
+def _share(known: Collection[str], word: str) -> float:
+    """1 where the word or its plural is, less where it only begins another, as "data" begins "database"."""
+    if any(word + ending in known for ending in _ENDINGS):
+        return 1.0
+    return _OF_BEGINNING * any(_fits(each, word) for each in known)
 
 
 def _fits(known: str, word: str) -> bool:
     return known.startswith(word) and (len(word) >= _MIN_BEGINNING or known[len(word) :] in _ENDINGS)
 
 
-def _hit(place: _Findable, asked: list[str]) -> Hit:
-    return Hit(place.title, place.heading, place.address, _snippet(place.text, asked))
+def _hit(place: Place, asked: list[str]) -> Hit:
+    part = place.part
+    is_in_text = any(_fits(known, word) for known in words(part.text) for word in asked)
+    text = part.text if is_in_text or not part.code else part.code
+    return Hit(part.title, part.heading, part.address, _snippet(text, asked))
 
 
 def _snippet(text: str, asked: list[str]) -> SafeString:
@@ -141,53 +115,3 @@ def _snippet(text: str, asked: list[str]) -> SafeString:
         "", "{}", ((format_html("<mark>{}</mark>", p) if n % 2 else p,) for n, p in enumerate(pieces))
     )
     return format_html("{}{}{}", "… " if begin else "", drawn, " …" if end > 0 else "")
-
-
-def _words(text: str) -> list[str]:
-    return [word.lower() for word in _WORD.findall(text)]
-
-
-@cache
-def _places() -> list[_Findable]:
-    return [
-        _Findable(
-            title=title,
-            heading=heading,
-            address=address,
-            text=text,
-            factor=factor,
-            words=Counter(_words(text)),
-            heading_words=frozenset(_words(heading)),
-            title_words=frozenset(_words(title)),
-        )
-        for title, heading, address, text, factor in (*_guides(), *_reference())
-    ]
-
-
-def _guides() -> Iterator[tuple[str, str, str, str, float]]:
-    for name in guides.files():
-        factor = _OF_BACKGROUND if name.startswith(_BACKGROUND) else 1.0
-        document = guides.guide(name)
-        for part in document.parts:
-            is_title = part.heading.level < 2
-            place = "" if is_title else f"#{part.heading.anchor}"
-            text = " ".join(part.text.split())
-            heading = "" if is_title else part.heading.text
-            yield document.title, heading, _address(name) + place, text, factor
-
-
-def _address(name: str) -> str:
-    return reverse("guide", args=[name])
-
-
-def _page_of(operation_id: str) -> str:
-    return reverse("api_operation", args=[operation_id])
-
-
-def _reference() -> Iterator[tuple[str, str, str, str, float]]:
-    api = api_reference.reference()
-    page = reverse("api_reference")
-    for operation in api["operations"]:
-        yield "API reference", operation["name"], _page_of(operation["id"]), operation["about"], 1.0
-    for code, about in (*api["codes"], *api["file_codes"]):
-        yield "Problem codes", code, f"{page}#problem-{code}", about.replace("`", ""), 1.0

@@ -140,6 +140,10 @@ def found(client: Client, query: str) -> list[tuple[str, str]]:
         ("scale ratio to ttc", "/docs/cli/#convert"),
         ("how to get an API token", "/docs/access/#tokens"),
         ("box", "/docs/baselines/"),
+        ("how do I get the data", "/docs/faq/#how-do-i-get-the-data"),
+        ("external data", "/rules/"),
+        ("what is an edition", "/docs/editions/"),
+        ("kernel size", "/published/#ablation-kernel-size"),
     ],
 )
 def test_what_people_look_for_is_among_the_first_five(
@@ -147,6 +151,15 @@ def test_what_people_look_for_is_among_the_first_five(
 ) -> None:
     first = [place for place, _ in found(client, query)[:5]]
     assert any(place.startswith(address) for place in first), first
+
+
+def test_what_a_word_means_comes_before_the_examples_that_have_it() -> None:
+    assert [hit.address for hit in search.find("what is MiD")[:2]] == [
+        "/docs/#metrics",
+        "/docs/faq/#what-is-mid",
+    ]
+    assert search.find("time to contact")[0].address == "/docs/faq/#what-is-time-to-contact"
+    assert search.find("rank range")[0].address.endswith(("#uncertainty", "#rank-ranges"))
 
 
 def test_every_address_that_the_search_gives_is_a_place(
