@@ -1,13 +1,16 @@
 """Boards: the current one of each split, and that of every published edition."""
 
 from datetime import datetime
+from typing import Final
 
+from django.http import HttpResponse, HttpResponseBase, StreamingHttpResponse
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
-from rest_framework.response import Response
 from rest_framework.views import APIView
 
+from leaderboard.api import board_document
+from leaderboard.api.parsers import UniformJSONRenderer
 from leaderboard.api.schema import errors
 from leaderboard.api.serializers import BoardSerializer
 from leaderboard.api.throttling import AsOfThrottle
@@ -17,6 +20,8 @@ from leaderboard.exports import tables
 from leaderboard.http import A_PAST_DAY, one_of
 from leaderboard.models import Edition, Split
 
+# Rows: what a board of so many says is about a megabyte.
+MAX_WHOLE: Final = 1500
 SORT = OpenApiParameter("sort", str, description="Name of a column; `-` before it: descending.")
 AT = OpenApiParameter("at", str, description="The board as of this date or time.")
 INTERVALS = OpenApiParameter(
@@ -39,7 +44,7 @@ FILTERS = [
 
 def _board(
     request: Request, *, split: Split, edition: Edition | None = None, at: datetime | None = None
-) -> Response:
+) -> HttpResponseBase:
     query = request.query_params
     board = snapshots.board(
         split=split,
@@ -49,8 +54,12 @@ def _board(
         at=at,
         filters=filters.parse(query.dict()),
     )
-    context = {"has_intervals": tables.is_asked_for("intervals", query.get("intervals", ""))}
-    return Response(BoardSerializer(board, context=context).data)
+    has_intervals = tables.is_asked_for("intervals", query.get("intervals", ""))
+    pieces = board_document.pieces(board, has_intervals=has_intervals)
+    # What the page cache takes in piece by piece. Of what is one reader's alone, the ETag needs the whole.
+    is_whole = len(board.entries) <= MAX_WHOLE or request.user.is_authenticated
+    kind = HttpResponse if is_whole else StreamingHttpResponse
+    return kind(pieces, content_type=UniformJSONRenderer.media_type)
 
 
 class BoardView(APIView):
@@ -64,7 +73,7 @@ class BoardView(APIView):
         parameters=[SORT, AT, INTERVALS, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
-    def get(self, request: Request, split: str) -> Response:
+    def get(self, request: Request, split: str) -> HttpResponseBase:
         """Submissions and quoted rows, ranked by published MiD; filters do not change the ranks."""
         query = request.query_params
         at = boards.parse_time(query["at"]) if query.get("at") else None
@@ -81,7 +90,7 @@ class EditionBoardView(APIView):
         parameters=[SORT, INTERVALS, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
-    def get(self, request: Request, split: str, number: int) -> Response:
+    def get(self, request: Request, split: str, number: int) -> HttpResponseBase:
         """Submissions and quoted rows as this edition ranks them."""
         edition = published_edition(split, number)
         return _board(request, split=edition.split, edition=edition)

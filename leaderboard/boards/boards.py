@@ -1,13 +1,13 @@
 """Boards: the rows of a split in one edition, submissions and published results together, at any time."""
 
 from collections import Counter
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import UTC, datetime, time
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
-from django.db.models import Count, Exists, OuterRef, Q
+from django.db.models import Count, Exists, OuterRef, Q, QuerySet
 from django.utils import timezone
 from django.utils.dateparse import parse_date, parse_datetime
 
@@ -16,6 +16,7 @@ from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol,
 from leaderboard.boards.filters import Filters
 from leaderboard.boards.ranking import PRIMARY, Place, in_ranks, key, listed
 from leaderboard.boards.rows import (
+    NO_RANGES,
     Entry,
     Scored,
     flat_scores,
@@ -23,10 +24,12 @@ from leaderboard.boards.rows import (
     profile_of,
     public_reason,
     published_entry,
+    ranges_in,
     scored_in,
     scores_in,
     submitted_entry,
 )
+from leaderboard.db.parts import in_parts
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -238,12 +241,9 @@ def _best_of_each(
     rows = scored_rows.select_related("submission__method__team").defer("report", "problems")
     if at is not None:
         rows = rows.filter(_finished_by(at, method="submission__method"))
-    # Before their scores, which are written with them; in an order of their own, so that bytes keep theirs.
-    evaluations = list(rows.order_by("pk"))
-    scored = scored_in(edition, methods=methods, has_ranges=at is None)
     unscorable = unscorable_in(edition, split=split)
     best: dict[UUID, tuple[Place, Entry]] = {}
-    for evaluation in evaluations:
+    for evaluation, scored in _with_scores(rows, edition=edition, has_ranges=at is None):
         submission = evaluation.submission
         if assuming_visible is not None and submission.method_id == assuming_visible.pk:
             submission.method = assuming_visible
@@ -254,7 +254,7 @@ def _best_of_each(
             continue  # it was never public: no tombstone row
         entry = submitted_entry(
             evaluation,
-            scored.get(evaluation.pk) or Scored.nothing(edition.rules),
+            scored,
             profile=profile_of(method, is_masked=method.is_masked),
             decimals=edition.decimals,
             withdrawn_at=withdrawn_at,
@@ -265,6 +265,18 @@ def _best_of_each(
         if rival is None or place < rival[0]:
             best[method.pk] = place, entry
     return [entry for _, entry in best.values()]
+
+
+def _with_scores(
+    rows: "QuerySet[Evaluation]", *, edition: Edition, has_ranges: bool
+) -> Iterator[tuple[Evaluation, Scored]]:
+    """Each evaluation with its scores; a large board is read in parts, of which only one is in memory."""
+    ranges = ranges_in(edition) if has_ranges else NO_RANGES
+    # In an order of their own, so that bytes keep theirs; before their scores, which are written with them.
+    for evaluations in in_parts(rows.order_by("pk")):
+        scored = scored_in(edition, evaluations=[row.pk for row in evaluations], ranges=ranges)
+        for row in evaluations:
+            yield row, scored.get(row.pk) or Scored.nothing(edition.rules)
 
 
 def _finished_by(at: datetime, *, method: str) -> Q:

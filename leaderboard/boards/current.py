@@ -12,7 +12,7 @@ from leaderboard.models import Edition, Method, Score, Status, Visibility, days
 from leaderboard.models.methods import MethodQuerySet
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Attempt:
     """One standing submission of a method, with its overall scores."""
 

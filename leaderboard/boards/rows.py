@@ -4,10 +4,10 @@ Rows are made from evaluations and from results printed in papers. An anonymous 
 for every page and format: whatever is made of an `Entry` or a `Profile` later cannot tell what neither holds.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Any
+from typing import Any, Final
 from uuid import UUID
 
 from evaluator.metrics.protocol import PRIMARY, Protocol, score_name
@@ -23,7 +23,6 @@ from leaderboard.models import (
     days,
 )
 from leaderboard.models.benchmark import SINCE_EVER
-from leaderboard.models.methods import MethodQuerySet
 
 ANONYMOUS_TEAM = "Anonymous"
 OTHER_REASON = "other"
@@ -43,7 +42,7 @@ class Profile:
     details: Details = field(default_factory=stated)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Interval:
     """Where a value may lie, and its row in that column, at 95 %; None until a worker has computed it."""
 
@@ -57,9 +56,12 @@ class Interval:
 _UNKNOWN = Interval()
 # Best and worst rank, and whether that is the best of its column.
 Range = tuple[int, int, bool]
+# By the evaluation's id a pair of ranks for each column of the protocol.
+KeptRanges = Mapping[str, Sequence[Sequence[int] | None]]
+NO_RANGES: Final[KeptRanges] = {}
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Entry:
     """One row of a board. `scores` has the names of its edition's protocol; None for no value."""
 
@@ -245,36 +247,36 @@ def scored_of(evaluation: Evaluation) -> Scored:
 
 def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
     """The values of every evaluation in an edition: one query, whatever their number."""
-    return {pk: scored.values for pk, scored in scored_in(edition, has_ranges=False).items()}
+    return {pk: scored.values for pk, scored in scored_in(edition).items()}
 
 
 def scored_in(
-    edition: Edition, *, methods: MethodQuerySet | None = None, has_ranges: bool = True
+    edition: Edition, *, evaluations: Collection[UUID] | None = None, ranges: KeptRanges = NO_RANGES
 ) -> dict[UUID, Scored]:
-    """Values and intervals of every evaluation in an edition, or of these methods: two queries.
+    """Values and intervals of every evaluation in an edition, or of these: one query.
 
-    Ranges are of the entries that stand now; without `has_ranges` they are left out, as if there were none.
+    With `ranges_in(edition)` also the rank ranges of the entries that stand now.
     """
     rows = Score.objects.filter(evaluation__edition=edition)
-    if methods is not None:
-        rows = rows.filter(evaluation__submission__method__in=methods)
-    ranges = _ranges_in(edition) if has_ranges else {}
-    nothing: dict[str, Range] = {}
+    if evaluations is not None:
+        rows = rows.filter(evaluation__in=evaluations)
     found: dict[UUID, Scored] = {}
+    placed_in: dict[UUID, dict[str, Range]] = {}
     for pk, metric, interval, value, low, high in rows.values_list(
         "evaluation_id", "metric", "interval", "value", "low", "high"
     ):
         scored = found.get(pk)
         if scored is None:
             scored = found[pk] = Scored.nothing(edition.rules)
+            placed_in[pk] = _by_name(ranges.get(str(pk), ()), edition.rules)
         name = score_name(metric, interval)
-        scored.put(name, value, Interval(low, high, *ranges.get(str(pk), nothing).get(name, ())))
+        scored.put(name, value, Interval(low, high, *placed_in[pk].get(name, ())))
     return found
 
 
-def _ranges_in(edition: Edition) -> dict[str, dict[str, Range]]:
-    kept = EditionRanges.objects.filter(edition=edition).values_list("ranges", flat=True).first() or {}
-    return {pk: _by_name(columns, edition.rules) for pk, columns in kept.items()}
+def ranges_in(edition: Edition) -> KeptRanges:
+    """The rank ranges of the entries that stand now, as they are kept."""
+    return EditionRanges.objects.filter(edition=edition).values_list("ranges", flat=True).first() or NO_RANGES
 
 
 def _by_name(columns: Iterable[Sequence[int] | None], rules: Protocol) -> dict[str, Range]:

@@ -1,11 +1,15 @@
 """Serialization of snapshots, and the cache of those that a process has read."""
 
+import gzip
 import hashlib
+import io
 import threading
+import zlib
 from collections import OrderedDict
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from functools import cache
+from itertools import chain, islice
 from typing import Generic, TypeVar
 
 import msgspec
@@ -30,24 +34,39 @@ class StoredSnapshot:
     body: bytes
 
 
-class _Envelope(msgspec.Struct):
+class _Header(msgspec.Struct):
     shape: str
-    drawn: msgspec.Raw
+    n_entries: int
+    n_attempts: int
+
+
+_ENTRY = msgspec.json.Decoder(Entry)
+_ATTEMPT = msgspec.json.Decoder(Attempt)
 
 
 def encode(drawn: CurrentBoard, *, version: int) -> StoredSnapshot:
-    """What was drawn, as it is kept."""
-    envelope = {"shape": _shape(), "drawn": drawn}
-    etag = _digest(_SORTED.encode(envelope))
-    return StoredSnapshot(version=version, etag=etag, body=msgspec.json.encode(envelope))
+    """What was drawn, as it is kept: compressed lines, of which neither writer nor reader has all at once."""
+    header = _Header(_shape(), len(drawn.entries), len(drawn.attempts))
+    digest, body = hashlib.sha256(), io.BytesIO()
+    with gzip.GzipFile(fileobj=body, mode="wb", compresslevel=6, mtime=0) as lines:
+        for each in chain([header], drawn.entries, drawn.attempts):
+            digest.update(_SORTED.encode(each) + b"\n")
+            lines.write(msgspec.json.encode(each) + b"\n")
+    return StoredSnapshot(version=version, etag=digest.hexdigest()[:32], body=body.getvalue())
 
 
 def decode(body: bytes) -> CurrentBoard | None:
     """What the bytes say; None if another version of this program wrote them."""
     try:
-        envelope = msgspec.json.decode(body, type=_Envelope)
-        return msgspec.json.decode(envelope.drawn, type=CurrentBoard) if envelope.shape == _shape() else None
-    except msgspec.DecodeError:
+        with gzip.GzipFile(fileobj=io.BytesIO(body)) as lines:
+            header = msgspec.json.decode(lines.readline(), type=_Header)
+            if header.shape != _shape():
+                return None
+            return CurrentBoard(
+                entries=tuple(map(_ENTRY.decode, islice(lines, header.n_entries))),
+                attempts=tuple(map(_ATTEMPT.decode, islice(lines, header.n_attempts))),
+            )
+    except (msgspec.DecodeError, zlib.error, EOFError, OSError):
         return None
 
 
@@ -91,6 +110,11 @@ class BoundedCache(Generic[T]):
             while self._total > self._limit:
                 self._forget(next(iter(self._values)))
         return value
+
+    def forget(self, key: str) -> None:
+        """Forget one value."""
+        with self._lock:
+            self._forget(key)
 
     def clear(self) -> None:
         """Forget everything."""

@@ -38,8 +38,16 @@ REDRAW_AFTER = timedelta(seconds=1)
 CHECK_AFTER = timedelta(minutes=2)
 MAX_CHECKS = 3
 
-# By the digest of its content: never wrong, at worst forgotten.
-snapshot_cache = BoundedCache[CurrentBoard](12)
+# In rows; a small board counts as many as it may grow to. Ten thousand take 50 MB.
+MAX_ROWS, MIN_ROWS = 24_000, 1000
+
+
+def _n_rows(_: str, known: tuple[str, CurrentBoard]) -> int:
+    return min(max(len(known[1].entries), MIN_ROWS), MAX_ROWS)
+
+
+# By edition, each with the digest of its content: never wrong, at worst forgotten.
+snapshot_cache = BoundedCache[tuple[str, CurrentBoard]](MAX_ROWS, cost=_n_rows)
 # By split, edition, number and time.
 as_of_cache = BoundedCache[tuple[Entry, ...]](4)
 # One thread of this process draws, the others wait for it; who asks for one of the two never for the other.
@@ -146,7 +154,7 @@ def _as_of(split: Any, edition: Edition | None, at: datetime) -> tuple[Entry, ..
 def shown(*, split: Split, edition: Edition) -> CurrentBoard:
     """What everybody sees of an edition that is or was the board, as of now."""
     etag = _etag(split, edition)
-    found = snapshot_cache.get(etag)
+    found = _known(edition.pk, etag)
     if found is None and etag:
         found = _read([edition.pk]).get(edition.pk)
     return found or _drawn_by_one(edition)
@@ -156,7 +164,7 @@ def shown_on(rows: Sequence[Split]) -> list[tuple[Split, CurrentBoard]]:
     """What everybody sees of each of these splits' boards, where there is one; `rows` are of `splits()`."""
     with_board = [(split, split.published_edition) for split in rows if split.published_edition is not None]
     etags = {edition.pk: _etag(split, edition) for split, edition in with_board}
-    found = {pk: snapshot_cache.get(etag) for pk, etag in etags.items()}
+    found = {pk: _known(pk, etag) for pk, etag in etags.items()}
     unread = [pk for pk, etag in etags.items() if etag and found[pk] is None]
     if unread:
         found.update(_read(unread))
@@ -168,16 +176,28 @@ def _read(edition_ids: Sequence[int]) -> dict[int, CurrentBoard | None]:
     rows = Snapshot.objects.filter(edition__in=edition_ids)
     found = {}
     for pk, etag, body in rows.values_list("edition", "etag", "body"):
+        # Of a large board, two at a time would be twice the memory.
+        snapshot_cache.forget(str(pk))
         drawn = decode(bytes(body))
-        found[pk] = None if drawn is None else snapshot_cache.put(etag, drawn)
+        found[pk] = None if drawn is None else _remembered(pk, etag, drawn)
     return found
+
+
+def _known(edition_id: int, etag: str) -> CurrentBoard | None:
+    """What this process knows of an edition, if it is what this etag names."""
+    found = snapshot_cache.get(str(edition_id))
+    return found[1] if found is not None and found[0] == etag else None
+
+
+def _remembered(edition_id: int, etag: str, drawn: CurrentBoard) -> CurrentBoard:
+    return snapshot_cache.put(str(edition_id), (etag, drawn))[1]
 
 
 def _drawn_by_one(edition: Edition) -> CurrentBoard:
     """Draw it, or wait for the thread of this process that does."""
     with _drawing:
         stamped = editions().get(pk=edition.pk)
-        return snapshot_cache.get(_etag(stamped.split, stamped)) or draw(edition)
+        return _known(edition.pk, _etag(stamped.split, stamped)) or draw(edition)
 
 
 # --- drawing ---------------------------------------------------------------------------------------------
@@ -185,9 +205,10 @@ def _drawn_by_one(edition: Edition) -> CurrentBoard:
 
 def draw(edition: Edition) -> CurrentBoard:
     """Draw an edition as everybody sees it now, and keep it."""
+    snapshot_cache.forget(str(edition.pk))
     kept, drawn = _as_of_now(edition)
     save(edition=edition, kept=kept)
-    return snapshot_cache.put(kept.etag, drawn)
+    return _remembered(edition.pk, kept.etag, drawn)
 
 
 def _as_of_now(edition: Edition) -> tuple[StoredSnapshot, CurrentBoard]:

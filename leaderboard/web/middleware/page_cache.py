@@ -19,18 +19,27 @@ secret of the reader in them, so that their compressed length betrays none.
 
 import gzip
 import hashlib
+import io
 import re
 import sys
-from collections.abc import Callable
+import zlib
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import date
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 from urllib.parse import urlencode
 
 from django.conf import settings
 from django.contrib.messages.storage.cookie import CookieStorage
-from django.http import HttpRequest, HttpResponse, HttpResponseNotModified, QueryDict
+from django.http import (
+    HttpRequest,
+    HttpResponse,
+    HttpResponseBase,
+    HttpResponseNotModified,
+    QueryDict,
+    StreamingHttpResponse,
+)
 from django.urls import Resolver404, resolve
 from django.utils import timezone
 
@@ -39,7 +48,7 @@ from leaderboard.boards.snapshot_store import BoundedCache
 from leaderboard.boards.snapshots import state_of
 from leaderboard.http import Parameters, is_cacheable, is_known, parameters_of
 
-Next = Callable[[HttpRequest], HttpResponse]
+Next = Callable[[HttpRequest], HttpResponseBase]
 
 MAX_PLAIN_BYTES: Final = 32_000_000
 MAX_QUERIES_BYTES: Final = 16_000_000
@@ -49,6 +58,10 @@ MAX_PATH: Final = 200
 # What an answer costs beside its bytes: its headers, in each of its forms, and its place in memory.
 OVERHEAD_BYTES: Final = 5000
 MIN_COMPRESSED_BYTES: Final = 1000
+# A longer answer is kept compressed alone: that of 10,000 rows is 8 MB, and compressed a tenth of it.
+MAX_WHOLE_BYTES: Final = 2_000_000
+PIECE_BYTES: Final = 65_536
+_AS_GZIP: Final = 31  # the frame that zlib writes around: 15 + 16
 # "gzip;q=0" asks for anything but that.
 _GZIP = re.compile(r"\bgzip\b(?!\s*;\s*q=0(?:\.0*)?\s*(?:,|$))")
 # Shared caches may keep it, but ask every time whether it holds.
@@ -86,10 +99,12 @@ class Form(NamedTuple):
 class CachedResponse:
     """An answer's bytes, as they are and compressed, with the headers that its view gave it.
 
-    `ready` has the headers of each form as it left the outermost layer, once it has.
+    A long one is kept compressed alone, and `body` is None: who does not take gzip gets it unpacked piece by
+    piece. `ready` has the headers of each form as it left the outermost layer, once it has.
     """
 
-    body: bytes
+    body: bytes | None
+    n_body: int
     compressed: bytes
     etag: str
     headers: tuple[tuple[str, str], ...]
@@ -98,18 +113,29 @@ class CachedResponse:
     @property
     def n_bytes(self) -> int:
         """What remembering it costs, but for its address."""
-        return OVERHEAD_BYTES + len(self.body) + len(self.compressed)
+        return OVERHEAD_BYTES + len(self.body or b"") + len(self.compressed)
 
     @classmethod
-    def of(cls, response: HttpResponse) -> "CachedResponse":
-        """The answer that a view made."""
-        body = bytes(response.content)
+    def of(cls, response: HttpResponseBase) -> "CachedResponse":
+        """The answer that a view made, or makes while it is read here."""
         # The same bytes compress to the same: a moment within would give each process its own ETag.
-        smaller = gzip.compress(body, compresslevel=6, mtime=0) if len(body) >= MIN_COMPRESSED_BYTES else b""
+        digest, packer, n_body = hashlib.sha256(), zlib.compressobj(6, wbits=_AS_GZIP), 0
+        kept: list[bytes] = []
+        packed: list[bytes] = []
+        for piece in _pieces_of(response):
+            digest.update(piece)
+            packed.append(packer.compress(piece))
+            n_body += len(piece)
+            if n_body <= MAX_WHOLE_BYTES:
+                kept.append(piece)
+            else:
+                kept.clear()
+        packed.append(packer.flush())
         return cls(
-            body=body,
-            compressed=smaller,
-            etag=hashlib.sha256(body).hexdigest()[:32],
+            body=b"".join(kept) if n_body <= MAX_WHOLE_BYTES else None,
+            n_body=n_body,
+            compressed=b"".join(packed) if n_body >= MIN_COMPRESSED_BYTES else b"",
+            etag=digest.hexdigest()[:32],
             headers=tuple((name, response[name]) for name in SHARED_HEADERS if response.has_header(name)),
         )
 
@@ -120,17 +146,17 @@ class CachedResponse:
         is_304 = is_known(request, self._etag_of(is_compressed=is_compressed))
         return Form(is_compressed, is_304, request.is_secure())
 
-    def to(self, request: HttpRequest) -> HttpResponse:
+    def to(self, request: HttpRequest) -> HttpResponseBase:
         """The response to one reader, with the headers that are this answer's own."""
         form = self.form_for(request)
-        response = HttpResponseNotModified() if form.is_304 else HttpResponse(self._body_of(form))
-        if request.method == "HEAD":
-            response.content = b""
+        response = HttpResponseNotModified() if form.is_304 else self._whole(form)
+        if request.method == "HEAD" and not form.is_304:
+            response = HttpResponse()
         for name, value in self.headers:
             if not form.is_304 or name in HEADERS_OF_304:
                 response[name] = value
         if not form.is_304:
-            response["Content-Length"] = str(len(self._body_of(form)))
+            response["Content-Length"] = str(len(self.compressed) if form.is_compressed else self.n_body)
             if form.is_compressed:
                 response["Content-Encoding"] = "gzip"
         response["ETag"] = self._etag_of(is_compressed=form.is_compressed)
@@ -138,20 +164,35 @@ class CachedResponse:
         response["Vary"] = VARY
         return response
 
-    def ready_for(self, form: Form) -> HttpResponse | None:
+    def ready_for(self, form: Form) -> HttpResponseBase | None:
         """The response with the headers of every layer; None if this form never went through them."""
         headers = self.ready.get(form)
         if headers is None:
             return None
         if form.is_304:
             return HttpResponseNotModified(headers=headers)
-        return HttpResponse(self._body_of(form), headers=headers)
+        return self._whole(form, headers=headers)
 
-    def _body_of(self, form: Form) -> bytes:
-        return self.compressed if form.is_compressed else self.body
+    def _whole(self, form: Form, *, headers: dict[str, str] | None = None) -> HttpResponseBase:
+        body = self.compressed if form.is_compressed else self.body
+        if body is not None:
+            return HttpResponse(body, headers=headers)
+        return StreamingHttpResponse(_unpacked(self.compressed), headers=headers)
 
     def _etag_of(self, *, is_compressed: bool) -> str:
         return f'"{self.etag}-gz"' if is_compressed else f'"{self.etag}"'
+
+
+def _pieces_of(response: Any) -> Iterator[bytes]:
+    """What a response says, as it is made."""
+    yield from response.streaming_content if response.streaming else (bytes(response.content),)
+
+
+def _unpacked(compressed: bytes) -> Iterator[bytes]:
+    """The bytes that were compressed, a piece at a time."""
+    with gzip.GzipFile(fileobj=io.BytesIO(compressed)) as whole:
+        while piece := whole.read(PIECE_BYTES):
+            yield piece
 
 
 # The boards' number, and the day in UTC: rows are new for some days, and ranks have moved since a day.
@@ -249,7 +290,7 @@ class ReadyAnswerMiddleware:
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response
 
-    def __call__(self, request: HttpRequest) -> HttpResponse:
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
         """Answer, or ask the layers, and remember their headers for the next time."""
         found = memory.get(request.get_full_path_info()) if request.method == "GET" else None
         if found is None or not is_anybodys(request) or found[0] != _state(request):
@@ -275,7 +316,7 @@ class PageCacheMiddleware:
     def __init__(self, get_response: Next) -> None:
         self._get_response = get_response
 
-    def __call__(self, request: HttpRequest) -> HttpResponse:
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
         """Answer, or ask the view."""
         path = request.path_info
         if path != "/" and not path.startswith(self.PREFIXES):
@@ -291,11 +332,11 @@ class PageCacheMiddleware:
         setattr(response, _REPEATS, found[1])
         return response
 
-    def _made(self, request: HttpRequest, address: str) -> HttpResponse:
+    def _made(self, request: HttpRequest, address: str) -> HttpResponseBase:
         """Ask the view, and remember what it answers if it says so."""
         # Before the view looks: what it finds may be newer than this state, and is never older.
         state = _today(state_of(request))
-        response = self._get_response(request)
+        response: HttpResponseBase = self._get_response(request)
         if not _is_cacheable(response) or request.method == "HEAD":
             return response
         answer = CachedResponse.of(response)
@@ -303,11 +344,6 @@ class PageCacheMiddleware:
         return answer.to(request)
 
 
-def _is_cacheable(response: HttpResponse) -> bool:
+def _is_cacheable(response: HttpResponseBase) -> bool:
     """Whether a view says so, and the answer is whole and sets nothing for its one reader."""
-    return (
-        is_cacheable(response)
-        and response.status_code == 200
-        and not response.streaming
-        and not response.cookies
-    )
+    return is_cacheable(response) and response.status_code == 200 and not response.cookies

@@ -4,7 +4,7 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
-from django.http import HttpRequest, HttpResponse
+from django.http import HttpRequest
 from django.http.response import HttpResponseBase
 from django.test import Client
 from django.utils import timezone
@@ -165,7 +165,7 @@ def test_nothing_is_repeated_to_who_says_who_they_are_nor_over_another_scheme(
     layers: list[str] = []
     asked = page_cache.PageCacheMiddleware.__call__
 
-    def ask(self: page_cache.PageCacheMiddleware, request: HttpRequest) -> HttpResponse:
+    def ask(self: page_cache.PageCacheMiddleware, request: HttpRequest) -> HttpResponseBase:
         layers.append(request.path)
         return asked(self, request)
 
