@@ -1,8 +1,5 @@
 """A backup says what it is, refuses what would do harm, and comes back whole or not at all."""
 
-import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,8 +9,6 @@ from django.core.management import CommandError, call_command
 from leaderboard.backups import backup, contents, restore
 from leaderboard.backups.contents import Contents, NoBackup
 from leaderboard.storage import files
-from tests.prepared import REPOSITORY, put_sqlite
-from tests.services import environment_of_its_own
 
 
 def listed(folder: Path, **changed: object) -> Contents:
@@ -114,43 +109,3 @@ def test_what_the_store_does_not_have_is_missing_and_what_is_there_is_not_copied
     assert backup.keep(folder, name, {name: digest}) == digest
     assert copy.read_bytes() == b"anno_id\n"
     assert backup.keep(folder, "manifests/cd.csv", {}) == ""
-
-
-SQLITE = """
-import django; django.setup()
-import json, sys
-from pathlib import Path
-from django.conf import settings
-from django.core.management import call_command
-from django.db import connection
-from leaderboard.models import User
-User.objects.create(email="ada@example.org")
-call_command("backup", sys.argv[1])
-connection.close()
-connection.settings_dict["NAME"] = sys.argv[2]
-assert "leaderboard_user" not in connection.introspection.table_names()
-call_command("restore", sys.argv[1])
-print(User.objects.get().email)
-call_command("restore", sys.argv[1])
-"""
-
-
-@pytest.mark.slow
-def test_an_sqlite_database_comes_back_into_a_new_file_once(tmp_path: Path) -> None:
-    data = tmp_path / "data"
-    data.mkdir()
-    put_sqlite(data / "leaderboard.sqlite3")
-    done = subprocess.run(
-        [sys.executable, "-c", SQLITE, str(tmp_path / "backup"), str(tmp_path / "new.sqlite3")],
-        cwd=REPOSITORY,
-        env=environment_of_its_own()
-        | {"TSTTC_DATA_DIR": str(data), "DJANGO_SETTINGS_MODULE": "leaderboard.settings"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert "ada@example.org" in done.stdout, done.stderr
-    assert "The database has users already" in done.stderr
-    said = json.loads((tmp_path / "backup" / contents.LIST).read_text())
-    assert (said["vendor"], said["missing"]) == ("sqlite", [])
-    assert (tmp_path / "backup").stat().st_mode & 0o077 == 0

@@ -2,8 +2,11 @@
 
 import errno
 import hashlib
+import json
 import os
 import random
+import subprocess
+import sys
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
@@ -20,10 +23,13 @@ from django.utils import timezone
 from moto.server import ThreadedMotoServer
 from pytest_django import Settings
 
+from leaderboard.backups import contents
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from leaderboard.scoring import worker
 from leaderboard.storage import files, orphans, s3
 from tests import builders
+from tests.prepared import REPOSITORY, put_sqlite
+from tests.services import environment_of_its_own
 
 pytestmark = pytest.mark.slow
 
@@ -284,3 +290,56 @@ def test_old_object_that_comes_again_is_written_again(stored: s3.S3FileStore, bu
     for later in (timedelta(0), timedelta(hours=1), timedelta(hours=13)):
         files.save_predictions(upload, now=timezone.now() + later)
     assert len(n_puts) == 2
+
+
+# --- backups --------------------------------------------------------------------------------------------
+
+BACK_UP = """
+import django; django.setup()
+import sys
+import boto3
+from django.core.management import call_command
+from django.db import connection
+from leaderboard.models import User
+truth, folder, new, endpoint, bucket = sys.argv[1:]
+call_command("import_truth", "test", truth)
+User.objects.create(email="ada@example.org")
+call_command("backup", folder)
+boto3.resource("s3", endpoint_url=endpoint).Bucket(bucket).objects.all().delete()
+connection.close()
+connection.settings_dict["NAME"] = new
+assert "leaderboard_user" not in connection.introspection.table_names()
+call_command("restore", folder)
+print(User.objects.get().email)
+call_command("restore", folder)
+"""
+
+
+def test_an_sqlite_database_and_the_files_of_a_bucket_come_back_once(
+    bucket: Any, server: str, tmp_path: Path
+) -> None:
+    data = tmp_path / "data"
+    data.mkdir()
+    put_sqlite(data / "leaderboard.sqlite3")
+    folder = tmp_path / "backup"
+    named = [REPOSITORY / "examples/truth.csv", folder, tmp_path / "new.sqlite3", server, BUCKET]
+    done = subprocess.run(
+        [sys.executable, "-c", BACK_UP, *map(str, named)],
+        cwd=REPOSITORY,
+        env=environment_of_its_own()
+        | {"TSTTC_DATA_DIR": str(data), "TSTTC_FILES_URL": at(server)["files"]["OPTIONS"]["url"]}
+        | {"DJANGO_SETTINGS_MODULE": "leaderboard.settings", "AWS_DEFAULT_REGION": "us-east-1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "1 board is the same byte for byte" in done.stdout, done.stderr
+    assert "ada@example.org" in done.stdout, done.stderr
+    assert "The database has users already" in done.stderr
+    said = json.loads((folder / contents.LIST).read_text())
+    assert (said["vendor"], said["missing"]) == ("sqlite", [])
+    assert folder.stat().st_mode & 0o077 == 0
+    [manifest] = bucket.objects.all()
+    assert manifest.key.startswith("files/manifests/")
+    copy = folder / contents.FILES / manifest.key.removeprefix("files/")
+    assert manifest.get()["Body"].read() == copy.read_bytes()
