@@ -18,6 +18,8 @@ from markdown_it.token import Token
 Target = Callable[[str], str]
 # Where links may lead: pages of any host, mail, and places on this site.
 _TARGET: Final = re.compile(r"(?:https?:|mailto:|/|#|\?)", re.IGNORECASE)
+# Figures below each other, or words behind formulas: lines that must not wrap.
+_IN_COLUMNS: Final = re.compile(r"\S {3,}\S")
 _TABLE: Final = '<div class="scroll" tabindex="0" role="group" aria-label="Table">\n<table class="list">\n'
 
 
@@ -68,7 +70,16 @@ def guide(text: str, *, link: Target, image: Callable[[str], Mapping[str, str]])
             token.attrSet("href", link(str(token.attrs["href"])))
         if "src" in token.attrs:
             token.attrs.update(image(str(token.attrs["src"])))
+    for token in tokens:
+        if token.children and [child.type for child in token.children] == ["image"]:
+            token.children = _linked(token.children[0])
     return _document(tokens, _parser(images=True))
+
+
+def _linked(figure: Token) -> list[Token]:
+    """A figure that leads to itself, where it can be made larger."""
+    link: dict[str, str | int | float] = {"href": str(figure.attrs["src"]), "class": "figure"}
+    return [Token("link_open", "a", 1, attrs=link), figure, Token("link_close", "a", -1)]
 
 
 def page(text: str) -> Document:
@@ -107,6 +118,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
             token.attrSet("id", heading.anchor)
         elif token.type in {"fence", "code_block"}:
             code.append(token.content)
+            if _IN_COLUMNS.search(token.content):
+                token.attrs |= {"class": "aligned", "tabindex": 0}
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
             texts.append(_plain(token))
         elif token.type in {"th_open", "td_open"}:

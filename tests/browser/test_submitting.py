@@ -304,10 +304,10 @@ def test_nothing_is_announced_while_nothing_moves(
 ) -> None:
     sign_up(page, email="quiet@example.org", name="Quiet")
     submit(page, predictions(truth, factor=1.3), method="Quiet")
-    # It has waited for a day already: that it takes longer than usual is said at once, and not meanwhile.
+    expect(page.locator("[aria-current=step] .note")).to_contain_text("next in line")
+    # It waits for a day already: the open page says by itself that it takes longer than usual, once.
     with closing(sqlite3.connect(site.directory / "leaderboard.sqlite3", timeout=60)) as database, database:
         database.execute("UPDATE leaderboard_evaluation SET queued_at = datetime(queued_at, '-1 day')")
-    page.reload()
     expect(page.locator("[aria-current=step] .note")).to_contain_text("longer than usual")
     page.evaluate(
         """() => { window.nChanges = 0;

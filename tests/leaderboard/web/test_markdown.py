@@ -62,7 +62,13 @@ def test_a_column_without_a_name_has_no_head_and_numbers_stand_right() -> None:
 
 def test_a_part_has_the_text_below_its_heading() -> None:
     drawn = markdown.page("Before\n\n## A `b`\n\nOne *two*\nthree.\n\n```sh\nls -l\n```\n")
-    assert [(part.heading.text, part.text) for part in drawn.parts] == [
-        ("", "Before"),
-        ("A b", "One two three. ls -l\n"),
+    assert [(part.heading.text, part.text, part.code) for part in drawn.parts] == [
+        ("", "Before", ""),
+        ("A b", "One two three.", "ls -l\n"),
     ]
+
+
+def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
+    boxed = '<code class="aligned" tabindex="0">a    1'
+    assert boxed in markdown.page("```\na    1\nbb   2\n```\n").html
+    assert "aligned" not in markdown.page("```sh\ntsttc check a.json --manifest b.csv\n```\n").html
