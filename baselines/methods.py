@@ -180,6 +180,13 @@ METHODS: Final[tuple[Method, ...]] = (
                 "What computes: numpy, or torch on cpu or cuda.",
                 choices=("numpy", "cpu", "cuda"),
             ),
+            Parameter(
+                "decoding",
+                "auto",
+                "The head's mean over four scale ratios, as published; the peak of the features' similarity; "
+                "or what the weights' card says, which is the peak for ours.",
+                choices=("auto", "head", "peak"),
+            ),
         ),
     ),
     Method(

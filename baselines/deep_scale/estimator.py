@@ -1,8 +1,9 @@
-"""Deep Scale as a baseline: the network on the crops of a pair, and the mean over its best scale ratios."""
+"""Deep Scale as a baseline: the network on the crops of a pair, and the scale ratio of its answer."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Final, Literal, get_args
@@ -14,7 +15,8 @@ from baselines.clips import TARGET, Clip, Image
 from baselines.deep_scale.crops import Crop, CropPair, cut_pair
 from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Array, Operations, Sampling, features, similarities
-from baselines.deep_scale.weights import N_SCALES, Use, Weights, read_weights
+from baselines.deep_scale.peak import peak_scale_ratio
+from baselines.deep_scale.weights import N_SCALES, Decoding, Use, Weights, read_weights
 from baselines.estimates import Estimate
 from baselines.methods import OWN_WEIGHTS
 from baselines.patches import boxes_of_pair, require_centre_inside
@@ -36,21 +38,42 @@ _FRAME_GAP: Final = 5
 class DeepScale:
     """The baseline with the weights that come with the package, or with those of a file.
 
-    `device` is "numpy", or where torch is to compute: "cpu" or "cuda". Raises `Rejected` for weights that are
-    at fault, `OSError`, and `ValueError` for a device that is not there.
+    `device` is "numpy", or where torch is to compute: "cpu" or "cuda". `decoding` is how the scale ratio
+    comes about: "head" is the paper's mean over the four surest of 20, "peak" searches the features finely
+    near it (`peak`), and "auto" is what the weights' card says; the toolkit's have the head. Raises
+    `Rejected` for weights that are at fault, `OSError`, and `ValueError` for a device that is not there.
     """
 
-    def __init__(self, *, weights: Path = OWN_WEIGHTS, device: Device = "numpy") -> None:
+    def __init__(
+        self,
+        *,
+        weights: Path = OWN_WEIGHTS,
+        device: Device = "numpy",
+        decoding: Literal["auto"] | Decoding = "auto",
+    ) -> None:
         loaded = read_weights(weights)
-        self._use = loaded.use
+        self._use = loaded.use if decoding == "auto" else replace(loaded.use, decoding=decoding)
         self._scales = network_scales()
         self._operations = operations_on(device, loaded)
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
         """Raises `Unusable` where a box is missing, too small, or has its centre outside of the image."""
-        confidences = self.confidences(self.crops(clip, frame_gap=frame_gap))
+        pair = self.crops(clip, frame_gap=frame_gap)
+        maps = network_features(self._operations, [pair])
+        confidences = self._confidences(pair, maps)
         best = best_of(-confidences, n_top=N_TOP)
         scale_ratio = float(np.average(self._scales[best], weights=confidences[best]))
+        if self._use.decoding == "peak":
+            target, reference = (self._operations.values(each)[0] for each in maps)
+            spacing = float(self._scales[1] - self._scales[0])
+            scale_ratio = peak_scale_ratio(
+                pair,
+                (target, reference),
+                near=scale_ratio,
+                limits=(float(self._scales[0]) - spacing, float(self._scales[-1]) + spacing),
+                n_cells=self._use.n_cells,
+                similarity=self._use.similarity,
+            )
         return Estimate(scale_ratio, confidence=float(confidences[best[0]]))
 
     def crops(self, clip: Clip, *, frame_gap: int) -> CropPair:
@@ -63,8 +86,11 @@ class DeepScale:
 
     def confidences(self, pair: CropPair) -> Floats:
         """(20,): how sure the network is of each scale ratio, between 0 and 1."""
-        logits = network_logits(self._operations, [pair], use=self._use)
-        return np.asarray(0.5 + 0.5 * np.tanh(0.5 * np.asarray(logits[0], dtype=np.float64)))
+        return self._confidences(pair, network_features(self._operations, [pair]))
+
+    def _confidences(self, pair: CropPair, maps: tuple[Array, Array]) -> Floats:
+        logits = self._operations.values(logits_of(self._operations, [pair], maps, use=self._use))[0]
+        return np.asarray(0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64)))
 
 
 def network_scales() -> Floats:
@@ -85,12 +111,28 @@ def cut(frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, use: Use) 
 
 
 def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Use) -> Array:
-    """(b, 20): the network's outputs for a batch, before the sigmoid, as an array of the operations.
+    """(b, 20): the network's outputs for a batch, before the sigmoid, as an array of the operations."""
+    return logits_of(operations, pairs, network_features(operations, pairs), use=use)
+
+
+def network_features(operations: Operations, pairs: Sequence[CropPair]) -> tuple[Array, Array]:
+    """(b, 24, h, w) of the targets and of the references.
 
     Crops smaller than the greatest of the batch repeat their right and lower border.
     """
     target = stacked([pair.target for pair in pairs])
     reference = stacked([pair.reference for pair in pairs])
+    return (
+        features(operations, operations.constant(target)),
+        features(operations, operations.constant(reference)),
+    )
+
+
+def logits_of(
+    operations: Operations, pairs: Sequence[CropPair], maps: tuple[Array, Array], *, use: Use
+) -> Array:
+    """(b, 20): `network_logits` of pairs whose features are known."""
+    target, reference = maps
     sampling = [
         Sampling.of(
             target_box=pair.target.box,
@@ -102,13 +144,7 @@ def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Us
         )
         for pair in pairs
     ]
-    found = similarities(
-        operations,
-        features(operations, operations.constant(target)),
-        features(operations, operations.constant(reference)),
-        sampling,
-        similarity=use.similarity,
-    )
+    found = similarities(operations, target, reference, sampling, similarity=use.similarity)
     return operations.linear("head.scale_preds", found)
 
 

@@ -75,6 +75,10 @@ class Operations(Protocol):
         """The linear layer on the last axis."""
         ...
 
+    def values(self, found: Array) -> NDArray[np.float32]:
+        """An array's numbers, for numpy."""
+        ...
+
 
 def features(operations: Operations, images: Array) -> Array:
     """(b, 24, h, w): the features of `images` (b, 3, h, w); h and w are even."""

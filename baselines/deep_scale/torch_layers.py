@@ -76,3 +76,8 @@ class TorchLayers:
     def linear(self, name: str, values: torch.Tensor) -> torch.Tensor:
         """As `network.Operations`."""
         return F.linear(values, self.tensors[f"{name}.weight"], self.tensors[f"{name}.bias"])
+
+    def values(self, found: torch.Tensor) -> NDArray[np.float32]:
+        """As `network.Operations`."""
+        numbers: NDArray[np.float32] = found.detach().cpu().numpy()
+        return numbers

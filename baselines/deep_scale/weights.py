@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from math import prod
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,9 @@ N_SCALES: Final = 20
 CARD: Final = "card.json"
 _HEADER_BYTES: Final = 128
 """Of an `.npy` file."""
+
+Decoding = Literal["head", "peak"]
+DECODINGS: Final[tuple[Decoding, ...]] = get_args(Decoding)
 
 Tensors = Mapping[str, NDArray[np.float32]]
 
@@ -61,12 +64,14 @@ class Use:
     `similarity` of two feature vectors: the paper words "cosine", the toolkit's weights are for "dot".
     `n_cells` is the paper's target size. Frames are shrunk until the longer side of the target's box has
     `max_box_px`. Crops have `margin_px` around what is compared.
+    `decoding` is how a scale ratio is made of what the network says (`estimator.DeepScale`).
     """
 
     similarity: Similarity = "dot"
     n_cells: int = 50
     max_box_px: float = 120.0
     margin_px: float = 16.0
+    decoding: Decoding = "head"
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,11 +165,14 @@ def _read_card(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 def _read_use(found: object) -> Use:
     """How the card says that the weights are to be used; raises `Rejected`."""
-    if isinstance(found, dict) and found.keys() == {each.name for each in fields(Use)}:
+    # Cards that were written before there was a choice have no decoding.
+    known = {each.name for each in fields(Use)}
+    if isinstance(found, dict) and known - {"decoding"} <= found.keys() <= known:
         use = Use(**found)
         numbers = (use.n_cells, use.max_box_px, use.margin_px)
         if (
             use.similarity in ("dot", "cosine")
+            and use.decoding in DECODINGS
             and type(use.n_cells) is int
             and all(type(number) in (int, float) for number in numbers)
             and 1 <= use.n_cells <= 100
