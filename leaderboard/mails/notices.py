@@ -56,27 +56,6 @@ def queue_due(*, now: datetime) -> None:
     )
 
 
-def announce(*, split: Split, subject: str, text: str, name: str, now: datetime) -> int:
-    """Queue a mail to everybody whose team has sent a file to a split. Returns to how many.
-
-    `name` says which announcement it is: nobody gets one of the same name twice.
-    """
-    people = list(readers(MailKind.ANNOUNCEMENT).filter(_has_sent_to(split)))
-    mails = [
-        _mail(
-            MailKind.ANNOUNCEMENT,
-            user,
-            key=f"announcement:{split.pk}:{name}",
-            subject=subject,
-            text=text,
-            now=now,
-        )
-        for user in people
-    ]
-    outbox.queue(mails)
-    return len(mails)
-
-
 def readers(kind: MailKind) -> QuerySet[User]:
     """Who gets mails of a kind: active accounts with a proved address that have not switched it off."""
     people = User.objects.filter(is_active=True)
@@ -184,28 +163,27 @@ def _deadlines(now: datetime) -> Iterator[Mail]:
     for split in Split.objects.filter(closes_at__gt=now, closes_at__lte=now + CLOSES_WITHIN):
         at = f"{split.closes_at:%Y-%m-%d at %H:%M} UTC"
         text = f"{split.pk} closes on {at}. After that no file is taken.\n\n{_link('board', split.pk)}"
-        for user in readers(MailKind.DEADLINE).filter(_has_sent_to(split)):
+        for user in readers(MailKind.DEADLINE).filter(has_sent_to(split)):
             key = f"deadline:{split.pk}:{split.closes_at:%Y%m%d%H%M}"
             subject = f"{split.pk} closes on {at}"
             yield _mail(MailKind.DEADLINE, user, key=key, subject=subject, text=text, now=now)
 
 
-def _has_sent_to(split: Split) -> Exists:
+def has_sent_to(split: Split) -> Exists:
+    """Of a person: whether their team has sent a file to the split that is not withdrawn."""
     sent = Submission.objects.filter(split=split, withdrawn_at=None, method__team__members=OuterRef("pk"))
     return Exists(sent)
 
 
-def _mail(kind: MailKind, user: User, *, key: str, subject: str, text: str, now: datetime) -> Mail:
-    """A mail of this site, with the way to switch it off below."""
+def framed(*, subject: str, text: str) -> tuple[str, str]:
+    """Subject and text of a notice as they are mailed: of this site, with the way to switch it off below."""
     footer = f"--\n{settings.SITE_NAME}\n{settings.SITE_URL}\nChoose which mails you get: {_link('mails')}"
-    return outbox.tell(
-        kind=kind,
-        user=user,
-        key=f"{key}:{user.pk}",
-        subject=f"[{settings.SITE_NAME}] {subject}",
-        text=f"{text}\n\n{footer}\n",
-        now=now,
-    )
+    return f"[{settings.SITE_NAME}] {subject}", f"{text}\n\n{footer}\n"
+
+
+def _mail(kind: MailKind, user: User, *, key: str, subject: str, text: str, now: datetime) -> Mail:
+    subject, text = framed(subject=subject, text=text)
+    return outbox.tell(kind=kind, user=user, key=f"{key}:{user.pk}", subject=subject, text=text, now=now)
 
 
 def _link(name: str, *arguments: object) -> str:

@@ -18,6 +18,7 @@ from leaderboard.web.boards import (
 from leaderboard.web.docs import docs_views, page_views, wheel_views
 from leaderboard.web.landing import crawler_views, landing_views
 from leaderboard.web.maintain import (
+    announcement_views,
     audit_views,
     edited_page_views,
     maintainer_views,
@@ -147,6 +148,7 @@ urlpatterns = [
     path("maintain/splits/", split_views.splits, name="maintain_splits"),
     path("maintain/announcement/", split_views.announcement, name="maintain_announcement"),
     path("maintain/splits/add/", split_views.add, name="maintain_split_add"),
+    path("maintain/splits/<slug:split>/mail/", announcement_views.mail, name="maintain_mail"),
     path("maintain/splits/<slug:split>/", split_views.change, name="maintain_split"),
     path("maintain/<slug:split>/open/", maintainer_views.open_edition, name="maintain_open"),
     path("maintain/<slug:split>/editions/<int:number>/", include(MAINTAINED_EDITION)),

@@ -1,20 +1,19 @@
 """`manage.py announce SPLIT --subject TEXT FILE`."""
 
-import hashlib
 import sys
 from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
-from django.core.management.base import BaseCommand, CommandError
+from django.core.management.base import CommandError
 from django.utils import timezone
 
-from leaderboard import audit
-from leaderboard.mails import notices
+from leaderboard.mails import announcements
+from leaderboard.management.refusing import RefusingCommand
 from leaderboard.models import Split
 
 
-class Command(BaseCommand):
+class Command(RefusingCommand):
     """Mails everybody whose team has sent a file to a split."""
 
     help = "Mail an announcement to the teams of a split; people who switched announcements off get none."
@@ -34,14 +33,7 @@ class Command(BaseCommand):
             text = sys.stdin.read() if options["file"] == "-" else Path(options["file"]).read_text("utf-8")
         except (OSError, UnicodeDecodeError) as fault:
             raise CommandError(f"{options['file']} cannot be read as text: {fault}") from fault
-        if not text.strip() or not options["subject"].strip():
-            raise CommandError("The announcement is empty; expected a subject and a text.")
-        name = hashlib.sha256(f"{options['subject']}\n{text}".encode()).hexdigest()[:16]
-        n_people = notices.announce(
-            split=split, subject=options["subject"], text=text.strip(), name=name, now=timezone.now()
-        )
-        audit.record(
-            verb="announced", noun="Split", noun_id=split.pk, details={"subject": options["subject"]}
-        )
+        announcement = announcements.written(split=split, subject=options["subject"], text=text)
+        n_people = announcements.announce(announcement, now=timezone.now(), actor=None)
         people = "1 person" if n_people == 1 else f"{n_people:,} people"
         self.stdout.write(f"Queued for {people}. The same text again reaches only those who have not got it.")

@@ -15,9 +15,11 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from leaderboard.editions import ground_truth
-from leaderboard.mails import fault_reports, notices, outbox
+from leaderboard.errors.refusals import NotMaintainer
+from leaderboard.mails import announcements, fault_reports, notices, outbox
 from leaderboard.models import (
     ApiToken,
+    AuditEvent,
     Edition,
     Mail,
     MailKind,
@@ -194,12 +196,39 @@ def test_an_announcement_reaches_the_teams_of_a_split_once(
     builders.submit(owner, builders.predictions(edition))
     text = tmp_path / "text"
     text.write_text("The server moves.")
-    for _ in range(2):
+    for people in ("1 person", "0 people"):
         out = StringIO()
         call_command("announce", "test", str(text), subject="Maintenance\nBcc: x@example.org", stdout=out)
-    assert "Queued for 1 person." in out.getvalue()
+        assert f"Queued for {people}." in out.getvalue()
     assert told() == [(owner.email, "announcement")]
     assert "\n" not in Mail.objects.get().subject
+
+
+def test_a_maintainer_previews_an_announcement_and_sends_it_once(
+    edition: Edition, owner: User, keeper: Client
+) -> None:
+    builders.submit(owner, builders.predictions(edition))
+    address, draft = "/maintain/splits/test/mail/", {"subject": "Moved", "text": "First.\r\n\r\nSecond <b>."}
+    assert keeper.post(address, {"subject": "", "text": " "}).status_code == 422
+    assert keeper.post(address, draft | {"subject": "x" * 151}).status_code == 422
+    page = keeper.post(address, draft | {"step": "preview"}).content.decode()
+    assert "1 person gets" in page
+    assert "[TSTTC leaderboard] Moved" in page
+    assert "Second &lt;b&gt;." in page
+    assert owner.email not in page
+    assert "First." in keeper.post(address, draft | {"step": "write"}).content.decode()
+    assert not Mail.objects.exists()
+    for words in ("The mail to 1 person is queued.", "Nothing was sent"):  # a double click
+        assert words in keeper.post(address, draft | {"step": "send"}, follow=True).content.decode()
+    assert told() == [(owner.email, "announcement")]
+    assert Mail.objects.get().text.startswith("First.\n\nSecond <b>.\n\n--\n")
+    event = AuditEvent.objects.get(verb="announced")
+    assert event.details == {"subject": "Moved", "n_people": 1}
+    assert "Nobody gets this mail" in keeper.post(address, draft | {"step": "preview"}).content.decode()
+    with pytest.raises(NotMaintainer):
+        announcements.announce(
+            announcements.written(split=edition.split, subject="S", text="T"), now=timezone.now(), actor=owner
+        )
 
 
 def test_only_proved_addresses_get_notices_where_addresses_are_proved(

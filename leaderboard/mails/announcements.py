@@ -1,0 +1,90 @@
+"""Announcements: a text of the maintainers by mail to the people whose teams have sent a file to a split.
+
+Who they are is told to nobody, only how many. Whoever has switched announcements off gets none, and nobody
+gets the same text twice, however often it is sent.
+"""
+
+import hashlib
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Final
+
+from django.db import transaction
+
+from leaderboard import audit
+from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
+from leaderboard.mails import notices, outbox
+from leaderboard.models import Mail, MailKind, Split, User
+
+MAX_SUBJECT: Final = 150
+MAX_TEXT: Final = 5000
+
+
+@dataclass(frozen=True)
+class Announcement:
+    """A checked text for the teams of a split."""
+
+    split: Split
+    subject: str
+    text: str
+
+    @property
+    def mailed(self) -> tuple[str, str]:
+        """Subject and text as people get them."""
+        return notices.framed(subject=self.subject, text=self.text)
+
+    def key(self, user_id: int) -> str:
+        """What keeps a person from getting it twice."""
+        digest = hashlib.sha256(f"{self.subject}\n{self.text}".encode()).hexdigest()
+        return f"announcement:{self.split.pk}:{digest[:16]}:{user_id}"
+
+
+def written(*, split: Split, subject: str, text: str) -> Announcement:
+    """An announcement; its subject is one line. Raises `Refused` for what is empty or too long."""
+    subject = " ".join(clean_text("subject", subject, limit=MAX_SUBJECT).split())
+    text = clean_text("text", text.replace("\r\n", "\n"), limit=MAX_TEXT)
+    return Announcement(split, subject, text)
+
+
+def left(announcement: Announcement) -> list[User]:
+    """Who would get it now: whoever wants announcements, has a team that sent a file, and has not got it."""
+    people = notices.readers(MailKind.ANNOUNCEMENT).filter(notices.has_sent_to(announcement.split))
+    keys = {user: announcement.key(user.pk) for user in people}
+    told = set(Mail.objects.filter(key__in=keys.values()).values_list("key", flat=True))
+    return [user for user, key in keys.items() if key not in told]
+
+
+def announce(announcement: Announcement, *, now: datetime, actor: User | None) -> int:
+    """Queue it for everybody who has not got it, and return for how many; `actor` None is the command line.
+
+    Two at the same time are one after the other. Raises `NotMaintainer`.
+    """
+    require_maintainer(actor, to="mail the teams of a split")
+    with transaction.atomic():
+        split = Split.objects.select_for_update(no_key=True).filter(pk=announcement.split.pk).first()
+        if split is None:
+            raise Refused("unknown-split", f"There is no split {announcement.split.pk!r} any more.")
+        people = left(announcement)
+        subject, text = announcement.mailed
+        outbox.queue(
+            [
+                outbox.tell(
+                    kind=MailKind.ANNOUNCEMENT,
+                    user=user,
+                    key=announcement.key(user.pk),
+                    subject=subject,
+                    text=text,
+                    now=now,
+                )
+                for user in people
+            ]
+        )
+        if people:
+            audit.record(
+                verb="announced",
+                noun="Split",
+                noun_id=split.pk,
+                actor=actor,
+                details={"subject": announcement.subject, "n_people": len(people)},
+            )
+    return len(people)
