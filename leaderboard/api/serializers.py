@@ -208,7 +208,7 @@ class SplitSerializer(serializers.Serializer[Split]):
     title = serializers.CharField(help_text="Title of the split.")
     description = serializers.CharField(help_text="Description of the split.")
     is_open = serializers.SerializerMethodField(help_text="Whether the split accepts submissions.")
-    is_archived = serializers.BooleanField(help_text="Whether submissions have ended for good.")
+    is_archived = serializers.BooleanField(help_text="Whether the split is archived: its board stays, and it takes no submissions until maintainers list it again.")
     same_truth_as = serializers.CharField(
         source="same_truth_as_id",
         allow_null=True,
