@@ -79,7 +79,12 @@ def logout(*, url: str, as_json: bool) -> None:
 
 
 @click.command(short_help="Show how many submissions your team has left.")
-@click.argument("split", required=False, callback=lambda c, p, value: value and slug(c, p, value))
+@click.argument(
+    "split",
+    required=False,
+    callback=lambda c, p, value: value and slug(c, p, value),
+    shell_complete=suggestions.splits,
+)
 @url_option
 @json_option
 def quota(*, split: str | None, url: str, as_json: bool) -> None:

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 @click.option(
     "--sort",
     callback=sendable,
+    shell_complete=suggestions.columns,
     default="rank",
     show_default=True,
     metavar="COLUMN",
@@ -81,12 +82,19 @@ def board(
       tsttc board val --sort rte_crucial
       tsttc board val --format latex --intervals > table.tex
       tsttc board test --edition 1
+      tsttc board test --format bibtex > board.bib
     """
     if edition is not None and at:
         raise click.UsageError("--edition and --at exclude each other; give one of them.")
+    is_bibtex = as_format == "bibtex" and not as_json
+    if is_bibtex and mine:
+        raise click.UsageError("BibTeX has what everyone sees: --mine does not go with --format bibtex.")
     with connect(url, with_token=mine) as client:
         found = client.board(split, sort=sort, edition=edition, at=at, has_intervals=has_intervals)
         address = client.board_page(found, sort=sort, at=at)
+        if is_bibtex:
+            click.echo(client.bibliography(found, at=at), nl=False)
+            return
     chosen = next((each for each in FORMATS if each.name == ("json" if as_json else as_format)), None)
     if chosen is None:
         _show(found, is_mine=mine)

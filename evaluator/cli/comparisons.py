@@ -29,8 +29,8 @@ Scores = Mapping[str, float | None]
 
 
 @click.command(short_help="Compare two methods or two files, with confidence intervals and p-values.")
-@click.argument("first", callback=sendable)
-@click.argument("second", callback=sendable)
+@click.argument("first", callback=sendable, shell_complete=suggestions.rows_or_files)
+@click.argument("second", callback=sendable, shell_complete=suggestions.rows_or_files)
 @click.option(
     "--split",
     default="test",

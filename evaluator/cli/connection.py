@@ -13,6 +13,7 @@ import click
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.heartbeat import signs_of_life
+from evaluator.cli.layout import printable
 from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.tokens import token_for
 
@@ -38,7 +39,7 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     Its errors leave as failures worded for a person.
     """
     bearer = token or (token_for(url) if with_token else None)
-    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
     from evaluator.client.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
 
@@ -55,9 +56,30 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
         ):
             if bearer:
                 client.require_leaderboard()
-            yield client
+            try:
+                yield client
+            except Refused as error:
+                splits = _splits_instead(client, error)
+                if not splits:
+                    raise
+                raise in_words(error, url=url, hint=f"The splits here are {', '.join(splits)}.") from error
     except ClientError as error:
         raise in_words(error, url=url) from error
+
+
+def _splits_instead(client: Client, error: Refused) -> list[str]:
+    """The splits of the leaderboard, where the one that the command names is not among them."""
+    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
+
+    context = click.get_current_context(silent=True)
+    split = context.params.get("split") if context else None
+    if error.status != 404 or not split:
+        return []
+    try:
+        known = client.splits()
+    except ClientError:
+        return []
+    return [] if split in known else [printable(name) for name in known]
 
 
 def version() -> str:
@@ -70,16 +92,17 @@ def version() -> str:
         return "0"
 
 
-def in_words(error: ClientError, *, url: str) -> Failure:
-    """What happened, whose fault it is and what to do next."""
+def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
+    """What happened, whose fault it is and what to do next; of a refusal `hint` says it."""
     from evaluator.client.answers import BadAnswer, NotReady, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
+    refused_hint = hint
     hint = "Check --server (or TSTTC_URL), your network, and whether the server runs."
     exit_code = Exit.NETWORK
     more: dict[str, Any] = {}
     match error:
         case Refused():
-            return _refused(error, url=url)
+            return _refused(error, url=url, hint=refused_hint)
         case Unreachable(was_connected=False):
             code, words = "unreachable", f"Nothing answers at {error.url} ({error.reason})."
         case Unreachable():
@@ -106,7 +129,7 @@ def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].removesuffix('.')}."
 
 
-def _refused(error: Refused, *, url: str) -> Failure:
+def _refused(error: Refused, *, url: str, hint: str) -> Failure:
     """The server's own words where it gave any; else what its status means."""
     words = _sentence(error.detail) if error.detail else _words_for(error)
     return Failure(
@@ -114,7 +137,7 @@ def _refused(error: Refused, *, url: str) -> Failure:
         exit_code=exit_code_of(error),
         code=error.code or f"http-{error.status}",
         problems=[p for p in error.problems if p.message != error.detail],  # the words above say it already
-        hint=_hint_for(error, url=url),
+        hint=hint or _hint_for(error, url=url),
         document=error.document,
     )
 

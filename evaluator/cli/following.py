@@ -54,6 +54,8 @@ def _states(client: Client, submission_id: str, *, timeout_s: float) -> Iterator
 def state_in_words(submission: Submission) -> str:
     """One line: the state, and for a waiting one how many are ahead and about how long that takes."""
     words = printable(submission.state)
+    if submission.withdrawn_at:
+        words += ", withdrawn"
     if submission.queue is not None and submission.state == "QUEUED":
         words += f", {submission.queue.ahead:,} ahead"
         if submission.queue.estimate_s is not None:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
+from evaluator.cli import suggestions
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
@@ -34,7 +35,7 @@ OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
     "<": operator.lt,
 }
 _CONDITION: Final = re.compile(
-    r"\s*(?P<name>[a-z0-9_]+)\s*(?P<operator>>=|<=|==|!=|>|<)\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)\s*",
+    r"\s*(?P<name>[A-Za-z0-9_]+)\s*(?P<operator>>=|<=|==|!=|>|<)\s*(?P<number>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)\s*",
     re.ASCII,
 )
 _OR: Final = re.compile(r"\bor\b", re.ASCII)
@@ -65,6 +66,8 @@ def parse(text: str) -> list[Condition]:
 
     >>> [str(condition) for condition in parse("mid > 15.0 or rte_crucial>=7")]
     ['mid > 15', 'rte_crucial >= 7']
+    >>> [str(condition) for condition in parse("MiD > 15 or RTE_n > 7")]
+    ['mid > 15', 'rte_negative > 7']
     >>> parse("mid")
     Traceback (most recent call last):
     ValueError: found 'mid', expected NAME OPERATOR NUMBER, such as mid > 15.0
@@ -76,10 +79,14 @@ def _condition(text: str) -> Condition:
     found = _CONDITION.fullmatch(text)
     if found is None:
         shown = text.strip() or "nothing"
-        raise ValueError(f"found {shown!r}, expected NAME OPERATOR NUMBER, such as mid > 15.0")
-    if found["name"] not in known_names():
+        joined = "; several are joined by or" if " and " in text else ""
+        raise ValueError(f"found {shown!r}, expected NAME OPERATOR NUMBER, such as mid > 15.0{joined}")
+    # As tables write them, too: MiD, MiD_c.
+    called = {spelt.lower(): name for name in known_names() for spelt in (short_name(name), name)}
+    name = called.get(found["name"].lower())
+    if name is None:
         raise ValueError(f"found {found['name']!r}, expected one of {', '.join(known_names())}")
-    return Condition(found["name"], found["operator"], float(found["number"]))
+    return Condition(name, found["operator"], float(found["number"]))
 
 
 def fail_if_option(command: Command) -> Command:
@@ -254,5 +261,6 @@ def worse_than_options(command: Command) -> Command:
         "--fail-if-worse-than",
         "worse_than",
         metavar="METHOD",
+        shell_complete=suggestions.rows,
         help=f"Exit with code 6 if {short_name(PRIMARY)} is higher than that of this method on the board.",
     )(command)

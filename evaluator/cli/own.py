@@ -14,6 +14,7 @@ from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
+from evaluator.cli.following import state_in_words
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
 from evaluator.cli.options import json_option, output_option, sendable, slug, url_option
 from evaluator.cli.reading import write_bytes
@@ -42,8 +43,16 @@ def whoami(*, url: str, as_json: bool) -> None:
     limit = f", for {found.split} only" if found.split else ""
     click.echo(printable(f"{team} at {url.rstrip('/')}"))
     click.echo(
-        printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, until {found.expires_at}')
+        printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, {_end_of(found.expires_at)}')
     )
+
+
+def _end_of(moment: str | None) -> str:
+    """
+    >>> _end_of("2027-02-20T20:16:57.601932Z"), _end_of(None)
+    ('until 2027-02-20 20:16 UTC', 'without an end')
+    """
+    return f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
 
 
 @click.command(short_help="List the methods of your team.")
@@ -115,7 +124,8 @@ def list_submissions(*, split: str | None, method: str | None, limit: int, url: 
         echo_json([submission.document for submission in found])
         return
     if not found:
-        click.echo("There are no such submissions.")
+        told = "Your team has no submissions yet." if split is method is None else "There are none of these."
+        click.echo(told)
         return
     for line in _table(found):
         click.echo(line)
@@ -133,7 +143,7 @@ def _table(found: Sequence[Submission]) -> list[str]:
             str(each.document.get("submitted_at", ""))[:16].replace("T", " "),
             each.split,
             each.method,
-            each.state,
+            state_in_words(each),
             format_published(mid, decimals=each.decimals, missing=NO_VALUE),
         )
         table.append([Cell(printable(text)) for text in texts])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -81,6 +82,7 @@ def _key(_context: click.Context, _parameter: click.Parameter, value: str | None
     metavar="TEXT",
     help="Requests with the same key count as one request, also across runs of a job.",
 )
+@click.option("--yes", is_flag=True, help="Do not ask before the results of a public method go public.")
 @click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
 @url_option
 @json_option
@@ -95,6 +97,7 @@ def submit(
     worse_than: str | None,
     significant: bool,
     idempotency_key: str | None,
+    yes: bool,
     no_check: bool,
     url: str,
     as_json: bool,
@@ -104,7 +107,7 @@ def submit(
 
     The command first checks the file with the code of the server. Submitting the same file again is safe:
     the server answers with the first submission. If the method is public or anonymous, the command says so
-    before it submits. A gate (--fail-if…) waits for the scores like --wait.
+    before it submits, and asks on a terminal. A gate (--fail-if…) waits for the scores like --wait.
 
     \b
     Examples:
@@ -125,6 +128,8 @@ def submit(
                 )
             notice = _notice_of(client, method)
             _warn(notice, err=as_json)
+            if notice and not yes:
+                _require_consent()
             filename = _name_to_send(predictions)
             with progress(file, filename) as watched:
                 submission = client.submit(
@@ -217,6 +222,12 @@ def _notice_of(client: Client, method: str) -> str:
 def _warn(notice: str, *, err: bool) -> None:
     if notice:
         click.echo(printable(notice), err=err)
+
+
+def _require_consent() -> None:
+    """Ask whoever sits there; a job has been set up to send this."""
+    if sys.stdin.isatty() and not click.confirm("Submit?", err=True):
+        raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
 
 
 def _name_to_send(path: Path) -> str:

@@ -1,4 +1,4 @@
-"""What a shell completes with the names that a leaderboard knows: splits, and one's own methods.
+"""What a shell completes with the names that a leaderboard knows: splits, methods, columns.
 
 A shell waits for it while somebody types, so the server is asked once and for two seconds at most; without an
 answer there are no suggestions.
@@ -10,11 +10,13 @@ import os
 from typing import TYPE_CHECKING, Final
 
 import click
+from click.shell_completion import CompletionItem
 
 from evaluator.cli.failures import Failure
 from evaluator.cli.options import DEFAULT_URL
 from evaluator.cli.paths import server_of_login
 from evaluator.cli.tokens import token_for
+from evaluator.metrics.protocol import known_names
 
 if TYPE_CHECKING:
     from evaluator.client.client import Client
@@ -32,7 +34,28 @@ def methods(context: click.Context, _parameter: click.Parameter, incomplete: str
     return _asked(context, incomplete, own=True)
 
 
-def _asked(context: click.Context, incomplete: str, *, own: bool) -> list[str]:
+def columns(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[str]:
+    """The columns by which a board can be sorted."""
+    names = ("rank", "method", "team", "date", *known_names())
+    return [name for name in names if name.startswith(incomplete)]
+
+
+def rows(context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[str]:
+    """The methods on the board of the split that stands in the same line."""
+    split = context.params.get("split") or "test"
+    return _asked(context, incomplete, own=False, board=split)
+
+
+def rows_or_files(
+    context: click.Context, parameter: click.Parameter, incomplete: str
+) -> list[str] | list[CompletionItem]:
+    """The methods of the board; with ground truth in the line, files."""
+    if context.params.get("truth_path"):
+        return [CompletionItem(incomplete, type="file")]
+    return rows(context, parameter, incomplete)
+
+
+def _asked(context: click.Context, incomplete: str, *, own: bool, board: str = "") -> list[str]:
     from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
     from evaluator.client.client import Client  # noqa: PLC0415 -- loads httpx, which --help can do without
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
@@ -42,10 +65,14 @@ def _asked(context: click.Context, incomplete: str, *, own: bool) -> list[str]:
     try:
         token = token_for(url) if own else None
         with Client(url=url, token=token, timeout_s=TIMEOUT_S, patience=once) as client:
-            names = _methods(client) if own else client.splits()
+            names = _rows(client, board) if board else _methods(client) if own else client.splits()
     except (ClientError, Failure):  # nobody who completes a word wants to read of it
         return []
     return [name for name in names if name.startswith(incomplete)]
+
+
+def _rows(client: Client, split: str) -> list[str]:
+    return [entry.method for entry in client.board(split).entries]
 
 
 def _methods(client: Client) -> list[str]:

@@ -42,6 +42,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     url: str | None = None
     visibility: str = ""
     notice: str = ""
+    withdrawn_at: str | None = None
     scores: dict[str, float | None] | None = None
     decimals: int = 2
     intervals: dict[str, Interval] = {}

@@ -12,11 +12,9 @@ is the same one again, and bytes that it holds get their first submission as ans
 
 from __future__ import annotations
 
-import hashlib
 import json
 import random
 import time
-import uuid
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -44,6 +42,7 @@ from evaluator.client.exchange import (
     PASSING_STATUSES,
     RetryPolicy,
     checked,
+    fresh_key,
     next_page,
     one,
     retry_after_s,
@@ -177,6 +176,11 @@ class Client:
         asked = {"at": at, "sort": sort if sort != "rank" else None}
         query = urlencode({name: value for name, value in asked.items() if value})
         return f"{self.url}/board/{path}{'?' if query else ''}{query}"
+
+    def bibliography(self, board: Board, *, at: str | None = None) -> str:
+        """BibTeX of the benchmark's paper, of the board and of the papers of its rows. Raises ClientError."""
+        page, mark, query = self.board_page(board, at=at).partition("?")
+        return self._retry(lambda: self._http.get(f"{page.rstrip('/')}.bib{mark}{query}")).text
 
     def manifest(self, split: str, *, edition: int | None = None) -> bytes:
         """The manifest of a split, or of an edition of it: all columns but the values. Raises ClientError."""
@@ -388,13 +392,3 @@ class Client:
             # any other fault is a mistake in the address more often than a pause.
             return self._was_answered or fault.was_refused
         return self.patience.may_pass(fault)
-
-
-def fresh_key(file: BinaryIO, fields: Mapping[str, str]) -> str:
-    """A key for one call: of the file's bytes, the fields, and an id that no other call has."""
-    file.seek(0)
-    digest = hashlib.sha256()
-    while block := file.read(1 << 20):
-        digest.update(block)
-    what = json.dumps([digest.hexdigest(), sorted(fields.items()), uuid.uuid4().hex])
-    return hashlib.sha256(what.encode()).hexdigest()

@@ -86,7 +86,6 @@ FORMATS: Final = (
         write=lambda export: "\n".join(export.references),
         has_values=False,
         is_pasted=True,
-        on_command_line=False,
     ),
 )
 """In the order in which they are offered."""

@@ -68,6 +68,9 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
     submitted_at = serializers.DateTimeField(help_text="When it was safely stored.")
     started_at = serializers.DateTimeField(allow_null=True, help_text="When scoring began; null: not yet.")
     finished_at = serializers.DateTimeField(allow_null=True, help_text="When it became final; null: not yet.")
+    withdrawn_at = serializers.DateTimeField(
+        allow_null=True, help_text="When the team withdrew it; null: not withdrawn."
+    )
     is_final = serializers.BooleanField(help_text="Whether the state will not change any more.")
     fault_is_ours = serializers.BooleanField(help_text="Whether scoring failed on our side, not by the file.")
     digest = serializers.CharField(help_text="Digest of the file's bytes.")
@@ -127,6 +130,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
             "submitted_at": submission.submitted_at,
             "started_at": progress.started_at,
             "finished_at": progress.finished_at,
+            "withdrawn_at": submission.withdrawn_at,
             "is_final": progress.is_final,
             "fault_is_ours": progress.fault_is_ours,
             "digest": submission.digest,

@@ -54,6 +54,8 @@ def submit(tsttc: Tsttc, *more: str) -> Result:
         ("mid <= 13.9 or mid != 14.00", False),
         ("mid > .5e1", True),
         ("mid > -1", True),
+        ("MiD > 13.99", True),
+        ("RTE_n == 14 or MID_C > 20", True),
     ],
 )
 def test_condition_is_compared_with_the_published_value(text: str, is_held: bool) -> None:
@@ -65,7 +67,7 @@ def test_condition_is_compared_with_the_published_value(text: str, is_held: bool
     "text",
     [
         *("", "mid", "mid >", "> 3", "mid > x", "mid => 3", "mid > 3 and rte > 2", "mid > 3 or", "or"),
-        *("MID > 3", "mid > 1e", "mid > 0x10", "mid > nan", "mid > inf", "mid > 1_000", "mid > ١"),
+        *("mid_e > 3", "mid > 1e", "mid > 0x10", "mid > nan", "mid > inf", "mid > 1_000", "mid > ١"),
         *("mid > 3; import os", "mid > (3)", "__import__('os') > 3", "mid_overall > 3", "mid > 3 or rte"),
     ],
 )
@@ -75,6 +77,7 @@ def test_anything_else_is_wrong_usage_before_anything_is_sent(
     result = submit(tsttc, "--fail-if", text)
     assert result.exit_code == 2
     assert "--fail-if" in result.stderr
+    assert ("several are joined by or" in result.stderr) is (" and " in text)
     assert site.requests == []
 
 

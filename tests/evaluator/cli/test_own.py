@@ -38,7 +38,7 @@ def test_whoami_names_team_token_and_limits(tsttc: Tsttc, site: RecordedSite) ->
     account = {"team": "TJU-V", "token": "ci", "scopes": ["read"], "split": "val", "expires_at": "2027-01-01"}
     site.put("GET /api/v1/account", Reply(account))
     result = tsttc("whoami")
-    assert result.stdout == f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01\n'
+    assert result.stdout == f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01 UTC\n'
     assert json.loads(tsttc("whoami", "--json").stdout) == account
 
 
@@ -109,6 +109,20 @@ def test_truth_of_a_folder_becomes_a_table_with_its_objects(tsttc: Tsttc, tmp_pa
     assert tsttc("truth", path, "-o", path).exit_code == 2
 
 
+def test_a_split_that_is_not_there_is_answered_with_those_that_are(tsttc: Tsttc, site: RecordedSite) -> None:
+    site.put("GET /api/v1/splits/trial/board", Reply(problem("Nothing here."), status=404))
+    told = tsttc("board", "trial")
+    assert (told.exit_code, told.stderr) == (8, "Error: Nothing here.\nThe splits here are val.\n")
+
+
+def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> None:
+    gone = SUBMISSIONS[0] | {"withdrawn_at": "2026-11-21T12:00:00Z"}
+    site.put("GET /api/v1/submissions", Reply([gone]))
+    site.put(f"GET /api/v1/submissions/{ID}", Reply(gone))
+    assert "SCORED, withdrawn" in tsttc("submissions").stdout
+    assert tsttc("status", ID).stdout.startswith("SCORED, withdrawn: Foo++ on val\n")
+
+
 def suggested(*words: str) -> list[str]:
     """What a shell would offer for the last of these words."""
     found = ShellComplete(main, {}, "tsttc", "_TSTTC_COMPLETE").get_completions(list(words[:-1]), words[-1])
@@ -121,6 +135,14 @@ def test_a_shell_completes_splits_and_one_s_own_methods(site: RecordedSite) -> N
     assert suggested("submit", "x.json", "--split", "t") == []
     assert suggested("submit", "x.json", "--method", "F") == ["Foo++"]
     assert suggested("publish", "") == ["Foo++", "Bar"]
+    assert suggested("quota", "v") == ["val"]
+    assert suggested("board", "--sort", "rte_c") == ["rte_crucial"]
+    entry = {"method": "Deep Scale", "scores": {}}
+    site.put("GET /api/v1/splits/val/board", Reply({"split": "val", "entries": [entry]}))
+    assert suggested("submit", "x.json", "--split", "val", "--fail-if-worse-than", "D") == ["Deep Scale"]
+    assert suggested("compare", "--split", "val", "") == ["Deep Scale"]
+    files = ShellComplete(main, {}, "tsttc", "").get_completions(["compare", "--truth", str(MANIFEST)], "x")
+    assert [item.type for item in files] == ["file"]
     assert suggested("publish", "--server", "http://127.0.0.1:9", "") == []
 
 

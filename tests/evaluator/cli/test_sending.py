@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -183,6 +184,21 @@ def test_public_method_is_told_to_be_so_before_the_file_is_sent(tsttc: Tsttc, si
     assert result.stdout.splitlines()[0] == NOTICE
     asked = paths(site)
     assert asked.index(METHODS) < asked.index(POST)
+
+
+def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(site: RecordedSite) -> None:
+    put_manifest(site)
+    site.put(METHODS, Reply([PUBLIC]))
+    words = ("submit", EXAMPLES / "predictions.json", "--split", "val", "--method", "Foo++")
+    keyboard, end = os.openpty()
+    os.write(keyboard, b"n\n")
+    done = process(*words, stdin=end)
+    assert (done.returncode, done.stdout, site.posts) == (2, f"{NOTICE}\n", [])
+    assert done.stderr.endswith("Submit? [y/N]: Error: Nothing was submitted.\n")
+    assert process(*words, "--yes", stdin=end).returncode == 0
+    os.close(end)
+    os.close(keyboard)
+    assert len(site.posts) == 1
 
 
 def test_public_method_is_told_in_json_and_beside_it(tsttc: Tsttc, site: RecordedSite) -> None:

@@ -71,6 +71,15 @@ def test_board_as_csv_is_read_back_and_runs_in_no_spreadsheet(board: Callable[[s
     assert (rows[0]["mid"], rows[0]["rte"], rows[2]["mid"], rows[2]["rank"]) == ("14.50", "20.00", "", "")
 
 
+def test_board_as_bibtex_is_the_text_of_the_site(
+    board: Callable[[str], str], tsttc: Tsttc, site: RecordedSite
+) -> None:
+    found = Reply("@misc{é,\n}\n".encode(), headers={"Content-Type": "text/x-bibtex; charset=utf-8"})
+    site.put("GET /board/test/editions/2.bib", found)
+    assert board("bibtex") == "@misc{é,\n}\n"
+    assert "--mine does not go with --format bibtex" in tsttc("board", "--mine", "--format", "bibtex").stderr
+
+
 def test_board_as_latex_marks_the_best_and_takes_the_power_from_names(board: Callable[[str], str]) -> None:
     text = board("latex")
     assert r"\textbf{14.50}" in text
