@@ -83,5 +83,5 @@ def exact_log(values: Floats) -> Floats:
     with np.errstate(invalid="ignore"):
         positive = values > 0
     logs = np.full(values.shape, math.nan)
-    logs[positive] = np.fromiter(map(math.log, values[positive].tolist()), dtype=np.float64)
+    logs[positive] = np.fromiter(map(math.log, values[positive].data), dtype=np.float64)
     return logs

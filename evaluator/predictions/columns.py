@@ -2,9 +2,9 @@
 
 Files that machines write are monotonous: keys of a few digits, one separator, one number each. For these the
 keys are compared with the manifest's as 64-bit words, then overwritten with spaces, so that what remains of
-the object is a JSON list of numbers for a fast parser. Natural keys in the manifest's order are cut out of
-the text instead, some thousands at a time, and compared with the manifest's as one text. Files with other
-keys, or another layout, are parsed into a dictionary.
+the object is a JSON list of numbers for a fast parser. Natural keys in the manifest's order, and the numbers
+behind them, are copied into rows of words instead, some thousands at a time, and compared with the manifest's
+row by row. Files with other keys, or another layout, are parsed into a dictionary.
 
 All ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
 result, and answer None for everything else: finding words for a fault is the strict reading's business.
@@ -16,9 +16,9 @@ white space, the first by `{` and white space, and (4) the text with all these k
 braces turned into brackets, is a JSON list of n numbers. By (4) there are n - 1 commas, by (3) each stands
 directly before a key; so every part between commas holds one key, at its front, and one number.
 
-The second way is exact for the same reasons: what is cut out is what stands from each odd quotation mark to
-one byte behind the next one, and all of it together is, byte for byte, the text of all keys, which hold no
-quotation mark themselves.
+The second way is exact for the same reasons: a key's row is what stands from an odd quotation mark to one
+byte behind the next one, and is, byte for byte, the next key of the manifest; a number's row is all that
+stands from there to the next odd quotation mark, and spaces.
 """
 
 from __future__ import annotations
@@ -35,13 +35,22 @@ from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
 from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
 from evaluator.problems import Findings, Rejected
-from evaluator.truth.packed_keys import MAX_DIGITS, WORD_BYTES, KeyWords, Rows, Words
+from evaluator.truth.packed_keys import (
+    MAX_CELL_BYTES,
+    MAX_DIGITS,
+    WORD_BYTES,
+    KeyWords,
+    Rows,
+    Words,
+    cells_of,
+)
 from evaluator.truth.truth import Manifest
 
 Octets = NDArray[np.uint8]
 
 _WHITE_SPACE: Final = b" \t\r\n"
 _PAD: Final = b" " * WORD_BYTES
+_CELL_PAD: Final = b" " * MAX_CELL_BYTES
 _SPACES: Final = np.frombuffer(_PAD, dtype="<u8")[0]
 _SPACE, _QUOTE = _PAD[0], ord('"')
 _SELECT_FROM: Final = tuple(np.uint64((2**64 - 1) ^ ((1 << 8 * first) - 1)) for first in range(WORD_BYTES))
@@ -189,34 +198,31 @@ def _by_spelling(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | No
     """Read natural keys in the manifest's order, block by block; see the module's docstring."""
     keys, n = manifest.natural_key_text, manifest.n_sequences
     start, row = text.find(b'"'), 0
-    if keys is None or not keys.is_first_of(text, start) or text[:start].strip(_WHITE_SPACE) != b"{":
+    if keys is None or text[:start].strip(_WHITE_SPACE) != b"{":
         return None
-    octets, values = np.frombuffer(text, dtype=np.uint8), np.empty(n)
+    values = np.empty(n)
     between: bytes | None = None
     while start < len(text):
-        block = octets[start : start + _BLOCK]
-        quotes = np.flatnonzero(block == _QUOTE)
+        block = text[start : start + _BLOCK]
+        octets = np.frombuffer(block + _CELL_PAD, dtype=np.uint8)
+        quotes = np.flatnonzero(octets == _QUOTE)
         is_last = start + len(block) == len(text)
         # All but the last block end before the key that the next one begins with.
         n_members = (len(quotes) - (0 if is_last else 1)) // 2
         if n_members < 1 or row + n_members > n:
             return None
-        stop = len(block) - 1 if is_last else int(quotes[2 * n_members])
-        opens, closes = quotes[: 2 * n_members + (not is_last) : 2], quotes[1 : 2 * n_members : 2]
-        if between is None and len(opens) > 1:
-            between = _between(block[: opens[1]].tobytes())
-        if not _follow(block, opens[1:], between):
+        opens, closes = quotes[: 2 * n_members : 2], quotes[1 : 2 * n_members : 2]
+        following = quotes[2 : 2 * n_members + (not is_last) : 2]
+        if between is None and len(following):
+            between = _between(block[: following[0]])
+        if not _follow(octets, following, between) or not keys.is_at(octets, opens, closes, row=row):
             return None
-        expected = keys.octets[keys.ends[row] : keys.ends[row + n_members]]
-        rest = _cut_out(block[:stop], opens[:n_members], closes, expected)
-        if rest is None:
-            return None
-        rest = rest if is_last else rest.removesuffix(between or b"")
-        part = _numbers(b"[%b]" % rest, n_members)
+        ends = np.append(following, len(block) - 1) if is_last else following
+        part = _numbers_between(octets, closes + 2, ends, is_last=is_last)
         if part is None:
             return None
         values[row : row + n_members] = part
-        start, row = (len(text) if is_last else start + stop), row + n_members
+        start, row = start + (len(block) if is_last else int(ends[-1])), row + n_members
     return (values, "natural_key") if row == n else None
 
 
@@ -236,19 +242,15 @@ def _follow(block: Octets, opens: Rows, between: bytes | None) -> bool:
     return all(bool((block[opens - back] == octet).all()) for back, octet in before)
 
 
-def _cut_out(block: Octets, opens: Rows, closes: Rows, expected: Octets) -> bytes | None:
-    """What is left of a block without its keys, or None if these are not the expected ones."""
-    stops = closes + 2
-    lengths = np.empty(2 * len(opens), dtype=np.intp)
-    lengths[::2] = stops - opens
-    lengths[1:-1:2] = opens[1:] - stops[:-1]
-    lengths[-1] = len(block) - stops[-1]
-    if lengths.min() < 0:
+def _numbers_between(octets: Octets, starts: Rows, ends: Rows, *, is_last: bool) -> Floats | None:
+    """The numbers of members, from behind their colons on; a comma follows each but the last of all."""
+    cells = cells_of(octets, starts, ends - starts, filling=_SPACE)
+    if cells is None:
         return None
-    is_key = np.repeat(np.tile([True, False], len(opens)), lengths)
-    if not np.array_equal(block[is_key], expected):
-        return None
-    return bytes(block[~is_key])
+    text = cells.tobytes()
+    return _numbers(
+        b"[%b]" % (text if is_last else text.rstrip(_WHITE_SPACE).removesuffix(b",")), len(starts)
+    )
 
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:

@@ -164,8 +164,7 @@ class Scorer:
 
     def _errors(self, predictions: Predictions) -> _Errors:
         truth = self._truth
-        raw = predictions.ttc_s[truth.ascending_rows]
-        predicted, n_truncated = _truncate(raw, self._protocol)
+        predicted, n_truncated = _truncate(predictions.ttc_s[truth.ascending_rows], self._protocol)
         alpha = scale_ratio_10hz(predicted)
         # One comparison each way: NaN fails both, so NaN, 0 (α₁₀ is 0 or -0 there) and undefined MiD end up
         # here.

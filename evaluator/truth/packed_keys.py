@@ -1,8 +1,9 @@
-"""The keys of a manifest as they stand in a prediction file: as 64-bit words, or as one text."""
+"""The keys of a manifest as they stand in a prediction file: as 64-bit words, or as rows of words."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
@@ -12,9 +13,13 @@ from numpy.typing import NDArray
 
 Words = NDArray[np.uint64]
 Rows = NDArray[np.intp]
+Lengths = NDArray[np.intp] | NDArray[np.uint8]
 
 WORD_BYTES: Final = 8
 MAX_DIGITS: Final = 6
+MAX_CELL_BYTES: Final = 128
+_BATCH: Final = 1 << 14
+_CELL_PAD: Final = b" " * MAX_CELL_BYTES
 
 
 def _mask(n_digits: int) -> int:
@@ -78,30 +83,76 @@ class KeyWords:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class KeyText:
-    """Keys of any length with their punctuation, `"a/b":"a/c":`, one after the other.
+    """Keys of up to 125 bytes with their punctuation, `"a/b":`, each at the start of a row of words.
 
-    `ends` (n + 1,) are where they end, from the 0 before the first one on.
+    `cells` (n, words) are those rows, `lengths` (n,) the bytes of each that are not filling.
     """
 
-    octets: NDArray[np.uint8]
-    ends: Rows
+    cells: Words
+    lengths: NDArray[np.uint8]
 
     @classmethod
-    def of(cls, keys: Sequence[str]) -> KeyText | None:
-        """The text of these keys, or None when JSON would write one of them in another way."""
-        try:
-            text = "".join([f'"{key}":' for key in keys]).encode()
-        except UnicodeEncodeError:
-            return None
-        octets = np.frombuffer(text, dtype=np.uint8)
-        ends = np.flatnonzero(octets == ord('"'))[1::2] + 2
-        if text.count(b'"') != 2 * len(keys) or b"\\" in text or int(octets.min()) < ord(" "):
-            return None
-        return cls(octets, np.concatenate([[0], ends]))
+    def of(cls, keys: Iterable[str], *, n: int) -> KeyText | None:
+        """The text of these n keys, or None when one is too long, or JSON would write it in another way."""
+        every = iter(keys)
+        cells, lengths = np.zeros((n, 1), dtype="<u8"), np.empty(n, dtype=np.uint8)
+        # Batch by batch, so that a million keys never exist all at once as texts.
+        for row in range(0, n, _BATCH):
+            found = _cells_of_keys(list(itertools.islice(every, _BATCH)))
+            if found is None:
+                return None
+            part, rows = found[0], slice(row, row + _BATCH)
+            n_more = part.shape[1] - cells.shape[1]
+            if n_more > 0:
+                cells = np.pad(cells, ((0, 0), (0, n_more)))
+            cells[rows, : part.shape[1]], lengths[rows] = part, found[1]
+        return cls(cells, lengths)
 
-    def is_first_of(self, text: bytes, start: int) -> bool:
-        """Whether the first key stands in a file from there on."""
-        return text.startswith(self.octets[: self.ends[1]].tobytes(), start)
+    def is_at(self, octets: NDArray[np.uint8], opens: Rows, closes: Rows, *, row: int) -> bool:
+        """Whether the keys from `row` on stand between these quotation marks, (m,), each with its colon."""
+        rows = slice(row, row + len(opens))
+        lengths = self.lengths[rows]
+        if not np.array_equal(closes + 2 - opens, lengths):
+            return False
+        found = cells_of(octets, opens, lengths, filling=0, n_words=self.cells.shape[1])
+        return found is not None and np.array_equal(found, self.cells[rows])
+
+
+def _cells_of_keys(keys: Sequence[str]) -> tuple[Words, Rows] | None:
+    try:
+        text = "".join([f'"{key}":' for key in keys]).encode()
+    except UnicodeEncodeError:
+        return None
+    octets = np.frombuffer(text + _CELL_PAD, dtype=np.uint8)
+    quotes = np.flatnonzero(octets == ord('"'))
+    if len(quotes) != 2 * len(keys) or b"\\" in text or int(octets.min()) < ord(" "):
+        return None
+    lengths = quotes[1::2] + 2 - quotes[::2]
+    cells = cells_of(octets, quotes[::2], lengths, filling=0)
+    return None if cells is None else (cells, lengths)
+
+
+def cells_of(
+    octets: NDArray[np.uint8], starts: Rows, lengths: Lengths, *, filling: int, n_words: int | None = None
+) -> Words | None:
+    """Copies of the pieces of a text as rows of words, (m, n_words), filled up with the octet `filling`.
+
+    The text must go on for `MAX_CELL_BYTES` behind each start. None if a piece is longer than these. Without
+    `n_words` the longest piece says how many words there are.
+    """
+    longest = int(lengths.max())
+    if longest > MAX_CELL_BYTES:
+        return None
+    n_bytes = WORD_BYTES * (n_words or -(-longest // WORD_BYTES))
+    # One copy of fixed length for each piece, which is much faster than to select bytes.
+    windows = np.ndarray((len(octets) - n_bytes + 1,), dtype=f"V{n_bytes}", buffer=octets, strides=(1,))
+    cells: Words = windows[starts].view("<u8").reshape(len(starts), -1)
+    is_filling = np.arange(n_bytes) >= np.arange(n_bytes + 1)[:, np.newaxis]
+    masks = np.where(is_filling, np.uint8(255), np.uint8(0)).view("<u8")
+    cells &= (~masks).take(lengths, axis=0)
+    if filling:
+        cells |= (masks & np.uint64(filling * (2**64 // 255))).take(lengths, axis=0)
+    return cells
 
 
 def _spell(anno_id: NDArray[np.int64], n_digits: Rows) -> Words:

@@ -13,7 +13,7 @@ change the digest.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -89,8 +89,12 @@ class Manifest:
     @cached_property
     def natural_keys(self) -> tuple[str, ...]:
         """`bag_stamp/cam_id/ts/track_id` of every target frame."""
-        columns = zip(self.bag_stamp, self.cam_id, self.ts_ns.tolist(), self.track_id, strict=True)
-        return tuple([f"{bag}/{cam}/{ts}/{track}" for bag, cam, ts, track in columns])
+        return tuple(self._each_natural_key())
+
+    def _each_natural_key(self) -> Iterator[str]:
+        # A memory view gives one integer after the other, where a list would hold them all.
+        columns = zip(self.bag_stamp, self.cam_id, self.ts_ns.data, self.track_id, strict=True)
+        return (f"{bag}/{cam}/{ts}/{track}" for bag, cam, ts, track in columns)
 
     @cached_property
     def anno_id_keys(self) -> tuple[str, ...]:
@@ -122,7 +126,7 @@ class Manifest:
     @cached_property
     def natural_key_text(self) -> KeyText | None:
         """The natural keys as the text of a file, where JSON writes them as they are."""
-        return KeyText.of(self.natural_keys)
+        return KeyText.of(self._each_natural_key(), n=self.n_sequences)
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:

@@ -215,6 +215,14 @@ def test_natural_keys_in_order_need_no_dictionary(monkeypatch: pytest.MonkeyPatc
     assert_equivalent(data, LONG, by_columns=True)
 
 
+@pytest.mark.parametrize("n_characters", [113, 114, 200])
+@pytest.mark.parametrize("number", ["2.5", "2." + "5" * 125, "2." + "5" * 126])
+def test_keys_and_numbers_of_any_length_read_the_same_both_ways(n_characters: int, number: str) -> None:
+    manifest = make_truth([4.0, 2.0, 3.0], bags=["a", "b" * n_characters, "c"]).manifest
+    data = "{" + ",".join(f'"{key}":{number}' for key in manifest.natural_keys) + "}"
+    assert_equivalent(data.encode(), manifest)
+
+
 @pytest.mark.parametrize("name", ['a"b', "a\\b", "a\nb", "ü"])
 def test_names_that_json_writes_in_another_way_are_read_too(name: str) -> None:
     manifest = make_truth([4.0, 2.0, 3.0], bags=[name, "b", "c"]).manifest
