@@ -3,6 +3,7 @@
 from datetime import datetime
 from typing import Final
 
+from django.contrib.auth.models import AnonymousUser
 from django.http import HttpResponse, HttpResponseBase, StreamingHttpResponse
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.permissions import AllowAny
@@ -30,10 +31,17 @@ INTERVALS = OpenApiParameter(
     enum=list(tables.WITH_INTERVALS),
     description="Whether to include the 95 % confidence interval of each score.",
 )
+MINE = OpenApiParameter(
+    "mine",
+    str,
+    enum=list(tables.WITH_INTERVALS),
+    description="`0` or `no`: without the rows that only your team sees, as everybody gets the board.",
+)
 PARAMETERS = {
     "sort": one_of(*boards.SORTS),
     "at": A_PAST_DAY,
     "intervals": tables.YES_OR_NO,
+    "mine": tables.YES_OR_NO,
     **filters.PARAMETERS,
 }
 FILTERS = [
@@ -46,10 +54,12 @@ def _board(
     request: Request, *, split: Split, edition: Edition | None = None, at: datetime | None = None
 ) -> HttpResponseBase:
     query = request.query_params
+    mine = query.get("mine", "")
+    has_own = not mine or tables.is_asked_for("mine", mine)
     board = snapshots.board(
         split=split,
         edition=edition,
-        viewer=request.user,
+        viewer=request.user if has_own else AnonymousUser(),
         sort=query.get("sort", "rank"),
         at=at,
         filters=filters.parse(query.dict()),
@@ -70,7 +80,7 @@ class BoardView(APIView):
 
     @extend_schema(
         operation_id="board",
-        parameters=[SORT, AT, INTERVALS, *FILTERS],
+        parameters=[SORT, AT, INTERVALS, MINE, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
     def get(self, request: Request, split: str) -> HttpResponseBase:
@@ -87,7 +97,7 @@ class EditionBoardView(APIView):
 
     @extend_schema(
         operation_id="edition_board",
-        parameters=[SORT, INTERVALS, *FILTERS],
+        parameters=[SORT, INTERVALS, MINE, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
     def get(self, request: Request, split: str, number: int) -> HttpResponseBase:

@@ -153,12 +153,16 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
     has_own = any(tables.mark_of(entry) for entry in board.entries)
     on_site = [each for each in formats.FORMATS if each.on_site]
 
+    def asked(form: Format, more: dict[str, str]) -> str:
+        # The API's document has the rows of whoever asks, unless it is asked for without.
+        is_public = has_own and form.is_api_document and "mine" not in more
+        return _asked(query, **more, **({"mine": "0"} if is_public else {}))
+
     def offered(label: str, about: str, these: Sequence[Format], **more: str) -> LabelledLinks:
-        asked = _asked(query, **more)
         return label, [
             ExportLink(
                 each,
-                f"{path.rstrip('/')}.{each.suffix}{asked}",
+                f"{path.rstrip('/')}.{each.suffix}{asked(each, more)}",
                 f"{each.title}{about}",
                 f"tsttc-{board.split.pk}.{each.suffix}",
             )
@@ -173,9 +177,7 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
         with_values = [each for each in these if each.has_values]
         return [plain, offered(label, f"{about}, {label}", with_values, **more, intervals="1")]
 
-    # The API's document has the rows of whoever asks, marked: for whom there are any, it is with those.
-    public = [each for each in on_site if not (has_own and each.is_api_document)]
     return {
-        "public": variants("", public),
+        "public": variants("", on_site),
         "with_own": variants(" including your private rows", on_site, mine="1") if has_own else [],
     }

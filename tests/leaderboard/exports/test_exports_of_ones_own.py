@@ -142,8 +142,18 @@ def test_the_page_offers_one_s_own_rows_to_who_has_some(
     offered = links(client)
     assert offered.keys() == {"public", "with-own"}
     everybodys, with_own = offered.values()
-    # The API's document is that of whoever asks: with their own rows, which it marks.
-    assert not [address for address in everybodys if ".json" in address or "mine" in address]
+    # The API's document is that of whoever asks, with their own rows, unless it is asked for without.
+    assert [address for address in everybodys if "mine" in address or ".json" in address] == [
+        "/board/test.json?mine=0",
+        "/board/test.json?intervals=1&mine=0",
+    ]
+    everybodys_document = Client().get("/api/v1/splits/test/board").json()
+    assert client.get("/board/test.json?mine=0", follow=True).json() == everybodys_document
+    assert (
+        client.get("/api/v1/splits/test/editions/1/board?mine=no").json()["entries"]
+        == everybodys_document["entries"]
+    )
+    assert client.get("/board/test.json?mine=perhaps", follow=True).status_code == 400
     assert with_own[:5] == [f"/board/test.{form}?mine=1" for form in ("csv", "json", "tex", "md", "bib")]
     document = client.get(with_own[1], follow=True).json()
     told = {row["method"]: (row["visibility"], row["pseudonym"]) for row in document["entries"]}
