@@ -208,7 +208,9 @@ class SplitSerializer(serializers.Serializer[Split]):
     title = serializers.CharField(help_text="Title of the split.")
     description = serializers.CharField(help_text="Description of the split.")
     is_open = serializers.SerializerMethodField(help_text="Whether the split accepts submissions.")
-    is_archived = serializers.BooleanField(help_text="Whether the split is archived: its board stays, and it takes no submissions until maintainers list it again.")
+    is_archived = serializers.BooleanField(
+        help_text="Whether the split is archived: the board stays, submissions are closed."
+    )
     same_truth_as = serializers.CharField(
         source="same_truth_as_id",
         allow_null=True,
