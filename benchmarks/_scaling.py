@@ -1,17 +1,19 @@
 """The measurement of `benchmarks/scale_out.py`, run in a process that has the site's settings.
 
-100 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued, not yet due.
-Once every worker is up they become due at once, and the clock runs, by the database, until the last is
-decided. The workers share the database, the broker and the files, and nothing else, as those on other
-machines do.
+100 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued before any
+worker is started, not yet due. Each worker then scores a few others, so that what a process reads and starts
+once, the ground truth and the server of its readers, is not counted. Then all become due at once, and the
+clock runs, by the database, until the last is decided: no file is sent meanwhile. The workers share the
+database, the broker and the files, and nothing else, as those on other machines do.
 
-Here PostgreSQL and this process, which asks whether all are decided, have the same processors as the workers.
-So each line says what every party took of them: where their sum is near the number of processors, no worker
-more can be of use on this machine.
+Here PostgreSQL has the same processors as the workers, and this process, which only asks whether all are
+decided. So each line says what every party took of them: where their sum is near the number of processors, no
+worker more can be of use on this machine.
 """
 
 import os
 import subprocess
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from datetime import timedelta
@@ -37,7 +39,7 @@ from leaderboard.submissions import submissions
 from tests.journeys.production import BIN, REPOSITORY, await_that
 
 N_WORKERS = (1, 2, 4)
-N_SUBMISSIONS = 100
+N_SUBMISSIONS, N_TO_WARM = 100, 6
 N_SEQUENCES = 28_600
 SEED = 20230901
 PATIENCE_S = 600.0
@@ -52,17 +54,16 @@ def main() -> None:
     ground_truth.import_truth(split_name="test", path=table, now=timezone.now())
     try:
         for n in N_WORKERS:
-            ids = queue_for_later(truth, n_workers=n)
+            warm_ids = queue_for_later(truth, name=f"to warm {n}", n=N_TO_WARM * n)
+            ids = queue_for_later(truth, name=f"for {n}", n=N_SUBMISSIONS)
             name = f"scale_out_{n}_{'worker' if n == 1 else 'workers'}"
             # What else the machine is doing, without which the rates cannot be read.
             print(f"{name}_load_before = {os.getloadavg()[0]:.1f} processes", flush=True)
             with workers(n) as processes:
-                parties = {"processor": processes, "postgres": database_server(), "client": [os.getpid()]}
-                before_s = {party: sum(map(processor_s, pids)) for party, pids in parties.items()}
+                rate(warm_ids)
+                before_s = used_by_party(processes)
                 per_s = rate(ids)
-                used_s = {
-                    party: sum(map(processor_s, pids)) - before_s[party] for party, pids in parties.items()
-                }
+                used_s = {party: now_s - before_s[party] for party, now_s in used_by_party(processes).items()}
             print(f"{name} = {per_s:.2f} submissions/s", flush=True)
             for party, seconds in used_s.items():
                 print(f"{name}_{party} = {seconds / len(ids):.4f} s/submission", flush=True)
@@ -72,23 +73,31 @@ def main() -> None:
         connections.close_all()
 
 
-def queue_for_later(truth: evaluator.GroundTruth, *, n_workers: int) -> list[UUID]:
+def used_by_party(workers: Sequence[int]) -> dict[str, float]:
+    """Processor seconds until now; the workers are children of this process, and not counted with it."""
+    return {
+        "processor": sum(map(processor_s, workers)),
+        "postgres": sum(map(processor_s, database_server())),
+        "client": time.process_time(),
+    }
+
+
+def queue_for_later(truth: evaluator.GroundTruth, *, name: str, n: int) -> list[UUID]:
     """Send different files while nobody works, none of them due yet; returns their evaluations."""
     user, _ = User.objects.get_or_create(email="scale-out@example.org")
-    method = f"for {n_workers}"
-    rng = np.random.default_rng([SEED, n_workers])
-    for i in range(N_SUBMISSIONS):
+    rng = np.random.default_rng([SEED, *name.encode()])
+    for i in range(n):
         ttc_s = truth.ttc_s * rng.lognormal(0, 0.15, truth.n_sequences)
         data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s)
         submissions.submit(
             user=user,
             split_name="test",
-            method_name=method,
+            method_name=name,
             upload=ContentFile(data, name=f"{i}.json"),
             via="API",
             now=timezone.now(),
         )
-    queued = Evaluation.objects.filter(submission__method__name=method)
+    queued = Evaluation.objects.filter(submission__method__name=name)
     queued.update(due_at=timezone.now() + timedelta(days=1))
     return list(queued.values_list("pk", flat=True))
 

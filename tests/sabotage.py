@@ -216,8 +216,8 @@ SABOTAGES = (
     Sabotage(
         "no flush before the rename",
         "leaderboard/storage/files.py",
-        "                os.fsync(out.fileno())\n",
-        "",
+        "                    os.fsync(out.fileno())\n",
+        "                    pass\n",
         f"{OUTAGES}::test_file_is_flushed_before_it_is_renamed_and_its_directories_after",
     ),
     Sabotage(

@@ -76,7 +76,7 @@ def sums_of(edition: Edition, *, file: SentFile) -> Floats:
     if kept is not None:
         return kept
     predictions = aligned.of(file, edition)
-    bags = _scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
+    bags = scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for
     save(edition, file=file, bags=bags)
     return bags.sums
@@ -84,7 +84,7 @@ def sums_of(edition: Edition, *, file: SentFile) -> Floats:
 
 def counts_of(edition: Edition) -> Floats:
     """Sequences per recording in every column, (G, columns). Raises `OSError` without the values."""
-    return _scorer(edition.ground_truth_id, edition.protocol).recording_counts
+    return scorer(edition.ground_truth_id, edition.protocol).recording_counts
 
 
 def floor_of(edition: Edition) -> dict[str, float | None]:
@@ -98,7 +98,12 @@ def _floor(truth_digest: str, protocol: str) -> dict[str, float | None]:
     return floors.floor_of(truth_values.load(truth_digest), protocol=protocol)
 
 
-@lru_cache(maxsize=2)
-def _scorer(truth_digest: str, protocol: str) -> Scorer:
+def scorer(truth_digest: str, protocol: str) -> Scorer:
+    """Ready for every file of an edition, with the truth as it is cached. Raises as `truth_values.load`."""
     truth: GroundTruth = truth_values.load(truth_digest)
+    return _scorer(truth, protocol)
+
+
+@lru_cache(maxsize=2)
+def _scorer(truth: GroundTruth, protocol: str) -> Scorer:
     return Scorer(truth, get_protocol(protocol))

@@ -14,8 +14,7 @@ import structlog
 from django.conf import settings
 from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection
 
-import evaluator
-from evaluator import GroundTruth, Rejected, Report, published
+from evaluator import Rejected, Report, published
 from evaluator.predictions.plausibility import warnings_of
 from evaluator.problems import FileWarning
 from evaluator.scoring.scoring import Scorer
@@ -108,7 +107,9 @@ def _decide(leases: list[Lease], *, claimed_s: float, rng: random.Random) -> Non
         leases = rescore(leases, edition=first.edition)
     waiting = deque(leases)
     while waiting:
-        run(waiting.popleft(), rng=rng, waiting=waiting)
+        lease = waiting.popleft()
+        known = first if lease.evaluation_id == first.pk else None
+        run(lease, rng=rng, waiting=waiting, evaluation=known)
         if time.monotonic() - claimed_s > settings.LEASE_S / 2:
             _release(waiting)
 
@@ -117,8 +118,8 @@ def _claimed() -> list[Lease]:
     """What this worker gets to decide. Raises the database's error if it stays away."""
     token = uuid.uuid4()
     try:
-        # Asked first, because a claim is a write, for which SQLite lets nobody else write.
-        if not Evaluation.objects.due().exists():
+        # Asked first where a claim is a write even of no row, for which SQLite lets nobody else write.
+        if connection.vendor == "sqlite" and not Evaluation.objects.due().exists():
             return []
         return lifecycle.claim(
             lease_s=settings.LEASE_S,
@@ -163,10 +164,9 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     """
     sent, warned = _retry_on_disconnect(lambda: _sent(leases, edition))
     try:
-        truth = _truth(edition)
+        scorer = _scorer(edition)
     except (OSError, TruthDamaged):
         return list(leases)
-    scorer = Scorer(truth, edition.rules)
     outcomes: list[tuple[Lease, Outcome]] = []
     rest: list[Lease] = []
     for lease in leases:
@@ -225,14 +225,22 @@ def _sent(
     return sent, warned
 
 
-def run(lease: Lease, *, rng: random.Random, waiting: deque[Lease] | None = None) -> None:
+def run(
+    lease: Lease,
+    *,
+    rng: random.Random,
+    waiting: deque[Lease] | None = None,
+    evaluation: Evaluation | None = None,
+) -> None:
     """Decide one claimed evaluation. Whatever happens, the lease ends: decided, given back, or lost.
 
-    `waiting` are leases of this worker that are not begun: they are handed back if this run takes long. Only
-    the loss of the database is raised; the lease then runs out by itself.
+    `waiting` are leases of this worker that are not begun: they are handed back if this run takes long.
+    `evaluation` is the row, if it was read since it was claimed. Only the loss of the database is raised; the
+    lease then runs out by itself.
     """
     waiting = deque() if waiting is None else waiting
-    evaluation = _retry_on_disconnect(lambda: _evaluations([lease]))[0]
+    if evaluation is None:
+        evaluation = _retry_on_disconnect(lambda: _evaluations([lease]))[0]
     # Every line from here on says what it is about, also those of modules that know of no submission.
     with structlog.contextvars.bound_contextvars(
         submission_id=str(evaluation.submission_id),
@@ -294,20 +302,20 @@ class Pulse:
 def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcome:
     """Read, check and score one file. A pure function of its bytes, its manifest and the edition."""
     edition, file = evaluation.edition, evaluation.submission.sent_file
-    truth = _truth(edition)
+    scorer = _scorer(edition)
     try:
         predictions = aligned.read(file, edition, heartbeat=heartbeat)
-        report = evaluator.evaluate(predictions, truth, protocol=edition.protocol, keep_bags=True)
+        report = scorer.report(predictions, keep_bags=True)
     except Rejected as rejected:
         return rejection(rejected)
     recording_sums.save(edition, file=file, bags=report.bags)
     return scored(report, decimals=edition.decimals, warnings=warnings_of(predictions))
 
 
-def _truth(edition: Edition) -> GroundTruth:
-    """The edition's values. Raises `OSError` or `TruthDamaged`: a submission is never to blame for them."""
+def _scorer(edition: Edition) -> Scorer:
+    """Made of the edition's values. Raises `OSError` or `TruthDamaged`: no submission is to blame."""
     try:
-        return truth_values.load(edition.ground_truth_id)
+        return recording_sums.scorer(edition.ground_truth_id, edition.protocol)
     except Rejected as fault:
         raise TruthDamaged(f"the ground truth {edition.ground_truth_id} cannot be used: {fault}") from fault
 

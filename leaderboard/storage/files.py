@@ -34,8 +34,14 @@ class StoreAway(OSError):
     """The store is on another machine and does not answer, or refuses us. Asking again later may help."""
 
 
+class Rebuildable(ContentFile):
+    """What is made anew where it is missing or damaged: it need not be on the disk before `save` returns."""
+
+
 class DurableFileSystemStorage(FileSystemStorage):
     """A local directory whose files are whole or absent, and on the disk before `save` returns.
+
+    Of what is `Rebuildable`, a power cut may leave a file that is not whole.
 
     A file is written below `.incoming`, flushed to the disk, and renamed. What a process that was killed left
     there is in nobody's way, and is removed by whoever saves next, after an hour.
@@ -66,12 +72,14 @@ class DurableFileSystemStorage(FileSystemStorage):
                 for chunk in content.chunks(CHUNK_BYTES):
                     out.write(chunk)
                 out.flush()
-                os.fsync(out.fileno())
+                if not isinstance(content, Rebuildable):
+                    os.fsync(out.fileno())
             Path(temporary).replace(target)
         except BaseException:
             Path(temporary).unlink(missing_ok=True)
             raise
-        self._settle(target)
+        if not isinstance(content, Rebuildable):
+            self._settle(target)
         return name
 
     def _settle(self, target: Path) -> None:
@@ -219,7 +227,7 @@ def save_aligned(predictions: Predictions) -> None:
         if _checked(_read(name)) == values:
             return
         store().delete(name)
-    store().save(name, ContentFile(hashlib.sha256(values).digest() + values))
+    store().save(name, Rebuildable(hashlib.sha256(values).digest() + values))
 
 
 def load_aligned(file: SentFile, *, n_sequences: int) -> NDArray[np.float64] | None:

@@ -11,7 +11,7 @@ import pytest
 from django.db import InterfaceError, OperationalError
 from pytest_django import Settings
 
-import evaluator
+from evaluator.scoring.scoring import Scorer
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from leaderboard.scoring import fork_server, lifecycle, worker
 from leaderboard.scoring.lifecycle import MAX_POISON_STRIKES, Lease
@@ -111,7 +111,7 @@ def test_fault_of_our_own_is_a_strike_at_once_and_ends_no_worker(
 ) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
     with monkeypatch.context() as patch:
-        patch.setattr(evaluator, "evaluate", lambda *_, **__: 1 / 0)
+        patch.setattr(Scorer, "report", lambda *_, **__: 1 / 0)
         assert run_next()
     assert strikes(submission) == (1, 0)
     assert evaluation_of(submission).last_error == "ZeroDivisionError: division by zero"
