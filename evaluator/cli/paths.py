@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
+import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -27,10 +30,21 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / APPLICATION
 
 
+def command_line(words: Sequence[str], *, platform: str = sys.platform) -> str:
+    """These words as one would type them in the shell of this system.
+
+    >>> command_line(["tsttc", "check", "a b.json"], platform="linux")
+    "tsttc check 'a b.json'"
+    >>> print(command_line(["tsttc", "check", r"C:\\my files\\a.json"], platform="win32"))
+    tsttc check "C:\\my files\\a.json"
+    """
+    return subprocess.list2cmdline(words) if platform == "win32" else shlex.join(words)
+
+
 def server_of_login() -> str | None:
     """The address that `tsttc login` was last given; None where there was none, or it cannot be read."""
     try:
-        found = json.loads(settings_file().read_text(encoding="utf-8"))
+        found = json.loads(settings_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
         return None
     server = found.get("server") if isinstance(found, dict) else None

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import sys
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
@@ -49,7 +50,7 @@ def has_token(url: str) -> bool:
 
 def checked(text: str, *, named: str) -> str:
     """The token that `text` is; raises Failure for one that cannot be sent."""
-    value = text.strip()
+    value = text.strip().removeprefix("\ufeff")  # editors of Windows begin a file so
     if not value:
         raise Failure(
             f"{named} is empty; expected a token.",
@@ -141,7 +142,7 @@ def tokens_file() -> Path:
 def _kept_in_file() -> dict[str, str]:
     """The tokens of the file; none where there is none, or it is not what was written."""
     try:
-        found = json.loads(tokens_file().read_text(encoding="utf-8"))
+        found = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
         return {}
     return {str(name): str(token) for name, token in found.items()} if isinstance(found, dict) else {}
@@ -161,7 +162,9 @@ def _keep_in_file(kept: dict[str, str]) -> str:
         part.replace(path)
     except OSError as error:
         raise no_keyring(f"There is no keyring, and {path} cannot be written ({error.strerror}).") from None
-    return f"{path}, which only you can read; this machine has no keyring"
+    # On Windows it has the rights of the user's own folder.
+    owner = "" if sys.platform == "win32" else ", which only you can read"
+    return f"{path}{owner}; this machine has no keyring"
 
 
 def _text_of(path: Path) -> str:

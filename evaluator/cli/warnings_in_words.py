@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from evaluator.cli.layout import printable
+from evaluator.cli.paths import command_line
 from evaluator.problems import FileWarning
 
 if TYPE_CHECKING:
@@ -50,8 +50,8 @@ def numbering_warnings(
             return []  # it is smooth as it stands, so its anno_ids are the manifest's
         if as_toolkit <= MAX_ROUGHNESS < as_manifest:
             origin = "The values are smooth in the toolkit's numbering only, so the toolkit wrote the file"
-    source = "-" if str(predictions) == "-" else shlex.quote(str(predictions))
-    command = f"tsttc convert {source} --annotations {shlex.quote(str(annotations))} -o natural.json"
+    words = ("tsttc", "convert", str(predictions), "--annotations", str(annotations), "-o", "natural.json")
+    command = command_line(words)
     return [
         FileWarning(
             "other-numbering",

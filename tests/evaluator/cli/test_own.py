@@ -38,7 +38,8 @@ def test_whoami_names_team_token_and_limits(tsttc: Tsttc, site: RecordedSite) ->
     account = {"team": "TJU-V", "token": "ci", "scopes": ["read"], "split": "val", "expires_at": "2027-01-01"}
     site.put("GET /api/v1/account", Reply(account))
     result = tsttc("whoami")
-    assert result.stdout == f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01 UTC\n'
+    told = f'team TJU-V at {site.url}\ntoken "ci": read, for val only, until 2027-01-01 UTC\n'
+    assert result.stdout == told
     assert json.loads(tsttc("whoami", "--json").stdout) == account
 
 
