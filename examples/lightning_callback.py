@@ -4,6 +4,7 @@
 
 The model's `validation_step` returns {"row": …, "ttc_s": …}: rows of the manifest and seconds, one for each
 item of the batch. `ModelCheckpoint(monitor="tsttc/mid")` and `EarlyStopping` then follow the board's number.
+`scores.report` is the report of the last epoch: `report.by("recording")`, `report.frame()`, `report.plot()`.
 """
 
 from typing import Any
@@ -30,6 +31,7 @@ class TsttcScores(Callback):
         self.truth = evaluator.read_truth(truth)
         self.protocol = protocol
         self.ttc_s = np.full(self.truth.n_sequences, np.nan)
+        self.report: evaluator.Report | None = None
 
     def on_validation_epoch_start(self, trainer: Any, pl_module: Any) -> None:
         self.ttc_s = np.full(self.truth.n_sequences, np.nan)
@@ -43,6 +45,7 @@ class TsttcScores(Callback):
         if trainer.sanity_checking or np.isnan(self.ttc_s).any():
             return  # only a part of the sequences was predicted
         predictions = evaluator.Predictions.from_arrays(ttc_s=self.ttc_s, manifest=self.truth.manifest)
-        scores = evaluator.evaluate(predictions, self.truth, protocol=self.protocol).flat()
+        self.report = evaluator.evaluate(predictions, self.truth, protocol=self.protocol, keep_sequences=True)
+        scores = self.report.flat()
         found = {f"tsttc/{name}": value for name, value in scores.items() if value is not None}
         pl_module.log_dict(found, rank_zero_only=True)

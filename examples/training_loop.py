@@ -31,5 +31,11 @@ for epoch in range(1, 201):
     if mid is not None and mid < best_mid:
         best_mid, best_ratios = mid, ratios
 
+# Where the best epoch is wrong; `report.by("recording")` is this as a pandas frame, `report.plot()` a figure.
+best = evaluator.Predictions.from_arrays(scale_ratio=best_ratios, frame_gap=5, manifest=truth.manifest)
+report = evaluator.evaluate(best, truth, keep_sequences=True)
+worst = max(report.breakdown("recording"), key=lambda group: group.scores["mid"] or 0)
+print(f"worst recording {worst.group}: MiD {worst.scores['mid']:.2f} of {worst.n_sequences} sequences")
+
 data = evaluator.write_predictions(manifest=truth.manifest, scale_ratio=best_ratios, frame_gap=5)
 print(f"best MiD {best_mid:.2f}; {len(data):,} bytes for tsttc submit")

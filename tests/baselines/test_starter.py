@@ -72,10 +72,18 @@ def test_the_notebook_runs_from_start_to_end(tmp_path: Path) -> None:
         text=True,
         check=False,
         cwd=tmp_path,
-        env={"PYTHONPATH": str(REPOSITORY), "PYTHONIOENCODING": "utf-8", "OPENBLAS_NUM_THREADS": "1"},
+        env={
+            "PYTHONPATH": str(REPOSITORY),
+            "PYTHONIOENCODING": "utf-8",
+            "OPENBLAS_NUM_THREADS": "1",
+            "MPLBACKEND": "agg",
+            "MPLCONFIGDIR": str(tmp_path),
+        },
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("12 sequences in 4 recordings\n")
+    assert "crucial 0–3 s" in done.stdout, "where the errors are"
+    assert (tmp_path / "scatter.pdf").read_bytes().startswith(b"%PDF")
     assert done.stdout.endswith("mine.json has 12 sequences\n")
     manifest = evaluator.read_manifest(FOLDER / "manifest.csv")
     predictions = evaluator.read_predictions((tmp_path / "mine.json").read_bytes(), manifest=manifest)

@@ -71,10 +71,13 @@ def test_better_model_is_better_by_more_than_chance(tmp_path: Path) -> None:
 
 
 def test_a_training_loop_gets_better_and_ends_with_a_file(tmp_path: Path) -> None:
-    *epochs, last = printed(EXAMPLES / "training_loop.py", tmp_path)
+    *epochs, worst, last = printed(EXAMPLES / "training_loop.py", tmp_path)
     found = [float(line.partition("MiD ")[2].partition(",")[0]) for line in epochs]
     assert found == sorted(found, reverse=True)
     assert last.startswith(f"best MiD {found[-1]:.2f}; ")
+    name, _, mid = worst.removeprefix("worst recording ").partition(": MiD ")
+    assert name in read_truth(EXAMPLES / "truth.csv").manifest.bag_stamp
+    assert float(mid.partition(" ")[0]) >= found[-1]
 
 
 def callback(monkeypatch: pytest.MonkeyPatch) -> Any:
@@ -100,6 +103,7 @@ def test_the_lightning_callback_logs_the_scores_of_a_whole_epoch(monkeypatch: py
     scores.on_validation_epoch_end(trainer, model)
     found = Predictions.from_arrays(ttc_s=1.1 * scores.truth.ttc_s, manifest=scores.truth.manifest)
     assert logged == {f"tsttc/{name}": value for name, value in evaluate(found, scores.truth).flat().items()}
+    assert len(scores.report.breakdown("recording")) == 6
 
 
 def test_the_callback_is_one_of_lightning_s(monkeypatch: pytest.MonkeyPatch) -> None:

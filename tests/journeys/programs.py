@@ -15,11 +15,11 @@ Done = subprocess.CompletedProcess[str]
 Tsttc = Callable[..., Done]
 
 
-def environment(url: str, token: str, *, home: Path) -> dict[str, str]:
-    """Where the command finds its server, its token and a home of its own."""
+def environment(url: str, token: str | Path, *, home: Path) -> dict[str, str]:
+    """Where the command finds its server, its token, or the file with it, and a home of its own."""
     return os.environ | {
         "TSTTC_URL": url,
-        "TSTTC_TOKEN": token,
+        "TSTTC_TOKEN_FILE" if isinstance(token, Path) else "TSTTC_TOKEN": str(token),
         "PYTHONPATH": str(REPOSITORY),
         "XDG_CONFIG_HOME": str(home / "config"),
         "XDG_CACHE_HOME": str(home / "cache"),
@@ -27,7 +27,7 @@ def environment(url: str, token: str, *, home: Path) -> dict[str, str]:
     }
 
 
-def command(url: str, token: str, *, home: Path) -> Tsttc:
+def command(url: str, token: str | Path, *, home: Path) -> Tsttc:
     """The command with that token for that address, called from the folder of examples."""
     surroundings = environment(url, token, home=home)
 

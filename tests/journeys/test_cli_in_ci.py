@@ -19,6 +19,7 @@ from pathlib import Path
 import psycopg
 import pytest
 
+from tests.evaluator.toolkit_folders import camera, write_folder
 from tests.journeys import recipes
 from tests.journeys.cutting import Cut, CutNetwork, MovingNetwork
 from tests.journeys.production import Site, free_port, get, web_process
@@ -119,6 +120,39 @@ def test_job_waits_for_its_scores_and_can_prove_them(job: Job) -> None:
     forged = job.tsttc("verify", receipt)
     assert (forged.returncode, forged.stdout) == (1, "")
     assert "The signature does not fit what the receipt says" in forged.stderr
+
+
+def test_what_is_one_s_own_is_listed_taken_back_and_withdrawn(job: Job) -> None:
+    """The token lies in a file, as the secret of a container does."""
+    secret, mine, sent = job.home / "secret", job.home / "mine.json", job.predictions(1.07)
+    secret.write_text(f"{job.token}\n")
+    tsttc = command(job.site.url, secret, home=job.home)
+    assert tsttc("methods").stdout == "Your team has no methods yet; tsttc submit creates one.\n"
+    assert job.submit(sent, "--wait", tsttc=tsttc).returncode == 0
+    assert 'token "CI": read and submit, until ' in tsttc("whoami").stdout
+    (submission,) = json.loads(tsttc("submissions", "--split", "test", "--json").stdout)
+    (method,) = json.loads(tsttc("methods", "--json").stdout)
+    assert (submission["method_id"], method["visibility"]) == (method["id"], "PRIVATE")
+    assert tsttc("download", submission["id"], "-o", mine).returncode == 0
+    assert mine.read_bytes() == sent.read_bytes()
+
+    manifest, table = job.home / "manifest.csv", job.home / "own.csv"
+    assert tsttc("manifest", "--split", "test", "-o", manifest).returncode == 0
+    checked = json.loads(tsttc("check", mine, "--manifest", manifest, "--json").stdout)
+    assert checked["predictions_digest"] == submission["digest"]
+    folder = write_folder(job.home / "folder", {"a.pkl": [camera({7: list(range(6))})]})
+    assert tsttc("truth", folder, "-o", table).stdout == f"{table}: 1 sequences of 1 recordings.\n"
+    nowhere = tsttc("manifest", "--split", "tset")
+    assert (nowhere.returncode, "The splits here are " in nowhere.stderr) == (8, True)
+
+    shown = tsttc("publish", "Job", "--yes")
+    assert shown.returncode == 0, shown.stderr
+    again = job.submit(sent, tsttc=tsttc)
+    assert again.stdout.startswith("Job is public: "), "a job is told, and not asked"
+    assert tsttc("board", "--format", "bibtex").stdout.startswith("@misc{shi2023tsttc,")
+    assert tsttc("withdraw", submission["id"]).returncode == 2
+    assert tsttc("withdraw", submission["id"], "--yes").stdout == "Job on test is withdrawn.\n"
+    assert tsttc("status", submission["id"]).stdout.startswith("SCORED, withdrawn: Job on test")
 
 
 def test_worse_method_fails_where_only_chance_is_hidden_and_the_better_one_is_shown(job: Job) -> None:
