@@ -40,7 +40,8 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     """
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
-    from evaluator.client.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.client.client import Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.client.connection import LOOPBACK_HOSTS  # noqa: PLC0415 -- the same
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)

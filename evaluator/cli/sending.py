@@ -85,14 +85,14 @@ def manifest_of(client: Client, split: str) -> Manifest | None:
 
     A copy goes by its digest, and what does not have that digest is no copy.
     """
-    from evaluator.truth.truth import read_manifest  # noqa: PLC0415 -- loads numpy
+    from evaluator.truth.truth import Manifest, read_manifest  # noqa: PLC0415 -- loads numpy
 
     digest = client.manifest_digest(split)
     if digest is None:
         return None
-    kept = cache_folder() / "manifests" / f"{digest.removeprefix('sha256:')[:64]}.csv"
+    kept = cache_folder() / "manifests" / f"{digest.removeprefix('sha256:')[:64]}.npz"
     try:
-        manifest = read_manifest(kept)
+        manifest = Manifest.load(kept)
         if manifest.digest == digest:
             return manifest
     except (Rejected, OSError):  # none yet, or damaged
@@ -104,16 +104,16 @@ def manifest_of(client: Client, split: str) -> Manifest | None:
             manifest = read_manifest(table)
         except Rejected as fault:
             raise rejected(f"the server's manifest of {split}", fault) from None
-        _keep(table, kept)
+    _keep(manifest, kept)
     return manifest
 
 
-def _keep(table: Path, kept: Path) -> None:
+def _keep(manifest: Manifest, kept: Path) -> None:
     """Put a copy where the next run finds it; a machine where that cannot be does without."""
     part = kept.with_suffix(f".{os.getpid()}.part")
     try:
         kept.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copyfile(table, part)
+        manifest.save(part)
         part.replace(kept)
     except OSError:
         return

@@ -83,11 +83,12 @@ def test_state_of_a_newer_server_is_not_taken_for_a_final_one(client: Client, si
 
 
 def test_watch_asks_the_server_to_hold_its_answer_after_a_first_look(
-    client: Client, site: RecordedSite
+    client: Client, site: RecordedSite, clock: FakeTime
 ) -> None:
     site.put(ONE, Reply(QUEUED), Reply(QUEUED), Reply(SCORED))
     list(client.watch("abc", timeout_s=60))
     assert [request.path.partition("?")[2] for request in site.requests] == ["", "wait=20", "wait=20"]
+    assert len(clock.slept_s) == 1, "at once after the first answer, which was not held"
 
 
 def test_held_answer_is_not_asked_for_longer_than_one_waits(client: Client, site: RecordedSite) -> None:
