@@ -1,19 +1,19 @@
 """Moderation for maintainers: a team with its people, methods and entries, and each deed on its own page."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 from uuid import UUID
 
 from django.contrib import messages
-from django.db.models import Q
+from django.db.models import F, Q
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Membership, Method, Submission, Team
+from leaderboard.models import Evaluation, Membership, Method, Submission, Team
 from leaderboard.submissions import forgetting, moderation
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
@@ -138,9 +138,21 @@ def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
         "team": found,
         "members": found.memberships.select_related("user").order_by("joined_at"),
         "methods": Method.objects.existing().filter(team=found).order_by("name"),
-        "sent": sent.order_by("-submitted_at")[:MAX_ENTRIES],
+        "sent": _with_states(sent.order_by("-submitted_at")[:MAX_ENTRIES]),
     }
     return render(request, "maintain/team.html", context)
+
+
+def _with_states(sent: Iterable[Submission]) -> list[Submission]:
+    """Each with the status that it has in the edition of the board, in words."""
+    rows = list(sent)
+    decided = Evaluation.objects.filter(
+        submission__in=rows, edition=F("submission__split__published_edition")
+    )
+    states = {row.submission_id: row.get_status_display() for row in decided}
+    for row in rows:
+        row.state = states.get(row.pk, "")  # type: ignore[attr-defined]  # for the template
+    return rows
 
 
 @maintainers_only

@@ -20,6 +20,13 @@ _LISTINGS: Final = [
     (Listing.ARCHIVED, "archived: the board stays, submissions are closed"),
     (Listing.OFF, "switched off: on no page, in no form, in no list of the API"),
 ]
+# What is not named here comes first, without a heading.
+_SECTIONS: Final = (
+    ("Dates", ("opens_at", "closes_at")),
+    ("Announcement", ("announcement", "announcement_ends_at")),
+    ("Quota", ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")),
+    ("Admission", ("needs_admission", "how_to_be_admitted")),
+)
 
 
 class MomentField(forms.CharField):
@@ -99,6 +106,14 @@ class PolicyForm(SiteForm):
         max_length=300,
         help_text="The end of a sentence, such as: write to board@example.org.",
     )
+
+    def sections(self) -> list[tuple[str, list[forms.BoundField]]]:
+        """The fields as the page shows them: each heading with those below it."""
+        below = {name: title for title, names in _SECTIONS for name in names}
+        found: dict[str, list[forms.BoundField]] = {"": [], **{title: [] for title, _ in _SECTIONS}}
+        for field in self:
+            found[below.get(field.name, "")].append(field)
+        return list(found.items())
 
     @staticmethod
     def filled_with(policy: Policy) -> dict[str, Any]:
