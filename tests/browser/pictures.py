@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from playwright.sync_api import Page
 
 MAX_COLOURS: Final = 256
+N_EXACT: Final = 24
 # The browser that made the picture takes it apart again; it comes back as rows of red, green, blue, alpha.
 TAKE_APART: Final = """async (encoded) => {
   const image = await createImageBitmap(await (await fetch("data:image/png;base64," + encoded)).blob());
@@ -37,11 +38,12 @@ def smaller(png: bytes, *, page: Page) -> bytes:
 
 
 def _chosen(colours: NDArray[np.uint8], counts: NDArray[np.intp]) -> NDArray[np.intp]:
-    """The most frequent colour of each neighbourhood, so that greys of letters leave room for marks."""
+    """The most frequent colours, then that of each neighbourhood: greys of letters leave room for marks."""
     by_count = np.argsort(-counts, kind="stable")
     coarse = colours[by_count].astype(np.uint32) >> 4
     _, first = np.unique(coarse @ np.array([256, 16, 1], dtype=np.uint32), return_index=True)
-    return by_count[np.sort(first)[:MAX_COLOURS]]
+    neighbours = np.sort(first[first >= N_EXACT])
+    return by_count[np.concatenate([np.arange(min(N_EXACT, len(by_count))), neighbours])[:MAX_COLOURS]]
 
 
 def _nearest(colours: NDArray[np.uint8], kept: NDArray[np.uint8]) -> NDArray[np.intp]:

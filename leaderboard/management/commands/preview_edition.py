@@ -39,7 +39,7 @@ class Command(RefusingCommand):
             f"{found.n_moved} change rank, {found.n_newly_rejected} become rejected."
         )
         self.stdout.write(line(found.progress))
-        for change in found.changes:
+        for change in found.entries:
             delta, decimals = change.delta["mid"], max(change.old_decimals, change.new_decimals)
             self.stdout.write(
                 f"{_rank(change.old_rank)} → {_rank(change.new_rank)}  {change.method} ({change.team})  "
@@ -49,6 +49,10 @@ class Command(RefusingCommand):
             )
             for problem in change.problems[:1]:
                 self.stdout.write(f"       {problem['message']}")
+        if n_left := len(found.changes) - len(found.entries):
+            self.stdout.write(
+                f"Not listed, because rejected in both editions: {n_left}; CSV and JSON have all."
+            )
 
 
 def _rank(rank: int | None) -> str:

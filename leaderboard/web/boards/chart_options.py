@@ -127,7 +127,7 @@ def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
     while room and math.log(min(known) / low) < room * math.log(high / low):
         low, _ = round_range(0.9 * low, high)
     within = [step for step in _round_numbers(low, high) if low <= step <= high]
-    if len(within) > 8:  # several decades: their beginnings are enough
+    if len(within) > 10:  # several decades: their beginnings are enough
         within = [step for step in within if math.log10(step) % 1 < 1e-9]
     ticks = {"customValues": within}
     return {"type": "log", "min": low, "max": high, "axisLabel": ticks, "axisTick": ticks}
