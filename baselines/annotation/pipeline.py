@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,14 @@ from evaluator.truth.pickles import Attributes
 MIN_BOX_PX: Final = 15.0
 """Width and height from which the paper takes a box."""
 
+JUMP_M: Final = 0.7
+"""A frame has jumped if its distance to the frame before is off by more from what its velocity says:
+by 7 m/s, which hard braking needs a second for.
+"""
+
 Cut = Literal["toolkit", "overlapping"]
-Depth = Literal["measured", "consensus"]
+Depth = Literal["checked", "measured", "consensus"]
+DEPTHS: Final[tuple[Depth, ...]] = get_args(Depth)
 Indices = NDArray[np.intp]
 
 
@@ -76,7 +82,7 @@ class Annotation:
 
 
 def annotate(
-    tracks: Tracks, *, cut: Cut = "toolkit", depth: Depth = "measured", inlier_m: float = INLIER_M
+    tracks: Tracks, *, cut: Cut = "toolkit", depth: Depth = "checked", inlier_m: float = INLIER_M
 ) -> Annotation:
     """Make ground truth of tracks, as the paper's section 4.2 says where it does.
 
@@ -142,14 +148,15 @@ def _table(tracks: Tracks, frames: FrameTtc, rows: Indices) -> Table:
 # --- time to contact -------------------------------------------------------------------------------------
 
 
-def frame_ttc(tracks: Tracks, *, depth: Depth = "measured", inlier_m: float = INLIER_M) -> FrameTtc:
+def frame_ttc(tracks: Tracks, *, depth: Depth = "checked", inlier_m: float = INLIER_M) -> FrameTtc:
     """τ of every observation from the past 3, 5 and 10 frames, itself included, and the choice among them.
 
     τ = −y / ẏ, with y of the nearest corner (Eq. 2) and ẏ its velocity: least squares over 3 frames, a
     consensus over 5 and 10. A window that reaches beyond the beginning of a track has fewer frames.
 
-    The paper's y is the measured one. With the depth "consensus", a frame that disagrees with the others has
-    the depth of their line: better where boxes jump, worse where a vehicle accelerates.
+    The paper's y is the "measured" one, whole jumps included. With the depth "consensus", a frame that
+    disagrees with the others has the depth of their line: better where boxes jump, worse where a vehicle
+    accelerates. "checked" takes the line's only of frames that have jumped, by `JUMP_M`.
     """
     depth_m = nearest_depth_m(tracks.centre_m, tracks.size_m, tracks.yaw_rad)
     index, is_there = past_frames(tracks, n_frames=WINDOWS[-1])
@@ -157,8 +164,17 @@ def frame_ttc(tracks: Tracks, *, depth: Depth = "measured", inlier_m: float = IN
     velocities = [
         _velocities(time_s[-q:], depth_m[index[-q:]], is_there[-q:], inlier_m=inlier_m) for q in WINDOWS
     ]
+    is_after_frame = is_there[-2] & _is_recent(time_s[-2:])[0]
+    step_m = depth_m - depth_m[index[-2]]
+
+    def on_line(velocity: Velocities) -> NDArray[np.bool_]:
+        """Which frames have the depth of their line, where it is another one than the measured."""
+        if depth != "checked":
+            return np.full(depth_m.shape, depth == "consensus")
+        return is_after_frame & (np.abs(step_m + velocity.mps * time_s[-2]) > JUMP_M)
+
     with np.errstate(divide="ignore", invalid="ignore"):
-        ttc_s = np.stack([-(v.depth_m if depth == "consensus" else depth_m) / v.mps for v in velocities])
+        ttc_s = np.stack([-np.where(on_line(v), v.depth_m, depth_m) / v.mps for v in velocities])
         radar_ttc_s = -np.abs(depth_m) / tracks.radar_mps
     chosen, reason = choose(ttc_s, radar_ttc_s)
     columns = np.arange(tracks.n_observations)
@@ -176,10 +192,15 @@ def _velocities(
     time_s: Floats, depth_m: Floats, is_there: NDArray[np.bool_], *, inlier_m: float
 ) -> Velocities:
     # Frames that are older than q frames at 10 Hz do not count: a track that was lost begins anew.
-    is_there = is_there & (-time_s < (len(time_s) - 0.5) / FRAME_RATE_HZ)
+    is_there = is_there & _is_recent(time_s)
     if len(time_s) <= MIN_FRAMES:
         return least_squares_velocity(time_s, depth_m, is_there)
     return consensus_velocity(time_s, depth_m, is_there, inlier_m=inlier_m)
+
+
+def _is_recent(time_s: Floats) -> NDArray[np.bool_]:
+    """Which of the frames (q, n) lie in q frames at 10 Hz."""
+    return np.asarray(-time_s < (len(time_s) - 0.5) / FRAME_RATE_HZ)
 
 
 def past_frames(tracks: Tracks, *, n_frames: int) -> tuple[Indices, NDArray[np.bool_]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from baselines.cli.options import out_option
 from evaluator.cli.failures import echo_json
 from evaluator.cli.options import json_option
 from evaluator.cli.reading import TABLE, naming, write_bytes
@@ -19,14 +20,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Make ground truth from tracks of 3D boxes.")
 @click.argument("source", metavar="TRACK.csv|FOLDER", type=TABLE)
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="TRUTH.csv",
-    help="Write the ground truth to this file.",
-)
+@out_option("Write the ground truth to this file.", name="--output", metavar="TRUTH.csv")
 @click.option(
     "--format",
     "input_format",
@@ -42,10 +36,11 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--depth",
-    type=click.Choice(("measured", "consensus")),
-    default="measured",
+    type=click.Choice(("checked", "measured", "consensus")),
+    default="checked",
     show_default=True,
-    help="Of a frame that disagrees with the frames before it.",
+    help="Of a frame that disagrees with the frames before it: as measured unless it jumped by more than a "
+    "vehicle can, always as measured, or always that of their line.",
 )
 @click.option(
     "--tolerance",
@@ -69,7 +64,7 @@ def annotate(
     output: Path,
     input_format: str,
     overlapping: bool,
-    depth: Literal["measured", "consensus"],
+    depth: Literal["checked", "measured", "consensus"],
     inlier_m: float,
     boxes: Path | None,
     as_json: bool,

@@ -40,6 +40,12 @@ def jobs_option(command: Command) -> Command:
     )(command)
 
 
+def out_option(what: str, *, name: str = "--out", metavar: str = "FILE") -> Callable[[Command], Command]:
+    """-o and --out, or another long name: the file that the command writes."""
+    kind = click.Path(dir_okay=False, path_type=Path)
+    return click.option("-o", name, required=True, type=kind, metavar=metavar, help=what)
+
+
 def truth_option(what: str) -> Callable[[Command], Command]:
     """--truth: the ground truth, by default that of the folder."""
     return click.option("--truth", "truth_path", type=TABLE, metavar="FILE", help=what)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from baselines.cli import require_opencv
-from baselines.cli.options import gap_option, jobs_option, require_writable
+from baselines.cli.options import gap_option, jobs_option, out_option, require_writable
 from baselines.methods import METHODS, Method, Parameter, Value, get_method
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -70,14 +70,7 @@ def _whole(end: float | None) -> int | None:
 @click.command(short_help="Run a method over a folder, into a prediction file.")
 @click.argument("method_name", metavar="METHOD", type=click.Choice([method.name for method in METHODS]))
 @click.argument("folder", type=FOLDER)
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Write the predictions to this file.",
-)
+@out_option("Write the predictions to this file.")
 @gap_option
 @_method_options
 @jobs_option

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Final
 import click
 
 from baselines.cli import require_opencv
-from baselines.cli.options import TRUTH, gap_option, truth_option
+from baselines.cli.options import TRUTH, gap_option, out_option, truth_option
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
 from evaluator.cli.reading import FOLDER, naming, write_bytes
@@ -23,14 +23,7 @@ SUFFIXES: Final = (".svg", ".png")
 @click.command(short_help="Draw what Pixel MSE saw of a sequence, and its choice.")
 @click.argument("folder", type=FOLDER)
 @click.argument("anno_id", type=click.IntRange(min=0))
-@click.option(
-    "-o",
-    "--output",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FIGURE",
-    help="Write the figure to this file, .svg or .png.",
-)
+@out_option("Write the figure to this file, .svg or .png.", name="--output", metavar="FIGURE")
 @gap_option
 @truth_option("Ground truth whose value is shown. [default: truth.csv in FOLDER, if it is there]")
 @click.option("--dark", is_flag=True, help="Light lines on a dark ground.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from baselines.cli import require_opencv
-from baselines.cli.options import TRUTH, require_writable
+from baselines.cli.options import TRUTH, out_option, require_writable
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.options import json_option
@@ -26,14 +26,7 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
 
 @click.command(short_help="Train Deep Scale, on a folder or on rendered frames.")
 @click.argument("folder", type=FOLDER, required=False)
-@click.option(
-    "-o",
-    "--out",
-    required=True,
-    type=click.Path(dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Write the weights of the best epoch to this file.",
-)
+@out_option("Write the weights of the best epoch to this file.")
 @click.option("--val", "val_folder", type=FOLDER, help="Score each epoch on this folder. [default: rendered]")
 @click.option(
     "--sequences",

@@ -37,9 +37,15 @@ def clip_folder(kitti_clip: Path, tmp_path_factory: pytest.TempPathFactory) -> P
 
 
 @pytest.fixture(scope="session")
-def kitti_folder(kitti: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The drives of kitti-dev as a folder of the convention without images; not to be written to."""
-    labels = kitti.parent / "kitti-labels"
-    if not labels.is_dir():
+def kitti_labels() -> Path:
+    """The folder of KITTI's tracking labels."""
+    shared = shared_data()
+    if shared is None or not (shared / "kitti-labels").is_dir():
         pytest.skip("kitti-labels is not here: TSTTC_SHARED_DATA names no folder that has it")
-    return kitti_label_folder(kitti, labels, tmp_path_factory.mktemp("kitti-dev"))
+    return shared / "kitti-labels"
+
+
+@pytest.fixture(scope="session")
+def kitti_folder(kitti: Path, kitti_labels: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The drives of kitti-dev as a folder of the convention without images; not to be written to."""
+    return kitti_label_folder(kitti, kitti_labels, tmp_path_factory.mktemp("kitti-dev"))

@@ -65,3 +65,15 @@ def text(rows: Sequence[str], *, header: str = HEADER) -> str:
 def approaching(n_frames: int = 12, **fields: object) -> list[str]:
     """A vehicle that comes 1 m nearer in each frame, from 30 m."""
     return [row(frame, depth_m=30.0 - frame, **fields) for frame in range(n_frames)]
+
+
+def noisy_windows(n: int = 4_000) -> tuple[Floats, Floats, Floats, Floats]:
+    """Times and depths (10, n), σ 5 cm, one in twenty 1 to 5 m off; true depths and velocities (n,)."""
+    rng = np.random.default_rng(0)
+    true_m = rng.uniform(5, 50, n)
+    mps = -true_m / (rng.choice([1, -1], n, p=[0.75, 0.25]) * rng.uniform(1, 20, n))
+    time_s = np.repeat(np.arange(-9, 1)[:, None] / 10, n, axis=1)
+    depth_m = true_m + mps * time_s + rng.normal(0, 0.05, (10, n))
+    off = rng.random((10, n)) < 0.05
+    depth_m[off] += rng.uniform(1, 5, off.sum()) * rng.choice([-1, 1], off.sum())
+    return time_s, depth_m, true_m, mps

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from baselines.annotation.consensus import consensus_velocity, least_squares_velocity
 from baselines.annotation.corners import corners_m, nearest_depth_m
 from evaluator.metrics.metrics import MID
-
-N = 4_000
+from tests.baselines.annotation.made_tracks import noisy_windows
 
 
 def literal_consensus(time_s: np.ndarray, depth_m: np.ndarray, inlier_m: float = 0.15) -> tuple[float, int]:
@@ -69,18 +68,6 @@ def test_fewer_than_three_frames_have_no_velocity() -> None:
     for velocity in (consensus_velocity, least_squares_velocity):
         assert np.isnan(velocity(time_s, depth_m, two).mps).all()
         assert velocity(time_s, depth_m, np.ones((3, 1), dtype=bool)).mps == pytest.approx([-10.0])
-
-
-def noisy_windows(n: int = N) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Ten frames each: σ 5 cm, and one frame in twenty is 1 to 5 m off."""
-    rng = np.random.default_rng(0)
-    true_m = rng.uniform(5, 50, n)
-    mps = -true_m / (rng.choice([1, -1], n, p=[0.75, 0.25]) * rng.uniform(1, 20, n))
-    time_s = np.repeat(np.arange(-9, 1)[:, None] / 10, n, axis=1)
-    depth_m = true_m + mps * time_s + rng.normal(0, 0.05, (10, n))
-    off = rng.random((10, n)) < 0.05
-    depth_m[off] += rng.uniform(1, 5, off.sum()) * rng.choice([-1, 1], off.sum())
-    return time_s, depth_m, true_m, mps
 
 
 def test_velocities_of_ten_noisy_frames_cost_at_most_2_6_mid() -> None:

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from baselines.annotation.choice import choose
-from baselines.annotation.pipeline import annotate, frame_ttc
+from baselines.annotation.pipeline import DEPTHS, Depth, annotate, frame_ttc
 from baselines.annotation.tracks import Tracks
 from evaluator.metrics.metrics import MID
 from evaluator.problems import Rejected
-from tests.baselines.annotation.made_tracks import tracks_of
+from tests.baselines.annotation.made_tracks import noisy_windows, tracks_of
 
 N_FRAMES = 12
 
@@ -122,9 +122,25 @@ def test_tracks_without_any_sequence_are_a_problem() -> None:
         annotate(tracks_of(steady(n_frames=5)))
 
 
-def test_a_frame_off_the_line_has_its_depth_as_measured_or_as_the_line_says() -> None:
+@pytest.mark.parametrize(
+    ("off_m", "expected"),
+    [
+        (3.0, {"measured": 2.8, "consensus": 2.5, "checked": 2.5}),
+        (0.5, {"measured": 2.55, "consensus": 2.5, "checked": 2.55}),
+    ],
+    ids=["jump", "acceleration"],
+)
+def test_a_frame_off_the_line_has_its_depth_as_measured_or_as_the_line_says(
+    off_m: float, expected: dict[Depth, float]
+) -> None:
     depth_m = steady()
-    depth_m[5] += 3.0
-    measured, by_line = (annotate(tracks_of(depth_m), depth=depth) for depth in ("measured", "consensus"))
-    assert measured.table.ttc_s[0] == pytest.approx(2.8)
-    assert by_line.table.ttc_s[0] == pytest.approx(2.5)
+    depth_m[5] += off_m
+    found = {depth: annotate(tracks_of(depth_m), depth=depth).table.ttc_s[0] for depth in DEPTHS}
+    assert found == pytest.approx(expected)
+    assert annotate(tracks_of(depth_m)).table.ttc_s[0] == found["checked"]
+
+
+def test_labels_of_noisy_depths_cost_at_most_2_6_mid() -> None:
+    _, depth_m, true_m, mps = noisy_windows()
+    found = frame_ttc(tracks_of(depth_m)).ttc_s[-len(true_m) :]
+    assert MID.errors(found, -true_m / mps).mean() <= 2.6
