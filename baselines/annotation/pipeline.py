@@ -171,7 +171,7 @@ def frame_ttc(tracks: Tracks, *, depth: Depth = "checked", inlier_m: float = INL
         """Which frames have the depth of their line, where it is another one than the measured."""
         if depth != "checked":
             return np.full(depth_m.shape, depth == "consensus")
-        return is_after_frame & (np.abs(step_m + velocity.mps * time_s[-2]) > JUMP_M)
+        return np.asarray(is_after_frame & (np.abs(step_m + velocity.mps * time_s[-2]) > JUMP_M))
 
     with np.errstate(divide="ignore", invalid="ignore"):
         ttc_s = np.stack([-np.where(on_line(v), v.depth_m, depth_m) / v.mps for v in velocities])
