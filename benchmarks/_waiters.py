@@ -1,21 +1,22 @@
 """Clients that wait for submissions, as `tsttc submit --wait` does: many of them in one process of their own.
 
-`python -m benchmarks._waiters URL FILE`: FILE is a JSON list of [submission id, token]. Prints a line `ready`
-once each has had its first answer, and when all are told that theirs is final, one line of JSON.
+`python -m benchmarks._waiters URL FILE SECONDS`: FILE is a JSON list of [submission id, token]. Prints a line
+`ready` once each has had its first answer. So many seconds after SIGUSR1, or when all are told that theirs is
+final, one line of JSON.
 """
 
 import asyncio
 import json
 import random
+import signal
 import sys
-import time
 from dataclasses import dataclass
 from pathlib import Path
 
 import httpx
 
 WAIT_S = 30
-RAMP_S = 60.0
+RAMP_S = 25.0
 
 
 @dataclass
@@ -26,7 +27,7 @@ class Counts:
     n_turned_away: int = 0
     n_failed: int = 0
     n_begun: int = 0
-    told_s: float = 0.0  # when the last one heard that its submission is final
+    n_told: int = 0  # heard that their submission is final
 
 
 async def wait(http: httpx.AsyncClient, submission_id: str, token: str, counts: Counts) -> None:
@@ -49,7 +50,7 @@ async def wait(http: httpx.AsyncClient, submission_id: str, token: str, counts: 
         counts.n_begun += is_first
         is_first = False
         if response.json()["is_final"]:
-            counts.told_s = time.time()
+            counts.n_told += 1
             return
         if "Retry-After" in response.headers:
             counts.n_turned_away += 1
@@ -63,17 +64,22 @@ async def say_ready(counts: Counts, n: int) -> None:
     print("ready", flush=True)
 
 
-async def main(url: str, waiters: list[tuple[str, str]]) -> None:
+async def main(url: str, waiters: list[tuple[str, str]], *, tell_s: float) -> None:
     """All of them at once."""
     counts = Counts()
+    is_cancelled = asyncio.Event()
+    asyncio.get_running_loop().add_signal_handler(signal.SIGUSR1, is_cancelled.set)
     limits = httpx.Limits(max_connections=None, max_keepalive_connections=None)
     async with httpx.AsyncClient(base_url=url, timeout=90, limits=limits, trust_env=False) as http:
-        await asyncio.gather(
-            say_ready(counts, len(waiters)),
-            *(wait(http, submission_id, token, counts) for submission_id, token in waiters),
-        )
+        tasks = [asyncio.ensure_future(say_ready(counts, len(waiters)))]
+        tasks += [asyncio.ensure_future(wait(http, *waiter, counts)) for waiter in waiters]
+        await is_cancelled.wait()
+        _, waiting = await asyncio.wait(tasks, timeout=tell_s)
+        for task in waiting:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
     print(json.dumps(vars(counts)), flush=True)
 
 
 if __name__ == "__main__":
-    asyncio.run(main(sys.argv[1], json.loads(Path(sys.argv[2]).read_text())))
+    asyncio.run(main(sys.argv[1], json.loads(Path(sys.argv[2]).read_text()), tell_s=float(sys.argv[3])))

@@ -78,21 +78,23 @@ def test_manifest_is_fetched_once_as_anybody_and_kept_under_its_digest(
     assert paths(site) == [EDITIONS, TABLE, METHODS, POST, EDITIONS, METHODS, POST]
     public = [request for request in site.requests if "/splits/" in request.path]
     assert [request.headers["Authorization"] for request in public] == [None] * 3
-    (kept,) = places.rglob("*.csv")
-    assert kept.read_bytes() == MANIFEST.read_bytes()
+    (kept,) = places.rglob("*.npz")
+    assert read_manifest(kept).digest == read_manifest(MANIFEST).digest
     assert kept.stem in read_manifest(MANIFEST).digest
 
 
-@pytest.mark.parametrize("damage", [b"", b"nonsense", MANIFEST.read_bytes()[:-60], b"\xff"])
+@pytest.mark.parametrize("damage", [b"", b"nonsense", MANIFEST.read_bytes(), b"\xff", "shorter", "other"])
 def test_copy_that_is_damaged_is_fetched_anew(
-    tsttc: Tsttc, site: RecordedSite, places: Path, damage: bytes
+    tsttc: Tsttc, site: RecordedSite, places: Path, damage: bytes | str
 ) -> None:
     put_manifest(site)
     submit(tsttc)
-    (kept,) = places.rglob("*.csv")
-    kept.write_bytes(damage)
+    (kept,) = places.rglob("*.npz")
+    copy = kept.read_bytes()
+    changed = {"shorter": copy[:-60], "other": copy.replace("sha".encode("utf-32-le"), b"." * 12)}
+    kept.write_bytes(changed[damage] if isinstance(damage, str) else damage)
     assert submit(tsttc).exit_code == 0
-    assert kept.read_bytes() == MANIFEST.read_bytes()
+    assert (paths(site).count(TABLE), kept.read_bytes()) == (2, copy)
 
 
 def test_machine_where_nothing_can_be_kept_does_without(
