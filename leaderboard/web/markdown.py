@@ -119,7 +119,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
         elif token.type in {"fence", "code_block"}:
             code.append(token.content)
             if _IN_COLUMNS.search(token.content):
-                token.attrs |= {"class": "aligned", "tabindex": 0}
+                # Of a fence the attributes stand at the code within, beside the button that copies it.
+                token.type, token.attrs = "fence", {**token.attrs, "class": "aligned", "tabindex": 0}
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
             texts.append(_plain(token))
         elif token.type in {"th_open", "td_open"}:

@@ -70,5 +70,6 @@ def test_a_part_has_the_text_below_its_heading() -> None:
 
 def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
     boxed = '<code class="aligned" tabindex="0">a    1'
-    assert boxed in markdown.page("```\na    1\nbb   2\n```\n").html
+    for text in ("```\na    1\nbb   2\n```\n", "    a    1\n    bb   2\n"):
+        assert boxed in markdown.page(text).html
     assert "aligned" not in markdown.page("```sh\ntsttc check a.json --manifest b.csv\n```\n").html
