@@ -8,6 +8,7 @@ import json
 import math
 import re
 from collections.abc import Collection, Iterator, Mapping
+from datetime import datetime
 from typing import Any, Final
 
 from django.core.exceptions import ValidationError
@@ -56,9 +57,9 @@ def parse(data: bytes) -> dict[str, Any]:
     return document
 
 
-def rows_of(document: Mapping[str, Any], *, splits: Collection[str]) -> list[dict[str, Any]]:
+def rows_of(document: Mapping[str, Any], *, splits: Collection[str], now: datetime) -> list[dict[str, Any]]:
     """The rows of a document as columns of `PublishedResult`. Raises `BadDocument` for all that is wrong."""
-    problems = list(_problems(document, splits))
+    problems = list(_problems(document, splits, latest_year=now.year + 1))
     if problems:
         raise BadDocument(problems)
     source = document["source"]
@@ -88,7 +89,7 @@ def rows_of(document: Mapping[str, Any], *, splits: Collection[str]) -> list[dic
 # --- what can be wrong -----------------------------------------------------------------------------------
 
 
-def _problems(document: Mapping[str, Any], splits: Collection[str]) -> Iterator[str]:
+def _problems(document: Mapping[str, Any], splits: Collection[str], *, latest_year: int) -> Iterator[str]:
     kinds = {"source": dict, "columns": list, "methods": list, "results": dict}
     sound = [name for name, kind in kinds.items() if isinstance(document.get(name), kind)]
     for name, kind in kinds.items():
@@ -96,7 +97,7 @@ def _problems(document: Mapping[str, Any], splits: Collection[str]) -> Iterator[
             expected = "an object" if kind is dict else "a list"
             yield f"/{name}: {_found(document, name)}; expected {expected}."
     if "source" in sound:
-        yield from _of_source(document["source"])
+        yield from _of_source(document["source"], latest_year=latest_year)
     columns = document["columns"] if "columns" in sound else None
     if columns is not None and not _are_columns(columns):
         names = ", ".join(SCORE_NAMES)
@@ -109,14 +110,15 @@ def _problems(document: Mapping[str, Any], splits: Collection[str]) -> Iterator[
         yield from _of_results(document, splits)
 
 
-def _of_source(source: Mapping[str, Any]) -> Iterator[str]:
+def _of_source(source: Mapping[str, Any], *, latest_year: int) -> Iterator[str]:
     for name in ("title", "authors", "table"):
         yield from _text(source, name, "/source", limit=_LIMITS[name])
     yield from _text(source, "url", "/source", limit=_LIMITS["url"], is_address=True)
     yield from _text(source, "code", "/source", limit=_LIMITS["code"], is_address=True, is_required=False)
     year = source.get("year")
-    if isinstance(year, bool) or not isinstance(year, int) or not 1950 <= year <= 2200:
-        yield f"/source/year: {_found(source, 'year')}; expected a year like 2026."
+    if isinstance(year, bool) or not isinstance(year, int) or not 1950 <= year <= latest_year:
+        # A paper in print may have the year after this one.
+        yield f"/source/year: {_found(source, 'year')}; expected a year from 1950 to {latest_year}."
 
 
 def _of_method(method: Any, where: str) -> Iterator[str]:

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from django.db import transaction
 from django.db.models import QuerySet
@@ -13,11 +13,12 @@ from django.utils import timezone
 from evaluator.papers.tables import published_tables
 from leaderboard import audit, versions
 from leaderboard.benchmark import papers
-from leaderboard.errors.refusals import Refused, require_maintainer
+from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import PublishedResult, Split, User
 from leaderboard.models.benchmark import SINCE_EVER
 
 PUBLISHED_DIR = Path(__file__).parent / "published"
+MAX_REASON: Final = 500
 
 SPLITS: tuple[dict[str, Any], ...] = (
     {
@@ -70,7 +71,7 @@ def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResu
             made |= {fields["name"]} if is_new else set()
         known = [fields["name"] for fields in SPLITS]
         for path in sorted(PUBLISHED_DIR.glob("*.json")):
-            for row in papers.rows_of(_with_results(papers.parse(path.read_bytes())), splits=known):
+            for row in papers.rows_of(_with_results(papers.parse(path.read_bytes())), splits=known, now=now):
                 names = {"split_id": row.pop("split_id"), "slug": row.pop("slug")}
                 if has_times:
                     row["added_at"] = SINCE_EVER if names["split_id"] in made else now
@@ -106,7 +107,7 @@ def import_published(
     such document, and `NotMaintainer`; `actor` None is the command line.
     """
     require_maintainer(actor, to="add rows of papers")
-    rows = papers.rows_of(document, splits=Split.objects.values_list("name", flat=True))
+    rows = papers.rows_of(document, splits=Split.objects.values_list("name", flat=True), now=now)
     found: dict[str, list[str]] = {"added": [], "replaced": [], "unchanged": []}
     with transaction.atomic():
         for row in rows:
@@ -124,6 +125,38 @@ def import_published(
             for split_id in split_ids:
                 versions.changed(split_id)
     return Imported(**{outcome: tuple(names) for outcome, names in found.items()})
+
+
+def remove_published(
+    *, split_name: str, slug: str, reason: str, now: datetime, actor: User | None = None
+) -> PublishedResult:
+    """Take a quoted row off the board from now on; boards of the past keep it.
+
+    `actor` None is the command line. Raises `NotMaintainer`, and `Refused` without a reason or such a row.
+    """
+    require_maintainer(actor, to="remove rows of papers")
+    reason = clean_text("reason", reason, limit=MAX_REASON)
+    with transaction.atomic():
+        standing = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
+        row = standing.filter(split=split_name, slug=slug).first()
+        if row is None:
+            known = ", ".join(sorted(standing.filter(split=split_name).values_list("slug", flat=True)))
+            raise Refused(
+                "bad-value",
+                f"The board of {split_name[:80]!r} quotes no row {slug[:80]!r}; "
+                f"expected one of {known or 'none'}.",
+            )
+        row.replaced_at = now
+        row.save(update_fields=["replaced_at"])
+        audit.record(
+            verb="removed",
+            noun="PublishedResult",
+            noun_id=f"{split_name}/{slug}"[:80],
+            actor=actor,
+            details={"reason": reason},
+        )
+        versions.changed(split_name)
+    return row
 
 
 def quoted() -> QuerySet[PublishedResult]:

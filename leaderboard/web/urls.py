@@ -145,6 +145,11 @@ urlpatterns = [
     path("maintain/teams/<uuid:team_id>/", moderation_views.team, name="maintain_team"),
     path("maintain/deeds/<slug:deed_name>/<uuid:subject_id>/", moderation_views.deed, name="maintain_deed"),
     path("maintain/published/", published_views.published, name="maintain_published"),
+    path(
+        "maintain/published/<slug:split>/<slug:slug>/remove/",
+        published_views.remove,
+        name="maintain_published_remove",
+    ),
     path("maintain/splits/", split_views.splits, name="maintain_splits"),
     path("maintain/announcement/", split_views.announcement, name="maintain_announcement"),
     path("maintain/splits/add/", split_views.add, name="maintain_split_add"),

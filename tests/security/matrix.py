@@ -150,6 +150,7 @@ LINES: dict[str, Line] = {
     # An empty form takes the line away.
     "maintain_announcement": line(GET=KEEPERS, POST="in 404 404 404 302 in in"),
     "maintain_split_add": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_published_remove": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_mail": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_split": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_open": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),

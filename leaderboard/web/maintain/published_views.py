@@ -5,13 +5,15 @@ from typing import Any
 from django import forms
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import redirect
+from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
 
 from leaderboard.benchmark import papers, splits
 from leaderboard.benchmark.papers import BadDocument
 from leaderboard.errors.refusals import Refused
+from leaderboard.models import PublishedResult
 from leaderboard.web.forms import SiteForm
+from leaderboard.web.maintain.maintainer_forms import reason_field
 from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
 
 
@@ -48,6 +50,32 @@ class PaperForm(SiteForm):
     def document(self) -> dict[str, Any]:
         """What was sent. Raises `BadDocument`."""
         return papers.parse(self.cleaned_data["file"].read(papers.MAX_BYTES + 1))
+
+
+class RemovalForm(SiteForm):
+    """Why."""
+
+    reason = reason_field("One sentence for the audit log.", max_length=splits.MAX_REASON)
+
+
+@maintainers_only
+@asks_first
+def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
+    """Take a quoted row off the board."""
+    row = get_object_or_404(PublishedResult, split=split, slug=slug, replaced_at=None)
+    form = RemovalForm.asked(request)
+    if form.is_valid():
+        with form.refusals():
+            splits.remove_published(
+                split_name=split,
+                slug=slug,
+                now=timezone.now(),
+                actor=maintainer_of(request),
+                **form.cleaned_data,
+            )
+            messages.success(request, f"The row {row.method_name} of {split} was removed.")
+            return redirect("maintain_published")
+    return form_page(request, "maintain/published_remove.html", form, row=row)
 
 
 @maintainers_only

@@ -65,6 +65,27 @@ def test_a_row_that_is_added_or_replaced_changes_no_board_of_the_past_and_no_for
     assert board_now().updated_at > at
 
 
+def test_a_row_that_is_removed_leaves_the_board_and_stays_on_those_of_the_past(
+    keeper: Client, former: Edition
+) -> None:
+    quote("later", mid=1.0)
+    at = timezone.now()
+    before, page = representations(Client(), at), f"{PAGE}test/later/remove/"
+    assert "Remove Later from the test board" in assert_sound(keeper.get(page)).one("main").text
+    assert keeper.post(page, {"reason": " "}).status_code == 422
+    assert "Later" in on_board()
+    assert keeper.post(page, {"reason": "Withdrawn by its authors."}).status_code == 302
+    assert "Later" not in on_board()
+    assert representations(Client(), at) == before
+    assert keeper.get(page).status_code == 404
+    with pytest.raises(CommandError, match="quotes no row 'later'; expected one of deep-scale"):
+        call_command("remove_published", "test", "later", reason="Again.")
+    call_command("remove_published", "test", "sot", reason="A typo.")
+    assert "SOT" not in on_board()
+    assert AuditEvent.objects.filter(verb="removed", noun="PublishedResult").count() == 2
+    assert quote("later").added == ("test/later",)
+
+
 def test_a_board_that_stands_has_every_row_and_a_former_one_those_of_its_time(
     former: Edition, client: Client
 ) -> None:
@@ -124,6 +145,7 @@ def test_a_document_is_imported_once_and_another_content_replaces_only_when_told
         ({"results": {"test": {"later": [1.0, float("nan"), *[1.0] * 8]}}}, "/results/test/later/1: nan;"),
         ({"results": {"test": {"other": [1.0] * 10}}}, "/results/test/other: no method of this slug"),
         ({"results": {}}, "/results: no rows"),
+        ({"source": paper()["source"] | {"year": 2150}}, "/source/year: 2150; expected a year from 1950 to"),
         ({"columns": ["mid"] * 10}, "/columns: not the scores of a protocol"),
         ({"methods": "none"}, "/methods: 'none'; expected a list"),
         (
@@ -174,7 +196,7 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_every_problem_wit
     assert send(json.dumps(document).encode(), is_replacing="on").status_code == 302
     bad = {**document, "columns": ["mid"], "source": {"year": "2026"}}
     sentences = [
-        (json.dumps(bad).encode(), "/source/year: '2026'; expected a year like 2026."),
+        (json.dumps(bad).encode(), "/source/year: '2026'; expected a year from 1950 to "),
         (b"{\n  x", "line 2, column 3: no JSON"),
         (b"\xff", "byte 1: not UTF-8"),
         (b"[]", "/: a list; expected an object"),
