@@ -1,4 +1,4 @@
-"""What many tests need and one run makes once: databases that have all tables, and the static files.
+"""What many tests need and one run makes once: databases that have all tables, static files, compiled code.
 
 To migrate takes ten seconds of a processor, to copy what was migrated a fifth of one. All processes of a run
 share a folder, which the environment names. Whoever needs something first makes it, and the rest wait.
@@ -9,12 +9,13 @@ import fcntl
 import os
 import secrets
 import shutil
+import sqlite3
 import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 
 import psycopg
@@ -38,7 +39,13 @@ _FORGOTTEN_S = 6 * 3600
 
 
 def begin() -> None:
-    """Make the folder, unless whoever started this process has one; it goes with this process."""
+    """Make the folder, unless whoever started this process has one; it goes with this process.
+
+    What is compiled is kept, even on a machine that says otherwise: a run starts hundreds of processes, and
+    each would compile the leaderboard for half a second, and the tests for ten.
+    """
+    os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+    sys.dont_write_bytecode = False
     if _FOLDER not in os.environ:
         os.environ[_FOLDER] = tempfile.mkdtemp(prefix="tsttc-run-")
         atexit.register(_end, Path(os.environ[_FOLDER]), os.getpid())
@@ -90,9 +97,24 @@ def static_files() -> Path:
 
 def put_sqlite(path: Path) -> None:
     """Make an SQLite database with all tables there."""
-    url = "sqlite:///{}".format
-    kept = _once("sqlite", lambda path: _manage("migrate", "--no-input", TSTTC_DATABASE_URL=url(path)))
-    shutil.copyfile(kept, path)
+    shutil.copyfile(_once("sqlite", _migrate_sqlite), path)
+
+
+def _migrate_sqlite(path: Path) -> None:
+    _manage("migrate", "--no-input", TSTTC_DATABASE_URL=f"sqlite:///{path}")
+
+
+@contextmanager
+def sqlite_in_memory(name: str) -> Iterator[None]:
+    """Make an SQLite database of that URI, which this process shares in its memory, with all tables.
+
+    It lasts as long as the context, or as any connection to it.
+    """
+    kept = _once("sqlite", _migrate_sqlite)
+    with closing(sqlite3.connect(name, uri=True)) as memory:
+        with closing(sqlite3.connect(kept)) as made:
+            made.backup(memory)
+        yield
 
 
 def template() -> str:
