@@ -60,6 +60,7 @@ def test_every_method_runs_on_the_example(tsttc: Tsttc, tmp_path: Path, method: 
     assert evaluator.evaluate(predictions, truth).scores["overall"].mid < most_mid
 
 
+@pytest.mark.slow
 def test_the_notebook_runs_from_start_to_end(tmp_path: Path) -> None:
     notebook = json.loads(NOTEBOOK.read_text(encoding="utf-8"))
     assert (notebook["nbformat"], notebook["nbformat_minor"]) == (4, 5)

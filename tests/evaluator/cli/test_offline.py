@@ -266,6 +266,7 @@ def test_help_loads_none_of_the_heavy_libraries() -> None:
     assert heavy & loaded == set()
 
 
+@pytest.mark.slow
 def test_no_module_of_the_command_loads_the_web_application() -> None:
     names = [
         ".".join(path.relative_to(REPOSITORY).with_suffix("").parts)

@@ -168,6 +168,7 @@ def test_good_files_read_the_same_both_ways(file: tuple[bytes, Manifest]) -> Non
     assert_equivalent(*file)
 
 
+@pytest.mark.slow
 @settings(max_examples=300)
 @given(file=files(values=spellings | oddities))
 def test_odd_values_read_the_same_both_ways(file: tuple[bytes, Manifest]) -> None:
@@ -196,6 +197,7 @@ def natural_files(draw: st.DrawFn) -> bytes:
     return text.encode()
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(data=natural_files(), block=st.sampled_from([40, 64, 100, 250, 1_000, 1 << 19]))
 def test_natural_keys_read_the_same_both_ways_in_blocks_of_any_size(data: bytes, block: int) -> None:
@@ -256,6 +258,7 @@ TOKENS = [
 TOKENS += ["true", "NaN", '"', "\\", "\\u0030", '"unit"', '"ttc"', '"predictions"', '"fps"', "0", "\x00", "é"]
 
 
+@pytest.mark.slow
 @settings(max_examples=500)
 @given(
     start=st.sampled_from(
@@ -294,6 +297,7 @@ documents = st.recursive(
 ).map(json.dumps)
 
 
+@pytest.mark.slow
 @settings(max_examples=500)
 @given(data=st.binary(max_size=200) | (st.text(max_size=100) | documents).map(str.encode))
 @example(data=b'{"\xe4":1,"1":2,"2":3}')

@@ -1,6 +1,7 @@
 """What is kept of the pairs of a board says the same as all pairs do, whatever came and went."""
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -58,6 +59,7 @@ def quoted_of(papers: list[float], counts: Floats) -> Quoted | None:
     return Quoted(values, np.where(np.isnan(values), np.nan, 0.05), np.tile(counts, 3))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 1_000),

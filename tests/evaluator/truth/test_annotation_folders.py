@@ -107,6 +107,7 @@ def test_child_that_dies_is_a_problem_of_the_file_that_it_was_at(
     assert not children()
 
 
+@pytest.mark.slow
 def test_file_that_needs_too_much_memory_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(annotation_folders, "_BASE_BYTES", 300 << 20)
     monkeypatch.setattr(annotation_folders, "_BYTES_PER_BYTE", 0)
@@ -120,6 +121,7 @@ def test_file_that_needs_too_much_memory_is_named(tmp_path: Path, monkeypatch: p
     )
 
 
+@pytest.mark.slow
 def test_time_is_limited_file_by_file() -> None:
     burn = (
         "import time; from evaluator.limits import allow_cpu, limit; limit(memory_bytes=1 << 40, cpu_s=9)\n"

@@ -229,6 +229,7 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
     assert rejection(tmp_path / "nothing.npz").problems[0].code == "unreadable"
 
 
+@pytest.mark.slow
 @settings(max_examples=200)
 @given(data=st.binary(max_size=200) | st.text(max_size=100).map(lambda text: (HEADER + "\n" + text).encode()))
 def test_no_bytes_raise_anything_but_a_rejection(

@@ -29,6 +29,7 @@ def test_schema_is_the_recorded_one(schema: dict[str, Any]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_schema_is_valid_openapi_3_1_below_a_versioned_path(schema: dict[str, Any]) -> None:
     assert schema["openapi"].startswith("3.1")
     validate_schema(schema)

@@ -219,6 +219,7 @@ BROKEN_AFTER_A_FILE = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["/api/v1/submissions", "/submit/"])
 def test_upload_whose_request_cannot_be_read_on_gives_its_room_back(
     edition: Edition, owner: User, path: str, monkeypatch: pytest.MonkeyPatch

@@ -44,6 +44,7 @@ def test_a_name_that_the_font_cannot_write_has_no_card_of_its_own() -> None:
     assert card_drawing.png(Card("接触时间", "by Owls", ())) == b""
 
 
+@pytest.mark.slow
 def test_a_worker_draws_each_card_once_and_pages_show_it(sent: Submission, client: Client) -> None:
     for address in addresses(sent):
         assert client.get(address)["Location"] == FALLBACK
@@ -80,6 +81,7 @@ def test_no_card_names_a_method_that_is_private_or_anonymous(
     assert answer.status_code == (404 if seen == "PRIVATE" else 302)
 
 
+@pytest.mark.slow
 def test_a_card_that_no_longer_holds_is_shown_to_nobody_and_removed(sent: Submission, client: Client) -> None:
     pictures.draw(now=timezone.now())
     before = set(CardPicture.objects.values_list("digest", flat=True))

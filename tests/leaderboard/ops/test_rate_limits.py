@@ -125,6 +125,7 @@ def test_after_five_wrong_passwords_the_right_one_is_refused_too(shared_cache: N
     assert b"Too many failed login attempts" in response.content
 
 
+@pytest.mark.slow
 def test_a_forwarding_header_does_not_help_the_guesser(
     shared_cache: None, db: None, settings: Settings
 ) -> None:

@@ -39,6 +39,7 @@ def test_the_host_that_a_request_names_begins_no_new_count(owner: User) -> None:
     assert not sign_in(owner, OLD_PASSWORD, address=ATTACKER)
 
 
+@pytest.mark.slow
 def test_guesses_from_many_addresses_meet_the_limit_of_the_account(owner: User) -> None:
     assert sign_in(owner, OLD_PASSWORD, address=HOME)
     for n in range(30):

@@ -61,6 +61,7 @@ def test_every_link_of_a_guide_leads_to_a_page_and_a_place_in_it(
     assert broken == []
 
 
+@pytest.mark.slow
 def test_every_guide_is_a_sound_page(client: Client, benchmark: None) -> None:
     for name in guides.files():
         root = assert_sound(client.get(f"/docs/{name}/"))

@@ -24,6 +24,7 @@ def listed(client: Client) -> list[str]:
     return [address.removeprefix(settings.SITE_URL) for address in found]
 
 
+@pytest.mark.slow
 def test_the_sitemap_names_public_pages_and_each_answers(
     client: Client, edition: Edition, owner: User
 ) -> None:
