@@ -1,6 +1,7 @@
 """Fixtures that everybody shares."""
 
 import gc
+import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
@@ -30,6 +31,9 @@ hypothesis.settings.load_profile("suite")
 
 # Playwright's own loop makes Django's guard against blocking calls in async code misfire.
 os.environ.setdefault("DJANGO_ALLOW_ASYNC_UNSAFE", "true")
+
+
+_NUMBERS = itertools.count()
 
 
 def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
@@ -113,11 +117,22 @@ def benchmark(db: None) -> None:
     splits.ensure_splits()
 
 
+@pytest.fixture
+def own_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the test may write: its `tmp_path` if it asks for one, or what is there once it writes.
+
+    Half of the tests write nothing, and to make folders for them takes longer than most of them.
+    """
+    if "tmp_path" in request.fixturenames:
+        return Path(request.getfixturevalue("tmp_path"))
+    return tmp_path_factory.getbasetemp() / "unasked" / str(next(_NUMBERS))
+
+
 @pytest.fixture(autouse=True)
-def private_directories(tmp_path: Path, settings: Settings) -> None:
+def private_directories(own_folder: Path, settings: Settings) -> None:
     """Files and ground truth of each test live in its own directory."""
-    settings.FILES_DIR = tmp_path / "files"
-    settings.GROUND_TRUTH_DIR = tmp_path / "ground-truth"
+    settings.FILES_DIR = own_folder / "files"
+    settings.GROUND_TRUTH_DIR = own_folder / "ground-truth"
     settings.STORAGES = {
         **settings.STORAGES,
         "files": {
