@@ -71,7 +71,8 @@ def django_db_modify_db_settings(django_db_modify_db_settings: None) -> Iterator
     if connection.vendor == "postgresql" and services.is_on_test_server(settings):
         settings["TEST"]["TEMPLATE"] = prepared.template()
     if connection.vendor == "sqlite" and "PYTEST_XDIST_WORKER" in os.environ:
-        with prepared.sqlite_in_memory(connection.creation._get_test_db_name()):
+        # Django's name of it.
+        with prepared.sqlite_in_memory(f"file:memorydb_{connection.alias}?mode=memory&cache=shared"):
             yield
     else:
         yield
