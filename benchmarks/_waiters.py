@@ -16,7 +16,7 @@ from pathlib import Path
 import httpx
 
 WAIT_S = 30
-RAMP_S = 25.0
+RAMP_S = 30.0
 
 
 @dataclass

@@ -26,7 +26,7 @@ from evaluator.truth.csv_tables import Table
 
 SIZES = (28_600, 1_000_000)
 SEQUENCES_PER_RECORDING = 41
-SECONDS_PER_FIGURE = 2.0
+SECONDS_PER_FIGURE = 1.0
 
 _OBJECT = msgspec.json.Decoder(dict[str, float])
 

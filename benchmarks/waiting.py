@@ -86,8 +86,8 @@ def _measure(site: Site) -> None:
             _cancel()
             _print_counts(clients)
         after = _read(site.url, reader, stop=_for(READ_S))
-    _print_phase("after", after)
     unloaded = {kind: [*before[kind], *after[kind]] for kind in before}
+    _print_phase("unloaded", unloaded)
     for name, times in (("arriving", arriving), ("waiting", during)):
         figure("waiting", N_WAITERS, f"board_{name}_p99_ratio", _p99_of(times) / _p99_of(unloaded), "x")
 

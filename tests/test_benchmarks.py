@@ -30,6 +30,6 @@ def test_a_report_is_read_as_it_was_written() -> None:
     )
 
 
-def test_all_benchmarks_together_take_ten_minutes_at_most() -> None:
+def test_all_benchmarks_together_take_twelve_minutes_at_most() -> None:
     assert set(bench.LIMITS_S) <= {path.stem for path in bench.FOLDER.glob("*.py")}
-    assert sum(bench.LIMITS_S.values()) <= 600
+    assert sum(bench.LIMITS_S.values()) <= 720
