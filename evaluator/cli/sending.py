@@ -51,8 +51,10 @@ def opened(path: Path) -> Iterator[BinaryIO]:
         raise click.BadParameter(f"{path} cannot be read: {error.strerror}.") from None
 
 
-def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> None:
+def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> frozenset[str]:
     """Raise Failure, with every problem, for a file that the server would reject; warn of a doubtful one.
+
+    Gives the codes of the warnings.
 
     A split without a manifest is left to the server, which says what is the matter with it.
     """
@@ -63,21 +65,23 @@ def require_good(client: Client, file: BinaryIO, *, split: str, name: str) -> No
     file.seek(0)
     data = file.read(LARGEST_CHECKED_BYTES + 1)
     if len(data) > LARGEST_CHECKED_BYTES:
-        return
+        return frozenset()
     try:
         manifest = manifest_of(client, split)
     except Refused as refused:
         if refused.status != 404:
             raise
-        return
+        return frozenset()
     if manifest is None:
-        return
+        return frozenset()
     try:
         found = read_predictions(data, manifest=manifest)
     except Rejected as fault:
         name = "standard input" if name == "-" else name
         raise rejected(name, fault, hint="Nothing was submitted; your quota is not used.") from None
-    echo_warnings(warnings_of(found))
+    warnings = warnings_of(found)
+    echo_warnings(warnings)
+    return frozenset(warning.code for warning in warnings)
 
 
 def manifest_of(client: Client, split: str) -> Manifest | None:

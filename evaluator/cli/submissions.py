@@ -119,8 +119,9 @@ def submit(
     _require_rival(worse_than, significant)
     with connect(url, with_token=True) as client:
         with opened(predictions) as file:
+            warned = frozenset[str]()
             if not no_check:
-                require_good(client, file, split=split, name=str(predictions))
+                warned = require_good(client, file, split=split, name=str(predictions))
             rival = None
             if worse_than:
                 rival = gates.rival(
@@ -162,7 +163,7 @@ def submit(
                     decimals=submission.decimals,
                 )
 
-        conclude(submission, as_json=as_json, judge=judge)
+        conclude(submission, as_json=as_json, judge=judge, warned=warned)
         if not as_json:
             _say_if_private(client, submission)
 
@@ -244,8 +245,17 @@ def _announce(submission: Submission, *, site: str, err: bool) -> None:
         click.echo("You already submitted this file; this is its first submission.", err=err)
 
 
-def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]) -> None:
-    """Print what is known of a submission; raises Failure when it ended without scores, or a gate fails."""
+def conclude(
+    submission: Submission,
+    *,
+    as_json: bool,
+    judge: Callable[[], None],
+    warned: frozenset[str] = frozenset(),
+) -> None:
+    """Print what is known of a submission; raises Failure when it ended without scores, or a gate fails.
+
+    Warnings with one of the codes `warned` have been printed before.
+    """
     named = (
         f"{submission.method} on {submission.split}" if submission.method else f"submission {submission.id}"
     )
@@ -265,7 +275,10 @@ def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]
             message, exit_code, hint = f"{named} was cancelled, so it has no scores.", Exit.REFUSED, ""
         case _:
             gates.told(
-                submission.document, show=partial(_show, submission, named), judge=judge, as_json=as_json
+                submission.document,
+                show=partial(_show, submission, named, warned),
+                judge=judge,
+                as_json=as_json,
             )
             return
     raise Failure(
@@ -278,7 +291,7 @@ def conclude(submission: Submission, *, as_json: bool, judge: Callable[[], None]
     )
 
 
-def _show(submission: Submission, named: str) -> None:
+def _show(submission: Submission, named: str, warned: frozenset[str]) -> None:
     click.echo(f"{state_in_words(submission)}: {printable(named)}")
     if submission.scores is not None:
         for line in in_short(submission):
@@ -292,7 +305,7 @@ def _show(submission: Submission, named: str) -> None:
             decimals=submission.decimals,
         ):
             click.echo(line)
-        echo_warnings(submission.warnings)
+        echo_warnings(warning for warning in submission.warnings if warning.code not in warned)
 
 
 def _say_if_private(client: Client, submission: Submission) -> None:

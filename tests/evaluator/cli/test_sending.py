@@ -11,6 +11,7 @@ import pytest
 from click.testing import Result
 
 from evaluator import read_manifest
+from evaluator.predictions import plausibility
 from evaluator.tables.parquet_tables import parquet_of
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
 from tests.evaluator.worlds import EXAMPLES, Tsttc, on_terminal, process
@@ -68,6 +69,21 @@ def test_parquet_is_sent_as_json(tsttc: Tsttc, site: RecordedSite, tmp_path: Pat
     name, content = site.posts[0].parts()["file"]
     assert name == "mine.json"
     assert json.loads(content) == {str(row): 1.5 + row for row in range(60)}
+
+
+def test_a_warning_of_the_check_is_not_repeated_with_the_scores(
+    tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(plausibility, "MIN_VALUES", 10)
+    put_manifest(site)
+    path = tmp_path / "ratios.json"
+    path.write_text(json.dumps({str(row): 0.9 for row in range(60)}))
+    words = "Probably"
+    warning = {"code": "looks-like-ratios", "message": f"{words} scale ratios."}
+    site.put(POST, Reply(QUEUED | {"state": "SCORED", "scores": {"mid": 1.0}, "warnings": [warning]}))
+    sent = ("submit", path, "--split", "val", "--method", "Foo++")
+    assert tsttc(*sent).stderr.count("Warning: ") == 1
+    assert tsttc(*sent, "--no-check").stderr == f"Warning: {words} scale ratios.\n"
 
 
 def test_manifest_is_fetched_once_as_anybody_and_kept_under_its_digest(
