@@ -14,10 +14,11 @@ from django.utils import timezone
 from leaderboard import versions
 from leaderboard.benchmark import moments, policy
 from leaderboard.benchmark.policy import Policy
-from leaderboard.editions import new_splits
+from leaderboard.editions import corrections, new_splits
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import AuditEvent, Edition, Split, Submission, User
 from tests import builders, pages
+from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -84,6 +85,35 @@ def test_a_challenge_shares_ground_truth_and_has_its_own_deadline_quota_and_boar
     builders.send(owner, builders.predictions(edition, factor=1.2), split="test")
     told = {each["split"]: each["same_truth_as"] for each in client.get("/api/v1/splits").json()}
     assert (told["challenge"], told["test"]) == ("test", None)
+
+
+def test_a_corrected_board_leaves_a_challenge_on_the_same_truth_as_it_is_until_it_is_corrected_too(
+    challenge: Split, edition: Edition, owner: User, tmp_path: Path, client: Client
+) -> None:
+    for split in ("test", "challenge"):
+        builders.submit(owner, builders.predictions(edition), split=split)
+    builders.score_all()
+    before = client.get("/api/v1/splits/challenge/board").json()
+    second = open_edition(corrected(tmp_path, factor=1.3))
+    builders.score_all()
+    publish(second)
+    assert client.get("/api/v1/splits/challenge/board").json() == before
+    assert client.get("/api/v1/splits/test/board").json()["edition"] == 2
+    theirs = corrections.open_edition(
+        split_name="challenge", digest=second.ground_truth_id, now=timezone.now(), actor=None
+    )
+    builders.score_all()
+    publish(theirs)
+    assert (theirs.number, theirs.ground_truth_id) == (2, second.ground_truth_id)
+    values = [client.get(f"/api/v1/splits/{split}/board").json() for split in ("test", "challenge")]
+    assert len({own_score(board) for board in values}) == 1
+    assert own_score(before) != own_score(values[0])
+
+
+def own_score(board: dict[str, Any]) -> float:
+    [row] = [row for row in board["entries"] if row["method"] == "Foo"]
+    value: float = row["scores"]["mid"]
+    return value
 
 
 def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Client, edition: Edition) -> None:
