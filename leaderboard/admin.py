@@ -3,6 +3,10 @@
 from collections.abc import Sequence
 from typing import Any, ClassVar, cast
 
+from allauth.mfa import admin as _second_factors  # noqa: F401 - registers what is taken out below
+from allauth.mfa.models import Authenticator
+from allauth.socialaccount import admin as _connected  # noqa: F401 - the same
+from allauth.socialaccount.models import SocialAccount, SocialApp, SocialToken
 from django.contrib import admin, messages
 from django.contrib.admin.models import LogEntry
 from django.contrib.auth.admin import UserAdmin as DjangoUserAdmin
@@ -278,3 +282,6 @@ class UserAdmin(AuditedAdmin, DjangoUserAdmin):
 # What else maintainers do with overrides, and ask the audit trail, they do at `/maintain/`.
 for model in (AuditEvent, Edition, GroundTruth, Membership, PublishedResult, QuotaOverride):
     admin.site.register(model, ReadOnlyAdmin)
+
+# A second factor is nobody else's to read or to change, and the providers are the settings' to name.
+admin.site.unregister([Authenticator, SocialAccount, SocialApp, SocialToken])

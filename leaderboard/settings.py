@@ -68,6 +68,10 @@ INSTALLED_APPS = [
     "django.contrib.staticfiles",
     "allauth",
     "allauth.account",
+    "allauth.mfa",
+    "allauth.socialaccount",
+    "allauth.socialaccount.providers.github",
+    "allauth.socialaccount.providers.orcid",
     "csp",
     "django_htmx",
     "django_structlog",
@@ -286,6 +290,27 @@ ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
 # Wrong passwords; the keys are an account at an address, and an account (see web/account/accounts.py).
 ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
 
+# Whether maintainers need a second factor for their pages (see web/account/second_factor.py).
+REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
+MFA_ADAPTER = "leaderboard.web.account.second_factor.SecondFactorAdapter"
+# Without a mail server nobody could verify an address.
+MFA_ALLOW_UNVERIFIED_EMAIL = not SENDS_MAIL
+# Accounts elsewhere that people may sign in with (see web/account/providers.py); without a client, none.
+SOCIALACCOUNT_PROVIDERS = environment.providers(
+    orcid=("ORCID", "TSTTC_ORCID_CLIENT_ID", "TSTTC_ORCID_CLIENT_SECRET"),
+    github=("GitHub", "TSTTC_GITHUB_CLIENT_ID", "TSTTC_GITHUB_CLIENT_SECRET"),
+)
+SOCIALACCOUNT_ADAPTER = "leaderboard.web.account.providers.ProviderAdapter"
+SOCIALACCOUNT_FORMS = {
+    "signup": "leaderboard.web.account.providers.ProviderSignupForm",
+    "disconnect": "leaderboard.web.account.providers.ConnectedForm",
+}
+# Who signs up reads of the rules first, and chooses a name.
+SOCIALACCOUNT_AUTO_SIGNUP = False
+# Another way into the account: whoever finds an open session does not add one.
+SOCIALACCOUNT_REAUTHENTICATION_REQUIRED = True
+SOCIALACCOUNT_REQUESTS_TIMEOUT = 5
+
 # --- API -------------------------------------------------------------------------------------------------
 
 KNOX_TOKEN_MODEL = "leaderboard.ApiToken"
@@ -338,7 +363,7 @@ METRICS_NETWORKS = environment.networks("TSTTC_METRICS_NETWORKS", default=["127.
 
 # --- security --------------------------------------------------------------------------------------------
 
-CONTENT_SECURITY_POLICY = frame.CONTENT_SECURITY_POLICY
+CONTENT_SECURITY_POLICY = frame.content_security_policy(SOCIALACCOUNT_PROVIDERS)
 X_FRAME_OPTIONS = "DENY"
 SECURE_CONTENT_TYPE_NOSNIFF = True
 SECURE_REFERRER_POLICY = "same-origin"

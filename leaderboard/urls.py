@@ -6,6 +6,7 @@ from django.urls import include, path, re_path
 
 from leaderboard.api.exceptions import NowhereView
 from leaderboard.web import monitoring
+from leaderboard.web.account import providers
 from leaderboard.web.submissions import receipt_views
 
 # Its own form knows no limit of how often one may guess.
@@ -16,7 +17,9 @@ urlpatterns = [
     path("api/v1/", include("leaderboard.api.urls")),
     re_path(r"^api(/|$)", NowhereView.as_view()),
     path(".well-known/tsttc-receipt-keys.json", receipt_views.receipt_keys, name="receipt_keys"),
-    path("accounts/", include("allauth.urls")),
+    path("accounts/", include("allauth.account.urls")),
+    path("accounts/2fa/", include("allauth.mfa.urls")),
+    path("accounts/", include(providers.patterns())),
     path("admin/", admin.site.urls),
     path("healthz", monitoring.healthz, name="healthz"),
     path("readyz", monitoring.readyz, name="readyz"),

@@ -59,6 +59,20 @@ def networks(name: str, *, default: list[str]) -> list[IPv4Network | IPv6Network
     return found
 
 
+def providers(**known: tuple[str, str, str]) -> dict[str, dict[str, Any]]:
+    """allauth's settings of the providers whose client is set; each has a name and two variables."""
+    found = {}
+    for provider, (name, id_variable, secret_variable) in known.items():
+        client_id, secret = (env.str(variable, default="") for variable in (id_variable, secret_variable))
+        if bool(client_id) != bool(secret):
+            missing = secret_variable if client_id else id_variable
+            given = id_variable if client_id else secret_variable
+            FAULTS.append(f"{missing} is not set, and {given} is; expected both or none.")
+        if client_id and secret:
+            found[provider] = {"APP": {"name": name, "client_id": client_id, "secret": secret}}
+    return found
+
+
 def _parsed(name: str, text: str, parse: Callable[[str], dict[str, Any]], example: str) -> dict[str, Any]:
     try:
         found = parse(text) if text else {}

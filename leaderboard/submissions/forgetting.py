@@ -8,6 +8,8 @@ from datetime import datetime
 from typing import Any
 
 from allauth.account.models import EmailAddress
+from allauth.mfa.models import Authenticator
+from allauth.socialaccount.models import SocialAccount
 from django.contrib.admin.models import LogEntry
 from django.contrib.contenttypes.models import ContentType
 from django.db import transaction
@@ -67,6 +69,23 @@ def export(*, user: User) -> dict[str, Any]:
             {"name": row.name, "begins_with": row.token_key, "created_at": _moment(row.created)}
             for row in ApiToken.objects.filter(user=user).order_by("created")
         ],
+        "second_factor": [
+            {
+                "type": row.type,
+                "created_at": _moment(row.created_at),
+                "last_used_at": _moment(row.last_used_at),
+            }
+            for row in Authenticator.objects.filter(user=user).order_by("type")
+        ],
+        "connected_accounts": [
+            {
+                "provider": row.provider,
+                "id": row.uid,
+                "said": row.extra_data,
+                "connected_at": _moment(row.date_joined),
+            }
+            for row in SocialAccount.objects.filter(user=user).order_by("provider")
+        ],
         "invitations": [
             {"team": str(row.team_id), "created_at": _moment(row.created_at)}
             for row in Invitation.objects.filter(Q(created_by=user) | Q(accepted_by=user))
@@ -124,6 +143,8 @@ def _delete_rows(user: User) -> None:
     Mail.objects.filter(Q(user=user) | Q(recipient__in=addresses)).delete()
     user.muted_kinds.all().delete()
     EmailAddress.objects.filter(user=user).delete()
+    Authenticator.objects.filter(user=user).delete()
+    SocialAccount.objects.filter(user=user).delete()
     Membership.objects.filter(user=user).delete()
     accounts = Q(content_type=ContentType.objects.get_for_model(User), object_id=str(user.pk))
     LogEntry.objects.filter(accounts | Q(user=user)).update(object_repr="", change_message="")

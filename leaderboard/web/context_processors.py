@@ -12,6 +12,7 @@ from django.utils.http import url_has_allowed_host_and_scheme
 
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.models import Split
+from leaderboard.web.account import providers
 
 _SECTIONS = {
     "home": "home",
@@ -41,7 +42,13 @@ _SECTIONS = {
     "api_reference": "api",
     "api_operation": "api",
 }
-_PREFIXES = {"account_": "account", "published": "published", "maintain": "maintain"}
+_PREFIXES = {
+    "account_": "account",
+    "mfa_": "account",
+    "socialaccount_": "account",
+    "published": "published",
+    "maintain": "maintain",
+}
 
 
 def split_or_404(request: HttpRequest, name: str) -> Split:
@@ -70,6 +77,7 @@ def site(request: HttpRequest) -> dict[str, Any]:
             (section for prefix, section in _PREFIXES.items() if name.startswith(prefix)),
             _SECTIONS.get(name, ""),
         ),
+        "providers": providers.offered(),
         "splits": SimpleLazyObject(lambda: splits_of(request)),
         "announcements": _announcements(request),
         # Only the pages of errors ask for it, which nobody remembers.

@@ -22,6 +22,8 @@ SIGNED_IN = "in  200 200 200 200 in  in"
 OWN = "in  404 200 200 200 in  in"  # maintainers may look at everybody's
 TEAM = "in  404 200 200 404 in  in"  # and act for nobody
 KEEPERS = "in  404 404 404 200 in  in"
+SENT_ON = "in  302 302 302 302 in  in"  # to the password, or to the page where one begins
+NOT_THERE = "in  404 404 404 404 in  in"
 
 API_OPEN = "200 200 200 200 200 403 401"
 API_SIGNED_IN = "401 200 200 200 200 403 401"
@@ -218,6 +220,15 @@ LINES: dict[str, Line] = {
     "account_confirm_email": line(GET=OPEN, POST=all_of("404")),
     # Signing in by a mailed code is not offered: whoever comes here is sent away.
     "account_confirm_login_code": line(GET=all_of("302"), POST=all_of("302")),
+    # --- the second factor, which nobody here has: its pages lead to the first step, or are not there ---
+    "mfa_index": line(GET=SIGNED_IN),
+    "mfa_authenticate": line(GET=all_of("302"), POST=all_of("302")),
+    "mfa_reauthenticate": line(GET=SENT_ON, POST=SENT_ON),
+    "mfa_activate_totp": line(GET=SENT_ON, POST=SENT_ON),
+    "mfa_deactivate_totp": line(GET=NOT_THERE, POST=NOT_THERE),
+    "mfa_view_recovery_codes": line(GET=NOT_THERE),
+    "mfa_generate_recovery_codes": line(GET=SENT_ON, POST=SENT_ON),
+    "mfa_download_recovery_codes": line(GET=NOT_THERE),
     # What is below /api/ and no address of it, told as a problem.
     "^api(/|$)": line(GET=all_of("404")),
     # --- monitoring: figures are for the operator's own network ---

@@ -1,5 +1,6 @@
-"""What each request passes, and what browsers may load: settings that no variable changes."""
+"""What each request passes, and what browsers may load."""
 
+from collections.abc import Iterable
 from typing import Any, Final
 
 from csp.constants import NONE, SELF
@@ -28,20 +29,27 @@ MIDDLEWARE: Final = [
     "django.contrib.messages.middleware.MessageMiddleware",
     "allauth.account.middleware.AccountMiddleware",
     "django_htmx.middleware.HtmxMiddleware",
+    "leaderboard.web.middleware.second_factor.SecondFactorMiddleware",
     # Last on the way in: their pages need the rest, and nothing before them reads the body.
     "leaderboard.web.middleware.request_limits.RateLimitMiddleware",
     "leaderboard.web.middleware.request_limits.UploadLimitMiddleware",
 ]
-CONTENT_SECURITY_POLICY: Final[dict[str, Any]] = {
-    "DIRECTIVES": {
-        "default-src": [NONE],
-        "script-src": [SELF],
-        "style-src": [SELF],
-        "img-src": [SELF, "data:"],
-        "font-src": [SELF],
-        "connect-src": [SELF],
-        "form-action": [SELF],
-        "base-uri": [NONE],
-        "frame-ancestors": [NONE],
+# Where the form that signs in with a provider leads to.
+_PROVIDERS: Final = {"orcid": "https://orcid.org", "github": "https://github.com"}
+
+
+def content_security_policy(providers: Iterable[str]) -> dict[str, Any]:
+    """What browsers may load and where forms may lead: to this site, and to the providers that it offers."""
+    return {
+        "DIRECTIVES": {
+            "default-src": [NONE],
+            "script-src": [SELF],
+            "style-src": [SELF],
+            "img-src": [SELF, "data:"],
+            "font-src": [SELF],
+            "connect-src": [SELF],
+            "form-action": [SELF, *(_PROVIDERS[name] for name in providers)],
+            "base-uri": [NONE],
+            "frame-ancestors": [NONE],
+        }
     }
-}

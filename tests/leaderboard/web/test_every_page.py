@@ -71,7 +71,8 @@ DATA = {"application/json", "application/ld+json"}
 INLINE_ATTRIBUTES = re.compile(r"^(on\w+|style)$")
 # Links that browsers follow only when somebody asks them to, and the part of the page to wait for.
 LEADING_ON = {"canonical", "alternate", "expect"}
-OWN = re.compile(r"^/(?!/)")
+# Of this site, or within the page itself, as the code that phones scan.
+OWN = re.compile(r"/(?!/)|data:image/svg\+xml;base64,")
 
 
 def assert_sound(response: HttpResponseBase) -> pages.Element:
@@ -122,7 +123,7 @@ def assert_nothing_from_elsewhere(html: pages.Element) -> None:
             names = ("src", "srcset", "href")
             address = next((found for name in names if (found := element.attributes.get(name))), "")
             assert OWN.match(address), element
-            if not address.startswith("/methods/"):  # a badge is drawn, and no file
+            if not address.startswith(("/methods/", "data:")):  # a badge is drawn, and no file
                 assert finders.find(address.removeprefix("/static/")), f"{address} is no static file"
 
 

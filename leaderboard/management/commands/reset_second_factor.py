@@ -1,0 +1,48 @@
+"""`manage.py reset_second_factor EMAIL --reason TEXT`."""
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.conf import settings
+from django.core.management.base import CommandError
+from django.utils import timezone
+
+from leaderboard.mails import outbox
+from leaderboard.management.refusing import RefusingCommand
+from leaderboard.models import MailKind, User
+from leaderboard.people import second_factor
+
+_TOLD = (
+    "A maintainer removed the second factor and the recovery codes of your account: you sign in without a "
+    "code again. If you did not ask for this, tell us at once: {contact}\n\n"
+    "Set up a new second factor here: {site}/accounts/2fa/\n\n--\n{name}\n{site}"
+)
+
+
+class Command(RefusingCommand):
+    """Takes the second factor off an account."""
+
+    help = "Remove the second factor of an account whose owner lost it, with its recovery codes."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """EMAIL, reason."""
+        parser.add_argument("email", help="address of the account")
+        parser.add_argument("--reason", required=True, help="a sentence for the audit log, without names")
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Reset, and tell the person by mail."""
+        user = User.objects.filter(email=options["email"].strip().lower()).first()
+        if user is None:
+            raise CommandError("There is no account with that address; expected the primary address of one.")
+        event = second_factor.reset(user=user, reason=options["reason"])
+        text = _TOLD.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=settings.SITE_NAME)
+        mail = outbox.tell(
+            kind=MailKind.ACCOUNT,
+            user=user,
+            key=f"second-factor-reset:{event.pk}",
+            subject="Your second factor was removed",
+            text=text,
+            now=timezone.now(),
+        )
+        outbox.queue([mail])
+        self.stdout.write("The second factor is removed. The person is told by mail.")

@@ -1,0 +1,33 @@
+"""The second factor of an account: codes of an app, and recovery codes for the day when the app is lost.
+
+allauth keeps both and asks for them at sign-in; here is what the site itself asks and does. API tokens have
+nothing to do with it.
+"""
+
+from allauth.mfa.models import Authenticator
+from django.db import transaction
+
+from leaderboard import audit
+from leaderboard.errors.refusals import Refused, clean_text
+from leaderboard.models import AuditEvent, User
+
+
+def is_set_up(user: User) -> bool:
+    """Whether an app makes codes for this account."""
+    return Authenticator.objects.filter(user=user, type=Authenticator.Type.TOTP).exists()
+
+
+def reset(*, user: User, reason: str) -> AuditEvent:
+    """Take the second factor off an account whose owner lost it, and its recovery codes with it.
+
+    Only the command line does this: who asks has shown a maintainer who they are. Returns the audit event.
+    Raises `Refused` without a reason, and for an account without a second factor.
+    """
+    reason = clean_text("reason", reason, limit=500)
+    with transaction.atomic():
+        n_deleted, _ = Authenticator.objects.filter(user=user).delete()
+        if not n_deleted:
+            raise Refused("bad-value", "The account has no second factor; there is nothing to reset.")
+        return audit.record(
+            verb="second factor reset", noun="User", noun_id=user.pk, details={"reason": reason}
+        )

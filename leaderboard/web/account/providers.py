@@ -1,0 +1,232 @@
+"""Signing in with an account elsewhere: ORCID or GitHub, each where the settings name a client of it.
+
+Of what a provider says, two things count: its number of the person, which never changes, and one address
+that it has verified. An address that it has not verified is dropped. An address that has an account here
+opens nothing: its owner signs in first, and then connects the two. What is kept is the number and, of
+GitHub, the login name.
+"""
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Final
+
+import requests
+import structlog
+from allauth.account.models import EmailAddress
+from allauth.core.exceptions import ImmediateHttpResponse
+from allauth.socialaccount.adapter import DefaultSocialAccountAdapter
+from allauth.socialaccount.forms import DisconnectForm, SignupForm
+from allauth.socialaccount.models import SocialAccount, SocialLogin
+from allauth.socialaccount.providers.base.constants import AuthError, AuthProcess
+from allauth.socialaccount.providers.github.views import GitHubOAuth2Adapter
+from allauth.socialaccount.providers.oauth2.client import OAuth2Error
+from allauth.socialaccount.providers.oauth2.views import (
+    OAuth2Adapter,
+    OAuth2CallbackView,
+    OAuth2LoginView,
+)
+from allauth.socialaccount.providers.orcid.views import OrcidOAuth2Adapter
+from django.conf import settings
+from django.core.exceptions import ImproperlyConfigured
+from django.http import HttpRequest
+from django.shortcuts import render
+from django.urls import URLPattern, URLResolver, include, path
+
+from leaderboard.models import User
+
+log = structlog.get_logger(__name__)
+
+
+def offered() -> list[tuple[str, str]]:
+    """The providers of this site: for each the word in addresses, and the name that people know."""
+    return [(name, given["APP"]["name"]) for name, given in settings.SOCIALACCOUNT_PROVIDERS.items()]
+
+
+def patterns() -> list[URLPattern | URLResolver]:
+    """The addresses, below `/accounts/`, of the providers that are offered; none where there are none."""
+    chosen = [pattern for name, _ in offered() for pattern in _PATTERNS[name]]
+    return [path("3rdparty/", include("allauth.socialaccount.urls")), *chosen] if chosen else []
+
+
+class MalformedAnswer(OAuth2Error):
+    """A provider's answer lacks what its documentation promises."""
+
+
+@contextmanager
+def _malformed_answers() -> Iterator[None]:
+    """What allauth raises for an answer of another shape than it expects, as an error of the provider."""
+    try:
+        yield
+    except requests.RequestException:
+        raise
+    except (
+        LookupError,
+        TypeError,
+        ValueError,
+        ArithmeticError,
+        AttributeError,
+        ImproperlyConfigured,
+    ) as fault:
+        raise MalformedAnswer(type(fault).__name__) from fault
+
+
+class _ProviderViews(OAuth2Adapter):
+    """The exchange with a provider. Its answers are a stranger's: none of them is a failure of ours."""
+
+    def get_access_token_data(self, *args: Any, **kwargs: Any) -> Any:
+        """The provider's answer to the code that the browser brought."""
+        with _malformed_answers():
+            return super().get_access_token_data(*args, **kwargs)
+
+    def parse_token(self, data: Any) -> Any:
+        """The token in it."""
+        with _malformed_answers():
+            return super().parse_token(data)
+
+    def complete_login(self, request: HttpRequest, app: Any, token: Any, **kwargs: Any) -> SocialLogin:
+        """Who signs in, with at most one address, which is verified."""
+        with _malformed_answers():
+            login = super().complete_login(request, app, token, **kwargs)
+            verified = self.verified(login)
+            login.email_addresses = verified[:1]
+            login.user.email = verified[0].email if verified else ""
+            login.account.extra_data = self.kept(login.account.extra_data)
+            return login
+
+    def verified(self, login: SocialLogin) -> list[EmailAddress]:
+        """The addresses that the provider has verified, the primary one first."""
+        raise NotImplementedError
+
+    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
+        """What of the provider's words is kept."""
+        raise NotImplementedError
+
+
+class OrcidViews(_ProviderViews, OrcidOAuth2Adapter):
+    """ORCID tells the iD, and addresses that the person has made public."""
+
+    def verified(self, login: SocialLogin) -> list[EmailAddress]:
+        """Those of the public record."""
+        person = login.account.extra_data.get("person") or {}
+        rows = (person.get("emails") or {}).get("email") or []
+        rows = [row for row in rows if row.get("verified") is True and row.get("email")]
+        return _sorted(_address(row["email"], is_primary=row.get("primary") is True) for row in rows)
+
+    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
+        """Nothing: the iD is the account's number, and the record is the person's own."""
+        return {}
+
+
+class GitHubViews(_ProviderViews, GitHubOAuth2Adapter):
+    """GitHub tells a number, the login name, and the addresses of the account."""
+
+    def verified(self, login: SocialLogin) -> list[EmailAddress]:
+        """Those that GitHub has verified; the one on the profile may be any text."""
+        rows = [row for row in login.email_addresses if row.verified is True]
+        return _sorted(_address(row.email, is_primary=row.primary is True) for row in rows)
+
+    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
+        """The login name, by which the person knows the account."""
+        return {"login": str(said.get("login", ""))[:100]}
+
+
+def _address(text: str, *, is_primary: bool) -> EmailAddress:
+    return EmailAddress(email=text.lower(), verified=True, primary=is_primary)
+
+
+def _sorted(addresses: Iterator[EmailAddress]) -> list[EmailAddress]:
+    return sorted(addresses, key=lambda address: (not address.primary, address.email))
+
+
+class ProviderAdapter(DefaultSocialAccountAdapter):
+    """Decides what a login of a provider opens, and says in words what went wrong."""
+
+    error_messages = {
+        **DefaultSocialAccountAdapter.error_messages,
+        "no_password": "Without it you could not sign in any more; set a password first.",
+        "no_verified_email": "Without it you could not sign in any more; verify an email address first.",
+    }
+
+    def pre_social_login(self, request: HttpRequest, sociallogin: SocialLogin) -> None:
+        """Stop where the address has an account that does not know this login."""
+        # It would wait in the session, and nobody needs it any more.
+        sociallogin.token = None
+        is_sign_in = sociallogin.state.get("process", AuthProcess.LOGIN) == AuthProcess.LOGIN
+        address = sociallogin.user.email if sociallogin.user else ""
+        if sociallogin.is_existing or not is_sign_in or not address or not _has_account(address):
+            return
+        context = {"provider": sociallogin.provider, "address": address}
+        raise ImmediateHttpResponse(render(request, "socialaccount/known_address.html", context, status=409))
+
+    def on_authentication_error(
+        self,
+        request: HttpRequest,
+        provider: Any,
+        error: Any = None,
+        exception: Exception | None = None,
+        extra_context: dict[str, Any] | None = None,
+    ) -> None:
+        """Find the sentence for the page. The log has the kind of error, nothing that the provider said."""
+        if error == AuthError.CANCELLED:
+            return
+        log.warning("provider_failed", provider=provider.id, fault=type(exception).__name__)
+        if extra_context is not None:
+            extra_context["sentence"] = _sentence(provider.app.name, exception, request)
+
+
+def _has_account(address: str) -> bool:
+    taken = EmailAddress.objects.filter(email__iexact=address)
+    return taken.exists() or User.objects.filter(email__iexact=address).exists()
+
+
+def _sentence(name: str, exception: Exception | None, request: HttpRequest) -> str:
+    if isinstance(exception, requests.Timeout):
+        return f"{name} did not answer in time. The fault is not yours: try again later."
+    if isinstance(exception, requests.exceptions.JSONDecodeError | OAuth2Error):
+        return f"The answer of {name} was not understood. The fault is not yours: try again later."
+    if isinstance(exception, requests.RequestException):
+        return f"{name} could not be reached, or failed. The fault is not yours: try again later."
+    if "error" in request.GET:
+        return f"{name} refused the sign-in."
+    return (
+        "This sign-in was not begun in this browser, was begun more than ten minutes ago, or is over. "
+        "Begin it again."
+    )
+
+
+class ProviderSignupForm(SignupForm):
+    """Address and name. The address is taken as verified where it is the one that the provider verified."""
+
+    def save(self, request: HttpRequest) -> User:
+        """Make the account."""
+        typed = self.cleaned_data["email"].lower()
+        addresses = self.sociallogin.email_addresses
+        self.sociallogin.email_addresses = [each for each in addresses if each.email == typed]
+        user: User = super().save(request)
+        return user
+
+
+class ConnectedForm(DisconnectForm):
+    """The accounts that open this one, of the providers that the site offers at present."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        offered_here = settings.SOCIALACCOUNT_PROVIDERS
+        mine = SocialAccount.objects.filter(user=kwargs["request"].user, provider__in=offered_here)
+        super().__init__(*args, **kwargs)
+        self.accounts = self.fields["account"].queryset = mine
+        self.fields["account"].error_messages["required"] = "No account was chosen; expected one of the list."
+
+
+def _of(name: str, views: type[OAuth2Adapter]) -> list[URLPattern]:
+    login = OAuth2LoginView.adapter_view(views)
+    callback = OAuth2CallbackView.adapter_view(views)
+    return [
+        path(f"{name}/login/", login, name=f"{name}_login"),
+        path(f"{name}/login/callback/", callback, name=f"{name}_callback"),
+    ]
+
+
+_PATTERNS: Final[dict[str, list[URLPattern]]] = {
+    "orcid": _of("orcid", OrcidViews),
+    "github": _of("github", GitHubViews),
+}

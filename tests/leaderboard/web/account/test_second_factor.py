@@ -1,0 +1,224 @@
+"""The second factor: who has one needs it, who must have one is led to it, who lost it gets help."""
+
+import re
+from io import StringIO
+from types import SimpleNamespace
+
+import pytest
+from allauth.mfa.models import Authenticator
+from allauth.mfa.totp.internal import auth
+from django.core import mail
+from django.core.management import CommandError, call_command
+from django.test import Client
+from django.utils import timezone
+from pytest_django import Settings
+
+from leaderboard.models import AuditEvent, Mail, User
+from leaderboard.submissions import forgetting
+from tests import builders
+from tests.leaderboard.web.test_every_page import assert_sound
+
+PASSWORD = "correct horse"
+
+
+class Phone:
+    """An app that makes codes, and a clock that it and the site share: no code is asked for twice."""
+
+    def __init__(self) -> None:
+        self.now_s = 1_800_000_000.0
+        self.key = ""
+
+    def code(self) -> str:
+        """The code of the next half minute."""
+        self.now_s += 30
+        [counter] = auth.yield_hotp_counters_from_time()
+        return auth.format_hotp_value(auth.hotp_value(self.key, counter))
+
+
+@pytest.fixture
+def phone(monkeypatch: pytest.MonkeyPatch) -> Phone:
+    made = Phone()
+    monkeypatch.setattr(auth, "time", SimpleNamespace(time=lambda: made.now_s))
+    return made
+
+
+@pytest.fixture
+def keeper(db: None) -> User:
+    return User.objects.create_superuser("keeper@example.org", PASSWORD)
+
+
+def sign_in(client: Client, user: User) -> str:
+    """Send the password; returns where that leads."""
+    answer = client.post("/accounts/login/", {"login": user.email, "password": PASSWORD})
+    assert answer.status_code == 302
+    return answer.headers["Location"]
+
+
+def signed_in(user: User) -> Client:
+    client = Client()
+    sign_in(client, user)
+    return client
+
+
+def set_up(client: Client, phone: Phone) -> list[str]:
+    """Confirm the password, read the key, send a code; returns the recovery codes."""
+    path = "/accounts/2fa/totp/activate/"
+    asked = client.get(path)
+    assert asked.headers["Location"] == f"/accounts/reauthenticate/?next={path.replace('/', '%2F')}"
+    assert_sound(client.get(asked.headers["Location"]))
+    confirmed = client.post("/accounts/reauthenticate/", {"password": PASSWORD, "next": path})
+    assert confirmed.headers["Location"] == path
+    page = client.get(path)
+    phone.key = assert_sound(page).one("code", id="key").text
+    assert "data:image/svg+xml;base64," in page.text
+    wrong = client.post(path, {"code": "000000" if phone.code() != "000000" else "000001"})
+    assert "That is not the code of this moment" in wrong.text
+    assert f'id="key">{phone.key}<' in wrong.text
+    done = client.post(path, {"code": phone.code()})
+    assert done.headers["Location"] == "/accounts/2fa/recovery-codes/"
+    codes = client.get("/accounts/2fa/recovery-codes/")
+    assert_sound(codes)
+    return re.findall(r"<li><code>(\d{8})</code></li>", codes.text)
+
+
+def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: User, phone: Phone) -> None:
+    client = signed_in(owner)
+    assert "Set up an app" in assert_sound(client.get("/accounts/2fa/")).text
+    codes = set_up(client, phone)
+    assert len(codes) == 10
+    assert client.get("/accounts/2fa/recovery-codes/download/").text.split() == codes
+    assert "10 of 10 codes are left" in assert_sound(client.get("/accounts/2fa/")).text
+
+    other = Client()
+    assert sign_in(other, owner) == "/accounts/2fa/authenticate/"
+    assert other.get("/submissions/").status_code == 302, "the password alone opens nothing"
+    assert_sound(other.get("/accounts/2fa/authenticate/"))
+    assert "That is not the code" in other.post("/accounts/2fa/authenticate/", {"code": "12345"}).text
+    code = phone.code()
+    assert other.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 302
+    assert other.get("/submissions/").status_code == 200
+
+    replayed = Client()
+    sign_in(replayed, owner)
+    assert replayed.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 200
+    for sent, expected in ((codes[0], 302), (codes[0], 200)):
+        lost = Client()
+        sign_in(lost, owner)
+        assert lost.post("/accounts/2fa/authenticate/", {"code": sent}).status_code == expected
+
+
+def test_who_guesses_codes_is_stopped(owner: User, phone: Phone) -> None:
+    set_up(signed_in(owner), phone)
+    client = Client()
+    sign_in(client, owner)
+    for _ in range(5):
+        client.post("/accounts/2fa/authenticate/", {"code": "1"})
+    assert client.post("/accounts/2fa/authenticate/", {"code": phone.code()}).status_code == 200
+    assert client.get("/submissions/").status_code == 302
+
+
+def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(owner: User, phone: Phone) -> None:
+    client = signed_in(owner)
+    codes = set_up(client, phone)
+    assert_sound(client.get("/accounts/2fa/recovery-codes/generate/"))
+    client.post("/accounts/2fa/recovery-codes/generate/")
+    anew = re.findall(r"<code>(\d{8})</code>", client.get("/accounts/2fa/recovery-codes/").text)
+    assert len(anew) == 10
+    assert not set(anew) & set(codes)
+    # Another session of the account gives the password or a code first.
+    other = Client()
+    sign_in(other, owner)
+    other.post("/accounts/2fa/authenticate/", {"code": phone.code()})
+    asked = other.get("/accounts/2fa/totp/deactivate/")
+    assert asked.headers["Location"].startswith("/accounts/reauthenticate/?next=")
+    assert_sound(other.get("/accounts/2fa/reauthenticate/"))
+    assert_sound(client.get("/accounts/2fa/totp/deactivate/"))
+    client.post("/accounts/2fa/totp/deactivate/")
+    assert not Authenticator.objects.exists()
+    assert sign_in(Client(), owner) == "/submit/"
+
+
+# --- maintainers -----------------------------------------------------------------------------------------
+
+
+def test_maintainers_who_must_have_one_are_led_to_it(keeper: User, phone: Phone, settings: Settings) -> None:
+    early = signed_in(keeper)
+    assert early.get("/maintain/").status_code == 200
+    settings.REQUIRE_SECOND_FACTOR = True
+    for path in ("/maintain/", "/maintain/audit/", "/admin/", "/admin/leaderboard/user/"):
+        assert early.get(path).headers["Location"] == "/accounts/2fa/totp/activate/"
+    assert early.post("/maintain/queue/retry/").headers["Location"] == "/accounts/2fa/totp/activate/"
+    assert "need a second factor" in early.get("/accounts/reauthenticate/").text
+    assert early.get("/submissions/").status_code == 200
+
+    client = signed_in(keeper)
+    set_up(client, phone)
+    # Sessions from before are no better for it: neither shows its pages without a code.
+    for session in (early, client):
+        asked = session.get("/maintain/?x=1").headers["Location"]
+        assert asked == "/accounts/2fa/reauthenticate/?next=%2Fmaintain%2F%3Fx%3D1"
+        page = assert_sound(session.get(asked))
+        assert page.one("input", name="next").attributes["value"] == "/maintain/?x=1"
+        sent = {"code": phone.code(), "next": "/maintain/?x=1"}
+        assert session.post("/accounts/2fa/reauthenticate/", sent).headers["Location"] == "/maintain/?x=1"
+        assert session.get("/maintain/").status_code == session.get("/admin/").status_code == 200
+
+    refused = client.post("/accounts/2fa/totp/deactivate/")
+    assert "Maintainers of this site must have a second factor." in refused.text
+    assert Authenticator.objects.filter(user=keeper, type="totp").exists()
+
+
+def test_api_tokens_and_other_people_need_no_code(
+    keeper: User, owner: User, phone: Phone, settings: Settings
+) -> None:
+    settings.REQUIRE_SECOND_FACTOR = True
+    assert signed_in(owner).get("/maintain/").status_code == 404
+    set_up(signed_in(owner), phone)
+    token = {"Authorization": f"Bearer {builders.token(owner)}"}
+    assert Client(headers=token).get("/api/v1/submissions").status_code == 200
+    assert Client().get("/maintain/").headers["Location"].startswith("/accounts/login/")
+
+
+def test_nobody_reads_or_writes_second_factors_in_the_administration(keeper: User) -> None:
+    client = signed_in(keeper)
+    for model in ("mfa/authenticator", "socialaccount/socialapp", "socialaccount/socialaccount"):
+        assert client.get(f"/admin/{model}/").status_code == 404
+
+
+# --- help, and a person's data ---------------------------------------------------------------------------
+
+
+def test_a_maintainer_resets_the_second_factor_of_another_with_a_reason(owner: User, phone: Phone) -> None:
+    set_up(signed_in(owner), phone)
+    call_command("reset_second_factor", owner.email, "--reason", "lost the phone", stdout=StringIO())
+    assert not Authenticator.objects.filter(user=owner).exists()
+    event = AuditEvent.objects.get(verb="second factor reset")
+    assert (event.noun, event.noun_id, event.details) == ("User", str(owner.pk), {"reason": "lost the phone"})
+    assert Mail.objects.get(user=owner).subject == "Your second factor was removed"
+    assert sign_in(Client(), owner) == "/submit/"
+
+
+@pytest.mark.parametrize(
+    ("email", "reason", "said"),
+    [
+        ("nobody@example.org", "lost", "no account with that address"),
+        ("owner@example.org", " ", "'reason' is empty"),
+        ("owner@example.org", "lost", "has no second factor"),
+    ],
+)
+def test_what_cannot_be_reset_is_said(owner: User, email: str, reason: str, said: str) -> None:
+    with pytest.raises(CommandError, match=said):
+        call_command("reset_second_factor", email.replace("owner@example.org", owner.email), reason=reason)
+    assert not AuditEvent.objects.filter(verb="second factor reset").exists()
+
+
+def test_the_export_names_the_second_factor_without_its_key_and_forgetting_deletes_it(
+    owner: User, phone: Phone
+) -> None:
+    codes = set_up(signed_in(owner), phone)
+    told = forgetting.export(user=owner)["second_factor"]
+    assert [row["type"] for row in told] == ["recovery_codes", "totp"]
+    assert not [secret for secret in (phone.key, *codes) if secret in str(told)]
+    assert not [message for message in mail.outbox if phone.key in message.body]
+    forgetting.forget(user=owner, reason="asked", actor=owner, now=timezone.now())
+    assert not Authenticator.objects.exists()
