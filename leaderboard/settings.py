@@ -290,6 +290,8 @@ ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
 # Wrong passwords; the keys are an account at an address, and an account (see web/account/accounts.py).
 ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
 
+# Whoever changes how one signs in, its owner is told by mail.
+ACCOUNT_EMAIL_NOTIFICATIONS = True
 # Whether maintainers need a second factor for their pages (see web/account/second_factor.py).
 REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
 MFA_ADAPTER = "leaderboard.web.account.second_factor.SecondFactorAdapter"

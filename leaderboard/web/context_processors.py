@@ -12,7 +12,6 @@ from django.utils.http import url_has_allowed_host_and_scheme
 
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.models import Split
-from leaderboard.web.account import providers
 
 _SECTIONS = {
     "home": "home",
@@ -77,7 +76,8 @@ def site(request: HttpRequest) -> dict[str, Any]:
             (section for prefix, section in _PREFIXES.items() if name.startswith(prefix)),
             _SECTIONS.get(name, ""),
         ),
-        "providers": providers.offered(),
+        # Those that people can sign in with: the word in addresses, and the name that people know.
+        "providers": [(name, set_["APP"]["name"]) for name, set_ in settings.SOCIALACCOUNT_PROVIDERS.items()],
         "splits": SimpleLazyObject(lambda: splits_of(request)),
         "announcements": _announcements(request),
         # Only the pages of errors ask for it, which nobody remembers.

@@ -17,12 +17,14 @@ from allauth.core import context as allauth_context
 from allauth.core.internal import ratelimit
 from django.conf import settings
 from django.contrib.auth.hashers import make_password
+from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
 from django.http import HttpRequest
 from django.utils import timezone
 
 from leaderboard.mails import outbox
+from leaderboard.models import User
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 
@@ -70,6 +72,14 @@ class AccountAdapter(DefaultAccountAdapter):
                 _known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S
             )
         return user
+
+    def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
+        """How somebody confirms that it is them: with a code if they have a second factor, else by password.
+
+        So a password that somebody else knows shows no recovery codes in a session that was left open.
+        """
+        methods: list[dict[str, Any]] = super().get_reauthentication_methods(user)
+        return [each for each in methods if each["id"] == "mfa_reauthenticate"] or methods
 
     def _get_login_attempts_cache_key(self, request: HttpRequest, **credentials: Any) -> str:
         return f"{_login_of(credentials)}:{ratelimit.get_ip(request)}"

@@ -37,14 +37,9 @@ from leaderboard.models import User
 log = structlog.get_logger(__name__)
 
 
-def offered() -> list[tuple[str, str]]:
-    """The providers of this site: for each the word in addresses, and the name that people know."""
-    return [(name, given["APP"]["name"]) for name, given in settings.SOCIALACCOUNT_PROVIDERS.items()]
-
-
 def patterns() -> list[URLPattern | URLResolver]:
     """The addresses, below `/accounts/`, of the providers that are offered; none where there are none."""
-    chosen = [pattern for name, _ in offered() for pattern in _PATTERNS[name]]
+    chosen = [pattern for name in settings.SOCIALACCOUNT_PROVIDERS for pattern in _PATTERNS[name]]
     return [path("3rdparty/", include("allauth.socialaccount.urls")), *chosen] if chosen else []
 
 

@@ -1,13 +1,8 @@
-"""The second factor on the pages: what allauth is told of this site, and who must have one."""
+"""The second factor on the pages: what allauth is told of this site."""
 
-from allauth.account.authentication import get_authentication_records
 from allauth.mfa.adapter import DefaultMFAAdapter
 from allauth.mfa.models import Authenticator
 from django.conf import settings
-from django.http import HttpRequest
-
-from leaderboard.models import User
-from leaderboard.people import second_factor
 
 
 class SecondFactorAdapter(DefaultMFAAdapter):
@@ -17,8 +12,8 @@ class SecondFactorAdapter(DefaultMFAAdapter):
         **DefaultMFAAdapter.error_messages,
         "cannot_delete_authenticator": "Maintainers of this site must have a second factor.",
         "cannot_generate_recovery_codes": "Recovery codes need a second factor; set up an app first.",
-        "incorrect_code": "That is not the code of this moment; expected the six digits that the app shows "
-        "now, or a recovery code that was not used yet.",
+        "incorrect_code": "That is not the code of this moment, or it was used already; expected the one "
+        "that the app shows now.",
         "unverified_email": "Verify all email addresses of the account before you set up a second factor.",
     }
 
@@ -29,17 +24,3 @@ class SecondFactorAdapter(DefaultMFAAdapter):
     def can_delete_authenticator(self, authenticator: Authenticator) -> bool:
         """Whether somebody may go on without it."""
         return not (settings.REQUIRE_SECOND_FACTOR and authenticator.user.is_maintainer)
-
-
-def missing_step(request: HttpRequest, user: User) -> str:
-    """The name of the page that a maintainer has to pass first; empty where nothing is missing.
-
-    It is the session that has to be opened with a code: one that was opened by a password alone, before the
-    app was set up, is no better for it.
-    """
-    if not settings.REQUIRE_SECOND_FACTOR or not user.is_maintainer:
-        return ""
-    if not second_factor.is_set_up(user):
-        return "mfa_activate_totp"
-    has_given_a_code = any(each.get("method") == "mfa" for each in get_authentication_records(request, user))
-    return "" if has_given_a_code else "mfa_reauthenticate"

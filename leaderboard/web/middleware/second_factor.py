@@ -3,13 +3,16 @@
 from collections.abc import Callable
 from typing import Any
 
+from allauth.account.authentication import get_authentication_records
+from django.conf import settings
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect, resolve_url
 from django.utils.http import urlencode
 from django_htmx.http import HttpResponseClientRefresh
 
-from leaderboard.web.account.second_factor import missing_step
+from leaderboard.models import User
+from leaderboard.people import second_factor
 
 
 class SecondFactorMiddleware:
@@ -28,7 +31,7 @@ class SecondFactorMiddleware:
         """Redirect, or let the view answer."""
         if not _is_for_maintainers(request) or not request.user.is_authenticated:
             return None
-        step = missing_step(request, request.user)
+        step = _missing_step(request, request.user)
         if not step:
             return None
         if getattr(request, "htmx", None):
@@ -47,3 +50,17 @@ def _is_for_maintainers(request: HttpRequest) -> bool:
         return False
     name = match.url_name or ""
     return name != "logout" if match.namespace == "admin" else name.startswith("maintain")
+
+
+def _missing_step(request: HttpRequest, user: User) -> str:
+    """The name of the page that a maintainer has to pass first; empty where nothing is missing.
+
+    It is the session that has to be opened with a code: one that was opened by a password alone, before the
+    app was set up, is no better for it.
+    """
+    if not settings.REQUIRE_SECOND_FACTOR or not user.is_maintainer:
+        return ""
+    if not second_factor.is_set_up(user):
+        return "mfa_activate_totp"
+    has_given_a_code = any(each.get("method") == "mfa" for each in get_authentication_records(request, user))
+    return "" if has_given_a_code else "mfa_reauthenticate"

@@ -11,7 +11,7 @@ from django.core import mail
 from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
-from pytest_django import Settings
+from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
 
 from leaderboard.models import AuditEvent, Mail, User
 from leaderboard.submissions import forgetting
@@ -117,23 +117,33 @@ def test_who_guesses_codes_is_stopped(owner: User, phone: Phone) -> None:
     assert client.get("/submissions/").status_code == 302
 
 
-def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(owner: User, phone: Phone) -> None:
+def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
+    owner: User, phone: Phone, django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks
+) -> None:
     client = signed_in(owner)
-    codes = set_up(client, phone)
-    assert_sound(client.get("/accounts/2fa/recovery-codes/generate/"))
-    client.post("/accounts/2fa/recovery-codes/generate/")
+    with django_capture_on_commit_callbacks(execute=True):
+        codes = set_up(client, phone)
+        assert_sound(client.get("/accounts/2fa/recovery-codes/generate/"))
+        client.post("/accounts/2fa/recovery-codes/generate/")
     anew = re.findall(r"<code>(\d{8})</code>", client.get("/accounts/2fa/recovery-codes/").text)
     assert len(anew) == 10
     assert not set(anew) & set(codes)
-    # Another session of the account gives the password or a code first.
+    # In another session the password is not enough: with a second factor, a code confirms.
     other = Client()
     sign_in(other, owner)
     other.post("/accounts/2fa/authenticate/", {"code": phone.code()})
     asked = other.get("/accounts/2fa/totp/deactivate/")
-    assert asked.headers["Location"].startswith("/accounts/reauthenticate/?next=")
-    assert_sound(other.get("/accounts/2fa/reauthenticate/"))
+    assert asked.headers["Location"].startswith("/accounts/2fa/reauthenticate/?next=")
+    assert "password" not in assert_sound(other.get("/accounts/2fa/reauthenticate/")).one("main").text
+    by_password = other.post("/accounts/reauthenticate/", {"password": PASSWORD})
+    assert by_password.headers["Location"].startswith("/accounts/2fa/reauthenticate/")
+    assert other.get("/accounts/2fa/recovery-codes/").status_code == 302
     assert_sound(client.get("/accounts/2fa/totp/deactivate/"))
     client.post("/accounts/2fa/totp/deactivate/")
+    told = [message.subject.partition("] ")[2] for message in mail.outbox]
+    assert told == [
+        *("You have a second factor", "You have new recovery codes", "Your second factor was removed")
+    ]
     assert not Authenticator.objects.exists()
     assert sign_in(Client(), owner) == "/submit/"
 
