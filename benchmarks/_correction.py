@@ -24,12 +24,13 @@ from evaluator.scoring.scoring import Scorer
 from evaluator.truth.csv_tables import Table
 from leaderboard.boards import boards
 from leaderboard.editions import corrections, ground_truth
-from leaderboard.models import Edition, Evaluation, Score, Status, Submission
+from leaderboard.models import Analysis, Edition, Evaluation, Score, Status, Submission, SweepBeat
 from leaderboard.scoring import lifecycle, worker
 from leaderboard.storage import files, truth_values
 from tests import crowd
 
-POLL_S = 0.01
+# Each question takes a millisecond of the processors that the workers have.
+POLL_S = 0.03
 PATIENCE_S = 600.0
 
 
@@ -71,9 +72,23 @@ def perturbed(truth: evaluator.GroundTruth, *, seed: int) -> evaluator.GroundTru
     )
 
 
-def leave_intervals() -> None:
-    """Keep the workers from making intervals, which are another benchmark's: to them, all were just made."""
-    Edition.objects.update(inferred_at=timezone.now() + timedelta(days=1))
+def leave_what_waits_behind() -> None:
+    """Keep the workers from what they do behind submissions, which are other benchmarks: to them it was done.
+
+    Intervals, the cards of a crowd that has just joined, and the analyses of an open split.
+    """
+    tomorrow = timezone.now() + timedelta(days=1)
+    Edition.objects.update(inferred_at=tomorrow)
+    SweepBeat.objects.update_or_create(defaults={"cards_begun_at": tomorrow})
+    scored = Evaluation.objects.filter(
+        status=Status.SCORED, analysis=None, edition__published_at__isnull=False
+    )
+    Analysis.objects.bulk_create(
+        [
+            Analysis(evaluation_id=pk, content={}, made_at=tomorrow)
+            for pk in scored.values_list("pk", flat=True)
+        ]
+    )
 
 
 def correct(*, split: str, truth: evaluator.GroundTruth, directory: Path, pids: Sequence[int]) -> Corrected:
@@ -90,7 +105,7 @@ def correct(*, split: str, truth: evaluator.GroundTruth, directory: Path, pids: 
     open_s = time.perf_counter() - started_s
     # To ask whether all are decided is no part of it.
     opened_s = time.process_time()
-    leave_intervals()
+    leave_what_waits_behind()
     undecided = Evaluation.objects.filter(edition=edition, status__in=[Status.QUEUED, Status.RUNNING])
     while undecided.exists():
         if time.perf_counter() - started_s > PATIENCE_S:

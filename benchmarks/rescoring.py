@@ -2,10 +2,10 @@
 
 Real PostgreSQL, real Redis, and a Celery worker with two processes, as in production. The clock runs from the
 call that opens the edition, which reads and checks the new ground truth, to the moment at which the last
-submission is decided in the database. Intervals and rank ranges are made later, and not here. `extra_memory`
-is what a worker process has at the peak of a correction beyond what it had before. `processor` is the time of
-the workers and of this process, which opens the edition, without PostgreSQL's; it can be compared even where
-the machine does something else.
+submission is decided in the database. What workers make behind submissions, as intervals, cards and analyses,
+is not measured here. `extra_memory` is what a worker process has at the peak of a correction beyond what it
+had before. `processor` is the time of the workers and of this process, which opens the edition, without
+PostgreSQL's; it can be compared even where the machine does something else.
 
 Beside it the dataset's own way over the same work: the plain Python loop of `benchmarks.evaluator` from the
 file to the means, measured on twenty of the submissions before each round, and multiplied. Figures are
@@ -73,7 +73,7 @@ def _measure(site: Site) -> None:
     rounds: dict[str, list[Corrected]] = {split: [] for split in SIZES}
     contents = [crowd.contents(truths["test"], number) for number in range(N_IN_THE_LOOP)]
     loops_s, extra_mb = [], []
-    _correction.leave_intervals()
+    _correction.leave_what_waits_behind()
     with _worker(site) as pids:
         for number in range(N_ROUNDS):
             loops_s.append(_loop_s(contents, truth))

@@ -30,27 +30,31 @@ def saved(file: SentFile, edition: Edition) -> Predictions | None:
     the private directory or the store does not answer.
     """
     manifest = truth_values.load(edition.ground_truth_id).manifest
-    n_sent, places = _places(file.manifest_digest, edition.ground_truth_id)
-    if len(missing := np.flatnonzero(places < 0)):
+    n_sent, places, missing = _places(file.manifest_digest, edition.ground_truth_id)
+    if len(missing):
         raise absent(missing, manifest=manifest)
     ascending = files.load_aligned(file, n_sequences=n_sent)
     if ascending is None:
         return None
-    return Predictions(manifest=manifest, ttc_s=ascending[places], digest=file.digest)
+    ttc_s = ascending if places is None else ascending[places]
+    return Predictions(manifest=manifest, ttc_s=ttc_s, digest=file.digest)
 
 
 @lru_cache(maxsize=16)
-def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows]:
+def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]:
     """How many values a file for this manifest has, and where among them, in ascending anno_id, each is.
 
-    (n,) in the order of the ground truth; -1 for what the file's manifest does not have.
+    (n,) in the order of the ground truth; None where that is the order of the values. And the rows of the
+    ground truth that the file's manifest does not have.
     """
     manifest = truth_values.load(truth_digest).manifest
     own = manifest if manifest.digest == own_digest else manifests.load(own_digest)
     rows = rows_in(own, manifest)
     place_of_row: NDArray[np.intp] = np.empty(own.n_sequences, dtype=np.intp)
     place_of_row[own.rows_by_id] = np.arange(own.n_sequences)
-    return own.n_sequences, np.where(rows < 0, -1, place_of_row[rows])
+    places = place_of_row[rows]
+    is_same_order = own.n_sequences == len(places) and bool(np.array_equal(places, np.arange(len(places))))
+    return own.n_sequences, None if is_same_order else places, np.flatnonzero(rows < 0)
 
 
 def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = lambda: True) -> Predictions:

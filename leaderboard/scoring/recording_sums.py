@@ -28,29 +28,41 @@ from leaderboard.storage import truth_values
 log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
+_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 
 
 def path(edition: Edition, *, file: SentFile) -> Path:
     """Where the sums of a file are kept for this ground truth and protocol."""
+    return Path(_folder(edition), _name(file))
+
+
+def _folder(edition: Edition) -> str:
     truth = edition.ground_truth_id.removeprefix("sha256:")
-    kept = Path(settings.BAGS_DIR or Path(settings.GROUND_TRUTH_DIR) / "bags")
+    kept = settings.BAGS_DIR or f"{settings.GROUND_TRUTH_DIR}/bags"
+    return f"{kept}/{truth[:32]}-{edition.protocol}"
+
+
+def _name(file: SentFile) -> str:
     digest, manifest = (part.removeprefix("sha256:") for part in file)
-    return kept / f"{truth[:32]}-{edition.protocol}" / f"{digest}-{manifest[:32]}.f8"
+    return f"{digest}-{manifest[:32]}.f8"
 
 
 def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> None:
     """Keep a file's sums, little-endian float64. A disk that does not take them costs only time later."""
     if bags is None:
         return
-    target = path(edition, file=file)
+    # Once for each file of a re-scoring: paths as objects would take longer than the writing.
+    folder = _folder(edition)
+    temporary = f"{folder}/tmp{uuid.uuid4().hex}"  # noqa: S108 - a folder of our own
     try:
-        if not target.parent.exists():
-            target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        temporary = target.with_name(f"tmp{uuid.uuid4().hex}")
-        handle = os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600)
+        try:
+            handle = os.open(temporary, _NEW, 0o600)
+        except FileNotFoundError:
+            Path(folder).mkdir(parents=True, exist_ok=True, mode=0o700)
+            handle = os.open(temporary, _NEW, 0o600)
         with os.fdopen(handle, "wb") as out:
             out.write(np.ascontiguousarray(bags.sums, dtype="<f8").data)
-        temporary.replace(target)
+        os.replace(temporary, f"{folder}/{_name(file)}")  # noqa: PTH105 - see above
     except OSError as fault:
         log.warning("bags_not_kept", digest=file.digest, reason=str(fault)[:200])
 

@@ -12,6 +12,7 @@ from PIL import Image
 from leaderboard.exports import card_drawing, cards
 from leaderboard.exports.cards import Card, CardRow
 from leaderboard.models import CardPicture, Edition, Method, Submission, User
+from leaderboard.scoring import worker
 from leaderboard.workers import pictures, queue
 from tests import builders, pages
 
@@ -116,3 +117,15 @@ def test_of_many_workers_one_draws_when_it_is_time(sent: Submission) -> None:
 
 def test_a_worker_that_is_to_stop_draws_no_further_card(sent: Submission) -> None:
     assert pictures.draw(now=timezone.now(), is_stopping=lambda: True) == 0
+
+
+def test_cards_wait_while_this_process_decides_a_submission(sent: Submission) -> None:
+    asked: list[bool] = []
+
+    def is_stopping() -> bool:
+        asked.append(True)
+        return len(asked) > 3
+
+    with worker._in_hand:
+        assert pictures.draw(now=timezone.now(), is_stopping=is_stopping) == 0
+    assert pictures.draw(now=timezone.now()) > 0
