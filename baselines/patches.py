@@ -32,6 +32,10 @@ MIN_CONTRAST: Final = 1.0
 """Least standard deviation of a patch in grey levels; below, every place matches as well as any other."""
 
 
+_MAX_ROW: Final = 2**15 - 1
+"""Cells in a row of what OpenCV samples at once."""
+
+
 @dataclass(frozen=True, slots=True)
 class Window:
     """A part of a frame. `pixels` is float32 (rows, columns) or (rows, columns, 3) in grey levels 0 … 255;
@@ -63,8 +67,11 @@ class Window:
         rows = ((np.asarray(y) - self.origin[1]) / self.pixel_size[1] - 0.5).astype(np.float32)
         shape = (len(columns), rows.shape[1], columns.shape[1])
         # One call for all grids, one below the other: OpenCV takes longer to start than to sample a patch.
-        map_x = np.broadcast_to(columns[:, np.newaxis, :], shape).reshape(-1, shape[2])
-        map_y = np.broadcast_to(rows[:, :, np.newaxis], shape).reshape(-1, shape[2])
+        # All cells of a grid are one row where it may be so long: OpenCV works faster along long rows.
+        row = shape[1] * shape[2] if shape[1] * shape[2] <= _MAX_ROW else shape[2]
+        maps = np.empty((2, *shape), dtype=np.float32)
+        maps[0], maps[1] = columns[:, np.newaxis, :], rows[:, :, np.newaxis]
+        map_x, map_y = maps[0].reshape(-1, row), maps[1].reshape(-1, row)
         found = cv2.remap(self.pixels, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         return np.asarray(found, dtype=np.float32).reshape(shape + self.pixels.shape[2:])
 

@@ -17,6 +17,7 @@ from typing import Any, Final, Literal, get_args
 
 import cv2
 import numpy as np
+from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from baselines import patches, pixel_mse_toolkit
@@ -213,14 +214,19 @@ class Comparison:
     def _placed(self, max_shift: int, kind: type[np.float32 | np.float64]) -> NDArray[Any]:
         """((2c + 1)², cells of the sampled reference): the patch at each shift, zeros around it."""
         rows, columns = self.patch.shape
-        n_shifts = 2 * max_shift + 1
-        shape = (n_shifts, n_shifts, rows + 2 * max_shift, columns + 2 * max_shift)
-        patch = self.patch.astype(kind)
-        placed = np.zeros(shape, dtype=kind)
-        for dy in range(n_shifts):
-            for dx in range(n_shifts):
-                placed[dy, dx, dy : dy + rows, dx : dx + columns] = patch
-        return placed.reshape(n_shifts**2, -1)
+        n_shifts, width = 2 * max_shift + 1, columns + 2 * max_shift
+        length = (rows + 2 * max_shift) * width
+        # Written row after row, a shift by (dx, dy) is one by dx + dy · row length: zeros move in.
+        room = 2 * max_shift * (width + 1)
+        framed = np.zeros(room + length, dtype=kind)
+        framed[room:].reshape(-1, width)[:rows, :columns] = self.patch
+        moved = as_strided(
+            framed[room:],
+            shape=(n_shifts, n_shifts, length),
+            strides=(-width * framed.itemsize, -framed.itemsize, framed.itemsize),
+            writeable=False,
+        )
+        return moved.reshape(n_shifts**2, length)
 
 
 def _sums_under(values: NDArray[Any], *, rows: int, columns: int) -> Floats:
