@@ -117,6 +117,7 @@ def test_machine_where_nothing_can_be_kept_does_without(
     tsttc: Tsttc, site: RecordedSite, places: Path
 ) -> None:
     put_manifest(site)
+    places.parent.mkdir(parents=True, exist_ok=True)
     places.write_text("a file where the folder would be")
     assert [submit(tsttc).exit_code for _ in range(2)] == [0, 0]
     assert paths(site).count(TABLE) == 2
