@@ -56,6 +56,7 @@ SAMPLES: Final = {
     "wheel_name": "none.whl",
     "table_name": "main-results",
     "suffix": "csv",
+    "slug": "none",
     "deed_name": "rename-team",
     "chosen": "csv",
     "secret": "none",

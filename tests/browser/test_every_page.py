@@ -25,6 +25,7 @@ OTHERS = {
     "wheel_name": "none.whl",
     "table_name": "main-results",
     "suffix": "csv",
+    "slug": "none",
     "deed_name": "rename-team",
     "chosen": "csv",
     "secret": "none",
