@@ -268,8 +268,11 @@ class Client(Connection):
         n_asked = 0
         while submission.awaits_intervals:
             n_asked += 1
-            # Where nothing else is to do, they follow the scores within a tenth of a second.
-            delay_s = 0.4 * self.patience.delay_s(n_failed=n_asked, retry_after_s=None, rng=self.rng)
+            delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=None, rng=self.rng)
+            if n_asked == 1:
+                delay_s *= (
+                    0.4  # where nothing else is to do, they follow the scores within a tenth of a second
+                )
             if self.monotonic_s() + delay_s >= until_s:
                 break
             self.sleep(delay_s)
