@@ -34,7 +34,7 @@ from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import comparisons, confidence, lifecycle, questions, recording_sums
 from leaderboard.storage import files, orphans, truth_values
 from leaderboard.submissions import empty_methods, idempotency, submissions
-from tests import builders
+from tests import builders, moderation_verbs
 from tests.leaderboard.web.maintain import queue_rows
 from tests.locking_scene import DAY, Scene
 
@@ -334,4 +334,5 @@ VERBS: Mapping[str, Callable[[Scene], Deed]] = {
     "edit a method": lambda scene: _edit(scene, scene.public, {"description": uuid.uuid4().hex}),
     "delete a method": _delete_method,
     "rename a method": lambda scene: _edit(scene, scene.private, {"name": uuid.uuid4().hex}),
+    **moderation_verbs.VERBS,
 }

@@ -26,7 +26,7 @@ def rename_team(*, team: Team, name: str, reason: str, actor: User | None, now: 
     require_maintainer(actor, to="rename teams")
     reason = _reason(reason)
     with transaction.atomic():
-        row = teams.locked(team)[0]
+        [row] = _locked_teams(team)
         name = clean_name("name", name or masked("Team", row.pk))
         before = row.name
         teams.set_name(team=row, name=name, now=now)
@@ -85,7 +85,7 @@ def move_method(*, method: Method, to: Team, reason: str, actor: User | None) ->
     require_maintainer(actor, to="move methods between teams")
     reason = _reason(reason)
     with transaction.atomic():
-        teams.locked(method.team, to)
+        _locked_teams(method.team, to)
         row = Method.objects.select_for_update(no_key=True).select_related(None).get(pk=method.pk)
         if row.team_id == to.pk:
             raise Refused("bad-value", f"The method is in the team {to.name!r} already.", field="name")
@@ -165,6 +165,14 @@ def masked(noun: str, pk: UUID) -> str:
     'Team 3f9c2a'
     """
     return f"{noun} {pk.hex[:6]}"
+
+
+def _locked_teams(*wanted: Team) -> list[Team]:
+    """These teams, which stay so until the transaction ends. Raises `Refused` where one has ended."""
+    found = teams.locked(*wanted)
+    if len(found) < len({team.pk for team in wanted}):
+        raise Refused("changed-meanwhile", "The team has just ended; reload the page and choose another one.")
+    return found
 
 
 def _locked(method: Method) -> Method:

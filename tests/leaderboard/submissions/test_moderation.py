@@ -206,3 +206,13 @@ def test_the_account_page_exports_and_deletes(signed_in: Client, edition: Editio
 def test_a_maintainer_is_not_forgotten_by_accident(maintainer: User) -> None:
     with pytest.raises(Refused, match="another maintainer ends the role first"):
         forgetting.forget(user=maintainer, reason="R", actor=maintainer, now=timezone.now())
+
+
+def test_a_team_that_has_just_ended_is_refused_in_words(edition: Edition, owner: User) -> None:
+    sent = published(edition, owner, method="Stays")
+    gone = Team(name="Gone")
+    told = {"reason": "R.", "actor": None}
+    with pytest.raises(Refused, match="The team has just ended"):
+        moderation.move_method(method=sent.method, to=gone, **told)
+    with pytest.raises(Refused, match="The team has just ended"):
+        moderation.rename_team(team=gone, name="New", now=timezone.now(), **told)
