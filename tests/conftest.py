@@ -62,7 +62,9 @@ def pytest_collection_finish() -> None:
 
 
 @pytest.fixture(scope="session")
-def django_db_modify_db_settings(django_db_modify_db_settings: None) -> Iterator[None]:
+def django_db_modify_db_settings(
+    django_db_modify_db_settings: None, pytestconfig: pytest.Config
+) -> Iterator[None]:
     """The test database is a copy of the one that was migrated already.
 
     On SQLite only where several processes need one: a single one migrates its own as quickly.
@@ -70,7 +72,8 @@ def django_db_modify_db_settings(django_db_modify_db_settings: None) -> Iterator
     settings = connection.settings_dict
     if connection.vendor == "postgresql" and services.is_on_test_server(settings):
         settings["TEST"]["TEMPLATE"] = prepared.template()
-    if connection.vendor == "sqlite" and "PYTEST_XDIST_WORKER" in os.environ:
+    is_one_of_many = "PYTEST_XDIST_WORKER" in os.environ and not pytestconfig.getoption("nomigrations")
+    if connection.vendor == "sqlite" and is_one_of_many:
         # Django's name of it.
         with prepared.sqlite_in_memory(f"file:memorydb_{connection.alias}?mode=memory&cache=shared"):
             yield

@@ -11,6 +11,7 @@ from __future__ import annotations
 import io
 import json
 import mmap
+import os
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -132,6 +133,9 @@ def main() -> None:
     except MemoryError:
         sys.exit(EXIT_OUT_OF_MEMORY)
     sys.stdout.buffer.write(answer)
+    sys.stdout.buffer.flush()
+    # Without its farewells: pyarrow's threads may end this process by a signal when it takes its time.
+    os._exit(0)
 
 
 if __name__ == "__main__":

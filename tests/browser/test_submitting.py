@@ -15,6 +15,7 @@ from playwright.sync_api import Browser, Page, expect
 import evaluator
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.plausibility import warnings_of
+from evaluator.predictions.predictions import read_sent
 from tests.browser.chromium import NARROW, tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import predictions, worker
@@ -214,7 +215,7 @@ CHECK = """async ([checker, manifest, files]) => {
 
 def answer_of(data: bytes, manifest: evaluator.Manifest) -> dict[str, object]:
     try:
-        found = evaluator.read_predictions(data, manifest=manifest)
+        found = read_sent(data, manifest=manifest)  # as the server, which reads no Parquet
     except evaluator.Rejected as rejected:
         return {**rejected.as_dict(), "warnings": []}
     return {"n_problems": 0, "problems": [], "warnings": [asdict(each) for each in warnings_of(found)]}

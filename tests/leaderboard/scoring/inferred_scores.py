@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 
 from evaluator.metrics.protocol import score_name
-from leaderboard.boards.rows import Interval, scored_in
+from leaderboard.boards.rows import Interval, ranges_in, scored_in
 from leaderboard.models import Edition, EditionRanges, Evaluation, Score, Submission
 
 INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
@@ -19,7 +19,7 @@ class Inferred(Interval):
 
 def scores_of(submission: Submission, edition: Edition) -> dict[str, Inferred]:
     evaluation = Evaluation.objects.get(submission=submission, edition=edition)
-    intervals = scored_in(edition)[evaluation.pk].intervals
+    intervals = scored_in(edition, ranges=ranges_in(edition))[evaluation.pk].intervals
     return {
         name: Inferred(**asdict(found), pk=row.pk, value=row.value)
         for row in Score.objects.filter(evaluation=evaluation)
