@@ -74,7 +74,11 @@ def test_opening_an_edition_is_killed_between_its_rows_and_goes_on_when_it_is_ru
             return tuple(map(int, row))
 
     def waits_for_the_lock() -> bool:
-        question = "SELECT count(*) FROM pg_locks WHERE NOT granted AND relation = %s::regclass"
+        # Tables have the same number in every copy of one database, and other tests lock theirs meanwhile.
+        question = (
+            "SELECT count(*) FROM pg_locks JOIN pg_database ON pg_database.oid = pg_locks.database "
+            "WHERE NOT granted AND datname = current_database() AND relation = %s::regclass"
+        )
         with psycopg.connect(postgres_url) as connection:
             [[n]] = connection.execute(question, [table]).fetchall()
             return bool(n)
