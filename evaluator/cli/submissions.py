@@ -226,7 +226,7 @@ def _warn(notice: str, *, err: bool) -> None:
 
 
 def _require_consent() -> None:
-    """Ask whoever sits there; a job has been set up to send this."""
+    """Ask the person at the terminal. A job is not asked: somebody set it up to send this."""
     if sys.stdin.isatty() and not click.confirm("Submit?", err=True):
         raise Failure("Nothing was submitted.", exit_code=Exit.USAGE, code="not-confirmed")
 
