@@ -23,6 +23,7 @@ from baselines.methods import Value, get_method
 from baselines.outcomes import Outcome, SequenceEstimator
 from baselines.processes import worked_through
 from evaluator import GroundTruth, Predictions, evaluate, fps_of_gap, scale_ratio_to_ttc
+from evaluator.counting import counted
 from evaluator.papers.tables import published_tables
 from evaluator.problems import reject
 
@@ -146,8 +147,8 @@ def _order(folder: SequenceFolder, truth: GroundTruth) -> list[int]:
     different = sorted(set(wanted) ^ set(row_of))
     if different:
         message = (
-            f"{len(different):,} sequences are only in the ground truth or only in the folder, the first is "
-            f"{different[0]}; expected the same sequences in both."
+            f"{counted(len(different), 'sequence is', 'sequences are')} only in the ground truth or "
+            f"only in the folder, the first is {different[0]}; expected the same sequences in both."
         )
         raise reject("missing-keys", message)
     return [row_of[anno_id] for anno_id in wanted]

@@ -1,9 +1,8 @@
-"""Two figures: what Pixel MSE saw of a sequence and chose, and what the task is."""
+"""A figure: what Pixel MSE saw of a sequence and chose."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Final
 
 import cv2
@@ -11,21 +10,17 @@ import numpy as np
 
 from baselines import patches
 from baselines.boxes import box_around, centre_of, size_of
-from baselines.clips import N_FRAMES, TARGET, Clip, Image
+from baselines.clips import TARGET, Clip, Image
 from baselines.drawing import THEMES, Anchor, Dot, Figure, Line, Picture, Text, outline
 from baselines.pixel_mse import Floats, PixelMse
 from baselines.scales import Match, best_of
-from evaluator.metrics.scale import FRAME_RATE_HZ, fps_of_gap, scale_ratio_to_ttc
+from evaluator.metrics.scale import fps_of_gap, scale_ratio_to_ttc
 
-_MARGIN: Final = 24.0
-_GAP: Final = 16.0
-# From here on both equations of the task figure have room side by side.
-_WIDE: Final = 900
-# Of its texts below the frames: still read where the figure is shrunk to a tablet.
-_LABEL: Final = 15.0
+MARGIN: Final = 24.0
+GAP: Final = 16.0
 
 
-class _Crop:
+class FrameCrop:
     """A square part of a frame, drawn at (x, y) with `side` units."""
 
     def __init__(
@@ -61,11 +56,11 @@ def search_figure(
         raise ValueError(f"The figure shows the paper's variant, not {estimator.variant}.")
     match = estimator.match(clip, frame_gap=frame_gap)
     ttc_s = float(scale_ratio_to_ttc(match.scale_ratio, fps_hz=fps_of_gap(frame_gap)))
-    truth = "" if true_ttc_s is None else f"; true TTC {_seconds(true_ttc_s)}"
-    headline = f"Sequence {clip.anno_id}: α = {match.scale_ratio:.3f}, TTC {_seconds(ttc_s)}{truth}"
+    truth = "" if true_ttc_s is None else f"; true TTC {seconds(true_ttc_s)}"
+    headline = f"Sequence {clip.anno_id}: α = {match.scale_ratio:.3f}, TTC {seconds(ttc_s)}{truth}"
     figure = Figure(920, 560, THEMES[theme], headline)
     colours = figure.theme
-    figure.shapes.append(Text(headline, _MARGIN, 36, colours.ink, size=18, is_bold=True))
+    figure.shapes.append(Text(headline, MARGIN, 36, colours.ink, size=18, is_bold=True))
     _add_crops(figure, clip, estimator, match, frame_gap)
     true_ratio = None
     if true_ttc_s is not None:
@@ -75,7 +70,7 @@ def search_figure(
 
 
 def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, frame_gap: int) -> None:
-    side = (figure.width - 2 * _MARGIN - 3 * _GAP) / 4
+    side = (figure.width - 2 * MARGIN - 3 * GAP) / 4
     top, reference = 62.0, TARGET - frame_gap
     frames = (clip.grey(reference), clip.grey(TARGET))
     reference_box, target_box = estimator.boxes(clip, frames, frame_gap=frame_gap)
@@ -86,9 +81,9 @@ def _add_crops(figure: Figure, clip: Clip, estimator: PixelMse, match: Match, fr
     found_box = box_around(middle, scale * size)
     # Both crops have one scale, so that the eye sees the change of size; the third follows the found box.
     reach_px = 1.35 * float(max(size_of(reference_box).max(), size.max()))
-    places = [_MARGIN + i * (side + _GAP) for i in range(4)]
+    places = [MARGIN + i * (side + GAP) for i in range(4)]
     ours, theirs, matched = (
-        _Crop(image, centre=centre, reach_px=reach, x=x, y=top, side=side)
+        FrameCrop(image, centre=centre, reach_px=reach, x=x, y=top, side=side)
         for image, centre, reach, x in (
             (frames[0], centre_of(reference_box), reach_px, places[0]),
             (frames[1], centre_of(target_box), reach_px, places[1]),
@@ -156,7 +151,7 @@ def _add_curve(
         ttc_s = float(scale_ratio_to_ttc(tick, fps_hz=fps_of_gap(frame_gap)))
         figure.shapes.append(Line([(x(tick), bottom), (x(tick), bottom + 5)], colours.quiet))
         figure.shapes.append(Text(f"{tick:.1f}", x(tick), bottom + 20, colours.ink, 12, "middle"))
-        figure.shapes.append(Text(_seconds(ttc_s), x(tick), bottom + 36, colours.quiet, 12, "middle"))
+        figure.shapes.append(Text(seconds(ttc_s), x(tick), bottom + 36, colours.quiet, 12, "middle"))
     figure.shapes.append(
         Text(
             "scale ratio α, and the time to contact that it means",
@@ -185,88 +180,10 @@ def _add_curve(
         figure.shapes.append(Dot(x(float(match.scales[i])), y(float(errors[i])), 4, colours.mark))
 
 
-def task_figure(
-    frames: Sequence[Image],
-    *,
-    boxes: Floats,
-    ttc_s: float,
-    theme: str = "light",
-    n_columns: int = N_FRAMES,
-) -> Figure:
-    """Six frames in which a vehicle changes its size, and what is to be estimated from them.
-
-    `boxes` is (6, 4) in pixels, `ttc_s` the time to contact at the last frame. `n_columns` of the frames
-    stand side by side: 6 for a wide page, 2 or 3 for a narrow one.
-    """
-    ratio = 1 / (1 + 1 / (float(fps_of_gap(TARGET)) * ttc_s))
-    n_rows = math.ceil(N_FRAMES / n_columns)
-    side, label = 168.0, 40.0
-    width = 2 * _MARGIN + n_columns * side + (n_columns - 1) * _GAP
-    foot = 46.0 if width >= _WIDE else 114.0
-    height = _MARGIN + n_rows * (side + label) + foot
-    title = (
-        f"Six frames at 10 Hz. The vehicle's box is {_ratio(ratio)} times as large in the first as in the "
-        f"last: the scale ratio. It means {_seconds(ttc_s)} to contact."
-    )
-    figure = Figure(round(width), round(height), THEMES[theme], title)
-    colours = figure.theme
-    reach_px = 1.3 * float(size_of(boxes).max())
-    for frame in range(N_FRAMES):
-        x = _MARGIN + (frame % n_columns) * (side + _GAP)
-        y = _MARGIN + (frame // n_columns) * (side + label)
-        crop = _Crop(frames[frame], centre=centre_of(boxes[frame]), reach_px=reach_px, x=x, y=y, side=side)
-        is_end = frame in {0, TARGET}
-        shown = colours.mark if is_end else colours.accent
-        figure.shapes += [crop.picture, outline(crop.place(boxes[frame]), colour=shown)]
-        name = {0: "reference", TARGET: "target"}.get(frame, "")
-        at_s = (frame - TARGET) / FRAME_RATE_HZ
-        figure.shapes.append(
-            Text(f"{at_s:.1f} s".replace("-", "−"), x, y + side + 20, colours.quiet, size=_LABEL)
-        )
-        figure.shapes.append(
-            Text(name, x + side, y + side + 20, colours.ink, _LABEL, anchor="end", is_bold=True)
-        )
-    _add_equations(figure, ratio, ttc_s, y=_MARGIN + n_rows * (side + label) + 26)
-    return figure
-
-
-def _add_equations(figure: Figure, ratio: float, ttc_s: float, *, y: float) -> None:
-    """The scale ratio and the time to contact: side by side, or below each other on two lines each."""
-    colours = figure.theme
-    scale = ("size in the reference ÷ size in the target", f"= α = {_ratio(ratio)}")
-    time = ("time to contact τ = 1 / (2 Hz · (1/α − 1))", f"= {_seconds(ttc_s)}")
-    if figure.width < _WIDE:
-        lines = [
-            (text, colour) for texts, colour in ((scale, colours.mark), (time, colours.ink)) for text in texts
-        ]
-        for i, (text, colour) in enumerate(lines):
-            figure.shapes.append(Text(text, _MARGIN, y + 24 * i, colour, 15.5, is_bold=i < 2))
-        return
-    figure.shapes += [
-        Text(" ".join(scale), _MARGIN, y, colours.mark, 18, is_bold=True),
-        Text(" ".join(time), figure.width - _MARGIN, y, colours.ink, 18, anchor="end"),
-    ]
-
-
-def _ratio(scale: float) -> str:
-    """A scale ratio over the whole gap, with so many digits that the printed time to contact follows from it.
-
-    >>> _ratio(0.8), _ratio(0.811425)
-    ('0.800', '0.8114')
-    """
-
-    def seconds(ratio: float) -> str:
-        growth = float(fps_of_gap(TARGET)) * (1 / ratio - 1)
-        return _seconds(1 / growth if growth else math.inf)
-
-    printed = (f"{scale:.{digits}f}" for digits in range(3, 17))
-    return next((text for text in printed if seconds(float(text)) == seconds(scale)), f"{scale:.3f}")
-
-
-def _seconds(ttc_s: float) -> str:
+def seconds(ttc_s: float) -> str:
     """Seconds with a true minus sign, and a decimal for small values; ∞ for an object that keeps its size.
 
-    >>> _seconds(3.42), _seconds(-12.3), _seconds(1121.0), _seconds(math.inf)
+    >>> seconds(3.42), seconds(-12.3), seconds(1121.0), seconds(math.inf)
     ('3.4 s', '−12 s', 'over 100 s', '∞ s')
     """
     if not math.isfinite(ttc_s):

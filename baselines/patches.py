@@ -157,4 +157,5 @@ def fewer_cells(shape: tuple[float, ...], *, max_cells: int) -> NDArray[np.int_]
 
 def is_flat(patch: Pixels) -> bool:
     """Whether a patch has no texture to compare."""
-    return not math.isfinite(contrast := float(np.std(patch))) or contrast < MIN_CONTRAST
+    contrast = float(cv2.meanStdDev(patch)[1][0, 0])
+    return not math.isfinite(contrast) or contrast < MIN_CONTRAST

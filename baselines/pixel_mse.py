@@ -13,11 +13,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, Final, Literal, get_args
 
 import cv2
 import numpy as np
-from numpy.lib.stride_tricks import as_strided
 from numpy.typing import NDArray
 
 from baselines import patches, pixel_mse_toolkit
@@ -37,7 +37,6 @@ from baselines.scales import (
 Floats = NDArray[np.float64]
 
 Variant = Literal["paper", "toolkit"]
-VARIANTS: Final[tuple[Variant, ...]] = get_args(Variant)
 
 Search = Literal["full", "coarse-to-fine"]
 SEARCHES: Final[tuple[Search, ...]] = get_args(Search)
@@ -55,6 +54,9 @@ that lie at most so many from the best of these.
 
 CLOSE: Final = 0.02
 """A match whose error is less than so much of the patch's variance is computed in float64."""
+
+_PART: Final = 1024
+"""So many cells are multiplied at once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,7 +199,12 @@ class Comparison:
     @property
     def variance(self) -> float:
         """That of the patch, in squared grey levels."""
-        return float(np.mean(self.patch**2))
+        return self._energy / self.patch.size
+
+    @property
+    def _energy(self) -> float:
+        """ΣT²."""
+        return float(np.vdot(self.patch, self.patch))
 
     def _errors(self, scales: Floats, max_shift: int, kind: type[np.float32 | np.float64]) -> Floats:
         rows, columns = self.patch.shape
@@ -205,10 +212,10 @@ class Comparison:
         x = patches.grid_about(self.centre[0], n_cells=columns + 2 * max_shift, cell_px=cells[:, 0])
         y = patches.grid_about(self.centre[1], n_cells=rows + 2 * max_shift, cell_px=cells[:, 1])
         sampled = self.reference.sample(x, y).astype(kind, copy=False)
-        products = sampled.reshape(len(scales), -1) @ self._placed(max_shift, kind).T
+        products = _products(sampled.reshape(len(scales), -1), self._placed(max_shift, kind))
         np.square(sampled, out=sampled)
         energies = _sums_under(sampled, rows=rows, columns=columns)
-        errors = energies - 2.0 * products.reshape(energies.shape) + np.sum(self.patch**2)
+        errors = energies - 2.0 * products.reshape(energies.shape) + self._energy
         return np.asarray(np.maximum(errors / self.patch.size, 0.0))
 
     def _placed(self, max_shift: int, kind: type[np.float32 | np.float64]) -> NDArray[Any]:
@@ -220,31 +227,45 @@ class Comparison:
         room = 2 * max_shift * (width + 1)
         framed = np.zeros(room + length, dtype=kind)
         framed[room:].reshape(-1, width)[:rows, :columns] = self.patch
-        moved = as_strided(
-            framed[room:],
-            shape=(n_shifts, n_shifts, length),
+        moved: NDArray[Any] = np.ndarray(
+            (n_shifts, n_shifts, length),
+            dtype=kind,
+            buffer=framed,
+            offset=room * framed.itemsize,
             strides=(-width * framed.itemsize, -framed.itemsize, framed.itemsize),
-            writeable=False,
         )
         return moved.reshape(n_shifts**2, length)
+
+
+def _products(sampled: NDArray[Any], placed: NDArray[Any]) -> NDArray[Any]:
+    """(n, k): every row of `sampled` (n, cells) times every row of `placed` (k, cells)."""
+    # In parts, because OpenBLAS takes up to twice as long for a few rows that are long.
+    products: NDArray[Any] = sampled[:, :_PART] @ placed[:, :_PART].T
+    for start in range(_PART, sampled.shape[1], _PART):
+        part = slice(start, start + _PART)
+        products += sampled[:, part] @ placed[:, part].T
+    return products
 
 
 def _sums_under(values: NDArray[Any], *, rows: int, columns: int) -> Floats:
     """(n, k, k): sums over all (rows, columns) parts of the n arrays."""
     _, n_rows, n_columns = values.shape
     # Down first: that reads the values as they lie.
-    down = _band(n_rows, rows).T.astype(values.dtype) @ values
-    return np.asarray(down.astype(np.float64) @ _band(n_columns, columns))
+    down = _band(n_rows, rows, values.dtype).T @ values
+    return np.asarray(down.astype(np.float64) @ _band(n_columns, columns, np.dtype(np.float64)))
 
 
-def _band(length: int, width: int) -> Floats:
-    """(length, length − width + 1): in column i, ones in the rows i … i + width − 1.
+@lru_cache(maxsize=1024)
+def _band(length: int, width: int, kind: np.dtype[Any]) -> NDArray[Any]:
+    """(length, length − width + 1), read-only: in column i, ones in the rows i … i + width − 1.
 
-    >>> _band(3, 2).tolist()
+    >>> _band(3, 2, np.dtype(np.float64)).tolist()
     [[1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]
     """
     offsets = np.subtract.outer(np.arange(length), np.arange(length - width + 1))
-    return ((offsets >= 0) & (offsets < width)).astype(np.float64)
+    band = ((offsets >= 0) & (offsets < width)).astype(kind)
+    band.setflags(write=False)
+    return band
 
 
 def near_the_best(comparison: Comparison, scales: Floats, *, max_shift: int) -> Floats:

@@ -22,7 +22,7 @@ from benchmarks._scaling import processor_s
 from benchmarks.evaluator import plain_loop
 from evaluator.scoring.scoring import Scorer
 from evaluator.truth.csv_tables import Table
-from leaderboard.boards import boards
+from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import corrections, ground_truth
 from leaderboard.models import Analysis, Edition, Evaluation, Score, Status, Submission, SweepBeat
 from leaderboard.scoring import lifecycle, worker
@@ -127,7 +127,7 @@ def check(corrected: Corrected, *, first: evaluator.GroundTruth, n: int) -> None
             edition=corrected.edition, submission__method__name=crowd.method_name(number)
         )
         expected = plain_loop(crowd.contents(first, number), true_s)
-        for name, value in boards.flat_scores(found).items():
+        for name, value in flat_scores(found).items():
             metric, _, interval = name.partition("_")
             mid, rte = expected[interval or "overall"]
             assert value == evaluator.published(

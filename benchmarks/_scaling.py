@@ -1,6 +1,6 @@
 """The measurement of `benchmarks/scale_out.py`, run in a process that has the site's settings.
 
-100 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued before any
+60 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued before any
 worker is started, not yet due. Each worker then scores a few others, so that what a process reads and starts
 once, the ground truth and the server of its readers, is not counted. Then all become due at once, and the
 clock runs, by the database, until the last is decided: no file is sent meanwhile. The workers share the
@@ -31,7 +31,7 @@ from django.utils import timezone
 
 import evaluator
 from leaderboard.db import clock
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from leaderboard.editions import ground_truth
 from leaderboard.models import Evaluation, Status, User
 from leaderboard.ops import broker
@@ -39,7 +39,7 @@ from leaderboard.submissions import submissions
 from tests.journeys.production import BIN, REPOSITORY, await_that
 
 N_WORKERS = (1, 2, 4)
-N_SUBMISSIONS, N_TO_WARM = 100, 6
+N_SUBMISSIONS, N_TO_WARM = 60, 6
 N_SEQUENCES = 28_600
 SEED = 20230901
 PATIENCE_S = 600.0
@@ -121,6 +121,7 @@ def rate(ids: Sequence[UUID]) -> float:
 def workers(n: int) -> Iterator[list[int]]:
     """So many worker processes, all of them up, by their numbers; ended with the context."""
     processes: list[int] = []
+    begun: list[subprocess.Popen[bytes]] = []
     logs = [Path(settings.DATA_DIR) / f"worker-{n}-{i}.log" for i in range(n)]
     with ExitStack() as started:
         for i, path in enumerate(logs):
@@ -137,7 +138,11 @@ def workers(n: int) -> Iterator[list[int]]:
             )
             started.callback(end, worker)
             processes.append(worker.pid)
+            begun.append(worker)
         await_that(lambda: all(b" ready." in path.read_bytes() for path in logs), what="the workers are up")
+        # All at once: each finishes what it has in hand, which takes seconds.
+        for worker in begun:
+            started.callback(worker.terminate)
         yield processes
 
 
@@ -156,10 +161,23 @@ def processor_s(process: int) -> float:
     """Processor seconds of a process and all that it has started, those that have ended included."""
     folder = Path("/proc", str(process))
     # The fields after the name, which may have spaces in it; times of its own, and of children that ended.
-    fields = (folder / "stat").read_text().rpartition(")")[2].split()
+    stat = _text_of(folder / "stat")
+    if not stat:
+        return 0.0  # It has ended since it was listed; its parent has its time from now on.
+    fields = stat.rpartition(")")[2].split()
     own_s = sum(map(int, fields[11:15])) / os.sysconf("SC_CLK_TCK")
-    children = (folder / "task" / str(process) / "children").read_text().split()
+    # Each thread has children of its own: the one that polls starts another server of readers.
+    lists = (folder / "task").glob("*/children")
+    children = [child for path in lists for child in _text_of(path).split()]
     return own_s + sum(processor_s(int(child)) for child in children)
+
+
+def _text_of(path: Path) -> str:
+    """What the kernel says of a process or thread; nothing of one that has ended since."""
+    try:
+        return path.read_text()
+    except (FileNotFoundError, ProcessLookupError):
+        return ""
 
 
 def end(worker: "subprocess.Popen[bytes]") -> None:

@@ -55,9 +55,9 @@ def measure(n: int) -> None:
     from django.utils import timezone  # noqa: PLC0415
 
     from benchmarks._correction import open_split  # noqa: PLC0415
-    from leaderboard.demo.truth import simulate  # noqa: PLC0415
+    from leaderboard.demo.runs import simulate  # noqa: PLC0415
     from leaderboard.models import Comparison, Method, Score, Submission, Visibility  # noqa: PLC0415
-    from leaderboard.scoring import aligned, analyses, comparisons, confidence  # noqa: PLC0415
+    from leaderboard.scoring import analyses, comparisons, confidence, sandbox  # noqa: PLC0415
     from leaderboard.storage import truth_values  # noqa: PLC0415
 
     call_command("migrate", "--no-input", "--verbosity=0")
@@ -106,7 +106,7 @@ def measure(n: int) -> None:
         _took_s(lambda: comparisons.compute(rows[0], now=timezone.now())) * 1e3,
         "ms",
     )
-    values = aligned.of(first.submission.sent_file, edition)
+    values = sandbox.of(first.submission.sent_file, edition)
     closer = _took_s(lambda: analyses.content_of(values, truth, rules=edition.rules))
     figure("inference", n, "analysis", closer * 1e3, "ms")
 

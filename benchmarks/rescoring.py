@@ -25,7 +25,7 @@ import numpy as np
 
 import evaluator
 from benchmarks.evaluator import figure, plain_loop
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from tests import crowd
 from tests.journeys.production import BIN, Site, await_that, running, settings_for
 from tests.services import ServiceMissing, throwaway_database, throwaway_redis

@@ -1,9 +1,10 @@
 """500 clients that wait for their submissions, and what that costs whoever reads the board meanwhile.
 
-gunicorn as in production (two processes), real PostgreSQL; each waiting client asks `?wait=30` and honours
-Retry-After. Readers ask for the board as a page and as JSON, as anybody and signed in, one reader of each
-kind, who pauses after each answer. Measured without the waiters, with them, and without them again. At the
-end all submissions are cancelled, and it is counted how many clients are told within some seconds: those
+gunicorn as in production (two processes), real PostgreSQL; each waiting client asks `?wait=30`, as `tsttc`
+does after the answer to its file, and honours Retry-After. Readers ask for the board as a page and as JSON,
+as anybody and signed in, one reader of each kind, who pauses after each answer. Measured without the
+waiters, with them, and without them again; of the web processes also how many processors they keep busy. At
+the end all submissions are cancelled, and it is counted how many clients are told within some seconds: those
 with a place at once, those that were turned away when they ask again, within a minute.
 """
 
@@ -72,15 +73,18 @@ def _measure(site: Site) -> None:
     django.setup()
     waiters, reader = _populate(site.directory)
     gunicorn = (str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application")
-    with running(site, "web", *gunicorn):
+    with running(site, "web", *gunicorn) as web:
         await_that(lambda: _is_up(site.url), what="the web server answers")
         _read(site.url, reader, stop=_for(3))  # everybody's first question costs more
-        before = _read(site.url, reader, stop=_for(READ_S))
+        with _busy("before", web.pid):
+            before = _read(site.url, reader, stop=_for(READ_S))
         _print_phase("before", before)
         with _waiting(site, waiters) as clients:
-            arriving = _read(site.url, reader, stop=_has_said(clients))
+            with _busy("arriving", web.pid):
+                arriving = _read(site.url, reader, stop=_has_said(clients))
             _print_phase("arriving", arriving)
-            during = _read(site.url, reader, stop=_for(READ_S))
+            with _busy("waiting", web.pid):
+                during = _read(site.url, reader, stop=_for(READ_S))
             _print_phase("waiting", during)
             figure("waiting", N_WAITERS, "database_connections", _connections(), "")
             _cancel()
@@ -90,6 +94,24 @@ def _measure(site: Site) -> None:
     _print_phase("unloaded", unloaded)
     for name, times in (("arriving", arriving), ("waiting", during)):
         figure("waiting", N_WAITERS, f"board_{name}_p99_ratio", _p99_of(times) / _p99_of(unloaded), "x")
+
+
+@contextmanager
+def _busy(phase: str, master: int) -> Iterator[None]:
+    """Print how many processors the web processes have used within."""
+    began_s, before_s = time.perf_counter(), _used_s(master)
+    yield
+    busy = (_used_s(master) - before_s) / (time.perf_counter() - began_s)
+    figure("waiting", N_WAITERS, f"web_busy_{phase}", busy, "processors")
+
+
+def _used_s(master: int) -> float:
+    """Processor seconds of the processes of a gunicorn, user and system."""
+    ticks = 0
+    for child in Path(f"/proc/{master}/task/{master}/children").read_text().split():
+        fields = Path(f"/proc/{child}/stat").read_text().rpartition(")")[2].split()
+        ticks += int(fields[11]) + int(fields[12])
+    return ticks / os.sysconf("SC_CLK_TCK")
 
 
 def _print_phase(name: str, times: "Times") -> None:
@@ -109,6 +131,13 @@ def _print_counts(clients: "subprocess.Popen[str]") -> None:
     counts = json.loads(clients.communicate(timeout=TELL_S + 20)[0].splitlines()[-1])
     figure("waiting", N_WAITERS, "turned_away", 100 * counts["n_turned_away"] / counts["n_requests"], "%")
     figure("waiting", N_WAITERS, "failed", counts["n_failed"], "requests")
+    figure(
+        "waiting",
+        N_WAITERS,
+        "client_processor",
+        1e3 * counts["processor_s"] / counts["n_requests"],
+        "ms/request",
+    )
     told = 100 * counts["n_told"] / N_WAITERS
     figure("waiting", N_WAITERS, f"told_within_{TELL_S:g}_s", told, "%")
 

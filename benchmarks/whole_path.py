@@ -65,7 +65,7 @@ def prepare(site: Site) -> tuple[str, evaluator.GroundTruth]:
     from django.db import connections  # noqa: PLC0415 - needs Django
     from django.utils import timezone  # noqa: PLC0415
 
-    from leaderboard.demo.truth import simulate  # noqa: PLC0415
+    from leaderboard.demo.runs import simulate  # noqa: PLC0415
     from leaderboard.models import User  # noqa: PLC0415
     from leaderboard.people import teams, tokens  # noqa: PLC0415
 

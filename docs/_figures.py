@@ -6,15 +6,16 @@ import struct
 from pathlib import Path
 from typing import Final
 
-from baselines.annotation.figures import choice_figure, consensus_figure
 from baselines.clips import Clip
 from baselines.deep_scale.estimator import DeepScale
-from baselines.deep_scale.figures import confidence_figure
 from baselines.drawing import JPEG_QUALITY, PNG_SCALE, THEMES, Figure, Line, Picture, Text, encoded, outline
-from baselines.figures import search_figure, task_figure
+from baselines.figures import search_figure
 from baselines.folders import read_folder
 from baselines.images import ImageCache
 from baselines.pixel_mse import PixelMse
+from docs._annotation_figures import choice_figure, consensus_figure
+from docs._confidence_figure import confidence_figure
+from docs._task_figure import task_figure
 from evaluator import read_truth
 
 REPOSITORY = Path(__file__).resolve().parents[1]

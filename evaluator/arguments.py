@@ -41,11 +41,6 @@ def data_of(source: Source, *, name: str = "source") -> bytes:
     return found.encode() if isinstance(found, str) else bytes(found)
 
 
-def is_path(source: object) -> bool:
-    """Whether this names a file, or a folder, rather than being its content."""
-    return isinstance(source, str | os.PathLike)
-
-
 def require(value: object, wanted: type, *, name: str) -> None:
     """Raise `TypeError` that says what was found, what was expected and how to get it."""
     if not isinstance(value, wanted):

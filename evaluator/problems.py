@@ -12,6 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Final
 
+from evaluator.counting import counted
+
 MAX_LISTED: Final = 20
 """At most so many lines of one kind, or places in one line, are listed; the rest are counted."""
 
@@ -199,7 +201,7 @@ def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
     >>> n_problems_in_words(1, n_lines=1), n_problems_in_words(7_000, n_lines=1)
     ('1 problem', '7,000 problems; equal ones share a line')
     """
-    told = "1 problem" if n_problems == 1 else f"{n_problems:,} problems"
+    told = counted(n_problems, "problem")
     return f"{told}; equal ones share a line" if n_lines < n_problems else told
 
 

@@ -1,6 +1,6 @@
-"""Mark a view's response as cacheable for anonymous readers, and answer conditional requests.
+"""Who gets the response of a view, and who may keep it; answers to conditional requests.
 
-`leaderboard/web/middleware/page_cache.py` reads the mark.
+`leaderboard/web/middleware/page_cache.py` reads the mark of what a cache may keep for anonymous readers.
 """
 
 import re
@@ -9,14 +9,36 @@ from dataclasses import dataclass
 from functools import wraps
 from typing import Any, Final, ParamSpec, TypeVar
 
-from django.http import HttpRequest
+from django.contrib.auth.decorators import login_required
+from django.http import HttpRequest, HttpResponseBase
 from django.utils import timezone
 from django.utils.http import parse_etags
+from django.views.decorators.cache import never_cache
+from django.views.decorators.http import require_http_methods, require_POST, require_safe
 
 P = ParamSpec("P")
 R = TypeVar("R")
+View = TypeVar("View", bound=Callable[..., HttpResponseBase])
 _MARK: Final = "is_kept"
 _PARAMETERS: Final = "query_parameters"
+
+asks_first = require_http_methods(["GET", "HEAD", "POST"])
+"""Of a view that shows a form and takes it."""
+
+
+def own_page(view: View) -> View:
+    """A page for whoever is signed in, that nothing keeps."""
+    return login_required(never_cache(require_safe(view)))
+
+
+def own_form(view: View) -> View:
+    """The same with a form."""
+    return login_required(never_cache(asks_first(view)))
+
+
+def own_deed(view: View) -> View:
+    """Something that is done for whoever is signed in, from a form on another page."""
+    return login_required(never_cache(require_POST(view)))
 
 
 @dataclass(frozen=True)

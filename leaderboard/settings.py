@@ -268,7 +268,7 @@ LOGOUT_REDIRECT_URL = "/"
 ACCOUNT_USER_MODEL_USERNAME_FIELD = None
 ACCOUNT_LOGIN_METHODS = {"email"}
 ACCOUNT_SIGNUP_FIELDS = ["email*", "password1*", "password2*"]
-ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.account.team_forms.SignupNameForm"
+ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.account.team_views.SignupNameForm"
 ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
 ACCOUNT_SESSION_REMEMBER = True
 EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default="consolemail://"))
@@ -292,9 +292,9 @@ ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywher
 
 # Whoever changes how one signs in, its owner is told by mail.
 ACCOUNT_EMAIL_NOTIFICATIONS = True
-# Whether maintainers need a second factor for their pages (see web/account/second_factor.py).
+# Whether maintainers need a second factor for their pages (see web/account/accounts.py).
 REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
-MFA_ADAPTER = "leaderboard.web.account.second_factor.SecondFactorAdapter"
+MFA_ADAPTER = "leaderboard.web.account.accounts.SecondFactorAdapter"
 # Without a mail server nobody could verify an address.
 MFA_ALLOW_UNVERIFIED_EMAIL = not SENDS_MAIL
 # Accounts elsewhere that people may sign in with (see web/account/providers.py); without a client, none.
@@ -341,6 +341,8 @@ if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
 SPECTACULAR_SETTINGS = settings.SPECTACULAR_SETTINGS
 # Waiters that a web process holds at once; gunicorn has as many threads for them (deploy/gunicorn.conf.py).
 WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)
+# So long after an addition, anybody may be shown the former board while a worker draws the new one.
+BOARD_LAG = timedelta(seconds=env.float("TSTTC_BOARD_LAG_S", default=3 if PRODUCTION else 0))
 
 # --- what is written down, and who may look --------------------------------------------------------------
 

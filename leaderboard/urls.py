@@ -7,7 +7,7 @@ from django.urls import include, path, re_path
 from leaderboard.api.exceptions import NowhereView
 from leaderboard.web import monitoring
 from leaderboard.web.account import providers
-from leaderboard.web.submissions import receipt_views
+from leaderboard.web.submissions import submission_views
 
 # Its own form knows no limit of how often one may guess.
 admin.site.login = secure_admin_login(admin.site.login)  # type: ignore[method-assign]  # the way that allauth documents
@@ -16,7 +16,7 @@ urlpatterns = [
     path("", include("leaderboard.web.urls")),
     path("api/v1/", include("leaderboard.api.urls")),
     re_path(r"^api(/|$)", NowhereView.as_view()),
-    path(".well-known/tsttc-receipt-keys.json", receipt_views.receipt_keys, name="receipt_keys"),
+    path(".well-known/tsttc-receipt-keys.json", submission_views.receipt_keys, name="receipt_keys"),
     path("accounts/", include("allauth.account.urls")),
     path("accounts/2fa/", include("allauth.mfa.urls")),
     path("accounts/", include(providers.patterns())),

@@ -2,19 +2,24 @@
 
 Whoever keeps a copy of a board (see `boards.snapshots`) knows by this number whether it still holds.
 It is raised inside the transaction that makes the change, so nobody ever sees the one without the other.
+
+After a change that only adds something, a reader may for a moment be given the board of before, while a
+worker draws the new one (see `may_be_late`); after any other change nobody is.
 """
 
 import uuid
-from collections.abc import Iterable
-from datetime import datetime
+from collections.abc import Iterable, Mapping
+from datetime import datetime, timedelta
 from typing import Any
 from weakref import WeakSet
 
 import psycopg
 from django.db import connection, transaction
-from django.db.models import F
+from django.db.models import Case, Exists, F, OuterRef, QuerySet, Subquery, When
+from django.db.models.functions import Now
 
-from leaderboard.models import BoardVersion, Evaluation, Split, Submission, Visibility
+from leaderboard.db import repeated
+from leaderboard.models import BoardVersion, Evaluation, Snapshot, Split, Submission, Visibility
 from leaderboard.ops import broker
 
 # Names who changes boards among PostgreSQL's advisory locks: "board" in ASCII.
@@ -28,13 +33,26 @@ def changed(*split_ids: str) -> None:
     Call it last of all that a verb writes: see `hold`.
     """
     hold()
-    _count(split_ids)
+    _count(split_ids, is_exact=True)
 
 
-def _count(split_ids: Iterable[str]) -> None:
+def added_to(*split_ids: str) -> None:
+    """The same, where something came to what everybody sees and nothing had to go: readers may be late."""
+    hold()
+    _count(split_ids, is_exact=False)
+
+
+def _count(split_ids: Iterable[str], *, is_exact: bool) -> None:
     for split_id in split_ids:
-        if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
-            BoardVersion.objects.create(split_id=split_id, number=1)
+        shown = Split.objects.filter(pk=OuterRef(OuterRef("split"))).values("published_edition")
+        drawn = Snapshot.objects.filter(edition__in=shown, version=OuterRef("number"))
+        changes = {
+            "number": F("number") + 1,
+            "behind_since": Case(When(Exists(drawn), then=Now()), default=F("behind_since")),
+            **({"exact_number": F("number") + 1} if is_exact else {}),
+        }
+        if not BoardVersion.objects.filter(split=split_id).update(**changes):
+            BoardVersion.objects.create(split_id=split_id, number=1, exact_number=1)
     # Workers hear of it, once for each event, to draw boards and to compute intervals. Robust: the rows are
     # committed by then, and a reader draws what no worker has drawn.
     transaction.on_commit(broker.work_off, robust=True)
@@ -100,6 +118,31 @@ def state_of(splits: Iterable[Any]) -> int:
     return sum(split.board_number or 0 for split in splits)
 
 
+def numbers_of(splits: Iterable[Any]) -> dict[str, int]:
+    """The number of each of these splits, read in the same way."""
+    return {split.pk: split.board_number or 0 for split in splits}
+
+
+def may_be_late(known: Mapping[str, int], *, lag: timedelta) -> bool:
+    """Whether an answer of when boards had these numbers may still be given: one statement.
+
+    It may where only additions came, the first not longer ago than `lag`, and nobody has drawn the board
+    since: so no reader gets a board that is older than one that they may have seen.
+    """
+    drawn = Snapshot.objects.filter(edition=OuterRef("split__published_edition")).values("version")
+    rows = BoardVersion.objects.values_list(
+        "split", "number", "exact_number", "behind_since", Subquery(drawn), Now()
+    )
+    for split_id, number, exact, behind_since, version, now in rows:
+        then = known.get(split_id, 0)
+        if number == then:
+            continue
+        is_drawn_since = version is None or version > then
+        if exact > then or is_drawn_since or behind_since is None or now - behind_since > lag:
+            return False
+    return True
+
+
 def _is_watched() -> bool:
     """Whether somebody counts or hinders statements, which they could not do to the driver's."""
     return connection.queries_logged or bool(connection.execute_wrappers) or connection.in_atomic_block
@@ -128,8 +171,8 @@ def times_passed(*, now: datetime) -> int:
     return n_told
 
 
-def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
-    """The same for the splits that these methods have submissions to."""
+def changed_by_methods(method_ids: Iterable[uuid.UUID], *, is_addition: bool = False) -> None:
+    """The same for the splits that these methods have submissions to; as `added_to` for an addition."""
     methods = list(method_ids)
     submissions = Submission.objects.filter(method__in=methods)
     split_ids = sorted(set(submissions.order_by().values_list("split", flat=True).distinct()))
@@ -137,7 +180,7 @@ def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
         # On no board, and yet with a page of its own: any of the numbers will do.
         split_ids = list(Split.objects.order_by("name").values_list("name", flat=True)[:1])
     if split_ids:
-        changed(*split_ids)
+        (added_to if is_addition else changed)(*split_ids)
 
 
 def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
@@ -148,7 +191,12 @@ def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
     hold()
-    shown = Evaluation.objects.filter(
-        pk__in=list(evaluation_ids), edition__published_at__isnull=False
-    ).exclude(submission__method__visibility=Visibility.PRIVATE)
-    _count(sorted(set(shown.order_by().values_list("edition__split", flat=True).distinct())))
+    ids = list(evaluation_ids)
+    shown = repeated.rows(_splits_showing, of=ids[0]) if len(ids) == 1 else _splits_showing(*ids)
+    _count(sorted({split_id for (split_id,) in shown}), is_exact=False)
+
+
+def _splits_showing(*evaluation_ids: uuid.UUID) -> "QuerySet[Evaluation, tuple[Any, ...]]":
+    shown = Evaluation.objects.filter(pk__in=evaluation_ids, edition__published_at__isnull=False)
+    public = shown.exclude(submission__method__visibility=Visibility.PRIVATE)
+    return public.order_by().values_list("edition__split").distinct()

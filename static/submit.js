@@ -50,7 +50,7 @@ function answered({ data }) {
 }
 
 function warning({ message, code }) {
-  const told = element("p", "", "notice bad");
+  const told = element("p", "", "notice doubtful");
   told.append(element("strong", "Warning."), ` ${message} `, element("span", code, "quiet code"));
   return told;
 }

@@ -17,7 +17,7 @@ from pytest_django.fixtures import Settings
 from leaderboard.benchmark import splits
 from leaderboard.web.middleware.page_cache import memory
 from leaderboard.web.monitoring import healthiness, readiness
-from tests import emptying, prepared, services, spread
+from tests import emptying, kept, prepared, services, spread
 
 # How long an example takes says more about the machine than about the code, and what is found by chance is
 # not found in the change that fails: `--hypothesis-profile=default` looks further.
@@ -61,6 +61,12 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """See `tests/kept.py`."""
+    kept.let_go_before(item)
+
+
 @pytest.fixture(scope="session")
 def django_db_modify_db_settings(
     django_db_modify_db_settings: None, pytestconfig: pytest.Config
@@ -72,6 +78,8 @@ def django_db_modify_db_settings(
     settings = connection.settings_dict
     if connection.vendor == "postgresql" and services.is_on_test_server(settings):
         settings["TEST"]["TEMPLATE"] = prepared.template()
+        # Nothing here must outlive the server, so no transaction waits for the disk.
+        settings["OPTIONS"] = {**settings.get("OPTIONS", {}), "options": "-c synchronous_commit=off"}
     is_one_of_many = "PYTEST_XDIST_WORKER" in os.environ and not pytestconfig.getoption("nomigrations")
     if connection.vendor == "sqlite" and is_one_of_many:
         # Django's name of it.
@@ -82,12 +90,14 @@ def django_db_modify_db_settings(
 
 
 @pytest.fixture(scope="session")
-def django_db_setup(django_db_setup: None, django_db_blocker: DjangoDbBlocker) -> None:
+def django_db_setup(django_db_setup: None, django_db_blocker: DjangoDbBlocker) -> Iterator[None]:
     """The test database, in which a transactional test may empty the audit trail when it ends."""
     if connection.vendor == "postgresql":
         with django_db_blocker.unblock(), connection.cursor() as cursor:
             cursor.execute(f"ALTER TABLE {emptying.AUDIT_TRAIL} DISABLE TRIGGER audit_no_truncate")
         DatabaseOperations.sql_flush = emptying.statements  # type: ignore[method-assign, assignment]
+    yield
+    kept.let_go()
 
 
 @pytest.fixture(scope="session")
@@ -135,15 +145,8 @@ def own_folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPath
 @pytest.fixture(autouse=True)
 def private_directories(own_folder: Path, settings: Settings) -> None:
     """Files and ground truth of each test live in its own directory."""
-    settings.FILES_DIR = own_folder / "files"
-    settings.GROUND_TRUTH_DIR = own_folder / "ground-truth"
-    settings.STORAGES = {
-        **settings.STORAGES,
-        "files": {
-            "BACKEND": "leaderboard.storage.files.DurableFileSystemStorage",
-            "OPTIONS": {"location": str(settings.FILES_DIR)},
-        },
-    }
+    for name, value in kept.storages(own_folder).items():
+        setattr(settings, name, value)
 
 
 @pytest.fixture(autouse=True)

@@ -4,6 +4,7 @@ The tests on PostgreSQL run beside the others and not before them: each has its 
 a server or for the disk, and the other one the processor. What they say comes at the end.
 """
 
+import os
 import shutil
 import subprocess
 import sys
@@ -20,7 +21,9 @@ def main() -> int:
             [sys.executable, "-m", "tests.on_postgresql"], stdout=said, stderr=subprocess.STDOUT
         )
         try:
-            command = [sys.executable, "-m", "pytest", "-n", "auto", *spread.OPTIONS]
+            # One process more than processors: browsers, servers and workers are waited for.
+            n_processes = str((os.cpu_count() or 1) + 1)
+            command = [sys.executable, "-m", "pytest", "-n", n_processes, *spread.OPTIONS]
             main_code = subprocess.run(command, check=False).returncode
             beside_code = beside.wait()
         finally:

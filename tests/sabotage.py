@@ -87,9 +87,9 @@ SABOTAGES = (
     ),
     Sabotage(
         "finalise whatever the status",
-        LIFECYCLE,
-        ".filter(pk__in=[lease.evaluation_id for lease in leases], status=Status.RUNNING)",
-        ".filter(pk__in=[lease.evaluation_id for lease in leases])",
+        "leaderboard/scoring/claimable.py",
+        ".filter(pk__in=ids, status=Status.RUNNING)",
+        ".filter(pk__in=ids)",
         f"{STEPS}::test_a_decided_evaluation_is_not_decided_otherwise",
     ),
     Sabotage(

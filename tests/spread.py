@@ -34,14 +34,15 @@ def sort(items: list[pytest.Item]) -> None:
     items.sort(key=place)
 
 
+def asks_database(item: pytest.Item) -> bool:
+    """Whether the test may ask a database."""
+    names = {"db", "transactional_db", "live_server"} & set(getattr(item, "fixturenames", ()))
+    return bool(names) or item.get_closest_marker("django_db") is not None
+
+
 def without_database(items: Sequence[pytest.Item]) -> list[pytest.Item]:
     """Tests that ask no database, so another one changes nothing for them."""
-    return [
-        item
-        for item in items
-        if item.get_closest_marker("django_db") is None
-        and not {"db", "transactional_db", "live_server"} & set(getattr(item, "fixturenames", ()))
-    ]
+    return [item for item in items if not asks_database(item)]
 
 
 def _file_of(item: pytest.Item) -> str:

@@ -1,6 +1,10 @@
 """The figures in the documentation are those of the report, which `make bench` writes."""
 
+import subprocess
+import sys
 from datetime import UTC, datetime
+
+import pytest
 
 from benchmarks import __main__ as bench
 from benchmarks import _report
@@ -33,3 +37,22 @@ def test_a_report_is_read_as_it_was_written() -> None:
 def test_all_benchmarks_together_take_twelve_minutes_at_most() -> None:
     assert set(bench.LIMITS_S) <= {path.stem for path in bench.FOLDER.glob("*.py")}
     assert sum(bench.LIMITS_S.values()) <= 720
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
+def test_a_benchmark_that_is_cut_off_takes_what_it_began_along() -> None:
+    """Also what has a group of its own, and a child that does not hear of the end, as a worker has."""
+    grandchild = "import time; print('up', flush=True); time.sleep(600)"
+    child = f"import subprocess, sys; subprocess.run([sys.executable, '-c', {grandchild!r}])"
+    benchmark = (
+        "import subprocess, sys;"
+        f"subprocess.Popen([sys.executable, '-c', {child!r}], start_new_session=True).wait()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", benchmark], stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
+    assert process.stdout is not None
+    assert process.stdout.readline() == "up\n"
+    bench._end(process)
+    # The pipe ends with the last of those that have it.
+    assert process.communicate(timeout=60)[0] == ""

@@ -12,8 +12,9 @@ from baselines.cli import require_opencv
 from baselines.cli.options import TRUTH, jobs_option, truth_option
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned
-from evaluator.cli.options import json_option
+from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import FOLDER, naming
+from evaluator.counting import counted
 
 if TYPE_CHECKING:
     from baselines.ablation import Ablation, AblationRow
@@ -28,13 +29,7 @@ NAMES: Final = ("bins", "frame-gap", "shift", "expansion")
 @truth_option(
     "Ground truth: a CSV file or an annotation folder. [default: truth.csv in FOLDER, or FOLDER itself]"
 )
-@click.option(
-    "--variant",
-    type=click.Choice(("paper", "toolkit")),
-    default="paper",
-    show_default=True,
-    help="Of Pixel MSE.",
-)
+@default_option("--variant", type=click.Choice(("paper", "toolkit")), default="paper", help="Of Pixel MSE.")
 @jobs_option
 @json_option
 def ablate(
@@ -113,7 +108,7 @@ def _in_words(ablation: Ablation, rows: list[AblationRow], *, n_sequences: int) 
         shown = [NO_VALUE if value is None else f"{value:.1f}" for value in values]
         setting = f"{row.setting} (default)" if row.setting == ablation.default else str(row.setting)
         lines.append([Cell(text) for text in (setting, *shown, f"{row.n_fallback:,}")])
-    notes = [f"MiD ×10⁻⁴, RTE %, lower is better; {n_sequences:,} sequences here."]
+    notes = [f"MiD ×10⁻⁴, RTE %, lower is better; {counted(n_sequences, 'sequence')} here."]
     if ablation.table is None:
         notes.append(f"The paper has no table for this: its boxes are enlarged by {ablation.default}.")
     else:

@@ -10,7 +10,7 @@ import click
 
 from baselines.cli.options import out_option
 from evaluator.cli.failures import echo_json
-from evaluator.cli.options import json_option
+from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import TABLE, naming, write_bytes
 
 if TYPE_CHECKING:
@@ -21,12 +21,11 @@ if TYPE_CHECKING:
 @click.command(short_help="Make ground truth from tracks of 3D boxes.")
 @click.argument("source", metavar="TRACK.csv|FOLDER", type=TABLE)
 @out_option("Write the ground truth to this file.", name="--output", metavar="TRUTH.csv")
-@click.option(
+@default_option(
     "--format",
     "input_format",
     type=click.Choice(("csv", "kitti")),
     default="csv",
-    show_default=True,
     help="A table of tracks, or a folder of KITTI tracking labels.",
 )
 @click.option(
@@ -34,20 +33,18 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Every six successive frames are a sequence; the toolkit cuts without overlap.",
 )
-@click.option(
+@default_option(
     "--depth",
     type=click.Choice(("checked", "measured", "consensus")),
     default="checked",
-    show_default=True,
     help="Of a frame that disagrees with the frames before it: as measured unless it jumped by more than a "
     "vehicle can, always as measured, or always that of their line.",
 )
-@click.option(
+@default_option(
     "--tolerance",
     "inlier_m",
     type=click.FloatRange(min=0, min_open=True),
     default=0.15,
-    show_default=True,
     metavar="M",
     help="Metres within which a frame agrees with a velocity.",
 )

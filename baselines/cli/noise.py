@@ -12,7 +12,7 @@ import click
 from baselines.cli.options import TRUTH
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned
-from evaluator.cli.options import json_option
+from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import TABLE, naming
 from evaluator.metrics.protocol import known_intervals
 
@@ -23,12 +23,11 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Estimate how noisy labels are.")
 @click.argument("source", metavar="FOLDER|TRUTH", type=TABLE)
-@click.option(
+@default_option(
     "--frames",
     "n_frames",
     type=click.IntRange(1, 100),
     default=10,
-    show_default=True,
     help="Frames from which a label's velocity was made; 1: labels share nothing.",
 )
 @json_option

@@ -9,6 +9,7 @@ from typing import Any, Final, TypeVar
 
 import click
 
+from evaluator.cli.options import default_option
 from evaluator.cli.reading import TABLE
 
 TRUTH: Final = "truth.csv"
@@ -19,12 +20,11 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 def gap_option(command: Command) -> Command:
     """--gap: which frame is the reference."""
-    return click.option(
+    return default_option(
         "--gap",
         "frame_gap",
         type=click.IntRange(1, 5),
         default=5,
-        show_default=True,
         help="Frames between reference and target.",
     )(command)
 

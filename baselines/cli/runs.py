@@ -16,6 +16,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.options import json_option
 from evaluator.cli.reading import FOLDER, naming
+from evaluator.counting import counted
 
 if TYPE_CHECKING:
     from baselines.running import Run
@@ -178,7 +179,7 @@ def _report(done: Run, *, out: Path, as_json: bool) -> None:
         )
         return
     resumed = f", {done.n_resumed:,} of them from the interrupted run" if done.n_resumed else ""
-    click.echo(f"{out}: {n_sequences:,} sequences in {done.seconds:.1f} s{resumed}.")
+    click.echo(f"{out}: {counted(n_sequences, 'sequence')} in {done.seconds:.1f} s{resumed}.")
     if n_fallback:
         have = "has" if n_fallback == 1 else "have"
         click.echo(f"{n_fallback:,} of them {have} a fallback, from the boxes' areas or 1:", err=True)

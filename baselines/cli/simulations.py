@@ -12,7 +12,7 @@ from baselines.cli import require_opencv
 from baselines.cli.options import jobs_option
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
-from evaluator.cli.options import json_option
+from evaluator.cli.options import default_option, json_option
 
 if TYPE_CHECKING:
     from baselines.simulation import Split
@@ -25,19 +25,17 @@ _SOURCES = ("val", "test", "scripts")
 def _split_options(command: Command) -> Command:
     """The options that say which split is drawn."""
     options = (
-        click.option(
+        default_option(
             "--like",
             type=click.Choice(_SOURCES),
             default="val",
-            show_default=True,
             help="Shares of the TTC ranges as in this split, or the runs of the six scripts.",
         ),
-        click.option(
+        default_option(
             "--sequences",
             "n_sequences",
             type=click.IntRange(1, 1_000_000),
             default=320,
-            show_default=True,
             help="Number of sequences; scripts have their own.",
         ),
         click.option(
@@ -47,7 +45,7 @@ def _split_options(command: Command) -> Command:
             default=None,
             help="Number of recordings. [default: one for 40 sequences]",
         ),
-        click.option("--seed", type=click.IntRange(0, 2**32 - 1), default=0, show_default=True),
+        default_option("--seed", type=click.IntRange(0, 2**32 - 1), default=0),
         click.option(
             "--half-open", is_flag=True, help="scripts: (a, b, s) leaves out b, as Python's range does."
         ),
@@ -122,9 +120,7 @@ def _track_table(split: Split) -> str:
 @click.command(short_help="Render simulated sequences into a folder.")
 @click.argument("folder", type=click.Path(file_okay=False, path_type=Path))
 @_split_options
-@click.option(
-    "--first", type=click.IntRange(0), default=0, show_default=True, help="The first anno_id rendered."
-)
+@default_option("--first", type=click.IntRange(0), default=0, help="The first anno_id rendered.")
 @click.option("--count", type=click.IntRange(1), default=None, help="How many are rendered. [default: all]")
 @jobs_option
 @json_option

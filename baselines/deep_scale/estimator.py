@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Final, Literal, get_args
+from typing import Final, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,6 @@ N_TOP: Final = 4
 """Best scale ratios that are averaged (§5.2)."""
 
 Device = Literal["numpy", "cpu", "cuda"]
-DEVICES: Final[tuple[Device, ...]] = get_args(Device)
 
 _FRAME_GAP: Final = 5
 """The weights are for the scale ratios of this gap. They hold at any other: a pair does not show its gap."""

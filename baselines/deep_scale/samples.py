@@ -21,6 +21,7 @@ from baselines.patches import boxes_of_pair, require_centre_inside
 from baselines.rendering.clips import Rendered, render
 from baselines.simulation import Split
 from evaluator import GroundTruth, fps_of_gap, ttc_to_scale_ratio
+from evaluator.counting import counted
 from evaluator.problems import reject
 
 Floats = NDArray[np.float64]
@@ -110,8 +111,8 @@ class FolderSequences:
         missing = [key for key in truth.manifest.natural_keys if key not in row_of]
         if missing:
             message = (
-                f"{len(missing):,} sequences of the ground truth have no boxes, the first is {missing[0]}; "
-                "expected boxes for every sequence."
+                f"The ground truth has {counted(len(missing), 'sequence')} without boxes, "
+                f"the first is {missing[0]}; expected boxes for every sequence."
             )
             raise reject("missing-keys", message)
         return cls(folder, truth, [row_of[key] for key in truth.manifest.natural_keys])

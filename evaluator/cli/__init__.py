@@ -8,26 +8,44 @@ from __future__ import annotations
 import io
 import os
 import sys
+from importlib import import_module
+from typing import Final
 
 import click
 
 from evaluator.cli import plugins
-from evaluator.cli.access import login, logout, publish, quota
-from evaluator.cli.boards import board
-from evaluator.cli.comparisons import compare
-from evaluator.cli.completion import completion
 from evaluator.cli.connection import version
-from evaluator.cli.conversions import convert
 from evaluator.cli.exits import MEANINGS, Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.offline import check, manifest, truth
-from evaluator.cli.own import download, list_submissions, methods, whoami, withdraw
-from evaluator.cli.published import published
-from evaluator.cli.receipts import receipt, verify
-from evaluator.cli.scores import plot, score
-from evaluator.cli.submissions import status, submit
 
 __all__ = ["main"]
+
+COMMANDS: Final = {
+    "check": "offline:check",
+    "score": "scores:score",
+    "plot": "scores:plot",
+    "convert": "conversions:convert",
+    "manifest": "offline:manifest",
+    "truth": "offline:truth",
+    "login": "access:login",
+    "logout": "access:logout",
+    "whoami": "own:whoami",
+    "submit": "submissions:submit",
+    "status": "submissions:status",
+    "submissions": "own:list_submissions",
+    "methods": "own:methods",
+    "download": "own:download",
+    "withdraw": "own:withdraw",
+    "publish": "access:publish",
+    "quota": "access:quota",
+    "board": "boards:board",
+    "published": "published:published",
+    "compare": "comparisons:compare",
+    "receipt": "receipts:receipt",
+    "verify": "receipts:verify",
+    "completion": "completion:completion",
+}
+"""Each command in the order of the help, with its module here and its name there; imported when used."""
 
 
 class _Group(click.Group):
@@ -50,14 +68,24 @@ class _Group(click.Group):
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         # In the order in which they are used, not of the alphabet; those of other packages after them.
-        return [*self.commands, *(name for name in plugins.found() if name not in self.commands)]
+        return [*COMMANDS, *(name for name in plugins.found() if name not in COMMANDS)]
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        own = self.commands.get(cmd_name)
-        if own is not None:
-            return own
+        if cmd_name in COMMANDS:
+            return _imported(cmd_name)
         point = plugins.found().get(cmd_name)
         return None if point is None else plugins.loaded(point)
+
+
+def _imported(command: str) -> click.Command:
+    module, _, name = COMMANDS[command].partition(":")
+    found: click.Command = getattr(import_module(f"evaluator.cli.{module}"), name)
+    return found
+
+
+def own_commands() -> dict[str, click.Command]:
+    """All commands but those of other packages, imported."""
+    return {name: _imported(name) for name in COMMANDS}
 
 
 def _show_version(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
@@ -95,14 +123,3 @@ def main() -> None:
     check, score, plot, compare --truth, convert, manifest, truth and published need files alone; the others
     speak to the leaderboard.
     """
-
-
-COMMANDS = (
-    *(check, score, plot, convert, manifest, truth),
-    *(login, logout, whoami, submit, status, list_submissions, methods),
-    *(download, withdraw, publish, quota),
-    *(board, published, compare, receipt, verify),
-    completion,
-)
-for _command in COMMANDS:
-    main.add_command(_command)

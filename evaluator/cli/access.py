@@ -13,7 +13,7 @@ from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
-from evaluator.cli.options import json_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
 from evaluator.cli.paths import keep_server_of_login, server_of_login
 from evaluator.cli.tokens import account, checked, forget_token, keep_token
 
@@ -115,12 +115,11 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
 
 @click.command(short_help="Publish one of your methods.")
 @click.argument("method", callback=sendable, shell_complete=suggestions.methods)
-@click.option(
+@default_option(
     "--as",
     "visibility",
     type=click.Choice(["public", "anonymous"]),
     default="public",
-    show_default=True,
     help="Publish with name and team, or under a pseudonym.",
 )
 @click.option(

@@ -12,7 +12,7 @@ import click
 from evaluator.cli import exports, suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
-from evaluator.cli.options import json_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
 from evaluator.cli.values import authors_or_team, overall_of, texts_of
 from evaluator.metrics.protocol import known_names
 from evaluator.tables import layouts
@@ -24,21 +24,19 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Show the ranked results of a split.")
 @click.argument("split", default="test", callback=slug, shell_complete=suggestions.splits)
-@click.option(
+@default_option(
     "--sort",
     callback=sendable,
     shell_complete=suggestions.columns,
     default="rank",
-    show_default=True,
     metavar="COLUMN",
     help=f"Sort by rank, method, team, date, {', '.join(known_names())}; -COLUMN for the reverse.",
 )
-@click.option(
+@default_option(
     "--format",
     "as_format",
     type=click.Choice(["table", *(each.name for each in FORMATS if each.on_command_line)]),
     default="table",
-    show_default=True,
     help="What to print.",
 )
 @click.option("--mine", is_flag=True, help="Include the private and anonymous methods of your team, marked.")
@@ -136,7 +134,7 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
         yield ""
         yield layouts.BRACKETS
     if found.floor:
-        from evaluator.scoring.floors import floor_sentence  # noqa: PLC0415 -- loads numpy
+        from evaluator.scoring.scoring import floor_sentence  # noqa: PLC0415 -- loads numpy
 
         yield ""
         yield floor_sentence(found.floor, decimals=found.decimals or 2)

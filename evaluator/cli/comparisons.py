@@ -15,7 +15,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.gates import named
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units
-from evaluator.cli.options import json_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
 from evaluator.cli.reading import TABLE, naming, predictions_of
 from evaluator.cli.tokens import has_token
 from evaluator.metrics.protocol import PRIMARY
@@ -31,10 +31,9 @@ Scores = Mapping[str, float | None]
 @click.command(short_help="Compare two methods or two files, with confidence intervals and p-values.")
 @click.argument("first", callback=sendable, shell_complete=suggestions.rows_or_files)
 @click.argument("second", callback=sendable, shell_complete=suggestions.rows_or_files)
-@click.option(
+@default_option(
     "--split",
     default="test",
-    show_default=True,
     callback=slug,
     shell_complete=suggestions.splits,
     help="The board of the methods.",

@@ -12,7 +12,7 @@ import click
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.heartbeat import signs_of_life
+from evaluator.cli.following import signs_of_life
 from evaluator.cli.layout import printable
 from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.tokens import token_for
@@ -40,6 +40,9 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     """
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
+
+    # httpx brings a command line of its own, with rich and pygments: a third of the time of its import.
+    sys.modules.setdefault("httpx._main", None)  # type: ignore[arg-type]  # None: as if it were not there
     from evaluator.client.client import Client  # noqa: PLC0415 -- loads httpx, which --help can do without
     from evaluator.client.connection import LOOPBACK_HOSTS  # noqa: PLC0415 -- the same
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same

@@ -7,7 +7,7 @@ from typing import Literal
 
 import click
 
-from evaluator.cli.options import output_option, predictions_argument
+from evaluator.cli.options import default_option, output_option, predictions_argument
 from evaluator.cli.reading import FOLDER, naming, predictions_of, write_bytes
 
 GAP = click.IntRange(1, 5)
@@ -20,12 +20,8 @@ RATE = click.FloatRange(min=0, min_open=True)
     "--frame-gap", type=GAP, metavar="G", help="PREDICTIONS contains scale ratios of frames with this gap."
 )
 @click.option("--fps", "fps_hz", type=RATE, metavar="HZ", help="The same as a rate: 10 Hz / frame gap.")
-@click.option(
-    "--to",
-    type=click.Choice(["ttc", "scale_ratio"]),
-    default="ttc",
-    show_default=True,
-    help="Output: seconds or scale ratios.",
+@default_option(
+    "--to", type=click.Choice(["ttc", "scale_ratio"]), default="ttc", help="Output: seconds or scale ratios."
 )
 @click.option("--to-frame-gap", type=GAP, metavar="G", help="With --to scale_ratio: the frame gap (5).")
 @click.option("--to-fps", "to_fps_hz", type=RATE, metavar="HZ", help="The same as a rate.")

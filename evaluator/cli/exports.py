@@ -107,7 +107,7 @@ def interval_text(entry: BoardEntry, name: str) -> str:
 
 def marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
     """The places of the best and the second of a column, among the rows that everybody sees."""
-    from evaluator.metrics.ranking import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
+    from evaluator.metrics.metrics import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
 
     return best_and_second(
         [None if entry.visibility == "PRIVATE" else entry.scores.get(name) for entry in board.entries]

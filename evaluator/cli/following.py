@@ -1,10 +1,15 @@
-"""Waiting for a submission: live on a terminal, one line for each state elsewhere."""
+"""Waiting: for a submission, live on a terminal, by lines elsewhere; and signs of life in a pipe.
+
+A terminal has bars and spinners; the log of a job has nothing but lines, and silence looks like a hang.
+"""
 
 from __future__ import annotations
 
 import sys
+import threading
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
+from contextlib import contextmanager
+from typing import IO, TYPE_CHECKING, Final
 
 import click
 
@@ -17,12 +22,15 @@ if TYPE_CHECKING:
 INTERVALS_WITHIN_S = 10.0
 
 
-def followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
+def followed(
+    client: Client, submission_id: str, *, timeout_s: float, seen: Submission | None = None
+) -> Submission:
     """The submission when it is final and has its intervals; until then standard error tells each state.
 
+    `seen` is the server's answer of a moment ago, if there is one.
     Intervals are waited for a little while only: workers make them when no submission waits.
     """
-    states = _states(client, submission_id, timeout_s=timeout_s)
+    states = _states(client, submission_id, timeout_s=timeout_s, seen=seen)
     if sys.stderr.isatty():
         from rich.console import Console  # noqa: PLC0415 -- only a terminal needs it
         from rich.live import Live  # noqa: PLC0415 -- as above
@@ -41,10 +49,12 @@ def followed(client: Client, submission_id: str, *, timeout_s: float) -> Submiss
     return submission
 
 
-def _states(client: Client, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
+def _states(
+    client: Client, submission_id: str, *, timeout_s: float, seen: Submission | None
+) -> Iterator[Submission]:
     """Every state seen, the last one final."""
     until_s = client.monotonic_s() + timeout_s
-    for submission in client.watch(submission_id, timeout_s=timeout_s):
+    for submission in client.watch(submission_id, timeout_s=timeout_s, seen=seen):
         yield submission
     if submission.awaits_intervals:
         left_s = min(INTERVALS_WITHIN_S, until_s - client.monotonic_s())
@@ -61,3 +71,30 @@ def state_in_words(submission: Submission) -> str:
         if submission.queue.estimate_s is not None:
             words += f", about {submission.queue.estimate_s:.0f} s"
     return words
+
+
+EVERY_S: Final = 5.0
+
+
+@contextmanager
+def signs_of_life(waiting_for: str, *, every_s: float = EVERY_S) -> Iterator[None]:
+    """While this lasts, say every `every_s` seconds what the command waits for; not on a terminal."""
+    if sys.stderr.isatty():
+        yield
+        return
+    is_over = threading.Event()
+    stream: IO[str] = sys.stderr
+
+    def tell() -> None:
+        n_told = 0
+        while not is_over.wait(every_s):
+            n_told += 1
+            click.echo(f"Waiting for {waiting_for} ({n_told * every_s:.0f} s) …", file=stream)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    teller.start()
+    try:
+        yield
+    finally:
+        is_over.set()
+        teller.join()

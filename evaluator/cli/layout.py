@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import click
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import OVERALL, grouped_names, interval_of, metric_of, split_name
 
 NO_VALUE = "–"
@@ -119,7 +120,7 @@ def result_in_words(
     yield ""
     yield units(scores)
     outside = f", {n_out_of_range:,} of them in no TTC range, which count in the overall scores only"
-    yield f"{counts.get(OVERALL, 0):,} sequences{outside if n_out_of_range else ''}."
+    yield f"{counted(counts.get(OVERALL, 0), 'sequence')}{outside if n_out_of_range else ''}."
     cut = [f"{n:,} to {boundary} s" for boundary, n in truncated.items() if n]
     yield f"Truncated predictions: {', '.join(cut) or 'none'}."
 

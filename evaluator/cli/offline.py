@@ -19,6 +19,7 @@ from evaluator.cli.warnings_in_words import (
     numbering_in_words,
     numbering_warnings,
 )
+from evaluator.counting import counted
 
 if TYPE_CHECKING:
     from evaluator import GroundTruth, Manifest
@@ -74,7 +75,8 @@ def check(*, predictions: Path, manifest_path: Path | None, annotations: Path | 
         )
         return
     good = "well-formed" if warnings else "good"
-    click.echo(f"{name_of(predictions)} is {good}: {sequences.n_sequences:,} sequences, each predicted once.")
+    n_predicted = counted(sequences.n_sequences, "sequence")
+    click.echo(f"{name_of(predictions)} is {good}: {n_predicted}, each predicted once.")
     if numbering is not None:
         click.echo(numbering_in_words(numbering))
     echo_warnings(warnings)
@@ -146,7 +148,7 @@ def manifest(
     counts = {"n_sequences": table.n_sequences, "n_recordings": table.n_recordings}
     n_renumbered = None if numbering is None else numbering.n_renumbered
     document = {"manifest_digest": table.digest, **counts, "n_renumbered": n_renumbered}
-    _tell_table(table, document, output=output, as_json=as_json)
+    _tell_table(table, document, manifest=table, output=output, as_json=as_json)
     if numbering is not None and not as_json:
         click.echo(numbering_in_words(numbering), err=True)
 
@@ -199,11 +201,16 @@ def truth(*, folder: Path, output: Path | None, as_json: bool) -> None:
         "n_sequences": found.n_sequences,
         "n_recordings": found.manifest.n_recordings,
     }
-    _tell_table(found, document, output=output, as_json=as_json)
+    _tell_table(found, document, manifest=found.manifest, output=output, as_json=as_json)
 
 
 def _tell_table(
-    table: Manifest | GroundTruth, document: Mapping[str, object], *, output: Path | None, as_json: bool
+    table: Manifest | GroundTruth,
+    document: Mapping[str, object],
+    *,
+    manifest: Manifest,
+    output: Path | None,
+    as_json: bool,
 ) -> None:
     """The table itself, or what was written of it."""
     if as_json:
@@ -212,5 +219,5 @@ def _tell_table(
     elif output is None:
         click.echo(table.to_csv(), nl=False)
     else:
-        n_sequences, n_recordings = document["n_sequences"], document["n_recordings"]
-        click.echo(f"{output}: {n_sequences:,} sequences of {n_recordings:,} recordings.")
+        n_recordings = counted(manifest.n_recordings, "recording")
+        click.echo(f"{output}: {counted(manifest.n_sequences, 'sequence')} of {n_recordings}.")

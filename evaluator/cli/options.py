@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Final, TypeVar
 from urllib.parse import urlsplit
 
 import click
@@ -16,6 +17,9 @@ DEFAULT_URL = "http://127.0.0.1:8000"
 TOKEN_VARIABLE = "TSTTC_TOKEN"  # noqa: S105 -- the name of a variable, not a token
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+
+default_option: Final = partial(click.option, show_default=True)
+"""An option whose help shows its default."""
 
 
 def json_option(command: Command) -> Command:
@@ -58,13 +62,12 @@ def url_option(command: Command) -> Command:
 
 def timeout_option(command: Command) -> Command:
     """--timeout: how long to wait for a final state."""
-    return click.option(
+    return default_option(
         "--timeout",
         "timeout_s",
         type=click.FloatRange(min=0, min_open=True),
         metavar="SECONDS",
         default=900.0,
-        show_default=True,
         help="Stop waiting after this time; the evaluation continues.",
     )(command)
 

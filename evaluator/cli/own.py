@@ -16,7 +16,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.following import state_in_words
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
-from evaluator.cli.options import json_option, output_option, sendable, slug, url_option
+from evaluator.cli.options import default_option, json_option, output_option, sendable, slug, url_option
 from evaluator.cli.reading import write_bytes
 from evaluator.metrics.protocol import PRIMARY
 
@@ -95,14 +95,7 @@ def methods(*, url: str, as_json: bool) -> None:
     shell_complete=suggestions.methods,
     help="Only this method, by name or id.",
 )
-@click.option(
-    "-n",
-    "--limit",
-    type=click.IntRange(min=1),
-    default=20,
-    show_default=True,
-    help="At most so many.",
-)
+@default_option("-n", "--limit", type=click.IntRange(min=1), default=20, help="At most so many.")
 @url_option
 @json_option
 def list_submissions(*, split: str | None, method: str | None, limit: int, url: str, as_json: bool) -> None:

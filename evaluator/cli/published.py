@@ -9,7 +9,7 @@ import click
 
 from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import Cell, aligned
-from evaluator.cli.options import json_option
+from evaluator.cli.options import default_option, json_option
 
 if TYPE_CHECKING:
     from evaluator.tables.published import PrintedTable
@@ -20,13 +20,8 @@ FORMATS: Final = ("csv", "latex", "markdown", "json")
 
 @click.command(short_help="Show the tables of the paper.")
 @click.argument("name", metavar="[TABLE]", required=False)
-@click.option(
-    "--format",
-    "as_format",
-    type=click.Choice(["table", *FORMATS]),
-    default="table",
-    show_default=True,
-    help="What to print.",
+@default_option(
+    "--format", "as_format", type=click.Choice(["table", *FORMATS]), default="table", help="What to print."
 )
 @json_option
 def published(*, name: str | None, as_format: str, as_json: bool) -> None:

@@ -13,9 +13,10 @@ from evaluator.cli import gates
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, result_in_words, short_name, units
-from evaluator.cli.options import json_option
+from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import TABLE, name_of, naming, predictions_of, without_pyarrow, write_bytes
 from evaluator.cli.warnings_in_words import echo_warnings
+from evaluator.counting import counted
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 from evaluator.tables.results import WRITERS, ResultRow, names_of
 
@@ -42,11 +43,10 @@ truth_option = click.option(
     metavar="FILE",
     help="Ground truth: a CSV file or an annotation folder of the toolkit.",
 )
-protocol_option = click.option(
+protocol_option = default_option(
     "--protocol",
     type=click.Choice(list(PROTOCOLS)),
     default=DEFAULT_PROTOCOL,
-    show_default=True,
     help="Protocol: tsttc-1 as on the board; toolkit gives the numbers of the dataset's toolkit to the bit.",
 )
 
@@ -81,12 +81,11 @@ class _Scored:
     metavar="FILE",
     help="Write the errors of every sequence to this file: CSV, or Parquet if its name ends so.",
 )
-@click.option(
+@default_option(
     "--format",
     "form",
     type=click.Choice(FORMATS),
     default="table",
-    show_default=True,
     help="How the scores are printed; csv has all digits.",
 )
 @gates.fail_if_option
@@ -142,11 +141,10 @@ def score(
 @several_predictions
 @truth_option
 @protocol_option
-@click.option(
+@default_option(
     "--kind",
     type=click.Choice(KINDS),
     default=KINDS[0],
-    show_default=True,
     help="error by true TTC with its confidence band, scatter of predicted against true, or distribution.",
 )
 @click.option(
@@ -340,12 +338,13 @@ def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
 
 
 def _counts_in_words(report: Report) -> str:
-    return f"{report.n_sequences:,} sequences, protocol {report.protocol}, truth {report.truth_digest}"
+    return (
+        f"{counted(report.n_sequences, 'sequence')}, protocol {report.protocol}, truth {report.truth_digest}"
+    )
 
 
 def _per_sequence(found: Sequence[_Scored], path: Path) -> bytes:
-    from evaluator.tables.formats import csv_lines  # noqa: PLC0415 -- needed here alone
-    from evaluator.tables.parquet_tables import parquet_of  # noqa: PLC0415 -- needed here alone
+    from evaluator.tables.formats import csv_lines, parquet_of  # noqa: PLC0415 -- needed here alone
 
     tables = [one.report.records() for one in found]
     columns = ["file", *tables[0]]

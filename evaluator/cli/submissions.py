@@ -147,7 +147,7 @@ def submit(
         if submission.notice != notice:  # a token that may only submit learns it now
             _warn(submission.notice, err=as_json)
         if is_waiting and not submission.is_final:
-            submission = followed(client, submission.id, timeout_s=timeout_s)
+            submission = followed(client, submission.id, timeout_s=timeout_s, seen=submission)
 
         def judge() -> None:
             gates.judge(fail_if, submission.scores, decimals=submission.decimals)
@@ -314,12 +314,15 @@ def _say_if_private(client: Client, submission: Submission) -> None:
 
     if not (submission.is_new and submission.method_id):
         return
-    try:
-        method = client.method(submission.method_id)
-    except ClientError:  # a token that may only submit; the file is there all the same
-        return
-    if method.visibility == "PRIVATE":
-        name = printable(method.name)
+    visibility, name = submission.visibility, submission.method
+    if not visibility:  # a server that does not say it with the submission
+        try:
+            method = client.method(submission.method_id)
+        except ClientError:  # a token that may only submit; the file is there all the same
+            return
+        visibility, name = method.visibility, method.name
+    if visibility == "PRIVATE":
+        name = printable(name)
         click.echo(
             f'\n{name} is private: only your team sees its results. Publish it with: tsttc publish "{name}"'
         )

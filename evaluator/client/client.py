@@ -45,6 +45,8 @@ from evaluator.client.exchange import (
 
 # For one answer to "is it final?"; what stands in between cuts silence after 30 s or more.
 LONGEST_WAIT_S = 20
+# Where nothing else is to do, intervals follow the scores within some tenths of a second: asked for soon.
+N_EAGER, EAGERNESS = 3, 0.4
 
 
 class Client(Connection):
@@ -230,16 +232,24 @@ class Client(Connection):
         address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
         return self._retry(lambda: self._http.get(address)).content
 
-    def watch(self, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
+    def watch(
+        self, submission_id: str, *, timeout_s: float, seen: Submission | None = None
+    ) -> Iterator[Submission]:
         """Ask until the submission is final, giving every state seen, the final one last.
+
+        `seen` is the answer of a moment ago, such as that to the file; else the present state is asked for.
 
         The server is asked to answer when there is something to tell; one that answers sooner, is away or
         busy is asked again less and less often. Raises TimedOut after `timeout_s` seconds; of the other
         errors only those that waiting cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
-        last: Submission | None = None
+        last = seen
         state, n_same = "", 0
+        if last is not None:
+            yield last
+            if last.is_final:
+                return
         while True:
             asked_s = self.monotonic_s()
             is_first = last is None
@@ -251,8 +261,8 @@ class Client(Connection):
                     return
                 if is_first and again_s is None:
                     continue  # the next answer is one that the server holds: nothing is gained by a pause
-            seen = last.state if last else ""
-            state, n_same = seen, (n_same + 1 if seen == state else 1)  # a change of state: ask often again
+            present = last.state if last else ""
+            state, n_same = present, (n_same + 1 if present == state else 1)  # a change: ask often again
             delay_s = self.patience.delay_s(n_failed=n_same, retry_after_s=again_s, rng=self.rng)
             delay_s = max(delay_s - (self.monotonic_s() - asked_s), again_s or 0.0)
             if self.monotonic_s() + delay_s >= until_s:
@@ -269,10 +279,8 @@ class Client(Connection):
         while submission.awaits_intervals:
             n_asked += 1
             delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=None, rng=self.rng)
-            if n_asked == 1:
-                delay_s *= (
-                    0.4  # where nothing else is to do, they follow the scores within a tenth of a second
-                )
+            if n_asked <= N_EAGER:
+                delay_s *= EAGERNESS
             if self.monotonic_s() + delay_s >= until_s:
                 break
             self.sleep(delay_s)

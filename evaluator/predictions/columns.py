@@ -2,9 +2,10 @@
 
 Files that machines write are monotonous: keys of a few digits, one separator, one number each. For these the
 keys are compared with the manifest's as 64-bit words, then overwritten with spaces, so that what remains of
-the object is a JSON list of numbers for a fast parser. Natural keys in the manifest's order, and the numbers
-behind them, are copied into rows of words instead, some thousands at a time, and compared with the manifest's
-row by row. Files with other keys, or another layout, are parsed into a dictionary.
+the object is a JSON list of numbers for a fast parser, which reads some thousands of them at a time. Natural
+keys in the manifest's order, and the numbers behind them, are copied into rows of words instead, some
+thousands at a time, and compared with the manifest's row by row. Files with other keys, or another layout,
+are parsed into a dictionary.
 
 All ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
 result, and answer None for everything else: finding words for a fault is the strict reading's business.
@@ -13,8 +14,9 @@ Why the first way is exact. Let n be the number of sequences. It is taken only i
 quotation marks, (2) what stands between each odd one and the next is, byte for byte, the key of another
 sequence of the manifest, and a colon follows, (3) each but the first is preceded by a comma and the same
 white space, the first by `{` and white space, and (4) the text with all these keys blanked, and the outer
-braces turned into brackets, is a JSON list of n numbers. By (4) there are n - 1 commas, by (3) each stands
-directly before a key; so every part between commas holds one key, at its front, and one number.
+braces turned into brackets, is a JSON list of n numbers: it is cut at commas that precede a key, and each
+piece is a list of as many numbers as it had keys. By (4) there are n - 1 commas, by (3) each stands directly
+before a key; so every part between commas holds one key, at its front, and one number.
 
 The second way is exact for the same reasons: a key's row is what stands from an odd quotation mark to one
 byte behind the next one, and is, byte for byte, the next key of the manifest; a number's row is all that
@@ -25,6 +27,7 @@ from __future__ import annotations
 
 import re
 import struct
+from collections.abc import Iterator
 from typing import Final
 
 import msgspec
@@ -63,6 +66,10 @@ _PREDICTIONS: Final = re.compile(rb'"predictions"[ \t\r\n]*:[ \t\r\n]*\{')
 _FIRST_DIGIT: Final = re.compile(rb'\{[ \t\r\n]*"[0-9]{1,%d}"' % MAX_DIGITS)
 _BLOCK: Final = 1 << 19
 """So many bytes of a file with natural keys are read at once: they stay in the processor's cache."""
+
+_STRETCH: Final = 1 << 17
+_KEYS: Final = 1 << 11
+"""So many bytes of other files are searched for marks at once, and so many keys and numbers are read."""
 
 _PLACEHOLDER: Final = "predictions, read by columns"
 
@@ -135,40 +142,98 @@ def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
     keys, n = manifest.key_words, manifest.n_sequences
     if keys is None or not _FIRST_DIGIT.match(text):
         return None
-    buffer = bytearray(_PAD + text)
-    rows = _blank_keys(buffer, keys, n)
-    values = None if rows is None else _numbers(buffer, n)
+    buffer = bytearray(_PAD)
+    buffer += text
+    quotes = _quotes(buffer, 2 * n)
+    if quotes is None:
+        return None
+    opens, closes = quotes[::2], quotes[1::2]
+    rows = _blank_keys(buffer, keys, opens, closes)
+    values = None if rows is None else _numbers_by_part(buffer, opens)
     if values is None:
         return None
+    if isinstance(rows, slice):
+        return values, "anno_id"
     aligned = np.empty_like(values)
     aligned[rows] = values
     return aligned, "anno_id"
 
 
-def _blank_keys(buffer: bytearray, keys: KeyWords, n: int) -> Rows | slice | None:
-    """Turn keys into spaces and braces into brackets; the row of each key, or None if any is odd."""
+def _quotes(buffer: bytearray, n: int) -> Rows | None:
+    """The places of the quotation marks, or None unless there are n."""
     octets = np.frombuffer(buffer, dtype=np.uint8)
-    quotes = np.flatnonzero(octets == _QUOTE)
-    if len(quotes) != 2 * n:
-        return None
-    opens, closes = quotes[::2], quotes[1::2]
+    quotes, n_found = np.empty(n, dtype=np.intp), 0
+    for start in range(0, len(octets), _STRETCH):
+        part = np.flatnonzero(octets[start : start + _STRETCH] == _QUOTE)
+        stop = n_found + len(part)
+        if stop > n:
+            return None
+        np.add(part, start, out=quotes[n_found:stop])
+        n_found = stop
+    return quotes if n_found == n else None
+
+
+def _blank_keys(buffer: bytearray, keys: KeyWords, opens: Rows, closes: Rows) -> Rows | slice | None:
+    """Turn keys and the outer braces into spaces; the row of each key, or None if any is odd."""
     # The eight bytes from each position of the buffer on, as one word.
     windows: Words = np.ndarray((len(buffer) - 7,), dtype="<u8", buffer=buffer, strides=(1,))
     if not _separated(buffer, windows, opens):
         return None
-    starts = closes - 6
-    words = windows[starts]
-    found = keys.find(words, closes - opens - 1)
-    if found is None:
-        return None
-    rows, masks = found
-    # Where values are so short that windows overlap, a window brings back the end of the key before it: its
-    # colon is no JSON then, and the dictionary takes over.
-    windows[starts] = (words & ~masks) | (_SPACES & masks)
+    rows: Rows | slice = slice(None)
+    if _are_in_order(windows, keys, opens, closes):
+        for part in _parts(len(opens)):
+            _blank(windows, closes[part], _masks_in_order(windows, keys, opens, closes, part))
+    else:
+        found = keys.find(windows[closes - 6], closes - opens - 1)
+        if found is None:
+            return None
+        rows = found[0]
+        _blank(windows, closes, found[1])
+    octets = np.frombuffer(buffer, dtype=np.uint8)
     if not keys.fits:
         octets[opens] = _SPACE
-    buffer[buffer.index(b"{")], buffer[-1] = ord("["), ord("]")
+    buffer[buffer.index(b"{")] = buffer[-1] = _SPACE
     return rows
+
+
+def _parts(n: int) -> Iterator[slice]:
+    """All of n keys, so many at once that what is computed of them stays in the processor's cache."""
+    return (slice(first, min(first + _KEYS, n)) for first in range(0, n, _KEYS))
+
+
+def _are_in_order(windows: Words, keys: KeyWords, opens: Rows, closes: Rows) -> bool:
+    """Whether the keys between these quotation marks are the manifest's, in its order."""
+    parts = _parts(len(opens))
+    return all(_masks_in_order(windows, keys, opens, closes, part) is not None for part in parts)
+
+
+def _masks_in_order(windows: Words, keys: KeyWords, opens: Rows, closes: Rows, part: slice) -> Words | None:
+    n_digits = closes[part] - opens[part] - 1
+    return keys.masks_in_order(windows[closes[part] - 6], n_digits, row=part.start)
+
+
+def _blank(windows: Words, closes: Rows, masks: Words | None) -> None:
+    """Turn the keys before these quotation marks into spaces."""
+    # Where values are so short that windows overlap, a window brings back the end of the key before it: its
+    # colon is no JSON then, and the dictionary takes over.
+    if masks is not None:
+        starts = closes - 6
+        windows[starts] = (windows[starts] & ~masks) | (_SPACES & masks)
+
+
+def _numbers_by_part(buffer: bytearray, opens: Rows) -> Floats | None:
+    """The numbers between keys that are blank and began at `opens`; a comma precedes each but the first."""
+    values, text = np.empty(len(opens)), memoryview(buffer)
+    for part in _parts(len(opens)):
+        begin, is_last = int(opens[part.start]), part.stop == len(opens)
+        piece = bytes(text[begin:] if is_last else text[begin : int(opens[part.stop])])
+        if not is_last:
+            piece = piece.rstrip(_WHITE_SPACE).removesuffix(b",")
+        numbers = _numbers(b"[%b]" % piece, part.stop - part.start)
+        if numbers is None:
+            return None
+        values[part] = numbers
+    return values
 
 
 def _separated(buffer: bytearray, windows: Words, opens: NDArray[np.intp]) -> bool:
@@ -181,7 +246,8 @@ def _separated(buffer: bytearray, windows: Words, opens: NDArray[np.intp]) -> bo
     if before[-1:] != b",":
         return False
     mask = _SELECT_FROM[len(before) - 1]
-    ends = windows[opens[1:] - 7] & mask
+    ends = windows[opens[1:] - 7]
+    ends &= mask
     return bool((ends == ends[0]).all())
 
 
@@ -247,10 +313,10 @@ def _numbers_between(octets: Octets, starts: Rows, ends: Rows, *, is_last: bool)
     cells = cells_of(octets, starts, ends - starts, filling=_SPACE)
     if cells is None:
         return None
-    text = cells.tobytes()
-    return _numbers(
-        b"[%b]" % (text if is_last else text.rstrip(_WHITE_SPACE).removesuffix(b",")), len(starts)
-    )
+    last: bytes = cells[-1].tobytes()
+    if not is_last:
+        last = last.rstrip(_WHITE_SPACE).removesuffix(b",")
+    return _numbers(b"".join((b"[", cells[:-1].data, last, b"]")), len(starts))
 
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from evaluator.arguments import Source, data_of
+from evaluator.counting import counted
 from evaluator.metrics.scale import (
     FRAME_RATE_HZ,
     N_FRAMES,
@@ -26,8 +27,8 @@ from evaluator.predictions.alignment import (
     seconds_fault,
 )
 from evaluator.predictions.documents import Document, Members, Unit, parse, read_document
-from evaluator.predictions.packages import json_of
 from evaluator.predictions.parquet import as_sent
+from evaluator.predictions.predictions import json_of
 from evaluator.predictions.writing import write_predictions
 from evaluator.problems import Findings, listed, quoted
 
@@ -135,7 +136,8 @@ def _require_anno_ids(
         findings.group("unknown-keys", message, place(names[0]), n_faults=len(names))
         return
     given = set(names)
-    counts = f"The file has {len(given):,} anno_ids and the folder {len(natural_keys):,} sequences"
+    n_in_folder = counted(len(natural_keys), "sequence")
+    counts = f"The file has {counted(len(given), 'anno_id')} and the folder {n_in_folder}"
     unknown = [name for name in given if name not in natural_keys]
     missing = [key for key in natural_keys if key not in given]
     if unknown:

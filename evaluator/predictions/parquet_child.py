@@ -20,8 +20,8 @@ from typing import Any, Final
 import pyarrow as pa
 from pyarrow import parquet, types
 
-from evaluator.predictions.packages import MAX_UNPACKED_BYTES, columns_of, document_of
 from evaluator.predictions.parquet import EXIT_OUT_OF_MEMORY
+from evaluator.predictions.predictions import MAX_UNPACKED_BYTES, columns_of, document_of
 from evaluator.problems import Rejected, quoted, reject
 
 GOOD: Final = b"good\n"

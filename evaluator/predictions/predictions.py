@@ -1,28 +1,34 @@
 """Prediction files: bytes in, values aligned with a manifest out, or a `Rejected` that says why.
 
-The format is described in docs/file-format.md. Nothing but `Rejected` leaves `read_sent`, whatever
-the bytes; every sequence of the manifest ends up with exactly one finite or infinite value that is neither 0
-nor NaN.
+The format is described in docs/file-format.md: JSON as it comes or in gzip, and CSV tables, which become the
+JSON that is read. Nothing but `Rejected` leaves `read_sent`, whatever the bytes; every sequence of the
+manifest ends up with exactly one finite or infinite value that is neither 0 nor NaN.
 """
 
 from __future__ import annotations
 
+import csv
 import hashlib
-from collections.abc import Mapping
+import io
+import json
+import re
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from evaluator.arguments import Source, data_of, require
+from evaluator.counting import counted
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import KeyKind, read_slowly
 from evaluator.predictions.columns import read_column
 from evaluator.predictions.documents import Unit
-from evaluator.predictions.packages import json_of
 from evaluator.predictions.parquet import as_sent
 from evaluator.predictions.writing import rate_of, require_values
-from evaluator.problems import pointer, reject
+from evaluator.problems import pointer, quoted, reject
 from evaluator.truth.truth import Manifest
 
 
@@ -46,7 +52,7 @@ class Predictions:
 
     def __repr__(self) -> str:
         ends = f"{self.ttc_s.min():.4g} to {self.ttc_s.max():.4g} s"
-        return f"Predictions({len(self.ttc_s):,} sequences, {ends}, {self.digest[:19]}…)"
+        return f"Predictions({counted(len(self.ttc_s), 'sequence')}, {ends}, {self.digest[:19]}…)"
 
     @classmethod
     def from_arrays(
@@ -123,3 +129,145 @@ def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
 def sha256_digest(data: bytes) -> str:
     """`sha256:` and the hex digest of `data`."""
     return "sha256:" + hashlib.sha256(data).hexdigest()
+
+
+# --- files that are no JSON as they come: JSON in gzip, and CSV tables; a field that is no number becomes a
+# --- JSON text, and is refused as one
+
+MAX_UNPACKED_BYTES: Final = 64 * 1024 * 1024
+"""What a gzip archive may unpack to, far above what the largest split needs."""
+
+GZIP: Final = b"\x1f\x8b"
+NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
+VALUES: Final = {"ttc": "ttc", "ttc_s": "ttc", "scale_ratio": "scale_ratio"}
+RATES: Final = ("fps", "frame_gap")
+
+_NAMES: Final = frozenset({"anno_id", *NATURAL_KEY, *VALUES, *RATES})
+_FIRST_LINE: Final = re.compile(rb"\s*([^\r\n]{0,2000})")
+_NUMBER: Final = re.compile(
+    r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
+)
+_EXPECTED: Final = (
+    "expected anno_id, or bag_stamp, cam_id, ts and track_id, and either ttc (seconds) or scale_ratio with "
+    "fps or frame_gap"
+)
+
+
+def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
+    """The JSON text of a prediction file, which is most often the file itself.
+
+    Raises `Rejected` for an archive that is damaged or unpacks to too much, and for a table that cannot be
+    read or has more than `max_rows` rows.
+    """
+    if data.startswith(GZIP):
+        data = _unpacked(data)
+    return _of_table(data, max_rows=max_rows) if _is_table(data) else data
+
+
+def _unpacked(data: bytes) -> bytes:
+    """The content of a gzip archive, of all its members; nothing beyond the limit is ever unpacked."""
+    parts, n_bytes = list[bytes](), 0
+    while data:
+        # A child that reads files may open nothing, and zlib opens nothing.
+        reader = zlib.decompressobj(wbits=31)
+        try:
+            parts.append(reader.decompress(data, MAX_UNPACKED_BYTES + 1 - n_bytes))
+        except zlib.error as error:
+            raise reject("not-json", f"The file is no intact gzip archive: {error}.") from None
+        n_bytes += len(parts[-1])
+        if n_bytes > MAX_UNPACKED_BYTES:
+            message = f"The archive unpacks to more than {MAX_UNPACKED_BYTES:,} bytes; expected at most that."
+            raise reject("too-large", message)
+        if not reader.eof:
+            raise reject("not-json", "The file is no intact gzip archive: it ends before its content does.")
+        data = reader.unused_data.lstrip(b"\x00")
+    return b"".join(parts)
+
+
+def _is_table(data: bytes) -> bool:
+    """Whether the first line names columns of a table; no JSON text begins so."""
+    found = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
+    line = found[1] if found else b""
+    fields = line.decode("utf-8", "replace").split(",")
+    return (
+        len(fields) > 1
+        and not line.startswith((b"{", b"["))
+        and not _NAMES.isdisjoint(name.strip().strip('"') for name in fields)
+    )
+
+
+def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        message = f"Byte {error.start:,} of the table is not UTF-8; expected CSV text encoded in UTF-8."
+        raise reject("not-utf8", message, f"byte {error.start}") from None
+    rows = csv.reader(io.StringIO(text.lstrip(), newline=""), strict=True)
+    try:
+        header = [name.strip() for name in next(rows)]
+        return document_of(header, _checked(rows, n_fields=len(header), max_rows=max_rows))
+    except csv.Error as error:
+        message = f"This is not a CSV table: {error}."
+        raise reject("bad-csv", message, f"line {rows.line_num}") from None
+
+
+def _checked(rows: Iterator[list[str]], *, n_fields: int, max_rows: int | None) -> Iterator[list[str]]:
+    for number, row in enumerate(filter(None, rows), start=1):
+        if max_rows is not None and number > max_rows:
+            message = f"The table has more than {max_rows:,} rows; expected one for each sequence."
+            raise reject("too-many-members", message)
+        if len(row) != n_fields:
+            message = f"The row has {len(row)} fields; expected {n_fields}, as the header."
+            raise reject("bad-csv", message, f"row {number}")
+        yield row
+
+
+def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
+    """Of the columns of a table, those of the key, that of the value and, of scale ratios, that of the rate.
+
+    Raises `Rejected` for a table without the columns that it needs.
+    """
+    keys = NATURAL_KEY if set(NATURAL_KEY) <= set(header) else ("anno_id",)
+    values = [name for name in VALUES if name in header]
+    rates = [name for name in RATES if name in header]
+    if not set(keys) <= set(header) or len(values) != 1 or len(rates) != (values == ["scale_ratio"]):
+        message = f"The table has the columns {quoted(','.join(header))}; {_EXPECTED}."
+        raise reject("missing-columns", message, "line 1")
+    return keys, values[0], rates[0] if rates else None
+
+
+def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> bytes:
+    """The JSON text of a table: the flat form for seconds, an envelope for scale ratios.
+
+    Keys that appear twice stay there twice. A field of None has no value; those of keys have one. Raises
+    `Rejected` for a table without the columns that it needs.
+    """
+    keys, value, rate = columns_of(header)
+    columns = {name: header.index(name) for name in header}
+    places = [columns[name] for name in keys]
+    members, ratios = list[str](), list[str]()
+    for row in rows:
+        name = json.dumps("/".join((row[place] or "").strip() for place in places))
+        members.append(f"{name}:{_number(row[columns[value]])}")
+        if rate is not None:
+            ratios.append(f"{name}:{_number(row[columns[rate]])}")
+    if rate is None:
+        return _object(members)
+    rates = _object(ratios).decode()
+    return f'{{"unit":"scale_ratio","{rate}":{rates},"predictions":{_object(members).decode()}}}'.encode()
+
+
+def _object(members: Sequence[str]) -> bytes:
+    return f"{{{','.join(members)}}}".encode()
+
+
+def _number(text: str | None) -> str:
+    """A field as JSON: the nearest float64 of a number, else the text, which the reader refuses.
+
+    >>> _number(" 5.31"), _number("inf"), _number(""), _number(None)
+    ('5.31', 'Infinity', '""', 'null')
+    """
+    if text is None:
+        return "null"
+    text = text.strip()
+    return json.dumps(float(text)) if _NUMBER.fullmatch(text) else json.dumps(text)

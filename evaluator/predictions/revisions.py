@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from evaluator.counting import counted
 from evaluator.predictions.predictions import Predictions
 from evaluator.problems import Problem, Rejected, listed, pointer, quoted
 from evaluator.truth.truth import GroundTruth, Manifest
@@ -85,7 +86,7 @@ def absent(rows: Rows, *, manifest: Manifest) -> Rejected:
     """The rejection of a file whose own manifest did not have these rows of `manifest`, to be raised."""
     names = [manifest.natural_keys[row] for row in rows.tolist()]
     n = len(names)
-    what = "1 sequence has" if n == 1 else f"{n:,} sequences have"
+    what = counted(n, "sequence has", "sequences have")
     message = (
         f"{what} no value, added by a correction after the file was sent: "
         f"{listed([quoted(name) for name in names])}; expected a new file with one for each of the "

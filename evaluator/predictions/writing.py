@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from evaluator.arguments import require
+from evaluator.counting import counted
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap
 from evaluator.predictions.documents import parse, read_document
 from evaluator.problems import Findings, pointer, quoted
@@ -82,7 +83,7 @@ def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_val
         require(manifest, Manifest, name="manifest")
     names = manifest.anno_id_keys if manifest is not None else tuple(map(str, keys or ()))
     if len(names) != n_values:
-        raise ValueError(f"There are {n_values} values for {len(names)} sequences.")
+        raise ValueError(f"Found {counted(n_values, 'value')} for {counted(len(names), 'sequence')}.")
     if len(set(names)) != len(names):
         raise ValueError("The keys are not distinct.")
     return names

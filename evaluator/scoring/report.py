@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import OVERALL, interval_of, metric_of, score_name
 from evaluator.metrics.scale import Floats
 from evaluator.scoring.breakdown import Details, GroupScores, breakdown
@@ -83,7 +84,7 @@ class Report:
         means = ", ".join(
             f"{metric_of(name).symbol} {format_published(value)}" for name, value in overall.items()
         )
-        return f"Report({self.protocol}, {self.n_sequences:,} sequences, {means})"
+        return f"Report({self.protocol}, {counted(self.n_sequences, 'sequence')}, {means})"
 
     def __str__(self) -> str:
         header, *rows = self._rows()
@@ -92,14 +93,14 @@ class Report:
             "  ".join([row[0].ljust(widths[0]), *map(str.rjust, row[1:], widths[1:])])
             for row in (header, *rows)
         ]
-        return "\n".join([*lines, f"{self.n_sequences:,} sequences, protocol {self.protocol}"])
+        return "\n".join([*lines, f"{counted(self.n_sequences, 'sequence')}, protocol {self.protocol}"])
 
     def _repr_html_(self) -> str:
         """The table of a notebook."""
         header, *rows = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in self._rows()]
         body = "".join(f"<tr>{row}</tr>" for row in rows)
         head = f"<tr>{header.replace('td>', 'th>')}</tr>"
-        words = escape(f"{self.n_sequences:,} sequences, protocol {self.protocol}")
+        words = escape(f"{counted(self.n_sequences, 'sequence')}, protocol {self.protocol}")
         return f"<table><thead>{head}</thead><tbody>{body}</tbody></table><p>{words}</p>"
 
     def _rows(self) -> list[list[str]]:

@@ -18,7 +18,7 @@ and finite, where the dataset's toolkit crashes. Both refuse 0 and NaN, and trun
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NoReturn
@@ -28,13 +28,22 @@ from numpy.typing import NDArray
 
 from evaluator.arguments import require
 from evaluator.metrics.metrics import Terms
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, OVERALL, Protocol, get_protocol
+from evaluator.metrics.protocol import (
+    DEFAULT_PROTOCOL,
+    OVERALL,
+    Protocol,
+    column_words,
+    get_protocol,
+    known_names,
+    metric_of,
+    split_name,
+)
 from evaluator.metrics.scale import Floats, scale_ratio_10hz
 from evaluator.predictions.alignment import ZERO_MESSAGE
 from evaluator.predictions.predictions import Predictions
 from evaluator.problems import Findings
 from evaluator.scoring.breakdown import Details
-from evaluator.scoring.report import IntervalScore, RecordingSums, Report
+from evaluator.scoring.report import IntervalScore, RecordingSums, Report, format_published
 from evaluator.truth.truth import GroundTruth
 
 
@@ -220,3 +229,30 @@ def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
             findings.add("undefined-error", message, where)
     findings.raise_if_any()
     raise AssertionError("unreachable: the caller saw a forbidden value")
+
+
+def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL) -> dict[str, float | None]:
+    """The scores of the ground truth itself; None for a TTC range without sequences."""
+    predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
+    return evaluate(predictions, truth, protocol=protocol).flat()
+
+
+def floor_sentence(floor: Mapping[str, float | None] | None, *, decimals: int = 2) -> str:
+    """The floor in words, from its published values; empty where it is not known, or 0 in every column.
+
+    >>> print(floor_sentence({"mid": 0.36, "mid_crucial": 0.0, "rte": 0.73, "rte_crucial": 0.02}))
+    Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73 %, RTE on crucial \
+0.02 % and 0 in every other column. No file can score lower, because the protocol truncates predictions and \
+not the ground truth.
+    """
+    if not floor or not any(floor.values()):
+        return ""
+    values = {name: floor[name] for name in known_names() if floor.get(name) is not None}
+    shown = [name for name, value in values.items() if value or split_name(name)[1] == OVERALL]
+    texts = {name: format_published(values[name], decimals=decimals) for name in shown}
+    parts = [f"{column_words(name)} {text}{metric_of(name).unit_of_value}" for name, text in texts.items()]
+    rest = " and 0 in every other column" if len(shown) < len(values) else ""
+    return (
+        f"Floor: the ground truth itself, submitted as predictions, scores {', '.join(parts)}{rest}. No file "
+        "can score lower, because the protocol truncates predictions and not the ground truth."
+    )

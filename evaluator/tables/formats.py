@@ -5,6 +5,7 @@ To add one, write a function that makes a text of an `Export`, and its row below
 
 from __future__ import annotations
 
+import io
 import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -89,3 +90,22 @@ FORMATS: Final = (
     ),
 )
 """In the order in which they are offered."""
+
+
+def parquet_of(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> bytes:
+    """Rows as a Parquet table with these columns; None where there is no value.
+
+    Raises `ModuleNotFoundError` where pyarrow is not installed.
+    """
+    try:
+        import pyarrow as pa  # noqa: PLC0415 -- of an extra
+        from pyarrow import parquet  # noqa: PLC0415 -- of an extra
+    except ImportError as error:
+        raise ModuleNotFoundError(
+            "Parquet tables need pyarrow, which is not installed: pip install pyarrow", name="pyarrow"
+        ) from error
+    held = list(rows)
+    table = pa.table({name: pa.array([row.get(name) for row in held]) for name in columns})
+    out = io.BytesIO()
+    parquet.write_table(table, out)
+    return out.getvalue()

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, metric_of, split_name
 from evaluator.tables.escaping import latex, latex_comment, markdown, markdown_address
 
@@ -83,7 +84,9 @@ def about(origin: Origin) -> tuple[str, ...]:
         if origin.protocol:
             facts.append(f"protocol {origin.protocol}")
         if origin.n_sequences is not None and origin.n_recordings is not None:
-            facts.append(f"{origin.n_sequences:,} sequences of {origin.n_recordings:,} recordings")
+            facts.append(
+                f"{counted(origin.n_sequences, 'sequence')} of {counted(origin.n_recordings, 'recording')}"
+            )
         lines.append(", ".join(facts))
     if origin.ground_truth:
         lines.append(f"Ground truth {origin.ground_truth}")

@@ -18,7 +18,7 @@ Lengths = NDArray[np.intp] | NDArray[np.uint8]
 WORD_BYTES: Final = 8
 MAX_DIGITS: Final = 6
 MAX_CELL_BYTES: Final = 128
-_BATCH: Final = 1 << 14
+_BATCH: Final = 1 << 11
 _CELL_PAD: Final = b" " * MAX_CELL_BYTES
 
 
@@ -45,9 +45,9 @@ class KeyWords:
 
     def __init__(self, anno_id: NDArray[np.int64]) -> None:
         self._anno_id = anno_id
-        self._n_digits = np.searchsorted(10 ** np.arange(1, MAX_DIGITS), anno_id, side="right") + 1
-        self._words: Words = _spell(anno_id, self._n_digits)
-        self._masks: Words = _MASKS[self._n_digits]
+        n_digits = np.searchsorted(10 ** np.arange(1, MAX_DIGITS), anno_id, side="right") + 1
+        self._words: Words = _spell(anno_id, n_digits)
+        self._n_digits = n_digits.astype(np.uint8)
         self.fits = int(self._n_digits.max()) < MAX_DIGITS
 
     @classmethod
@@ -55,14 +55,22 @@ class KeyWords:
         """The words of these ids, or None when one has more than six digits."""
         return cls(anno_id) if int(anno_id.max()) < 10**MAX_DIGITS else None
 
-    def find(self, windows: Words, n_digits: Rows) -> tuple[Rows | slice, Words] | None:
+    def masks_in_order(self, windows: Words, n_digits: Rows, *, row: int) -> Words | None:
+        """The masks that select the keys in the words that end with them, (m,), whose keys have `n_digits`
+        characters; or None unless these are the keys from `row` on.
+        """
+        rows = slice(row, row + len(windows))
+        if not np.array_equal(n_digits, self._n_digits[rows]):
+            return None
+        masks = _MASKS[n_digits]
+        return masks if np.array_equal(windows & masks, self._words[rows]) else None
+
+    def find(self, windows: Words, n_digits: Rows) -> tuple[Rows, Words] | None:
         """Match the words that end with the keys of a file, (n,), whose keys have `n_digits` characters.
 
-        Returns the row of each key (a slice when they stand in the manifest's order) and the masks that
-        select the keys; or None unless every row is matched once.
+        Returns the row of each key and the masks that select the keys; or None unless every row is matched
+        once.
         """
-        if np.array_equal(n_digits, self._n_digits) and np.array_equal(windows & self._masks, self._words):
-            return slice(None), self._masks
         if int(n_digits.min()) < 1 or int(n_digits.max()) > MAX_DIGITS:
             return None
         masks = _MASKS[n_digits]
@@ -149,9 +157,12 @@ def cells_of(
     cells: Words = windows[starts].view("<u8").reshape(len(starts), -1)
     is_filling = np.arange(n_bytes) >= np.arange(n_bytes + 1)[:, np.newaxis]
     masks = np.where(is_filling, np.uint8(255), np.uint8(0)).view("<u8")
-    cells &= (~masks).take(lengths, axis=0)
+    # Words in which even the shortest piece has no filling stay as they are.
+    first = int(lengths.min()) // WORD_BYTES
+    last_words, masks = cells[:, first:], masks[:, first:]
+    last_words &= (~masks).take(lengths, axis=0)
     if filling:
-        cells |= (masks & np.uint64(filling * (2**64 // 255))).take(lengths, axis=0)
+        last_words |= (masks & np.uint64(filling * (2**64 // 255))).take(lengths, axis=0)
     return cells
 
 

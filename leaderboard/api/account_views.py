@@ -22,7 +22,7 @@ from leaderboard.api.serializers import (
 from leaderboard.api.throttling import RevokeThrottle
 from leaderboard.models import Scope, Split, User
 from leaderboard.people import teams, tokens
-from leaderboard.quotas import deadlines
+from leaderboard.quotas import admissions
 
 
 class AccountView(APIView):
@@ -52,7 +52,7 @@ class QuotaView(APIView):
         only = split_of(request.auth)
         splits = Split.objects.shown()
         splits = splits.filter(pk=only) if only is not None else splits
-        rows = [deadlines.left(team=team, user=user, split=split, now=now) for split in splits]
+        rows = [admissions.left(team=team, user=user, split=split, now=now) for split in splits]
         return Response(QuotaSerializer(rows, many=True).data)  # type: ignore[arg-type]  # many rows, as it says
 
 

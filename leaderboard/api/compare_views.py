@@ -1,21 +1,135 @@
-"""Comparisons of methods."""
+"""Comparisons of methods: serializers and views. A field once here stays."""
 
+from typing import Any
 from uuid import UUID
 
 from django.utils import timezone
-from drf_spectacular.utils import OpenApiParameter, OpenApiResponse, extend_schema
+from drf_spectacular.utils import OpenApiParameter, OpenApiResponse, extend_schema, extend_schema_field
+from rest_framework import serializers
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
+from evaluator import Difference, published
+from evaluator.tables import sentences
 from leaderboard.api.authentication import require_split
-from leaderboard.api.compare_serializers import ComparedSerializer
 from leaderboard.api.exceptions import edition_number
 from leaderboard.api.schema import errors, response_header
+from leaderboard.api.serializers import DECIMALS, EDITION, SPLIT, EntrySerializer, NamedSerializer
 from leaderboard.api.views import current_split, published_edition
 from leaderboard.ops import rate_limits
 from leaderboard.scoring import comparisons
+from leaderboard.scoring.comparisons import Compared, Pair
+
+
+class DifferenceSerializer(serializers.Serializer[Difference]):
+    """First minus second in one column; negative: the first is better."""
+
+    difference = serializers.FloatField(help_text="Difference in the column's unit.")
+    low = serializers.FloatField(
+        allow_null=True,
+        help_text="Lower end of the 95 % confidence interval; null: too few recordings, or withheld.",
+    )
+    high = serializers.FloatField(
+        allow_null=True,
+        help_text="Upper end of the 95 % confidence interval; null: too few recordings, or withheld.",
+    )
+    p = serializers.FloatField(
+        allow_null=True,
+        help_text="p-value of the two-sided cluster sign-flip test, four decimals; null: too few recordings, "
+        "withheld, or the ground truth is hidden and only `p_below` is published.",
+    )
+    p_below = serializers.FloatField(
+        allow_null=True,
+        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few recordings, "
+        "or withheld.",
+    )
+    n_effective = serializers.FloatField(
+        allow_null=True,
+        help_text="Effective number of recordings in this column; below 8 there is no confidence interval "
+        "and no p.",
+    )
+    is_significant = serializers.BooleanField(
+        help_text="Whether p is below 0.05, uncorrected: among many columns and several pairs expect false "
+        "positives."
+    )
+    detectable_difference = serializers.SerializerMethodField(
+        help_text="The smallest difference that the test detects with 80 % power; null: this one is "
+        "significant, or there are too few recordings."
+    )
+    sentence = serializers.SerializerMethodField(
+        help_text="The result as a sentence. Its p is uncorrected, for this column and pair alone."
+    )
+
+    def get_detectable_difference(self, found: Difference) -> float | None:
+        """Rounded like the differences."""
+        return published(found.detectable_difference, decimals=self.context["decimals"])
+
+    def get_sentence(self, found: Difference) -> str:
+        """The sentence for this column."""
+        return sentences.sentence(
+            **self.context["names"],
+            name=self.field_name or "",
+            found=found,
+            decimals=self.context["decimals"],
+            withheld=self.context["withheld"],
+        )
+
+
+class DifferencesSerializer(NamedSerializer):
+    """A difference for each score."""
+
+    def child(self, name: str, **options: Any) -> DifferenceSerializer:
+        """The difference of one score."""
+        text = "Null: one of the two has no score in this column."
+        return DifferenceSerializer(allow_null=True, help_text=text, **options)
+
+
+class PairSerializer(serializers.Serializer[Pair]):
+    """A pair of the methods."""
+
+    first = serializers.UUIDField(source="first.method_id", help_text="Id of the first method.")
+    second = serializers.UUIDField(source="second.method_id", help_text="Id of the second method.")
+    differences = serializers.SerializerMethodField(
+        help_text="First minus second, by score name; null until computed."
+    )
+    sentence = serializers.SerializerMethodField(
+        help_text="The difference in MiD as a sentence; empty until computed."
+    )
+    withheld = serializers.CharField(
+        allow_blank=True,
+        help_text="Why only the difference of the published scores is available for this pair; else empty.",
+    )
+
+    @extend_schema_field(DifferencesSerializer(allow_null=True))
+    def get_differences(self, pair: Pair) -> dict[str, Any] | None:
+        """All scores, once computed."""
+        if pair.differences is None:
+            return None
+        found = {name: pair.differences.get(name) for name in pair.first.scores}
+        names = {"first": pair.first.method, "second": pair.second.method}
+        context = {"names": names, "decimals": pair.first.decimals, "withheld": pair.withheld}
+        return dict(DifferencesSerializer(found, context=context).data)
+
+    def get_sentence(self, pair: Pair) -> str:
+        """The sentence for the overall MiD."""
+        return pair.sentence()
+
+
+class ComparedSerializer(serializers.Serializer[Compared]):
+    """Two to five methods of one board side by side."""
+
+    split = serializers.CharField(source="split.name", help_text=SPLIT)
+    edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
+    decimals = serializers.IntegerField(source="edition.decimals", help_text=DECIMALS)
+    is_complete = serializers.BooleanField(
+        help_text="Whether every pair is computed; if not, repeat the request after Retry-After seconds."
+    )
+    reason = serializers.CharField(help_text="Why there are no confidence intervals, if there are none.")
+    entries = EntrySerializer(many=True, help_text="The methods' rows, in the requested order.")
+    pairs = PairSerializer(many=True, help_text="Every pair of them.")
+
 
 RETRY_AFTER_S = 2
 

@@ -1,22 +1,125 @@
-"""Editions: history for everybody, progress and preview for maintainers."""
+"""Editions: history for everybody, progress and preview for maintainers. A field once here stays."""
+
+from typing import Any
 
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema
+from rest_framework import serializers
 from rest_framework.permissions import AllowAny, IsAdminUser
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from leaderboard.api import pagination
-from leaderboard.api.edition_serializers import (
-    EditionSerializer,
-    PreviewSerializer,
-    PublicationSerializer,
-    RescoringSerializer,
-)
 from leaderboard.api.schema import errors
+from leaderboard.api.serializers import (
+    DECIMALS,
+    EDITION,
+    GROUND_TRUTH,
+    N_RECORDINGS,
+    N_SEQUENCES,
+    NULLABLE,
+    PROTOCOL,
+    SPLIT,
+    absolute,
+)
 from leaderboard.editions import corrections, preview
 from leaderboard.models import Edition, Publication, Split
+
+
+class EditionSerializer(serializers.Serializer[Edition]):
+    """A published edition: a ranking that can be cited permanently."""
+
+    split = serializers.CharField(source="split_id", help_text=SPLIT)
+    edition = serializers.IntegerField(source="number", help_text=EDITION)
+    protocol = serializers.CharField(help_text=PROTOCOL)
+    decimals = serializers.IntegerField(help_text=DECIMALS)
+    ground_truth = serializers.CharField(source="ground_truth_id", help_text=GROUND_TRUTH)
+    manifest = serializers.CharField(
+        source="ground_truth.manifest_digest", help_text="Digest of the public manifest."
+    )
+    n_sequences = serializers.IntegerField(source="ground_truth.n_sequences", help_text=N_SEQUENCES)
+    n_recordings = serializers.IntegerField(source="ground_truth.n_recordings", help_text=N_RECORDINGS)
+    published_at = serializers.DateTimeField(help_text="When it was first published.")
+    is_board = serializers.SerializerMethodField(help_text="Whether it is the split's current edition.")
+    url = serializers.SerializerMethodField(help_text="URL of its permanent page.")
+
+    def get_is_board(self, edition: Edition) -> bool:
+        """Whether the split points to it."""
+        return edition.split.published_edition_id == edition.pk
+
+    def get_url(self, edition: Edition) -> str:
+        """URL of its permanent page."""
+        return absolute("edition", edition.split_id, edition.number)
+
+
+class PublicationSerializer(serializers.Serializer[Publication]):
+    """One entry of a split's public changelog."""
+
+    at = serializers.DateTimeField(help_text="When the edition was published.")
+    kind = serializers.CharField(help_text="PUBLISHED: a new edition; ROLLED_BACK: a former one.")
+    edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
+    replaced = serializers.IntegerField(
+        source="replaced.number", help_text="Number of the edition it replaced; null: the first.", **NULLABLE
+    )
+    reason = serializers.CharField(help_text="Reason given by the maintainer.")
+    n_left_out = serializers.SerializerMethodField(
+        help_text="Submissions knowingly left out: unfinished, or rejected now and scored before."
+    )
+
+    def get_n_left_out(self, publication: Publication) -> int:
+        """Number of submissions knowingly left out."""
+        return len(publication.left_out)
+
+
+class RescoringSerializer(serializers.Serializer[corrections.RescoringProgress]):
+    """Progress of the re-scoring of an edition."""
+
+    n_total = serializers.IntegerField(help_text="Submissions to score.")
+    n_done = serializers.IntegerField(help_text="Submissions that are final.")
+    n_waiting = serializers.IntegerField(help_text="Submissions that are queued or running.")
+    n_scored = serializers.IntegerField(help_text="Submissions scored.")
+    n_rejected = serializers.IntegerField(help_text="Submissions that this ground truth cannot score.")
+    n_failed = serializers.IntegerField(help_text="Submissions that failed through our fault.")
+    n_cancelled = serializers.IntegerField(help_text="Submissions cancelled by their team.")
+    percent = serializers.IntegerField(help_text="Percentage that is final, rounded down.")
+    rate_per_s = serializers.FloatField(allow_null=True, help_text="Recent rate per second; null: unknown.")
+    left_s = serializers.FloatField(allow_null=True, help_text="Seconds remaining; null: unknown.")
+
+
+class PreviewSerializer(serializers.Serializer[preview.Preview]):
+    """What publishing an edition would change."""
+
+    edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
+    replaces = serializers.IntegerField(help_text="Number of the edition that it would replace.")
+    n_added = serializers.IntegerField(
+        source="truth.n_added",
+        help_text="Sequences added to the ground truth; null: not compared.",
+        **NULLABLE,
+    )
+    n_removed = serializers.IntegerField(
+        source="truth.n_removed", help_text="Sequences removed; null: not compared.", **NULLABLE
+    )
+    n_changed_sequences = serializers.IntegerField(
+        source="truth.n_changed",
+        help_text="Sequences whose true value changes; null: not compared.",
+        **NULLABLE,
+    )
+    n_renumbered = serializers.IntegerField(
+        source="truth.n_renumbered",
+        help_text="Sequences whose anno_id changes; null: not compared.",
+        **NULLABLE,
+    )
+    n_changed = serializers.IntegerField(help_text="Submissions whose scores change.")
+    n_moved = serializers.IntegerField(help_text="Submissions whose rank changes.")
+    n_newly_rejected = serializers.IntegerField(help_text="Submissions that it cannot score.")
+    progress = RescoringSerializer(help_text="Progress of its scoring.")
+    changes = serializers.SerializerMethodField(help_text="One flat row for each submission.")
+
+    def get_changes(self, found: preview.Preview) -> list[dict[str, Any]]:
+        """One flat row for each submission."""
+        return preview.rows(found)
+
 
 EDITIONS = Edition.objects.select_related("split__published_edition", "ground_truth")
 

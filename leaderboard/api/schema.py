@@ -1,11 +1,20 @@
-"""What all operations share in the schema: errors and headers, path parameters, examples."""
+"""The schema, and what all operations share in it: errors and headers, path parameters, examples."""
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
-from drf_spectacular.utils import OpenApiParameter
+from django.http import HttpResponse
+from drf_spectacular.generators import SchemaGenerator
+from drf_spectacular.utils import OpenApiParameter, extend_schema
+from drf_spectacular.views import SpectacularAPIView
+from rest_framework.permissions import AllowAny
+from rest_framework.renderers import BaseRenderer
+from rest_framework.request import Request
+from rest_framework.response import Response
 
 from evaluator.metrics.protocol import known_names
+from leaderboard.api.parsers import UniformJSONRenderer
 from leaderboard.api.serializers import ErrorSerializer
 from leaderboard.errors import problem_codes
 from leaderboard.methods.details import DETAILS
@@ -149,3 +158,31 @@ def _complete(responses: Node, *, has_body: bool) -> None:
         responses.setdefault(status, {"$ref": f"#/components/responses/{name}"})
     for status in sorted(responses):
         responses[status] = responses.pop(status)
+
+
+class SchemaView(SpectacularAPIView):
+    """The schema as OpenAPI 3.1, as YAML or as JSON. It is the same for everybody."""
+
+    permission_classes = [AllowAny]
+
+    @extend_schema(exclude=True)
+    def get(self, request: Request, *args: Any, **kwargs: Any) -> HttpResponse:
+        """The whole of it, in the form that the request accepts."""
+        renderer: BaseRenderer = request.accepted_renderer
+        return HttpResponse(
+            _written(renderer.media_type),
+            content_type=f"{renderer.media_type}; charset=utf-8",
+            headers={"Content-Disposition": f'inline; filename="tsttc-openapi.{renderer.format}"'},
+        )
+
+    def handle_exception(self, exc: Exception) -> Response:
+        """A problem document is JSON whatever form of the schema the request accepts."""
+        self.request.accepted_renderer = UniformJSONRenderer()
+        return super().handle_exception(exc)
+
+
+@cache
+def _written(media_type: str) -> bytes:
+    renderer = next(kind for kind in SchemaView.renderer_classes if kind.media_type == media_type)
+    text = renderer().render(SchemaGenerator().get_schema(request=None, public=True), renderer_context={})
+    return text.encode() if isinstance(text, str) else text

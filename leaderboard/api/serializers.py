@@ -23,7 +23,7 @@ from leaderboard.boards.rows import Entry, Interval
 from leaderboard.methods import details
 from leaderboard.methods.details import Details
 from leaderboard.models import Split, Visibility
-from leaderboard.quotas import deadlines
+from leaderboard.quotas import admissions
 from leaderboard.quotas.quotas import Quota
 
 SPLIT: Final = "Name of the split."
@@ -245,7 +245,7 @@ class SplitSerializer(serializers.Serializer[Split]):
 
     def get_is_open(self, split: Split) -> bool:
         """Whether there is ground truth and now is between opening and closing."""
-        return deadlines.is_open(split, now=timezone.now())
+        return admissions.is_open(split, now=timezone.now())
 
 
 FIELD_OF: Final[Mapping[type, type[serializers.Field[Any, Any, Any, Any]]]] = {

@@ -12,7 +12,7 @@ from leaderboard.api import (
     pagination,
     published_views,
     receipt_views,
-    schema_views,
+    schema,
     submission_views,
     views,
 )
@@ -79,7 +79,7 @@ urlpatterns = [
         cacheable(published_views.PublishedTableView.as_view()),
         name="api-published-table",
     ),
-    path("schema", schema_views.SchemaView.as_view(), name="api-schema"),
+    path("schema", schema.SchemaView.as_view(), name="api-schema"),
     path(
         "docs",
         RedirectView.as_view(pattern_name="api_reference", http_method_names=["get", "head", "options"]),

@@ -172,11 +172,6 @@ def applied_migrations() -> list[list[str]]:
     return sorted([app, name] for app, name in MigrationRecorder(connection).applied_migrations())
 
 
-def counted(n: int, noun: str) -> str:
-    """How many there are, as "1 board" or "2,000 boards"."""
-    return f"{n:,} {noun}{'s' if n != 1 else ''}"
-
-
 def listed(names: list[str]) -> str:
     """The first few, one a line, and how many more."""
     rest = [f"… and {len(names) - _SHOWN:,} more"] if len(names) > _SHOWN else []

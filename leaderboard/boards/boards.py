@@ -11,25 +11,26 @@ from django.db.models import Count, Exists, OuterRef, Q, QuerySet
 from django.utils import timezone
 from django.utils.dateparse import parse_date, parse_datetime
 
-from evaluator.metrics import ranking
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol, known_names
+from evaluator.metrics import metrics
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol, known_names
 from leaderboard.boards.filters import Filters
-from leaderboard.boards.ranking import PRIMARY, Place, in_ranks, key, listed
 from leaderboard.boards.rows import (
     NO_RANGES,
     Entry,
+    Place,
     Scored,
-    flat_scores,
+    in_ranks,
+    key,
+    listed,
     named,
     profile_of,
     public_reason,
     published_entry,
     ranges_in,
     scored_in,
-    scores_in,
     submitted_entry,
 )
-from leaderboard.db.parts import in_parts
+from leaderboard.db.bulk import in_parts
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -43,9 +44,7 @@ from leaderboard.models import (
     days,
 )
 from leaderboard.models.methods import MethodQuerySet
-from leaderboard.quotas import deadlines
-
-__all__ = ["Board", "Entry", "board", "flat_scores", "public_rows", "scores_in", "with_own"]
+from leaderboard.quotas import admissions
 
 TEXT_COLUMNS = ("rank", "method", "team", "date")
 SORTABLE = (*TEXT_COLUMNS, *known_names())
@@ -161,8 +160,8 @@ def board(
         sort=sort,
         at=at,
         updated_at=max(dates, default=None),
-        is_open=deadlines.is_open(split, now=now),
-        deadline=deadlines.sentence_of(split, now=now),
+        is_open=admissions.is_open(split, now=now),
+        deadline=admissions.sentence_of(split, now=now),
         filters=filters,
         unfiltered=entries,
         n_submissions=n_submissions,
@@ -392,7 +391,7 @@ def _private_rows(
             unmasked(row, by_id[row.method_id]),
             visibility=Visibility.PRIVATE,
             pseudonym="",
-            rank=ranking.rank([*public, row.scores[PRIMARY]])[-1],
+            rank=metrics.rank([*public, row.scores[PRIMARY]])[-1],
             n_attempts=attempts.get(row.method_id, 0),
         )
         for row in rows

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from django.contrib.auth.models import AnonymousUser
 
 from evaluator.metrics.protocol import PRIMARY
-from leaderboard.boards import boards, current, snapshots
-from leaderboard.boards.current import Attempt
+from leaderboard.boards import boards, snapshots
 from leaderboard.boards.rows import Entry, Profile, profile_of
+from leaderboard.boards.snapshot_store import Attempt
 from leaderboard.models import Edition, Method, Split, User
 
 
@@ -48,7 +48,7 @@ def results(
         ranked = drawn.entries if is_shown else (*drawn.entries, entry)
         n_ranked = sum(other.rank is not None for other in ranked)
         # What is private no snapshot has, because nobody else sees it.
-        own = current.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
+        own = snapshots.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
         attempts = own or tuple(each for each in drawn.attempts if each.method_id == method.pk)
         neighbours = _neighbours(entry, drawn.entries)
         found.append(Result(split, edition, entry, n_ranked, attempts, neighbours))

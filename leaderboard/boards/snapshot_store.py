@@ -1,4 +1,4 @@
-"""Serialization of snapshots, and the cache of those that a process has read."""
+"""What a snapshot holds, its serialization, and the cache of those that a process has read."""
 
 import gzip
 import hashlib
@@ -6,15 +6,16 @@ import io
 import threading
 import zlib
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from datetime import datetime
 from functools import cache
 from itertools import chain, islice
 from typing import Generic, TypeVar
+from uuid import UUID
 
 import msgspec
 
-from leaderboard.boards.current import Attempt, CurrentBoard
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.methods.details import DETAILS
 
@@ -22,7 +23,24 @@ T = TypeVar("T")
 # Sets and mappings in one order, so that what says the same has the same digest in every process. What is
 # kept has scores in the order of their protocol, which readers see.
 _SORTED = msgspec.json.Encoder(order="deterministic")
-_PARTS = (CurrentBoard, Attempt, Entry, Interval)
+
+
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One standing submission of a method, with its overall scores."""
+
+    method_id: UUID
+    submission_id: UUID
+    at: datetime
+    scores: Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class CurrentBoard:
+    """What everybody sees of an edition: the rows, ranked, and everything that was tried, newest first."""
+
+    entries: tuple[Entry, ...]
+    attempts: tuple[Attempt, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -40,6 +58,7 @@ class _Header(msgspec.Struct):
     n_attempts: int
 
 
+_PARTS = (CurrentBoard, Attempt, Entry, Interval)
 _ENTRY = msgspec.json.Decoder(Entry)
 _ATTEMPT = msgspec.json.Decoder(Attempt)
 

@@ -2,8 +2,9 @@
 
 A snapshot is stamped with the version of its split (`leaderboard/versions.py`) as of which it was drawn; with
 another version it is drawn again: by a worker that was told of the change, or by the first reader to find it.
-Nobody is ever answered from an old one. Every snapshot is read from the database as of one moment, so none
-mixes two; its `etag` is the digest of what it says, so that a change which nobody can see changes nothing.
+Only the page cache answers from an old one, and says so (ADR 76). Every snapshot is read from the database as
+of one moment, so none mixes two; its `etag` is the digest of what it says, so that a change which nobody can
+see changes nothing.
 
 A board as of a time is read in the same way for whoever asks, and remembered by this process alone: there are
 more times than can be kept.
@@ -15,6 +16,7 @@ from contextlib import contextmanager
 from datetime import datetime, timedelta
 from functools import partial
 from typing import Any
+from uuid import UUID
 
 import structlog
 from django.db import connection, transaction
@@ -22,13 +24,21 @@ from django.db.models import F, QuerySet
 from django.http import HttpRequest
 from django.utils import timezone
 
+from evaluator.metrics.protocol import OVERALL
 from leaderboard import versions
-from leaderboard.boards import boards, current
-from leaderboard.boards.current import CurrentBoard
+from leaderboard.boards import boards
 from leaderboard.boards.rows import Entry
-from leaderboard.boards.snapshot_store import BoundedCache, StoredSnapshot, decode, encode
-from leaderboard.models import Edition, Snapshot, Split
+from leaderboard.boards.snapshot_store import (
+    Attempt,
+    BoundedCache,
+    CurrentBoard,
+    StoredSnapshot,
+    decode,
+    encode,
+)
+from leaderboard.models import Edition, Method, Score, Snapshot, Split, Status, Visibility, days
 from leaderboard.models.benchmark import Listing
+from leaderboard.models.methods import MethodQuerySet
 
 log = structlog.get_logger(__name__)
 
@@ -73,6 +83,11 @@ def splits_of(request: HttpRequest) -> list[Split]:
 def state_of(request: HttpRequest) -> int:
     """The sum of the versions of all boards as this request found them; see `versions.state`."""
     return versions.state_of(_all_splits_of(request))
+
+
+def numbers_of(request: HttpRequest) -> dict[str, int]:
+    """The version of each of them, by split."""
+    return versions.numbers_of(_all_splits_of(request))
 
 
 def _all_splits() -> list[Split]:
@@ -216,7 +231,7 @@ def _as_of_now(edition: Edition) -> tuple[StoredSnapshot, CurrentBoard]:
         rows = Edition.objects.select_related("split__published_edition", "ground_truth")
         row = rows.get(pk=edition.pk)
         version = versions.number(row.split_id)
-        drawn = current.read(row)
+        drawn = read(row)
     return encode(drawn, version=version), drawn
 
 
@@ -283,3 +298,38 @@ def _differed(row: Snapshot) -> bool:
         kept, _ = _as_of_now(row.edition)
     save(edition=row.edition, kept=kept)
     return has_differed
+
+
+# --- what everybody sees now -----------------------------------------------------------------------------
+
+
+def read(edition: Edition) -> CurrentBoard:
+    """The edition as the database has it, which comes with its split."""
+    entries = boards.public_rows(split=edition.split, edition=edition)
+    return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
+
+
+def attempts(edition: Edition, *, methods: MethodQuerySet) -> tuple[Attempt, ...]:
+    """The standing, scored submissions of these methods, the newest first."""
+    rows = Score.objects.filter(
+        evaluation__edition=edition,
+        evaluation__status=Status.SCORED,
+        evaluation__submission__withdrawn_at=None,
+        evaluation__submission__method__in=methods,
+        interval=OVERALL,
+    )
+    columns = (
+        *("submission__method_id", "submission__method__visibility"),
+        *("submission_id", "submission__submitted_at"),
+    )
+    found: dict[UUID, Attempt] = {}
+    values: dict[UUID, dict[str, float | None]] = {}
+    for method_id, visibility, pk, sent_at, metric, value in rows.values_list(
+        *(f"evaluation__{column}" for column in columns), "metric", "value"
+    ):
+        if pk not in found:
+            at = days.truncate_to_day(sent_at, is_masked=visibility == Visibility.ANONYMOUS)
+            values[pk] = dict.fromkeys(edition.rules.overall_names)
+            found[pk] = Attempt(method_id, pk, at, values[pk])
+        values[pk][metric] = value
+    return tuple(sorted(found.values(), key=lambda a: (a.at, a.submission_id.int), reverse=True))

@@ -7,11 +7,11 @@ PostgreSQL takes whole columns as arrays in one statement; SQLite, which no netw
 the rows one by one.
 """
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from typing import Any, Final, TypeVar
 
 from django.db import connection
-from django.db.models import AutoField, Field, Model
+from django.db.models import AutoField, Field, Model, QuerySet
 
 Fields = Sequence["Field[Any, Any]"]
 Rows = Sequence[Sequence[Any]]
@@ -88,3 +88,21 @@ def _table(model: type[Model]) -> str:
 
 def _column(field: "Field[Any, Any]") -> str:
     return connection.ops.quote_name(str(field.column))
+
+
+M = TypeVar("M", bound=Model)
+PART: Final = 500
+
+
+def in_parts(rows: "QuerySet[M]", *, size: int = PART) -> Iterator[list[M]]:
+    """The rows, `size` at a time; they are in the order of their primary keys. One query for each part.
+
+    A cursor of the server would do it with one, but lives only as long as a transaction.
+    """
+    part = list(rows[:size])
+    yield part
+    if len(part) < size:
+        return
+    rest = list(rows.filter(pk__gt=part[-1].pk).values_list("pk", flat=True))
+    for first in range(0, len(rest), size):
+        yield list(rows.filter(pk__in=rest[first : first + size]))

@@ -25,8 +25,7 @@ from baselines.outcomes import SequenceEstimator
 from baselines.processes import worked_through
 from baselines.rendering.clips import Rendered, boxes, render, view_of
 from baselines.simulation import Split
-from leaderboard.demo import truth
-from leaderboard.demo.runs import RUNS, SEED, Floats, Run
+from leaderboard.demo.runs import RUNS, SEED, Floats, Run, demo_split
 
 FRAME_GAP = 5
 SAVED_EVERY_S = 30.0
@@ -102,7 +101,7 @@ class AllRuns:
 
 def make(runs: Sequence[Run], *, work: Path, n_processes: int) -> None:
     """Estimate the whole split with these runs and keep the files; `work` holds what is done so far."""
-    split = truth.demo_split()
+    split = demo_split()
     work.mkdir(parents=True, exist_ok=True)
     journals = [work / f"{run.name}.npy" for run in runs]
     done = [np.load(path) if path.exists() else np.full(split.n_sequences, np.nan) for path in journals]

@@ -1,4 +1,4 @@
-"""The runs whose files the demo's teams submit: what ran, and its kept estimates.
+"""The simulated split of the demo, and the runs whose files its teams submit: what ran, and its estimates.
 
 `python -m leaderboard.demo.make_runs` makes them anew from rendered frames; reading them needs numpy alone.
 """
@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+import evaluator
+from baselines import simulation
 from baselines.methods import Value
 
 Floats = NDArray[np.float64]
@@ -75,3 +77,24 @@ RUNS = (
 def get_run(name: str) -> Run:
     """The run of that name; raises `KeyError`."""
     return {run.name: run for run in RUNS}[name]
+
+
+SHAPE = simulation.SHAPES["test"]
+
+
+def demo_split() -> simulation.Split:
+    """The demo's split with the motion of its vehicles, from which its frames are rendered."""
+    return simulation.split(
+        rng=np.random.default_rng(SEED), n_sequences=N_SEQUENCES, n_recordings=N_RECORDINGS, shape=SHAPE
+    )
+
+
+def simulate(
+    *, rng: np.random.Generator, n_sequences: int = N_SEQUENCES, n_recordings: int = N_RECORDINGS
+) -> evaluator.GroundTruth:
+    """Ground truth of tracks that are spread over recordings; the same generator gives the same values.
+
+    A track is a run of windows cut without overlap, as in the dataset, of a vehicle in one of the paper's six
+    driving scripts or in highway driving.
+    """
+    return simulation.split(rng=rng, n_sequences=n_sequences, n_recordings=n_recordings, shape=SHAPE).truth

@@ -17,8 +17,7 @@ from django.core.files.base import ContentFile
 from django.db import transaction
 
 import evaluator
-from leaderboard.demo.runs import FRAMES, Run, get_run
-from leaderboard.demo.truth import demo_split
+from leaderboard.demo.runs import FRAMES, Run, demo_split, get_run
 from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import methods, visibility
@@ -28,8 +27,12 @@ from leaderboard.submissions import submissions
 SPLIT = "demo"
 DEMO_EMAIL = "demo@example.org"
 
-_ON_PIXELS = "pixels@example.org"
-_ON_BOXES = "boxes@example.org"
+TEAMS = {
+    "Demo team": DEMO_EMAIL,
+    "Baselines on boxes": "boxes@example.org",
+    "Baselines on pixels": "pixels@example.org",
+}
+"""Each team with the address of its one account."""
 _PAPER = "https://arxiv.org/abs/2309.01539"
 _RENDERED = (
     "The frames are rendered, not filmed. Rendered vehicles are flat: they do not turn, shine or bend, "
@@ -41,13 +44,17 @@ _RENDERED = (
 class DemoEntry:
     """One submission of the demo. Without a run, the file is one that has faults."""
 
-    email: str
     team: str
     method: str
     description: str
     run: Run | None
     visibility: str = Visibility.PUBLIC
     details: Mapping[str, object] = field(default_factory=dict)
+
+    @property
+    def email(self) -> str:
+        """The address of the account that sends it."""
+        return TEAMS[self.team]
 
     @property
     def full_description(self) -> str:
@@ -57,17 +64,21 @@ class DemoEntry:
         return f"{self.description} {_RENDERED}\n\nCommands:\n{FRAMES}\n{self.run.command}"
 
 
-_MEASURED = {
-    "cameras": "ONE",
-    "box_source": "GIVEN",
-    "uses_nerf": False,
-    "uses_extra_data": False,
-    "hardware": "one processor core, shared",
-}
+def _measured(n_frames: int, **others: object) -> Mapping[str, object]:
+    """The details of a method that ran on the rendered frames."""
+    return {
+        "cameras": "ONE",
+        "box_source": "GIVEN",
+        "uses_nerf": False,
+        "uses_extra_data": False,
+        "hardware": "one processor core, shared",
+        "n_frames": n_frames,
+        **others,
+    }
+
 
 ENTRIES = (
     DemoEntry(
-        email=_ON_BOXES,
         team="Baselines on boxes",
         method="Detection, box area",
         description=(
@@ -75,35 +86,31 @@ ENTRIES = (
             "published row. Areas grow with the square of the scale, so times to contact are half as long."
         ),
         run=get_run("detection-area"),
-        details={**_MEASURED, "n_frames": 2, "latency_ms": 0.1, "paper_url": _PAPER},
+        details=_measured(2, latency_ms=0.1, paper_url=_PAPER),
     ),
     DemoEntry(
-        email=_ON_BOXES,
         team="Baselines on boxes",
         method="Detection, root of the area",
         description="The root of the ratio of the areas of the two boxes.",
         run=get_run("detection-sqrt-area"),
         visibility=Visibility.ANONYMOUS,
-        details={**_MEASURED, "n_frames": 2, "latency_ms": 0.1},
+        details=_measured(2, latency_ms=0.1),
     ),
     DemoEntry(
-        email=DEMO_EMAIL,
         team="Demo team",
         method="Detection, box height",
         description="The ratio of the heights of the two boxes.",
         run=get_run("detection-height"),
-        details={**_MEASURED, "n_frames": 2, "latency_ms": 0.1},
+        details=_measured(2, latency_ms=0.1),
     ),
     DemoEntry(
-        email=_ON_PIXELS,
         team="Baselines on pixels",
         method="Pixel MSE",
         description="The scale at which the reference frame looks most like the target, worded by the paper.",
         run=get_run("pixel-mse"),
-        details={**_MEASURED, "n_frames": 2, "latency_ms": 5.7, "paper_url": _PAPER},
+        details=_measured(2, latency_ms=5.7, paper_url=_PAPER),
     ),
     DemoEntry(
-        email=_ON_PIXELS,
         team="Baselines on pixels",
         method="Pixel MSE, as in the toolkit",
         description=(
@@ -111,10 +118,9 @@ ENTRIES = (
             "nearest pixel, and its reference patch is off centre where the object moves away."
         ),
         run=get_run("pixel-mse-toolkit"),
-        details={**_MEASURED, "n_frames": 2, "paper_url": _PAPER},
+        details=_measured(2, paper_url=_PAPER),
     ),
     DemoEntry(
-        email=_ON_PIXELS,
         team="Baselines on pixels",
         method="SOT, median flow",
         description=(
@@ -122,10 +128,9 @@ ENTRIES = (
             "with OSTrack and takes the ratio of the areas."
         ),
         run=get_run("tracking"),
-        details={**_MEASURED, "n_frames": 6, "paper_url": _PAPER},
+        details=_measured(6, paper_url=_PAPER),
     ),
     DemoEntry(
-        email=_ON_PIXELS,
         team="Baselines on pixels",
         method="Photometric alignment",
         description=(
@@ -133,10 +138,9 @@ ENTRIES = (
             "this project, not of the paper."
         ),
         run=get_run("alignment"),
-        details={**_MEASURED, "n_frames": 2, "latency_ms": 15.4},
+        details=_measured(2, latency_ms=15.4),
     ),
     DemoEntry(
-        email=DEMO_EMAIL,
         team="Demo team",
         method="First try",
         description="A file with the faults that first files have; see its page for the list.",

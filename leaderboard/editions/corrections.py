@@ -12,6 +12,7 @@ from pathlib import Path
 from django.db import transaction
 from django.db.models import Count, Min, Q
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import get_protocol
 from leaderboard import audit
 from leaderboard.db import clock
@@ -295,16 +296,19 @@ def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: 
     said = []
     if waiting:
         said.append(
-            f"{edition} is not finished: {len(waiting)} submissions are neither scored nor "
+            f"{edition} is not finished: {_are(waiting)} neither scored nor "
             f"rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
         )
     if losing:
-        entries = "1 entry" if len(losing) == 1 else f"{len(losing)} entries"
         said.append(
-            f"{edition} rejects {entries} that the board scores: {_named(losing)}. "
-            "Confirm that they are left out, or correct the ground truth."
+            f"{edition} rejects {counted(len(losing), 'entry', 'entries')} that the board scores: "
+            f"{_named(losing)}. Confirm that they are left out, or correct the ground truth."
         )
     return " ".join(said)
+
+
+def _are(rows: Sequence[Submission]) -> str:
+    return counted(len(rows), "submission is", "submissions are")
 
 
 def _named(rows: Sequence[Submission]) -> str:

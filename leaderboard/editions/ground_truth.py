@@ -12,6 +12,7 @@ from django.db import transaction
 from django.db.models import Max
 
 import evaluator
+from evaluator.counting import counted
 from evaluator.metrics.protocol import INTERVALS, OVERALL, get_protocol, known_intervals
 from evaluator.predictions.revisions import Comparison, compare
 from leaderboard import audit, versions
@@ -107,7 +108,7 @@ def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> Comparis
     comparison = compare(truth_values.load(old.digest), truth)
     if comparison.n_added == truth.n_sequences:
         message = (
-            f"None of the {truth.n_sequences:,} sequences is in the published manifest of "
+            f"None of the {counted(truth.n_sequences, 'sequence')} is in the published manifest of "
             f"{old.n_sequences:,}; "
             "expected a correction of it, with the same natural keys (bag_stamp/cam_id/ts/track_id)."
         )

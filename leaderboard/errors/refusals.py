@@ -33,7 +33,7 @@ class NotMaintainer(Exception):
 
 def require_maintainer(actor: User | None, *, to: str) -> None:
     """Raise `NotMaintainer` for anybody else; None is the command line. `to` ends "Only maintainers may"."""
-    if actor is not None and not actor.is_maintainer:
+    if actor is not None and not actor.acts_as_maintainer:
         raise NotMaintainer(f"Only maintainers may {to}.")
 
 

@@ -1,4 +1,7 @@
-"""New entries as an Atom feed (RFC 4287): what everybody sees, under the names that everybody sees."""
+"""What others fetch now and then: new entries as an Atom feed (RFC 4287), and the sitemap (sitemaps.org).
+
+The feed says what everybody sees, under the names that everybody sees.
+"""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -15,6 +18,9 @@ from leaderboard.models import Split
 
 MAX_ENTRIES: Final = 50
 _ATOM: Final = "http://www.w3.org/2005/Atom"
+_SITEMAP: Final = "http://www.sitemaps.org/schemas/sitemap/0.9"
+# What the format of sitemaps allows in one file.
+MAX_PAGES: Final = 50_000
 # Of a feed in which nothing has happened yet: when the benchmark was published.
 _BEGINNING: Final = datetime(2023, 9, 4, tzinfo=UTC)
 
@@ -82,3 +88,22 @@ def _text(parent: ET.Element, name: str, text: str) -> None:
 
 def _moment(at: datetime) -> str:
     return at.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+@dataclass(frozen=True)
+class SitemapEntry:
+    """A public page: its absolute address, and when it last changed."""
+
+    address: str
+    changed_at: datetime | None = None
+
+
+def xml(entries: Iterable[SitemapEntry]) -> bytes:
+    """These pages, at most as many as the format allows."""
+    root = ET.Element("urlset", xmlns=_SITEMAP)
+    for page in list(entries)[:MAX_PAGES]:
+        element = ET.SubElement(root, "url")
+        ET.SubElement(element, "loc").text = page.address
+        if page.changed_at is not None:
+            ET.SubElement(element, "lastmod").text = f"{page.changed_at.astimezone(UTC):%Y-%m-%d}"
+    return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="utf-8")

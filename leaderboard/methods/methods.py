@@ -81,14 +81,19 @@ def require_team(method: Method, actor: User) -> None:
         raise Refused("not-yours", "Only the team of a method can change its details.")
 
 
-def require_distinct_name(name: str, *, team: Team, field: str, but: Method | None = None) -> None:
+def require_distinct_name(
+    name: str, *, team: Team, field: str, but: Method | None = None, may_exist: bool = False
+) -> None:
     """Raise `Refused` for a name that would be taken for another one of the team's methods.
 
-    It stays true for whoever has the team's row locked.
+    It stays true for whoever has the team's row locked. Nobody else knows whether another request is making
+    a method of this very name: with `may_exist` that one is no other method.
     """
     others = Method.objects.existing().filter(team=team)
     if but is not None:
         others = others.exclude(pk=but.pk)
+    if may_exist:
+        others = others.exclude(name=name)
     twin = confusable_with(name, others.values_list("name", flat=True))
     if twin is not None:
         raise Refused(

@@ -64,7 +64,7 @@ def change(
                 "reveal_at": reveal_at.isoformat() if reveal_at else None,
             },
         )
-        versions.changed_by_methods([row.pk])
+        versions.changed_by_methods([row.pk], is_addition=True)
     log.info("method_shown", method_id=str(row.pk), visibility=row.visibility)
     return row
 
@@ -125,6 +125,6 @@ def reveal_due(*, now: datetime) -> int:
             teams.show_name_in_any_case(Team.objects.get(methods=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
-            versions.changed_by_methods([method_id])
+            versions.changed_by_methods([method_id], is_addition=True)
         n_revealed += 1
     return n_revealed

@@ -71,7 +71,7 @@ class MethodQuerySet(models.QuerySet["Method"]):
         """
         if not user.is_authenticated:
             return self.shown()
-        if user.is_maintainer:
+        if user.acts_as_maintainer:
             return self
         own = Membership.objects.filter(user=user).values("team")
         return self.existing().filter(~Q(visibility=Visibility.PRIVATE) | Q(team__in=own))
@@ -167,4 +167,4 @@ class Method(models.Model):
             return True
         if not user.is_authenticated:
             return False
-        return user.is_maintainer or self.team.memberships.filter(user=user).exists()
+        return user.acts_as_maintainer or self.team.memberships.filter(user=user).exists()

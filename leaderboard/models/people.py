@@ -65,10 +65,18 @@ class User(AbstractBaseUser, PermissionsMixin):  # type: ignore[django-manager-m
     def __str__(self) -> str:
         return self.email
 
+    # Of a session, not of the account: whether it still owes the code that maintainers must give here.
+    owes_a_code = False
+
     @property
     def is_maintainer(self) -> bool:
         """Whether this person looks after the benchmark."""
         return self.is_active and self.is_staff
+
+    @property
+    def acts_as_maintainer(self) -> bool:
+        """Whether this person may do and see here what only maintainers may."""
+        return self.is_maintainer and not self.owes_a_code
 
 
 class Team(models.Model):

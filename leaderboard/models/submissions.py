@@ -37,7 +37,7 @@ class SubmissionQuerySet(models.QuerySet["Submission"]):
         """The person's own team's submissions; maintainers see all, strangers none."""
         if not user.is_authenticated:
             return self.none()
-        return self if user.is_maintainer else self.of(user)
+        return self if user.acts_as_maintainer else self.of(user)
 
     def of(self, user: User) -> Self:
         """The person's own team's submissions, without those to splits that are switched off."""

@@ -1,9 +1,12 @@
 """Figures for Prometheus, read from the database when they are asked for.
 
 So they are the same from every process on every machine, and a restart loses nothing. Six statements a
-scrape; the counters are counts of rows that never change again. Figures of HTTP alone are a process's own.
+scrape; the counters are counts of rows that never change again. Figures of HTTP alone are a process's own:
+processes of one gunicorn share a directory, `PROMETHEUS_MULTIPROC_DIR`, which `deploy/gunicorn.conf.py`
+makes, so that a scrape of any of them has the sum.
 """
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import timedelta
 from functools import partial
@@ -12,12 +15,13 @@ from typing import Any, Final
 
 from django.db.models import Case, Count, F, IntegerField, Min, Sum, Value, When
 from django.db.models.functions import Now
-from prometheus_client import CollectorRegistry, generate_latest
+from prometheus_client import CollectorRegistry, Counter, Histogram, disable_created_metrics, generate_latest
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
 
 from leaderboard.models import AuditEvent, Evaluation, Mail, Status, SweepBeat
-from leaderboard.ops import health, http_figures
+from leaderboard.ops import health
 
 PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
 BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
@@ -25,9 +29,9 @@ BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.
 
 def exposition() -> bytes:
     """All figures in Prometheus' text format. Raises the database's error if it does not answer."""
-    registry = CollectorRegistry(auto_describe=False)
-    registry.register(DatabaseCollector())
-    return generate_latest(registry) + generate_latest(http_figures.registry())
+    ours = CollectorRegistry(auto_describe=False)
+    ours.register(DatabaseCollector())
+    return generate_latest(ours) + generate_latest(registry())
 
 
 class DatabaseCollector(Collector):
@@ -212,3 +216,42 @@ _gauge, _counter = partial(_family, GaugeMetricFamily), partial(_family, Counter
 
 def _or_nan(value: float | None) -> float:
     return float("nan") if value is None else value
+
+
+# --- how the web processes answer -------------------------------------------------------------------------
+
+SHARED: Final = "PROMETHEUS_MULTIPROC_DIR"
+ANSWER_BUCKETS_S: Final = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0)
+# A figure for the moment at which each other began would double them, and nothing here asks for it.
+disable_created_metrics()
+_OWN: Final = CollectorRegistry()
+_REQUESTS: Final = Counter(
+    "tsttc_http_requests",
+    "Answers of the web processes on this machine since they were started.",
+    ["method", "route", "status"],
+    registry=_OWN,
+)
+_SECONDS: Final = Histogram(
+    "tsttc_http_request_seconds",
+    "From the request to the answer; what waits on purpose for a submission is among it.",
+    ["route"],
+    buckets=ANSWER_BUCKETS_S,
+    registry=_OWN,
+)
+_METHODS: Final = frozenset({"GET", "HEAD", "POST", "PUT", "PATCH", "DELETE", "OPTIONS"})
+
+
+def count(*, method: str, route: str, status: int, took_s: float) -> None:
+    """Count one answer. `route` is a name out of few, never an address that somebody typed."""
+    method = method if method in _METHODS else "other"
+    _REQUESTS.labels(method, route, f"{status // 100}xx").inc()
+    _SECONDS.labels(route).observe(took_s)
+
+
+def registry() -> CollectorRegistry:
+    """The figures of this process, or of all that share its directory."""
+    if not os.environ.get(SHARED):
+        return _OWN
+    together = CollectorRegistry()
+    MultiProcessCollector(together)
+    return together

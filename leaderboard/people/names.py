@@ -10,7 +10,6 @@ from datetime import datetime, timedelta
 from functools import cache
 from typing import Any
 
-from confusable_homoglyphs.confusables import confusables_data
 from django.conf import settings
 
 from leaderboard.errors.refusals import Refused, clean_text
@@ -134,6 +133,10 @@ def _prototypes() -> Mapping[str, str]:
     The library lists pairs both ways round. The list that it was made from gives every character one target,
     which itself has none: what stands alone with one partner is the character, what has many is the target.
     """
+    from confusable_homoglyphs.confusables import (  # noqa: PLC0415 - a list of 0.9 MB, which few processes need
+        confusables_data,
+    )
+
     data: Mapping[str, list[dict[str, Any]]] = confusables_data
     found = {}
     for character, partners in data.items():

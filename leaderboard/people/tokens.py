@@ -11,6 +11,7 @@ from knox.crypto import hash_token
 from knox.models import get_digest_token
 from knox.settings import CONSTANTS
 
+from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import ApiToken, Scope, Split, User
@@ -102,7 +103,9 @@ def _check(*, scopes: Collection[str], days: int) -> None:
         raise Refused("bad-scope", f"The token has {found}; expected read, submit, or both.", field="scopes")
     if not 1 <= days <= MAX_DAYS:
         raise Refused(
-            "bad-days", f"The token expires after {days} days; expected 1 to {MAX_DAYS}.", field="days"
+            "bad-days",
+            f"The token expires after {counted(days, 'day')}; expected 1 to {MAX_DAYS}.",
+            field="days",
         )
 
 

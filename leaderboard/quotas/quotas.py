@@ -13,17 +13,21 @@ has one account: what is sent from several accounts of one mailbox is sent by on
 """
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
+from typing import Final
 
 from django.conf import settings
 from django.db import transaction
 from django.db.models import Exists, OuterRef, Q, QuerySet
 
+from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
+from leaderboard.models.quotas import MAX_SPAN
 from leaderboard.models.submissions import MAX_POISON_STRIKES
 from leaderboard.quotas.rules import UNLIMITED, Rules, rules_of
 
@@ -201,8 +205,8 @@ def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int,
         quota,
         is_open=False,
         next_slot_at=opens_at,
-        sentence=f"Your team has sent {n_sent:,} bytes within 24 hours, and this file has {size_bytes:,}; "
-        f"expected at most {limit:,} bytes together{then}.",
+        sentence=f"Your team has sent {counted(n_sent, 'byte')} within 24 hours, and this file has "
+        f"{size_bytes:,}; expected at most {counted(limit, 'byte')} together{then}.",
     )
 
 
@@ -230,8 +234,8 @@ def weigh(
             full_until: f"Your team has used {_n(rules.limit)} to {split.pk}, its quota for "
             f"{span(rules.window)}",
             gap_until: f"Submissions of a team to {split.pk} must be at least {span(rules.min_gap)} apart",
-            rejected_until: f"Your team has used its limit of {len(rejected)} files to {split.pk} within 24 "
-            "hours that were rejected or cancelled, or stopped the process that read them",
+            rejected_until: f"Your team has used its limit of {counted(len(rejected), 'file')} to {split.pk} "
+            "within 24 hours that were rejected or cancelled, or stopped the process that read them",
         }
         sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
     return Quota(
@@ -348,3 +352,32 @@ def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") ->
             actor=actor,
             details={"split": row.split_id, "reason": reason},
         )
+
+
+_UNITS: Final = {
+    "day": timedelta(days=1),
+    "hour": timedelta(hours=1),
+    "minute": timedelta(minutes=1),
+    "second": timedelta(seconds=1),
+}
+_SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s*({'|'.join(_UNITS)})s?\s*", re.ASCII | re.IGNORECASE)
+
+
+def parse_span(text: str, *, field: str = "") -> timedelta:
+    """The span of a text such as `quotas.span` writes, also of none (0 days). Raises `Refused`."""
+    found = _SPAN.fullmatch(text)
+    number = found[1].replace(",", "") if found else ""
+    if found is None or not number:
+        raise Refused(
+            "bad-value",
+            f"{text.strip()[:40]!r} is no span of time; expected one like 30 days, 24 hours or 90 minutes.",
+            field=field,
+        )
+    n, unit = int(number), _UNITS[found[2].lower()]
+    if n > MAX_SPAN // unit:
+        raise Refused(
+            "bad-value",
+            f"That is longer than ten years; expected at most {span(MAX_SPAN)}.",
+            field=field,
+        )
+    return n * unit

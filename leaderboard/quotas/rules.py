@@ -39,11 +39,6 @@ class Rules:
         """The gap in seconds."""
         return self.min_gap.total_seconds()
 
-    @property
-    def are_none(self) -> bool:
-        """Whether nothing is limited."""
-        return self.limit is None and self.rejected_limit is None and not self.min_gap
-
 
 UNLIMITED = Rules(limit=None, window=timedelta(days=1), min_gap=timedelta(0), rejected_limit=None)
 

@@ -16,7 +16,7 @@ from evaluator.metrics.protocol import PRIMARY, Protocol
 from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
 from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
-from leaderboard.scoring import aligned
+from leaderboard.scoring import sandbox
 from leaderboard.storage import truth_values
 
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
     if truth_values.is_marked_hidden(evaluation.edition.ground_truth_id):
         return
     truth = truth_values.load(evaluation.edition.ground_truth_id)
-    predictions = aligned.of(evaluation.submission.sent_file, evaluation.edition)
+    predictions = sandbox.of(evaluation.submission.sent_file, evaluation.edition)
     content = content_of(predictions, truth, rules=evaluation.edition.rules)
     with transaction.atomic():
         if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:

@@ -19,7 +19,7 @@ from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring import differences
 from evaluator.tables import sentences
 from leaderboard.boards import boards, rows, snapshots
-from leaderboard.boards.boards import Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.scoring import confidence, disclosure, questions, recording_sums, verdicts
 

@@ -4,6 +4,7 @@ Each thread that scores has one such process, started at its first file, replace
 with the thread, or with the worker, however that ends.
 """
 
+import fcntl
 import json
 import os
 import selectors
@@ -25,6 +26,7 @@ AVAILABLE = sys.platform == "linux"
 """Elsewhere `fork` after loading numpy is not safe, or a process cannot be tied to its parent's life."""
 
 _CHUNK_BYTES = 1 << 20
+_SET_PIPE_SIZE = 1031  # F_SETPIPE_SZ, whose name `fcntl` has on Linux only
 
 
 class ServerEnded(Exception):
@@ -130,6 +132,7 @@ class ForkServer:
         with ExitStack() as sent:
             for into in (reading.output, reading.complaint):
                 ours, end = os.pipe()
+                _widen(ours)
                 reading.follow(ours, into)
                 sent.callback(os.close, end)
                 theirs.append(end)
@@ -217,6 +220,12 @@ class _Reading:
         if "failed" in reply:
             raise NotStarted(reply["failed"])
         self._returncode = reply.get("returncode")
+
+
+def _widen(pipe: int) -> None:
+    """Let an answer pass at once where it can; else the reader waits for us after each 64 KB."""
+    with suppress(OSError):
+        fcntl.fcntl(pipe, _SET_PIPE_SIZE, _CHUNK_BYTES)
 
 
 def _end(server: socket.socket, pid: int, owner: int) -> None:

@@ -29,11 +29,12 @@ from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
 from leaderboard import audit, versions
-from leaderboard.db import bulk
+from leaderboard.db import bulk, repeated
 from leaderboard.db.clock import after, database_now, just_before
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.models.submissions import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
 from leaderboard.ops import broker
+from leaderboard.scoring import claimable
 
 log = structlog.get_logger(__name__)
 
@@ -151,16 +152,13 @@ def claim(
     """
     token = token or uuid.uuid4()
     with transaction.atomic():
-        # SQLite has one writer, and skips nothing.
-        due = Evaluation.objects.due().select_for_update(skip_locked=True, no_key=True)
-        scorable = due if held is None else due.scorable(held)
-        waiting = scorable.values_list("pk", "attempt", "priority", "edition")
-        if not (rows := list(waiting[:limit])):
+        known = None if held is None else frozenset(held)
+        if not (rows := repeated.rows(claimable.first, limit=limit, held=known)):
             return []
         alike = {"priority": rows[0][2], "edition": rows[0][3]}
         if alike["priority"] == Evaluation.PRIORITY_RESCORE and in_batches:
             n_waiting = Evaluation.objects.due().filter(**alike)[: 2 * RESCORE_BATCH].count()
-            more = waiting.filter(**alike).exclude(pk__in=[row[0] for row in rows])
+            more = claimable.waiting(held).filter(**alike).exclude(pk__in=[row[0] for row in rows])
             rows += more[: max(batch_of(n_waiting) - len(rows), 0)]
         Evaluation.objects.filter(pk__in=[row[0] for row in rows], status=Status.QUEUED).update(
             status=Status.RUNNING,
@@ -257,12 +255,8 @@ def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
 
     With each the present time, by the database's clock.
     """
-    rows = (
-        Evaluation.objects.select_for_update(no_key=True)
-        .filter(pk__in=[lease.evaluation_id for lease in leases], status=Status.RUNNING)
-        .order_by("pk")  # every batch locks in the same order, so that two cannot wait for each other
-        .values_list("pk", "attempt", "lease_token", Now())
-    )
+    ids = [lease.evaluation_id for lease in leases]
+    rows = repeated.rows(claimable.running, of=ids[0]) if len(ids) == 1 else claimable.running(*ids)
     valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
     return {row[0]: row[3] for row in rows if row[:3] in valid}
 

@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from evaluator import GroundTruth, published
 from evaluator.metrics.protocol import get_protocol
-from evaluator.scoring import floors
+from evaluator.scoring import scoring
 from evaluator.scoring.report import RecordingSums
 from evaluator.scoring.scoring import Scorer
 from leaderboard.models import Edition, SentFile
-from leaderboard.scoring import aligned
+from leaderboard.scoring import sandbox
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
@@ -87,7 +87,7 @@ def sums_of(edition: Edition, *, file: SentFile) -> Floats:
     kept = load(edition, file=file)
     if kept is not None:
         return kept
-    predictions = aligned.of(file, edition)
+    predictions = sandbox.of(file, edition)
     bags = scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for
     save(edition, file=file, bags=bags)
@@ -107,7 +107,7 @@ def floor_of(edition: Edition) -> dict[str, float | None]:
 
 @lru_cache(maxsize=4)
 def _floor(truth_digest: str, protocol: str) -> dict[str, float | None]:
-    return floors.floor_of(truth_values.load(truth_digest), protocol=protocol)
+    return scoring.floor_of(truth_values.load(truth_digest), protocol=protocol)
 
 
 def scorer(truth_digest: str, protocol: str) -> Scorer:

@@ -1,5 +1,6 @@
 """Sentences about the end of scoring; pages ask for them, so this module computes nothing."""
 
+from evaluator.counting import counted
 from evaluator.scoring.significance import MIN_DEGREES, too_few_recordings
 from leaderboard.models import Edition, Evaluation, Status
 from leaderboard.scoring import lifecycle
@@ -16,8 +17,7 @@ def sentence_of(evaluation: Evaluation) -> str:
             )
         case Status.REJECTED:
             n = evaluation.n_problems
-            found = f"it has {n:,} problems" if n != 1 else "it has a problem"
-            return f"The file is at fault: {found}, so it was not scored."
+            return f"The file is at fault: it has {counted(n, 'problem')}, so it was not scored."
         case Status.SYSTEM_ERROR:
             tries = f"{n_failed} times" if n_failed != 1 else "once"
             is_poison = evaluation.n_poison_strikes >= lifecycle.MAX_POISON_STRIKES

@@ -19,7 +19,7 @@ from evaluator.predictions.plausibility import warnings_of
 from evaluator.problems import FileWarning
 from evaluator.scoring.scoring import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
-from leaderboard.scoring import aligned, lifecycle, recording_sums, sandbox
+from leaderboard.scoring import lifecycle, recording_sums, sandbox
 from leaderboard.scoring.lifecycle import Lease, LostRace, Outcome, Strike
 from leaderboard.storage import truth_values
 
@@ -172,7 +172,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     for lease in leases:
         file = sent[lease.evaluation_id]
         try:
-            predictions = aligned.saved(file, edition)
+            predictions = sandbox.saved(file, edition)
         except Rejected as rejected:
             # For want of sequences that the file cannot have, which needs no word of the file.
             outcomes.append((lease, rejection(rejected)))
@@ -304,7 +304,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
     edition, file = evaluation.edition, evaluation.submission.sent_file
     scorer = _scorer(edition)
     try:
-        predictions = aligned.read(file, edition, heartbeat=heartbeat)
+        predictions = sandbox.read(file, edition, heartbeat=heartbeat)
         report = scorer.report(predictions, keep_bags=True)
     except Rejected as rejected:
         return rejection(rejected)

@@ -74,10 +74,18 @@ class Watcher:
         self._closing = threading.Event()
         self._turned_away: dict[UUID, float] = {}
 
-    def hold(self, submission_id: UUID, *, wait_s: float, is_gone: Callable[[], bool]) -> bool:
+    def hold(
+        self,
+        submission_id: UUID,
+        *,
+        wait_s: float,
+        is_gone: Callable[[], bool],
+        prepare: Callable[[], None] = lambda: None,
+    ) -> bool:
         """Return once the submission is final, `wait_s` is over, or the asker is gone.
 
-        Returns False at once where no place is free, or the process is about to end.
+        Returns False at once where no place is free, or the process is about to end; else `prepare` is called
+        before the wait.
         """
         place = _Place(submission_id, is_gone)
         with self._lock:
@@ -90,6 +98,7 @@ class Watcher:
                 self._thread = threading.Thread(target=self._watch, name="watcher", daemon=True)
                 self._thread.start()
         try:
+            prepare()
             place.is_over.wait(wait_s)
         finally:
             with self._lock:
@@ -162,7 +171,13 @@ THE_WATCHER = Watcher(look=final_among, n_places=lambda: settings.WAITERS, every
 
 
 def wait(submission_id: UUID, *, wait_s: float, is_gone: Callable[[], bool]) -> bool:
-    """`Watcher.hold` at a place of this process, with the thread's database connection closed."""
+    """`Watcher.hold` at a place of this process, with the thread's database connection closed meanwhile.
+
+    Who finds no place keeps it: a new one costs the database more than the answer does.
+    """
+    return THE_WATCHER.hold(submission_id, wait_s=wait_s, is_gone=is_gone, prepare=_let_go_of_the_database)
+
+
+def _let_go_of_the_database() -> None:
     if not connection.in_atomic_block:
         connection.close()
-    return THE_WATCHER.hold(submission_id, wait_s=wait_s, is_gone=is_gone)

@@ -11,12 +11,11 @@ from uuid import UUID
 
 from django.db.models import QuerySet
 
-from evaluator.metrics import ranking
-from evaluator.metrics.protocol import OVERALL
+from evaluator.metrics import metrics
+from evaluator.metrics.protocol import OVERALL, PRIMARY
 from leaderboard.boards import snapshots
-from leaderboard.boards.boards import PRIMARY
-from leaderboard.boards.current import CurrentBoard
 from leaderboard.boards.rows import Entry, Interval, profile_of, scored_of, submitted_entry
+from leaderboard.boards.snapshot_store import CurrentBoard
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
 from leaderboard.scoring import verdicts
 from leaderboard.submissions import submissions
@@ -185,7 +184,7 @@ def _place(
     if submission.pk not in best:
         return place
     values = [row.scores[PRIMARY] for row in drawn.entries]
-    rank = ranking.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
+    rank = metrics.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
     return replace(place, rank=rank, n_ranked=n_ranked + 1, is_supposed=True)
 
 

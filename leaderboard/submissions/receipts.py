@@ -13,7 +13,7 @@ from django.core.checks import CheckMessage, Error
 from django.core.exceptions import ImproperlyConfigured
 
 from evaluator import receipts
-from leaderboard.boards import boards
+from leaderboard.boards.rows import flat_scores
 from leaderboard.models import Evaluation, Status, Submission
 from leaderboard.submissions import submissions
 
@@ -33,7 +33,7 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> dic
     """
     evaluation = _scored(submission, edition_number)
     edition, rules = evaluation.edition, evaluation.edition.rules
-    scores = boards.flat_scores(evaluation)
+    scores = flat_scores(evaluation)
     counts = (evaluation.report or {})["counts"]
     assert evaluation.finished_at is not None  # noqa: S101 - for the type checker: what is scored is finished
     document = {

@@ -19,7 +19,7 @@ from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name
-from leaderboard.quotas import admissions, deadlines, quotas
+from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import lifecycle, verdicts
 from leaderboard.storage import files, orphans
 from leaderboard.submissions import estimates
@@ -157,7 +157,7 @@ def _admit(asked: _Asked, file: files.StoredFile) -> Submission | None:
     else:
         methods.require_hardware(asked.details, method=None)
         if team is not None:
-            methods.require_distinct_name(asked.method_name, team=team, field="method")
+            methods.require_distinct_name(asked.method_name, team=team, field="method", may_exist=True)
     return None
 
 
@@ -222,7 +222,7 @@ def _open_split(name: str, *, now: datetime) -> Split:
         raise Refused(
             "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
         )
-    refusal = deadlines.refusal_of(split, now=now)
+    refusal = admissions.refusal_for_all(split, now=now)
     if refusal is not None:
         raise refusal
     return split

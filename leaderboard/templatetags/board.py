@@ -6,6 +6,8 @@ from django import template
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
+from evaluator.counting import counted
+
 register = template.Library()
 
 
@@ -19,6 +21,16 @@ def grouped(value: int | None) -> str:
     return "" if value is None else f"{value:,}"
 
 
+@register.filter(name="counted")
+def with_noun(value: int, nouns: str) -> str:
+    """A count and its noun; two nouns with a comma between them where an s does not make the plural.
+
+    >>> with_noun(1, "recording"), with_noun(3, "person,people")
+    ('1 recording', '3 people')
+    """
+    return counted(value, *nouns.split(","))
+
+
 @register.filter
 def size(n_bytes: int) -> str:
     """A size in the largest fitting unit.
@@ -27,7 +39,7 @@ def size(n_bytes: int) -> str:
     ('812 bytes', '81.2 KB', '20 MB')
     """
     if n_bytes < 1000:
-        return f"{n_bytes} bytes"
+        return counted(n_bytes, "byte")
     return f"{n_bytes / 1e3:.3g} KB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.3g} MB"
 
 

@@ -3,22 +3,19 @@
 from django.urls import include, path, register_converter
 
 from leaderboard.http import cacheable, takes
-from leaderboard.web.account import data_views, mail_views, team_views, token_views
+from leaderboard.web.account import data_views, team_views, token_views
 from leaderboard.web.boards import (
-    badge_and_feed_views,
     board_query,
     board_views,
-    card_views,
     chart_views,
     compare_views,
-    edition_views,
     export_views,
-    paper_views,
+    paper_charts,
+    shared_views,
 )
-from leaderboard.web.docs import docs_views, page_views, wheel_views
+from leaderboard.web.docs import docs_views
 from leaderboard.web.landing import crawler_views, landing_views
 from leaderboard.web.maintain import (
-    announcement_views,
     audit_views,
     edited_page_views,
     maintainer_views,
@@ -29,10 +26,10 @@ from leaderboard.web.maintain import (
     split_views,
 )
 from leaderboard.web.methods import method_views
-from leaderboard.web.submissions import analysis_views, receipt_views, submission_views
+from leaderboard.web.submissions import submission_views
 
 register_converter(export_views.FormatConverter, "export_format")
-register_converter(page_views.PageConverter, "page")
+register_converter(docs_views.PageConverter, "page")
 MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
     path("progress/", maintainer_views.edition_progress, name="maintain_progress"),
@@ -46,17 +43,17 @@ urlpatterns = [
     path("", cacheable(landing_views.home, board_query.PARAMETERS), name="home"),
     path("board/", takes(landing_views.main_board, board_query.PARAMETERS), name="main_board"),
     path("board/<slug:split>/", cacheable(board_views.board, board_query.PARAMETERS), name="board"),
-    path("board/<slug:split>/card.png", takes(card_views.board_card), name="board_card"),
+    path("board/<slug:split>/card.png", takes(shared_views.board_card), name="board_card"),
     path("board/<slug:split>/charts/", takes(chart_views.board_charts), name="charts"),
     path(
         "board/<slug:split>/charts/progress.json",
         cacheable(chart_views.progress_options),
         name="progress_options",
     ),
-    path("board/<slug:split>/editions/", cacheable(edition_views.editions), name="editions"),
+    path("board/<slug:split>/editions/", cacheable(board_views.editions), name="editions"),
     path(
         "board/<slug:split>/editions/<int:number>/",
-        cacheable(edition_views.edition, board_query.PARAMETERS),
+        cacheable(board_views.edition, board_query.PARAMETERS),
         name="edition",
     ),
     path(
@@ -69,14 +66,14 @@ urlpatterns = [
         cacheable(export_views.edition, export_views.PARAMETERS),
         name="edition_export",
     ),
-    path("board/<slug:split>/feed.atom", cacheable(badge_and_feed_views.feed), name="feed"),
-    path("feed.atom", cacheable(badge_and_feed_views.feed), name="feed_of_all"),
+    path("board/<slug:split>/feed.atom", cacheable(shared_views.feed), name="feed"),
+    path("feed.atom", cacheable(shared_views.feed), name="feed_of_all"),
     path(
         "methods/<uuid:method_id>/badge.svg",
-        cacheable(badge_and_feed_views.badge, badge_and_feed_views.PARAMETERS),
+        cacheable(shared_views.badge, shared_views.PARAMETERS),
         name="badge",
     ),
-    path("methods/<uuid:method_id>/card.png", takes(card_views.method_card), name="method_card"),
+    path("methods/<uuid:method_id>/card.png", takes(shared_views.method_card), name="method_card"),
     path("robots.txt", crawler_views.robots, name="robots"),
     path("sitemap.xml", cacheable(crawler_views.sitemap), name="sitemap"),
     path("favicon.ico", crawler_views.favicon, name="favicon"),
@@ -84,11 +81,11 @@ urlpatterns = [
     path("submit/template/<slug:split>.json", submission_views.template, name="template"),
     path("submissions/", submission_views.submission_list, name="submissions"),
     path("submissions/<uuid:submission_id>/", submission_views.submission, name="submission"),
-    path("submissions/<uuid:submission_id>/analysis/", analysis_views.analysis, name="analysis"),
+    path("submissions/<uuid:submission_id>/analysis/", submission_views.analysis, name="analysis"),
     path(
         "submissions/<uuid:submission_id>/state/", submission_views.submission_state, name="submission_state"
     ),
-    path("submissions/<uuid:submission_id>/receipt.json", receipt_views.receipt, name="receipt"),
+    path("submissions/<uuid:submission_id>/receipt.json", submission_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", submission_views.withdraw, name="withdraw"),
     path("methods/<uuid:method_id>/", cacheable(method_views.method), name="method"),
     path("compare/", takes(compare_views.compare, compare_views.PARAMETERS), name="compare"),
@@ -109,22 +106,22 @@ urlpatterns = [
     path("account/data/", data_views.data, name="account_data"),
     path("account/data.json", data_views.download, name="account_data_download"),
     path("tokens/", token_views.token_page, name="tokens"),
-    path("mails/", mail_views.mails, name="mails"),
+    path("mails/", data_views.mails, name="mails"),
     path("tokens/revoke/", token_views.revoke, name="revoke_token"),
     path("docs/", docs_views.docs, name="docs"),
     path("docs/api/", docs_views.api_page, name="api_reference"),
     path("docs/api/<slug:operation_id>/", docs_views.api_operation, name="api_operation"),
     path("docs/search/", takes(docs_views.find, docs_views.SEARCH_PARAMETERS), name="docs_search"),
     path("docs/<path:guide_name>/", docs_views.guide, name="guide"),
-    path("published/", cacheable(paper_views.published_page), name="published"),
+    path("published/", cacheable(paper_charts.published_page), name="published"),
     path(
         "published/<slug:table_name>.<slug:suffix>",
-        cacheable(paper_views.published_table),
+        cacheable(paper_charts.published_table),
         name="published_table",
     ),
-    path("dist/", wheel_views.dist, name="dist"),
-    path("dist/<str:wheel_name>", wheel_views.dist_file, name="dist_file"),
-    path("<page:page_name>/", page_views.site_page, name="site_page"),
+    path("dist/", docs_views.dist, name="dist"),
+    path("dist/<str:wheel_name>", docs_views.dist_file, name="dist_file"),
+    path("<page:page_name>/", docs_views.site_page, name="site_page"),
     path("maintain/", maintainer_views.hub, name="maintain"),
     path("maintain/pages/", edited_page_views.site_pages, name="maintain_pages"),
     path("maintain/pages/<page:page_name>/", edited_page_views.site_page, name="maintain_page"),
@@ -153,7 +150,7 @@ urlpatterns = [
     path("maintain/splits/", split_views.splits, name="maintain_splits"),
     path("maintain/announcement/", split_views.announcement, name="maintain_announcement"),
     path("maintain/splits/add/", split_views.add, name="maintain_split_add"),
-    path("maintain/splits/<slug:split>/mail/", announcement_views.mail, name="maintain_mail"),
+    path("maintain/splits/<slug:split>/mail/", split_views.mail, name="maintain_mail"),
     path("maintain/splits/<slug:split>/", split_views.change, name="maintain_split"),
     path("maintain/<slug:split>/open/", maintainer_views.open_edition, name="maintain_open"),
     path("maintain/<slug:split>/editions/<int:number>/", include(MAINTAINED_EDITION)),

@@ -24,7 +24,7 @@ from leaderboard.models import Evaluation, SweepBeat
 from leaderboard.ops import health, rate_limits
 from leaderboard.scoring import analyses, lifecycle, worker
 from leaderboard.storage import truth_values
-from leaderboard.workers import backlog, pictures, upkeep
+from leaderboard.workers import backlog, upkeep
 
 log = structlog.get_logger(__name__)
 
@@ -67,7 +67,7 @@ def clean_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
 def draw_cards_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
     """Draw the cards that are missing, unless somebody has begun to within `SWEEP_S`."""
     if _begun("cards_begun_at", every_s=settings.SWEEP_S):
-        pictures.draw(now=clock.database_now(), is_stopping=stopping.is_set)
+        upkeep.draw(now=clock.database_now(), is_stopping=stopping.is_set)
 
 
 def send_mails_if_due(*, rng: random.Random, stopping: threading.Event) -> None:

@@ -15,7 +15,7 @@ UNITS = sorted((DEPLOY / "systemd").glob("*.service"))
 
 def figures() -> set[str]:
     """The names of all figures, as their sources have them."""
-    sources = [REPOSITORY / "leaderboard/ops" / name for name in ("prometheus.py", "http_figures.py")]
+    sources = [REPOSITORY / "leaderboard/ops/prometheus.py"]
     text = "".join(path.read_text() for path in sources)
     # The names that are put together from parts.
     made = {"tsttc_run_seconds", "tsttc_turnaround_seconds"}

@@ -62,7 +62,7 @@ def test_a_gap_without_boxes_has_no_scores(rendered: Path, truth: GroundTruth, t
 def test_a_truth_of_other_sequences_is_rejected(rendered: Path, truth: GroundTruth, tmp_path: Path) -> None:
     other = tmp_path / "truth.csv"
     other.write_text("\n".join((rendered / "truth.csv").read_text().splitlines()[:-1]) + "\n")
-    with pytest.raises(Rejected, match="1 sequences are only in the ground truth or only in the folder"):
+    with pytest.raises(Rejected, match="1 sequence is only in the ground truth or only in the folder"):
         scores_of_settings(get_ablation("bins"), folder=read_folder(rendered), truth=read_truth(other))
 
 

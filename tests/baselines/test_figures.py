@@ -10,9 +10,10 @@ import pytest
 from baselines.clips import Clip
 from baselines.drawing import PNG_SCALE, THEMES, Dot, Figure, Line, Picture, Text, outline
 from baselines.estimates import Unusable
-from baselines.figures import search_figure, task_figure
+from baselines.figures import search_figure
 from baselines.pixel_mse import PixelMse
 from docs._figures import figures
+from docs._task_figure import task_figure
 from tests.baselines.warped_frames import planted
 
 SVG = "{http://www.w3.org/2000/svg}"

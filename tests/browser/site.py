@@ -1,21 +1,24 @@
 """The leaderboard as `make demo` runs it, small: SQLite, one web process, one worker."""
 
 import os
+import signal
+import sqlite3
 import sys
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 import httpx
 import numpy as np
 
 import evaluator
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from tests import services
-from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, free_port, running
+from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, end, free_port, running, start
 from tests.prepared import put_sqlite, static_files
 
 PASSWORD = "kestrel-altimeter-9"
+DATABASE = "leaderboard.sqlite3"
 # Parts of pages, for a page that is open.
 PARTS = ("/state/", "/progress/")
 WEB = (sys.executable, "-m", "waitress")
@@ -39,15 +42,17 @@ def environment(directory: Path, *, url: str, **settings: str) -> dict[str, str]
 
 @contextmanager
 def web_alone(directory: Path, **settings: str) -> Iterator[Site]:
-    """A migrated site with its web process; nothing is scored until `worker` runs."""
+    """A migrated site with its web process; nothing is scored until `worker` works."""
     url = f"http://127.0.0.1:{free_port()}"
     site = Site(url=url, directory=directory, environment=environment(directory, url=url, **settings))
-    put_sqlite(directory / "leaderboard.sqlite3")
+    put_sqlite(directory / DATABASE)
     listen = f"--listen={url.removeprefix('http://')}"
     with running(site, "web", *WEB, listen, "leaderboard.wsgi:application") as web:
         await_that(lambda: web.poll() is not None or _answers(url), what="the web server answers")
         assert web.poll() is None, (directory / "web.log").read_text()
-        yield site
+        with ExitStack() as ends:
+            ends.callback(_end_worker, site)
+            yield site
 
 
 def _answers(url: str) -> bool:
@@ -70,10 +75,27 @@ def site_to_look_at(directory: Path, **settings: str) -> Iterator[Site]:
 
 @contextmanager
 def worker(site: Site) -> Iterator[None]:
-    """A worker of the site, which scores what is queued and what comes."""
-    with ExitStack() as processes:
-        processes.enter_context(running(site, "worker", *WORKER))
+    """The site's worker scores what is queued and what comes; afterwards it stands still, as if it were not.
+
+    To start one takes seconds.
+    """
+    if "worker" in site.processes:
+        os.killpg(site.processes["worker"].pid, signal.SIGCONT)
+    else:
+        start(site, "worker", *WORKER)
+    try:
         yield
+    finally:
+        # Whoever writes has the lock of the database, so a worker that is stopped meanwhile has it not.
+        with closing(sqlite3.connect(site.directory / DATABASE, timeout=PATIENCE_S)) as database:
+            database.execute("BEGIN IMMEDIATE")
+            os.killpg(site.processes["worker"].pid, signal.SIGSTOP)
+
+
+def _end_worker(site: Site) -> None:
+    if "worker" in site.processes:
+        os.killpg(site.processes["worker"].pid, signal.SIGCONT)
+        end(site.processes["worker"])
 
 
 def open_split(site: Site, split: str) -> evaluator.GroundTruth:

@@ -18,7 +18,7 @@ from evaluator.predictions.plausibility import warnings_of
 from evaluator.predictions.predictions import read_sent
 from tests.browser.chromium import NARROW, tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
-from tests.browser.site import predictions, worker
+from tests.browser.site import DATABASE, predictions, worker
 from tests.evaluator import faulty_files
 from tests.evaluator.toolkit_folders import driving_folder
 from tests.evaluator.worlds import flat
@@ -307,7 +307,7 @@ def test_nothing_is_announced_while_nothing_moves(
     submit(page, predictions(truth, factor=1.3), method="Quiet")
     expect(page.locator("[aria-current=step] .note")).to_contain_text("next in line")
     # It waits for a day already: the open page says by itself that it takes longer than usual, once.
-    with closing(sqlite3.connect(site.directory / "leaderboard.sqlite3", timeout=60)) as database, database:
+    with closing(sqlite3.connect(site.directory / DATABASE, timeout=60)) as database, database:
         database.execute("UPDATE leaderboard_evaluation SET queued_at = datetime(queued_at, '-1 day')")
     expect(page.locator("[aria-current=step] .note")).to_contain_text("longer than usual")
     page.evaluate(

@@ -16,7 +16,7 @@ from django.utils import timezone
 
 import evaluator
 from leaderboard import versions
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from leaderboard.editions import ground_truth
 from leaderboard.models import BoxSource, Edition, Evaluation, Method, Split, Submission, User, Visibility
 from leaderboard.scoring import comparisons

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import psycopg
 
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from tests.chaos.faults import Faults
 from tests.chaos.site import SPLIT, Site, running_site
 from tests.chaos.uploads import Clients, make_uploads

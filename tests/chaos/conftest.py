@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import evaluator
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from tests.chaos.services import postgres_folder, redis_program
 from tests.chaos.site import Site, running_site
 from tests.services import ServiceMissing, skip_or_fail

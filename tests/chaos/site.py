@@ -2,7 +2,7 @@
 
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
@@ -32,7 +32,7 @@ SPLIT = "test"
 class Site:
     """Web, workers, PostgreSQL and Redis of one run."""
 
-    def __init__(self, directory: Path, *, n_workers: int, changes: Mapping[str, str]) -> None:
+    def __init__(self, directory: Path, *, n_workers: int, memory_bytes: int) -> None:
         self.directory = directory
         self.postgres = Postgres(directory)
         self.redis = Redis(directory)
@@ -40,7 +40,8 @@ class Site:
         self.environment = settings_for(
             directory, url=self.url, postgres_url=self.postgres.url, redis_url=self.redis.url
         )
-        self.environment |= {**PACE, "TSTTC_STATIC_ROOT": str(static_files()), **changes}
+        self.environment |= {**PACE, "TSTTC_STATIC_ROOT": str(static_files())}
+        self.environment["TSTTC_CHILD_MEMORY_BYTES"] = str(memory_bytes)
         gunicorn = [
             str(BIN / "gunicorn"),
             "--config",
@@ -86,17 +87,10 @@ class Site:
 
 
 @contextmanager
-def running_site(
-    directory: Path,
-    *,
-    truth: evaluator.GroundTruth,
-    n_workers: int,
-    changes: Mapping[str, str] | None = None,
-) -> Iterator[Site]:
+def running_site(directory: Path, *, truth: evaluator.GroundTruth, n_workers: int) -> Iterator[Site]:
     """A site whose split `test` is open; everything that was started ends with the context."""
     memory_bytes = reader_memory_bytes(truth, directory=directory)
-    limits = {"TSTTC_CHILD_MEMORY_BYTES": str(memory_bytes)}
-    site = Site(directory, n_workers=n_workers, changes=limits | dict(changes or {}))
+    site = Site(directory, n_workers=n_workers, memory_bytes=memory_bytes)
     with ExitStack() as ends:
         ends.callback(site.postgres.end)
         ends.callback(site.redis.server.ask_to_end)

@@ -219,9 +219,10 @@ def limited(folder: Path) -> list[str]:
 
 @contextmanager
 def another_web(site: Site, *, prefix: list[str], **environment: str) -> Iterator[str]:
-    """The address of a second web server of the site, with other directories."""
+    """The address of a second web server of the site, of one process, with other directories."""
     url = f"http://127.0.0.1:{free_port()}"
-    changed = site.environment | environment | {"TSTTC_WEB_BIND": url.removeprefix("http://")}
+    bind = {"TSTTC_WEB_BIND": url.removeprefix("http://"), "WEB_CONCURRENCY": "1"}
+    changed = site.environment | environment | bind
     command = [*prefix, str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py"]
     web = Process(
         f"web-{url[-5:]}",

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from evaluator import INTERVALS, Predictions, evaluate, read_predictions, read_truth
-from evaluator.cli import main
+from evaluator.cli import own_commands
 from evaluator.cli.exits import Exit
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
 
@@ -123,8 +123,8 @@ def test_snippet_of_the_page_is_part_of_a_program_that_runs(snippet: str) -> Non
 
 def test_page_names_commands_options_and_exit_codes_that_there_are() -> None:
     shown = re.findall(r"`tsttc ([a-z]+)|^tsttc ([a-z]+)", PAGE, re.MULTILINE)
-    assert {first or second for first, second in shown} <= set(main.commands)
-    known = {flag for command in main.commands.values() for option in command.params for flag in option.opts}
+    assert {first or second for first, second in shown} <= set(own_commands())
+    known = {flag for command in own_commands().values() for option in command.params for flag in option.opts}
     assert set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", PAGE)) - {"--fail-with-body"} <= known
     codes = {int(code) for code in re.findall(r"[Cc]ode (\d)", PAGE)}
     assert codes <= {code.value for code in Exit}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import evaluator
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from tests.journeys.people import Program, Visitor
 from tests.journeys.production import Site, production_site
 from tests.prepared import postgres_url

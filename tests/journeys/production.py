@@ -1,6 +1,7 @@
 """The leaderboard as it runs in production, started by a test: web and worker as processes of their own."""
 
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -93,12 +94,20 @@ def settings_for(directory: Path, *, url: str, postgres_url: str, redis_url: str
     }
 
 
-@contextmanager
-def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[bytes]]:
-    """A process of the site; asked to finish at the end, and made to if it does not."""
+def guard() -> list[str]:
+    """A prefix to a command: the kernel ends it with this run, however that ends, where it can.
+
+    It must be started from a thread that lives as long as the run.
+    """
+    setpriv = shutil.which("setpriv")
+    return [setpriv, "--pdeathsig=KILL", "--"] if setpriv else []
+
+
+def start(site: Site, name: str, *command: str) -> subprocess.Popen[bytes]:
+    """A process of the site, in a session of its own."""
     with (site.directory / f"{name}.log").open("wb") as log, default_signals():
-        process = subprocess.Popen(
-            command,
+        site.processes[name] = subprocess.Popen(
+            [*guard(), *command],
             cwd=REPOSITORY,
             env=site.environment,
             stdout=log,
@@ -106,16 +115,27 @@ def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[b
             stdin=subprocess.DEVNULL,
             start_new_session=True,
         )
-    site.processes[name] = process
+    return site.processes[name]
+
+
+def end(process: subprocess.Popen[bytes]) -> None:
+    """Ask it to finish, and make it if it does not."""
+    process.terminate()
+    with suppress(subprocess.TimeoutExpired):
+        process.wait(timeout=PATIENCE_S)
+    if process.poll() is None:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.wait()
+
+
+@contextmanager
+def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[bytes]]:
+    """A process of the site while the context lasts."""
+    process = start(site, name, *command)
     try:
         yield process
     finally:
-        process.terminate()
-        with suppress(subprocess.TimeoutExpired):
-            process.wait(timeout=PATIENCE_S)
-        if process.poll() is None:
-            os.killpg(process.pid, signal.SIGKILL)
-            process.wait()
+        end(process)
 
 
 @contextmanager
@@ -137,7 +157,7 @@ def _answers(site: Site, name: str) -> bool:
 
 @contextmanager
 def production_site(
-    directory: Path, *, postgres_url: str, redis_url: str, truth: Path, split: str, protocol: str = "tsttc-1"
+    directory: Path, *, postgres_url: str, redis_url: str, truth: Path, split: str
 ) -> Iterator[Site]:
     """On a database with all tables: import the ground truth, start web and worker, and end them."""
     url = f"http://127.0.0.1:{free_port()}"
@@ -145,7 +165,7 @@ def production_site(
     environment |= {"TSTTC_STATIC_ROOT": str(static_files())}
     site = Site(url=url, directory=directory, environment=environment)
     (directory / "mail").mkdir()
-    site.manage("import_truth", split, str(truth), "--protocol", protocol)
+    site.manage("import_truth", split, str(truth))
     celery = str(BIN / "celery")
     worker = ("worker", "--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info")
     with ExitStack() as processes:

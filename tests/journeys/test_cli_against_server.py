@@ -123,29 +123,22 @@ def test_manifest_of_the_server_checks_files_like_the_local_one(
         assert client.manifest("val") == (EXAMPLES / "manifest.csv").read_bytes()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "code", "words"),
-    [
-        (
-            ["submit", "predictions.json", "--split", "trial", "--method", "Foo"],
-            2,
-            "There is no split 'trial'",
-        ),
-        (["submit", "predictions.json", "--split", "test", "--method", "Foo"], 8, "are not open yet"),
-        (["submit", "predictions.json", "--split", "val", "--method", " "], 2, "method"),
-        (["submit", "predictions.json", "--split", "val", "--method", "F", "--code-url", "x"], 2, "code_url"),
+def test_refusal_of_the_server_is_told_by_whose_fault_it_is(tsttc: Tsttc) -> None:
+    send = ["submit", "predictions.json", "--split"]
+    nothing = "There is nothing at this address"
+    for arguments, code, words in (
+        ([*send, "trial", "--method", "Foo"], 2, "There is no split 'trial'"),
+        ([*send, "test", "--method", "Foo"], 8, "are not open yet"),
+        ([*send, "val", "--method", " "], 2, "method"),
+        ([*send, "val", "--method", "F", "--code-url", "x"], 2, "code_url"),
         (["board", "val", "--sort", "x"], 2, "cannot be sorted by 'x'"),
-        (["board", "trial"], 8, "There is nothing at this address"),
-        (["status", "00000000-0000-4000-8000-000000000000"], 8, "There is nothing at this address"),
-    ],
-)
-def test_refusal_of_the_server_is_told_by_whose_fault_it_is(
-    tsttc: Tsttc, arguments: list[str], code: int, words: str
-) -> None:
-    done = tsttc(*arguments)
-    assert done.returncode == code, done.stderr
-    assert words in done.stderr
-    assert "Traceback" not in done.stderr
+        (["board", "trial"], 8, nothing),
+        (["status", "00000000-0000-4000-8000-000000000000"], 8, nothing),
+    ):
+        done = tsttc(*arguments)
+        assert done.returncode == code, done.stderr
+        assert words in done.stderr
+        assert "Traceback" not in done.stderr
 
 
 def test_token_that_the_server_does_not_know_is_told(

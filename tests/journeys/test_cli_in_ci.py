@@ -141,7 +141,7 @@ def test_what_is_one_s_own_is_listed_taken_back_and_withdrawn(job: Job) -> None:
     checked = json.loads(tsttc("check", mine, "--manifest", manifest, "--json").stdout)
     assert checked["predictions_digest"] == submission["digest"]
     folder = write_folder(job.home / "folder", {"a.pkl": [camera({7: list(range(6))})]})
-    assert tsttc("truth", folder, "-o", table).stdout == f"{table}: 1 sequences of 1 recordings.\n"
+    assert tsttc("truth", folder, "-o", table).stdout == f"{table}: 1 sequence of 1 recording.\n"
     nowhere = tsttc("manifest", "--split", "tset")
     assert (nowhere.returncode, "The splits here are " in nowhere.stderr) == (8, True)
 

@@ -1,18 +1,23 @@
 """What the project exists for, on the real thing: a prediction file in, a ranked board out.
 
 Real processes (gunicorn, a Celery worker), a real PostgreSQL and a real Redis; the people use forms
-and the programs use tokens.
+and the programs use tokens. Meanwhile an operator sees probes, figures, and logs that follow a submission.
 """
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import pytest
 
 import evaluator
-from tests.journeys.people import Program, Visitor
-from tests.journeys.production import REPOSITORY, Site, free_port
+from tests.journeys.people import PASSWORD, Program, Visitor
+from tests.journeys.production import REPOSITORY, Site, await_that, free_port, get
+from tests.prepared import migrated_database
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -94,3 +99,113 @@ def test_the_check_that_containers_use_finds_the_web_process_alive(site: Site) -
     elsewhere = site.environment | {"TSTTC_WEB_BIND": f"127.0.0.1:{free_port()}"}
     dead = subprocess.run(command, cwd=REPOSITORY, env=elsewhere, capture_output=True, check=False)
     assert dead.returncode == 1
+
+
+# --- what an operator sees ---------------------------------------------------------------------------------
+
+
+def lines(site: Site, name: str) -> list[dict[str, Any]]:
+    """A process's log as far as it is written.
+
+    A line that is no JSON fails the test, but for Celery's greeting at a terminal.
+    """
+    text = (site.directory / f"{name}.log").read_text().rpartition("\n")[0].splitlines()
+    return [json.loads(line) for line in text if name == "web" or line.startswith("{")]
+
+
+def said(site: Site, name: str, event: str, submission: str) -> dict[str, Any]:
+    """The one line in which a process says that of a submission, which it may do after it was seen."""
+    found: list[dict[str, Any]] = []
+
+    def is_written() -> bool:
+        found[:] = [line for line in lines(site, name) if line.get("submission_id") == submission]
+        found[:] = [line for line in found if line["event"] == event]
+        return bool(found)
+
+    await_that(is_written, what=f"{name} says {event}")
+    [line] = found
+    return line
+
+
+def is_ready(site: Site) -> bool:
+    return get(f"{site.url}/healthy").status_code == 200
+
+
+def figure(site: Site, name: str) -> float:
+    """One figure of /metrics, read from loopback as a Prometheus on the same machine would."""
+    answer = get(f"{site.url}/metrics")
+    assert answer.status_code == 200
+    return next(float(line.split()[-1]) for line in answer.text.splitlines() if line.startswith(f"{name} "))
+
+
+def test_a_submission_can_be_followed_through_every_process_and_nothing_secret_is_written(
+    site: Site, people: People, programs: Programs, truth: evaluator.GroundTruth
+) -> None:
+    eve = people(site)
+    eve.sign_up(email="eve@example.org", name="Eve and company")
+    eve.get("/accounts/password/reset/key/4-c2hhcmVk-secret/")
+    eve.get("/board/test/?sort=-mid&looking=for-something")
+    data = predictions(truth, factor=1.07)
+    program = programs(site, "eve@example.org")
+    submission = program.submit(split="test", method="Followed", data=data)
+    assert program.outcome(submission)["state"] == "SCORED"
+
+    queued = said(site, "web", "evaluation_queued", submission)
+    finished = said(site, "worker", "evaluation_finished", submission)
+    assert finished["evaluation_id"] == queued["evaluation_id"]
+    assert finished["status"] == "SCORED"
+    if "task_id" in finished:  # found by the message, and not by the worker's own look
+        assert finished["request_id"] == queued["request_id"]
+
+    text = "".join(path.read_text() for path in site.directory.glob("*.log"))
+    token = str(program.http.headers["Authorization"]).removeprefix("Bearer ")
+    secrets = [token, token[-40:], PASSWORD, "@example.org", "c2hhcmVk-secret", "for-something"]
+    assert [secret for secret in secrets if secret in text] == []
+    true_values = [repr(value)[:10] for value in truth.ttc_s.tolist() if len(repr(value)) > 12]
+    assert [value for value in true_values if value in text] == []
+
+
+def test_a_working_site_says_so(site: Site) -> None:
+    assert get(f"{site.url}/healthz").json() == {"status": "alive"}
+    # The first sweep comes some seconds after the workers.
+    await_that(lambda: is_ready(site), what="the site is ready")
+    assert 0 <= figure(site, "tsttc_last_sweep_age_seconds") < 60
+
+
+def test_figures_follow_what_is_scored(
+    site: Site, people: People, programs: Programs, truth: evaluator.GroundTruth
+) -> None:
+    people(site).sign_up(email="finn@example.org", name="Finn")
+    program = programs(site, "finn@example.org")
+    scored = 'tsttc_runs_finished_total{outcome="scored"}'
+    before = figure(site, scored)
+    data = predictions(truth, factor=1.11)
+    assert program.outcome(program.submit(split="test", method="Counted", data=data))["state"] == "SCORED"
+    assert figure(site, scored) == before + 1
+    assert figure(site, 'tsttc_queue_depth{priority="live"}') == 0
+    assert figure(site, 'tsttc_evaluations{status="SYSTEM_ERROR"}') == 0
+
+
+def test_a_backup_of_the_running_site_comes_back_byte_for_byte_in_a_fresh_place(
+    site: Site, tmp_path: Path
+) -> None:
+    folder = tmp_path / "backup"
+    assert " 1 board;" in site.manage("backup", str(folder))
+    kept = json.loads((folder / "backup.json").read_text())
+    files = site.directory / "files"
+    sent = {path.relative_to(files).as_posix() for path in files.glob("predictions/**/*.json")}
+    assert sent
+    assert {name for name in kept["files"] if name.startswith("predictions/")} == sent
+    assert kept["missing"] == []
+    with migrated_database() as url:
+        place = {"TSTTC_DATABASE_URL": url, "TSTTC_DATA_DIR": str(tmp_path / "new")}
+        said = replace(site, environment=site.environment | place).manage("restore", str(folder))
+    # It holds every file, the audit trail and each published board against the backup, and fails otherwise.
+    assert "1 board is the same byte for byte" in said
+    assert "cannot be checked here" not in said
+
+
+def test_a_stranger_reads_no_figures_through_a_proxy(site: Site) -> None:
+    for header in ("X-Forwarded-For", "Forwarded", "X-Real-IP", "X-Forwarded-Proto"):
+        answer = get(f"{site.url}/metrics", **{header: "127.0.0.1"})
+        assert answer.status_code == 403

@@ -7,6 +7,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import LiteralString
 
 import numpy as np
 import psycopg
@@ -20,7 +21,8 @@ from tests.services import ServiceMissing, skip_or_fail, throwaway_redis
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
 N_SUBMISSIONS = 120
-TABLES = ("leaderboard_groundtruth", "leaderboard_edition", "leaderboard_evaluation")  # as they are written
+# As they are written, and how many ground truths are there when the row is not.
+TABLES = {"leaderboard_groundtruth": 1, "leaderboard_edition": 2, "leaderboard_evaluation": 2}
 COUNTS = """
 SELECT (SELECT count(*) FROM leaderboard_edition), (SELECT count(*) FROM leaderboard_groundtruth),
        count(*), count(DISTINCT submission_id), count(*) FILTER (WHERE status = 'QUEUED')
@@ -55,23 +57,25 @@ def locked(postgres_url: str, table: str) -> Iterator[None]:
         connection.rollback()
 
 
-@pytest.mark.parametrize(
-    "table", ["leaderboard_groundtruth", "leaderboard_edition", "leaderboard_evaluation"]
-)
 def test_opening_an_edition_is_killed_between_its_rows_and_goes_on_when_it_is_run_again(
-    site: Site, truth: evaluator.GroundTruth, table: str
+    site: Site, truth: evaluator.GroundTruth
 ) -> None:
-    """The row that it waits to write is the one that it never writes."""
-    postgres_url = site.environment["TSTTC_DATABASE_URL"]
+    """The row that it waits to write is the one that it never writes; each run goes on from the last one."""
     path = site.directory / "corrected.csv"
     corrected = truth.to_table()
     corrected.ttc_s = np.where(truth.manifest.recording_index == 0, truth.ttc_s * 1.1, truth.ttc_s).tolist()
     path.write_bytes(evaluator.GroundTruth.from_table(corrected).to_csv())
+    command = ("open_edition", "test", "--truth", str(path))
+    for table, n_truths in TABLES.items():
+        killed_before_it_writes(site, table, command)
+        assert counts(site) == (1, n_truths, 0, 0, 0), table
+    for _ in range(2):
+        site.manage(*command)
+        assert counts(site) == (2, 2, N_SUBMISSIONS, N_SUBMISSIONS, N_SUBMISSIONS)
 
-    def counts() -> tuple[int, ...]:
-        with psycopg.connect(postgres_url) as connection:
-            [row] = connection.execute(COUNTS).fetchall()
-            return tuple(map(int, row))
+
+def killed_before_it_writes(site: Site, table: str, command: tuple[str, ...]) -> None:
+    """Run a management command up to its first row of that table."""
 
     def waits_for_the_lock() -> bool:
         # Tables have the same number in every copy of one database, and other tests lock theirs meanwhile.
@@ -79,20 +83,11 @@ def test_opening_an_edition_is_killed_between_its_rows_and_goes_on_when_it_is_ru
             "SELECT count(*) FROM pg_locks JOIN pg_database ON pg_database.oid = pg_locks.database "
             "WHERE NOT granted AND datname = current_database() AND relation = %s::regclass"
         )
-        with psycopg.connect(postgres_url) as connection:
-            [[n]] = connection.execute(question, [table]).fetchall()
-            return bool(n)
+        return ask(site, question, table) > 0
 
-    def is_gone() -> bool:
-        question = "SELECT count(*) FROM pg_stat_activity WHERE datname = current_database()"
-        with psycopg.connect(postgres_url) as connection:
-            [[n]] = connection.execute(question).fetchall()
-            return int(n) == 1
-
-    with locked(postgres_url, table):
-        command = [sys.executable, "manage.py", "open_edition", "test", "--truth", str(path)]
+    with locked(site.environment["TSTTC_DATABASE_URL"], table):
         opening = subprocess.Popen(
-            command,
+            [sys.executable, "manage.py", *command],
             cwd=REPOSITORY,
             env=site.environment,
             stdout=subprocess.DEVNULL,
@@ -101,12 +96,18 @@ def test_opening_an_edition_is_killed_between_its_rows_and_goes_on_when_it_is_ru
         await_that(waits_for_the_lock, what=f"the command is about to write to {table}")
         os.kill(opening.pid, signal.SIGKILL)
         opening.wait()
-    await_that(is_gone, what="the database has noticed")
+    others = "SELECT count(*) - 1 FROM pg_stat_activity WHERE datname = current_database()"
+    await_that(lambda: ask(site, others) == 0, what="the database has noticed")
 
-    n_truths = 1 if table == "leaderboard_groundtruth" else 2
-    assert counts() == (1, n_truths, 0, 0, 0)
-    site.manage("open_edition", "test", "--truth", str(path))
-    complete = (2, 2, N_SUBMISSIONS, N_SUBMISSIONS, N_SUBMISSIONS)
-    assert counts() == complete
-    site.manage("open_edition", "test", "--truth", str(path))
-    assert counts() == complete
+
+def counts(site: Site) -> tuple[int, ...]:
+    with psycopg.connect(site.environment["TSTTC_DATABASE_URL"]) as connection:
+        [row] = connection.execute(COUNTS).fetchall()
+        return tuple(map(int, row))
+
+
+def ask(site: Site, question: LiteralString, *parameters: str) -> int:
+    """A number from the database."""
+    with psycopg.connect(site.environment["TSTTC_DATABASE_URL"]) as connection:
+        [[n]] = connection.execute(question, parameters).fetchall()
+        return int(n)

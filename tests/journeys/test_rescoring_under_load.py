@@ -22,7 +22,7 @@ import numpy as np
 import pytest
 
 import evaluator
-from leaderboard.demo.truth import simulate
+from leaderboard.demo.runs import simulate
 from tests import crowd
 from tests.chaos.services import postgres_folder, redis_program
 from tests.chaos.site import SPLIT, Site, running_site

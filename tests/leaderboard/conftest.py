@@ -1,22 +1,53 @@
 """The cast: an owner, a teammate, and a stranger who must see nothing."""
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from django.test import Client
 
+from leaderboard.benchmark import splits
 from leaderboard.models import Edition, Membership, Split, Submission, Team, User
 from leaderboard.people import teams
 from leaderboard.scoring.lifecycle import Lease
-from tests import builders
+from tests import builders, kept
 from tests.editions import FACTORS, corrected, open_edition
 from tests.leaderboard.web.maintain import queue_rows
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_fixture_setup(fixturedef: pytest.FixtureDef[Any], request: pytest.FixtureRequest) -> None:
+    """Hold the world that the test begins with, before pytest-django makes a savepoint for the test."""
+    if fixturedef.argname == "_django_db_helper":
+        kept.prepare(request.node, blocker=request.getfixturevalue("django_db_blocker"))
+
+
+def make_edition(folder: Path) -> Edition:
+    splits.ensure_splits()
+    return builders.import_truth(folder)
+
+
+def make_owner() -> User:
+    return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
+
+
+def _make_four(edition: Edition, owner: User) -> list[Submission]:
+    made = [
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
+        for factor in FACTORS
+    ]
+    builders.score_all()
+    return made
+
+
+kept.MAKERS["edition"] = make_edition
+kept.MAKERS["entries"] = lambda folder: _make_four(make_edition(folder), make_owner())
 
 
 @pytest.fixture
 def owner(db: None) -> User:
     """Somebody who submits."""
-    return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
+    return User.objects.get(email="owner@example.org") if kept.has_people() else make_owner()
 
 
 @pytest.fixture
@@ -53,9 +84,12 @@ def signed_in(client: Client, owner: User) -> Client:
 
 
 @pytest.fixture
-def edition(benchmark: None, tmp_path: Path) -> Edition:
+def edition(db: None, tmp_path: Path) -> Edition:
     """The test split, open, with made-up ground truth."""
-    return builders.import_truth(tmp_path)
+    if kept.is_kept("edition"):
+        kept.copy_files(tmp_path)
+        return Edition.objects.select_related("split", "ground_truth").get()
+    return make_edition(tmp_path)
 
 
 @pytest.fixture
@@ -74,12 +108,9 @@ def open_values(benchmark: None) -> None:
 @pytest.fixture
 def entries(edition: Edition, owner: User) -> list[Submission]:
     """Four scored submissions of four methods."""
-    made = [
-        builders.submit(owner, builders.predictions(edition, factor=factor), method=f"M{factor}")
-        for factor in FACTORS
-    ]
-    builders.score_all()
-    return made
+    if kept.is_kept("entries"):
+        return list(Submission.objects.select_related("method__team", "split").order_by("submitted_at"))
+    return _make_four(edition, owner)
 
 
 @pytest.fixture

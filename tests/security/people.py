@@ -1,6 +1,6 @@
 """The seven roles, each with its way to ask, and the things that they ask for."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import timedelta
 from typing import Any
 from uuid import UUID
@@ -11,6 +11,7 @@ from django.contrib.auth.models import Group
 from django.contrib.sessions.backends.db import SessionStore
 from django.http import HttpResponseBase
 from django.test import Client
+from django.test.client import ClientHandler
 from django.utils import timezone
 from knox.settings import CONSTANTS
 
@@ -35,6 +36,9 @@ class World:
     tokens: dict[str, str]
     invitation: Invitation
     secret: str
+    sessions: dict[str, str]
+    # All clients have one: each of their own would make every middleware anew for every request.
+    handler: ClientHandler = field(default_factory=lambda: ClientHandler(enforce_csrf_checks=False))
 
     @property
     def method(self) -> Method:
@@ -61,20 +65,22 @@ class World:
     def client(self, role: str, *, method: str, as_program: bool = False) -> Client:
         """A new client of that role; people have a session, or as programs a token that may do everything."""
         client = Client(raise_request_exception=False, REMOTE_ADDR=ADDRESS)
+        client.handler = self.handler
         token = self.tokens.get(f"{role} {method}") or self.tokens.get(role)
         if token and (as_program or role not in self.users):
             client.defaults["HTTP_AUTHORIZATION"] = f"Bearer {token}"
         elif role in self.users:
-            client.cookies[settings.SESSION_COOKIE_NAME] = self._session(self.users[role])
+            client.cookies[settings.SESSION_COOKIE_NAME] = self.sessions[role]
         return client
 
-    def _session(self, user: User) -> str:
-        session = SessionStore()
-        session["_auth_user_id"] = str(user.pk)
-        session["_auth_user_backend"] = "django.contrib.auth.backends.ModelBackend"
-        session["_auth_user_hash"] = user.get_session_auth_hash()
-        session.create()
-        return session.session_key or ""
+
+def _session(user: User) -> str:
+    session = SessionStore()
+    session["_auth_user_id"] = str(user.pk)
+    session["_auth_user_backend"] = "django.contrib.auth.backends.ModelBackend"
+    session["_auth_user_hash"] = user.get_session_auth_hash()
+    session.create()
+    return session.session_key or ""
 
 
 def populate(edition: Edition) -> World:
@@ -89,7 +95,6 @@ def populate(edition: Edition) -> World:
     submission = builders.submit(users["owner"], builders.predictions(edition), method="Hidden")
     builders.score_all()
     Method.objects.update(visibility=Visibility.PRIVATE)
-    builders.infer_all()
     _fill_the_administration(users["maintainer"], submission)
     tokens = {role: builders.token(user) for role, user in users.items()}
     # A token without the scope that a method needs: the other one.
@@ -105,6 +110,7 @@ def populate(edition: Edition) -> World:
     invitation, secret = invitations.make(
         team=submission.method.team, actor=users["owner"], now=timezone.now()
     )
+    builders.infer_all()  # which draws the boards as well, once for all that look at them
     return World(
         edition=edition,
         users=users,
@@ -112,6 +118,7 @@ def populate(edition: Edition) -> World:
         tokens=tokens,
         invitation=invitation,
         secret=secret,
+        sessions={role: _session(user) for role, user in users.items()},
     )
 
 

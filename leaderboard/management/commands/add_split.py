@@ -7,8 +7,7 @@ from django.utils import timezone
 
 from leaderboard.benchmark.policy import Policy
 from leaderboard.editions import new_splits
-from leaderboard.management import split_options
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand, add_to, given
 
 
 class Command(RefusingCommand):
@@ -23,11 +22,11 @@ class Command(RefusingCommand):
         truth.add_argument("--hidden", action="store_true", help="its ground truth is hidden")
         truth.add_argument("--open", action="store_true", help="its ground truth is open")
         truth.add_argument("--same-truth-as", default="", metavar="SPLIT", help="it shares that of SPLIT")
-        split_options.add_to(parser)
+        add_to(parser)
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make it, and say what comes next."""
-        policy = Policy(**{"title": "", **split_options.given(options)})
+        policy = Policy(**{"title": "", **given(options)})
         split = new_splits.add_split(
             name=options["name"],
             policy=policy,

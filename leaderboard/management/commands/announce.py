@@ -8,9 +8,9 @@ from typing import Any
 from django.core.management.base import CommandError
 from django.utils import timezone
 
+from evaluator.counting import counted
 from leaderboard.mails import announcements
-from leaderboard.management.refusing import RefusingCommand
-from leaderboard.models import Split
+from leaderboard.management.arguments import RefusingCommand, split_of
 
 
 class Command(RefusingCommand):
@@ -26,14 +26,12 @@ class Command(RefusingCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Queue it, once for each person whatever happens, and say for how many."""
-        split = Split.objects.filter(pk=options["split"]).first()
-        if split is None:
-            raise CommandError(f"There is no split {options['split']!r}.")
+        split = split_of(options)
         try:
             text = sys.stdin.read() if options["file"] == "-" else Path(options["file"]).read_text("utf-8")
         except (OSError, UnicodeDecodeError) as fault:
             raise CommandError(f"{options['file']} cannot be read as text: {fault}") from fault
         announcement = announcements.written(split=split, subject=options["subject"], text=text)
         n_people = announcements.announce(announcement, now=timezone.now(), actor=None)
-        people = "1 person" if n_people == 1 else f"{n_people:,} people"
+        people = counted(n_people, "person", "people")
         self.stdout.write(f"Queued for {people}. The same text again reaches only those who have not got it.")

@@ -7,7 +7,8 @@ from typing import Any, Final
 from django.core.management.base import CommandError
 from django.db.models import Q
 
-from leaderboard.management.refusing import RefusingCommand
+from evaluator.counting import counted
+from leaderboard.management.arguments import RefusingCommand
 from leaderboard.models import Team, User
 from leaderboard.people import teams
 
@@ -46,6 +47,6 @@ def _team(text: str) -> Team:
     if not found:
         raise CommandError(f"No team is called {text!r}.")
     if len(found) > 1:
-        ids = ", ".join(f"{team.pk} ({team.memberships.count()} members)" for team in found)
+        ids = ", ".join(f"{team.pk} ({counted(team.memberships.count(), 'member')})" for team in found)
         raise CommandError(f"{len(found)} teams are called {text!r}; expected one of their ids: {ids}.")
     return found[0]

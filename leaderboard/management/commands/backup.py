@@ -7,6 +7,7 @@ from django.core.management.base import BaseCommand, CommandError
 from django.db import Error as DatabaseProblem
 from django.utils import timezone
 
+from evaluator.counting import counted
 from leaderboard.backups import backup, contents
 
 
@@ -26,8 +27,8 @@ class Command(BaseCommand):
         except (contents.NoBackup, OSError, DatabaseProblem) as fault:
             raise CommandError(f"There is no new backup. {fault}") from fault
         self.stdout.write(
-            f"Backed up: {contents.counted(len(made.files), 'file')}, {len(made.ground_truth)} of ground "
-            f"truth, {contents.counted(len(made.boards), 'board')}; last hash of the audit trail {made.audit}"
+            f"Backed up: {counted(len(made.files), 'file')}, {len(made.ground_truth)} of ground "
+            f"truth, {counted(len(made.boards), 'board')}; last hash of the audit trail {made.audit}"
         )
         if made.missing:
             raise CommandError(

@@ -6,8 +6,7 @@ from typing import Any
 
 from leaderboard.benchmark import policy
 from leaderboard.benchmark.policy import Policy
-from leaderboard.management import split_options
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand, add_to, given
 from leaderboard.models import Split
 
 
@@ -19,11 +18,11 @@ class Command(RefusingCommand):
     def add_arguments(self, parser: ArgumentParser) -> None:
         """NAME, and its policy."""
         parser.add_argument("name", help="name of the split")
-        split_options.add_to(parser)
+        add_to(parser)
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Change it, and say what it was before."""
-        values = split_options.given(options)
+        values = given(options)
         before = Split.objects.filter(pk=options["name"]).first()
         old = policy.policy_of(before) if before else Policy(title="")
         after = policy.change(split_name=options["name"], policy=replace(old, **values), actor=None)

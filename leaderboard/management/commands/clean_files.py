@@ -6,6 +6,7 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 from django.utils import timezone
 
+from evaluator.counting import counted
 from leaderboard.storage import orphans
 from leaderboard.submissions import idempotency
 
@@ -33,7 +34,7 @@ class Command(BaseCommand):
                 path.unlink(missing_ok=True)
         n_keys = idempotency.purge(now=timezone.now()) if options["remove"] else 0
         if n_keys:
-            keys = "1 idempotency key" if n_keys == 1 else f"{n_keys} idempotency keys"
+            keys = counted(n_keys, "idempotency key")
             self.stdout.write(f"{keys} of more than {idempotency.KEPT.days} days ago removed.")
 
     def _files(self, *, remove: bool) -> None:
@@ -41,11 +42,12 @@ class Command(BaseCommand):
         n_found = n_removed = n_bytes = 0
         for orphan in orphans.orphans(now=now):
             self.stdout.write(
-                f"{orphan.name}  {orphan.size_bytes:,} bytes, written {orphan.modified_at:%Y-%m-%d %H:%M} UTC"
+                f"{orphan.name}  {counted(orphan.size_bytes, 'byte')}, "
+                f"written {orphan.modified_at:%Y-%m-%d %H:%M} UTC"
             )
             n_found += 1
             n_bytes += orphan.size_bytes
             n_removed += remove and orphans.remove(orphan, now=now)
-        found = f"{n_found} file{'s' if n_found != 1 else ''} without a submission, {n_bytes:,} bytes"
+        found = f"{counted(n_found, 'file')} without a submission, {counted(n_bytes, 'byte')}"
         done = f"removed {n_removed}" if remove else "nothing was removed (--remove does)"
         self.stdout.write(f"{found}; {done}.")

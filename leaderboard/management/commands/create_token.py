@@ -9,7 +9,8 @@ from django.core.validators import validate_email
 from django.db import transaction
 from django.utils import timezone
 
-from leaderboard.management.refusing import RefusingCommand
+from evaluator.counting import counted
+from leaderboard.management.arguments import RefusingCommand
 from leaderboard.models import Scope, User
 from leaderboard.people import tokens
 
@@ -54,7 +55,9 @@ class Command(RefusingCommand):
                 now=timezone.now(),
             )
         self.stdout.write(secret)
-        self.stderr.write(f"The token is shown only once. It expires after {options['days']} days.")
+        self.stderr.write(
+            f"The token is shown only once. It expires after {counted(options['days'], 'day')}."
+        )
 
     def _account(self, email: str) -> User:
         user = User.objects.filter(email=email).first()

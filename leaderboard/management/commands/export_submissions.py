@@ -6,10 +6,10 @@ from typing import Any
 
 from django.core.management.base import BaseCommand, CommandError
 
-from evaluator.tables.formats import csv_lines
-from evaluator.tables.parquet_tables import parquet_of
+from evaluator.counting import counted
+from evaluator.tables.formats import csv_lines, parquet_of
 from leaderboard.exports import submission_tables
-from leaderboard.models import Split
+from leaderboard.management.arguments import split_of
 from leaderboard.storage import files
 
 
@@ -27,8 +27,8 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Write it, whole or not at all, readable by its owner only."""
         path: Path = options["file"]
-        if options["split"] and not Split.objects.filter(pk=options["split"]).exists():
-            raise CommandError(f"There is no split {options['split']!r}.")
+        if options["split"]:
+            split_of(options)
         if path.suffix not in {".csv", ".parquet"}:
             raise CommandError(f"{path.name} ends in {path.suffix!r}; expected .csv or .parquet.")
         rows = list(submission_tables.rows(split=options["split"], has_addresses=options["addresses"]))
@@ -37,7 +37,7 @@ class Command(BaseCommand):
                 _write(unfinished, rows)
         except OSError as fault:
             raise CommandError(f"{path} cannot be written: {fault.strerror}") from fault
-        self.stdout.write(f"{path}: {len(rows):,} evaluations.")
+        self.stdout.write(f"{path}: {counted(len(rows), 'evaluation')}.")
 
 
 def _write(path: Path, rows: list[dict[str, object]]) -> None:

@@ -8,7 +8,7 @@ from django.core.management.base import CommandError
 from django.utils import timezone
 
 from leaderboard.benchmark import papers, splits
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand
 
 
 class Command(RefusingCommand):

@@ -6,8 +6,9 @@ from typing import Any
 
 from django.utils import timezone
 
+from evaluator.counting import counted
 from leaderboard.editions import ground_truth
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand
 
 
 class Command(RefusingCommand):
@@ -31,6 +32,7 @@ class Command(RefusingCommand):
         )
         truth = edition.ground_truth
         self.stdout.write(
-            f"{edition}: {truth.n_sequences:,} sequences in {truth.n_recordings:,} recordings, "
+            f"{edition}: {counted(truth.n_sequences, 'sequence')} in "
+            f"{counted(truth.n_recordings, 'recording')}, "
             f"ground truth {truth.digest}, protocol {edition.protocol}."
         )

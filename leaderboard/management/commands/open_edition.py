@@ -9,10 +9,11 @@ from typing import Any
 from django.core.management.base import CommandError
 from django.utils import timezone
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import PROTOCOLS
 from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, label_changes
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand
 from leaderboard.models import Edition, Split
 
 
@@ -84,9 +85,9 @@ class Command(RefusingCommand):
         found = label_changes.look(split_name=options["split"], path=options["truth"])
         counts, rows = found.counts, found.recordings
         self.stdout.write(
-            f"Against {found.edition}: {counts.n_added} sequences added, {counts.n_removed} removed, "
-            f"{counts.n_changed} changed; {counts.n_renumbered} with another anno_id; in "
-            f"{len(rows)} recordings. Nothing was kept."
+            f"Against {found.edition}: {counted(counts.n_added, 'sequence')} added, "
+            f"{counts.n_removed} removed, {counts.n_changed} changed; {counts.n_renumbered} with "
+            f"another anno_id; in {counted(len(rows), 'recording')}. Nothing was kept."
         )
         for row in rows[:10]:
             self.stdout.write(
@@ -113,11 +114,11 @@ def counts(change: history.TruthChange | None) -> str:
     """By how much one ground truth differs from another, in words."""
     if change is None:
         return "different ground truth, not compared yet"
-    said = f"{change.n_added} sequences added, {change.n_removed} removed, {change.n_changed} changed"
+    added = counted(change.n_added, "sequence")
+    said = f"{added} added, {change.n_removed} removed, {change.n_changed} changed"
     if change.n_renumbered is None:
         return said
-    have = "sequence has" if change.n_renumbered == 1 else "sequences have"
-    return f"{said}; {change.n_renumbered} {have} another anno_id"
+    return f"{said}; {counted(change.n_renumbered, 'sequence has', 'sequences have')} another anno_id"
 
 
 def line(progress: corrections.RescoringProgress) -> str:

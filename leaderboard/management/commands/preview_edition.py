@@ -4,10 +4,11 @@ import json
 from argparse import ArgumentParser
 from typing import Any
 
+from evaluator.counting import counted
 from evaluator.tables.formats import csv_lines
 from leaderboard.editions import preview
+from leaderboard.management.arguments import RefusingCommand, edition_of
 from leaderboard.management.commands.open_edition import counts, line
-from leaderboard.management.refusing import RefusingCommand, edition_of
 
 
 class Command(RefusingCommand):
@@ -35,8 +36,9 @@ class Command(RefusingCommand):
     def _table(self, found: preview.Preview) -> None:
         self.stdout.write(
             f"{found.edition} against edition {found.replaces}: {counts(found.truth)}; "
-            f"{found.n_changed} entries change, "
-            f"{found.n_moved} change rank, {found.n_newly_rejected} become rejected."
+            f"{counted(found.n_changed, 'entry changes', 'entries change')}, "
+            f"{counted(found.n_moved, 'changes', 'change')} rank, "
+            f"{counted(found.n_newly_rejected, 'becomes', 'become')} rejected."
         )
         self.stdout.write(line(found.progress))
         for change in found.entries:

@@ -3,11 +3,10 @@
 from argparse import ArgumentParser
 from typing import Any
 
-from django.core.management.base import CommandError
 from django.utils import timezone
 
 from leaderboard.editions import corrections
-from leaderboard.management.refusing import RefusingCommand, edition_of
+from leaderboard.management.arguments import RefusingCommand, edition_of, split_of
 from leaderboard.models import Publication, Split
 
 
@@ -48,10 +47,8 @@ class Command(RefusingCommand):
         )
 
     def _roll_back(self, options: dict[str, Any]) -> Publication:
-        if not Split.objects.filter(pk=options["split"]).exists():
-            raise CommandError(f"There is no split {options['split']!r}.")
         return corrections.roll_back(
-            split_name=options["split"],
+            split_name=split_of(options).pk,
             reason=options["reason"],
             now=timezone.now(),
             actor=None,

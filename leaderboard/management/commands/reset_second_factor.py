@@ -1,15 +1,13 @@
 """`manage.py reset_second_factor EMAIL --reason TEXT`."""
 
-from argparse import ArgumentParser
 from typing import Any
 
 from django.conf import settings
-from django.core.management.base import CommandError
 from django.utils import timezone
 
 from leaderboard.mails import outbox
-from leaderboard.management.refusing import RefusingCommand
-from leaderboard.models import MailKind, User
+from leaderboard.management.arguments import AccountCommand, account_of
+from leaderboard.models import MailKind
 from leaderboard.people import second_factor
 
 _TOLD = (
@@ -19,21 +17,14 @@ _TOLD = (
 )
 
 
-class Command(RefusingCommand):
+class Command(AccountCommand):
     """Takes the second factor off an account."""
 
     help = "Remove the second factor of an account whose owner lost it, with its recovery codes."
 
-    def add_arguments(self, parser: ArgumentParser) -> None:
-        """EMAIL, reason."""
-        parser.add_argument("email", help="address of the account")
-        parser.add_argument("--reason", required=True, help="a sentence for the audit log, without names")
-
     def handle(self, *args: Any, **options: Any) -> None:
         """Reset, and tell the person by mail."""
-        user = User.objects.filter(email=options["email"].strip().lower()).first()
-        if user is None:
-            raise CommandError("There is no account with that address; expected the primary address of one.")
+        user = account_of(options)
         event = second_factor.reset(user=user, reason=options["reason"])
         text = _TOLD.format(contact=settings.CONTACT_EMAIL, site=settings.SITE_URL, name=settings.SITE_NAME)
         mail = outbox.tell(

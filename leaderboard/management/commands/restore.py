@@ -6,6 +6,7 @@ from typing import Any
 from django.core.management.base import BaseCommand, CommandError
 from django.db import Error as DatabaseProblem
 
+from evaluator.counting import counted
 from leaderboard.backups import contents
 from leaderboard.backups.restore import restore
 
@@ -28,13 +29,11 @@ class Command(BaseCommand):
         except (contents.NoBackup, OSError, DatabaseProblem) as fault:
             raise CommandError(str(fault)) from fault
         kept = done.contents
-        boards = (
-            f"{contents.counted(done.n_boards, 'board')} {'is' if done.n_boards == 1 else 'are'} the same"
-        )
+        boards = f"{counted(done.n_boards, 'board')} {'is' if done.n_boards == 1 else 'are'} the same"
         boards = f"{boards} byte for byte" if done.n_boards else "no board was compared"
         self.stdout.write(
             f"Restored the backup of {kept.made_at[:16].replace('T', ' ')} UTC. "
-            f"{contents.counted(len(kept.files), 'file')} and {len(kept.ground_truth)} of ground truth have "
+            f"{counted(len(kept.files), 'file')} and {len(kept.ground_truth)} of ground truth have "
             f"their digests, {boards}, and the audit trail is unbroken."
         )
         if kept.boards and not done.n_boards:

@@ -7,7 +7,7 @@ from django.core.management.base import CommandError
 from django.utils import timezone
 
 from leaderboard.demo import seed
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand
 
 
 class Command(RefusingCommand):

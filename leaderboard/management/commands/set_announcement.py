@@ -6,7 +6,7 @@ from typing import Any
 from django.utils import timezone
 
 from leaderboard.benchmark import moments, policy
-from leaderboard.management.refusing import RefusingCommand
+from leaderboard.management.arguments import RefusingCommand
 
 
 class Command(RefusingCommand):

@@ -15,6 +15,8 @@ from allauth.account import forms
 from allauth.account.adapter import DefaultAccountAdapter
 from allauth.core import context as allauth_context
 from allauth.core.internal import ratelimit
+from allauth.mfa.adapter import DefaultMFAAdapter
+from allauth.mfa.models import Authenticator
 from django.conf import settings
 from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import AnonymousUser
@@ -129,3 +131,24 @@ def _is_address(value: object) -> bool:
 def _on_our_site(address: str) -> str:
     parts = urlsplit(address)
     return settings.SITE_URL + urlunsplit(("", "", parts.path, parts.query, parts.fragment))
+
+
+class SecondFactorAdapter(DefaultMFAAdapter):
+    """The names and the words of this site."""
+
+    error_messages = {
+        **DefaultMFAAdapter.error_messages,
+        "cannot_delete_authenticator": "Maintainers of this site must have a second factor.",
+        "cannot_generate_recovery_codes": "Recovery codes need a second factor; set up an app first.",
+        "incorrect_code": "That is not the code of this moment, or it was used already; expected the one "
+        "that the app shows now.",
+        "unverified_email": "Verify all email addresses of the account before you set up a second factor.",
+    }
+
+    def get_totp_issuer(self) -> str:
+        """The name that the app shows: the site's, whatever `Host` a request names."""
+        return str(settings.SITE_NAME)
+
+    def can_delete_authenticator(self, authenticator: Authenticator) -> bool:
+        """Whether somebody may go on without it."""
+        return not (settings.REQUIRE_SECOND_FACTOR and authenticator.user.is_maintainer)

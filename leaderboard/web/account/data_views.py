@@ -1,19 +1,18 @@
-"""A person's own data: what is kept about them, to download, and its deletion."""
+"""A person's own data: what is kept about them, to download, and its deletion; and which mails they get."""
 
-from typing import cast
+from typing import Final, cast
 
 from django import forms
 from django.contrib import messages
 from django.contrib.auth import logout
-from django.contrib.auth.decorators import login_required
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import redirect, render
 from django.utils import timezone
-from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import User
+from leaderboard.http import own_form, own_page
+from leaderboard.mails import notices
+from leaderboard.models import MailKind, User
 from leaderboard.submissions import forgetting
 from leaderboard.web.forms import SiteForm
 
@@ -37,9 +36,7 @@ class DeleteForm(SiteForm):
             )
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def data(request: HttpRequest) -> HttpResponse:
     """What is kept, how to download it, and the form that deletes it."""
     user = cast("User", request.user)
@@ -54,9 +51,7 @@ def data(request: HttpRequest) -> HttpResponse:
     return render(request, "account/data.html", {"form": form}, status=422 if form.errors else 200)
 
 
-@login_required
-@never_cache
-@require_safe
+@own_page
 def download(request: HttpRequest) -> HttpResponse:
     """All of it as JSON."""
     return JsonResponse(
@@ -64,3 +59,25 @@ def download(request: HttpRequest) -> HttpResponse:
         json_dumps_params={"indent": 1, "ensure_ascii": False},
         headers={"Content-Disposition": 'attachment; filename="tsttc-my-data.json"'},
     )
+
+
+_CHOICES: Final = [(kind.value, kind.label) for kind in MailKind if kind is not MailKind.ACCOUNT]
+
+
+class MailsForm(SiteForm):
+    """A tick for each kind of mail that is wanted."""
+
+    wanted = forms.MultipleChoiceField(label="Send me a mail about", choices=_CHOICES, required=False)
+
+
+@own_form
+def mails(request: HttpRequest) -> HttpResponse:
+    """Choose the kinds of mail."""
+    user = cast("User", request.user)
+    wanted = [kind for kind, _ in _CHOICES if kind not in notices.muted_by(user)]
+    form = MailsForm.asked(request, initial={"wanted": wanted})
+    if form.is_valid():
+        notices.choose(user=user, wanted=form.cleaned_data["wanted"])
+        messages.success(request, "Your choice is saved.")
+        return redirect("mails")
+    return render(request, "account/mails.html", {"form": form}, status=422 if form.errors else 200)

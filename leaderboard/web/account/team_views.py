@@ -1,24 +1,99 @@
 """The pages of a team: its name, its members, its invitations."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
 from typing import Any, cast
 from uuid import UUID
 
+from django import forms
 from django.contrib import messages
-from django.contrib.auth.decorators import login_required
 from django.contrib.auth.views import redirect_to_login
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_variables
-from django.views.decorators.http import require_http_methods, require_POST
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Invitation, Team, User
-from leaderboard.people import invitations, teams
+from leaderboard.http import asks_first, own_deed, own_form
+from leaderboard.models import Invitation, Membership, Team, User
+from leaderboard.people import invitations, names, teams
 from leaderboard.web.account import shown_once
-from leaderboard.web.account.team_forms import NameForm, team_page
+from leaderboard.web.forms import SiteForm
+
+
+class SignupNameForm(forms.Form):
+    """The name that signing up asks for, beside address and password."""
+
+    name = forms.CharField(
+        label="Name shown on the board",
+        max_length=80,
+        required=False,
+        help_text="Your own name or your team's. Without one, boards show “Team” and a number. "
+        "Your team and the maintainers see your email address.",
+        widget=forms.TextInput(attrs={"autocomplete": "nickname"}),
+    )
+    field_order = ["email", "name", "password1", "password2"]
+
+    def clean_name(self) -> str:
+        """The name as boards will show it; two teams whose names look alike get a number."""
+        name: str = self.cleaned_data["name"]
+        if not name.strip():
+            return ""
+        try:
+            return names.clean_name("name", name)
+        except Refused as refusal:
+            raise forms.ValidationError(str(refusal)) from None
+
+    def signup(self, request: HttpRequest, user: User) -> None:
+        """Called once the account exists."""
+        user.name = self.cleaned_data["name"]
+        user.save(update_fields=["name"])
+
+
+class NameForm(SiteForm):
+    """The team's name."""
+
+    name = forms.CharField(
+        help_text="Shown on the boards once your team has a public method. Names of teams on the boards "
+        "must not look alike. You can change the name once a day.",
+        widget=forms.TextInput(attrs={"maxlength": 80, "autocomplete": "organization"}),
+        error_messages={"required": "The team has no name; expected one."},
+    )
+
+
+@dataclass(frozen=True)
+class TeamPage:
+    """Everything that the page of a team places."""
+
+    team: Team | None
+    members: tuple[Membership, ...]
+    is_owner: bool
+    is_alone: bool
+    invitations: list[tuple[Invitation, str]]  # each with its state, and without its secret
+
+    @property
+    def would_be_lost(self) -> bool:
+        """Whether methods would be left to nobody if this person left."""
+        return self.is_alone and self.team is not None and self.team.methods.filter(deleted_at=None).exists()
+
+
+def team_page(user: User, *, now: datetime) -> TeamPage:
+    """The person's team, as they see it. Invitations are the owner's to see."""
+    team = teams.current_team_of(user=user)
+    if team is None:
+        return TeamPage(team=None, members=(), is_owner=False, is_alone=True, invitations=[])
+    members = tuple(team.memberships.select_related("user").order_by("-is_owner", "joined_at", "pk"))
+    is_owner = any(member.is_owner and member.user_id == user.pk for member in members)
+    rows = team.invitations.select_related("created_by", "accepted_by") if is_owner else ()
+    return TeamPage(
+        team=team,
+        members=members,
+        is_owner=is_owner,
+        is_alone=len(members) == 1,
+        invitations=[(row, invitations.state_of(row, now=now)) for row in rows],
+    )
 
 
 def _own_team(request: HttpRequest) -> Team:
@@ -50,9 +125,7 @@ def _done(request: HttpRequest, deed: Callable[[], object], *, told: str) -> Htt
     return redirect("team")
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def team(request: HttpRequest) -> HttpResponse:
     """Who is in it and who may come in. A name that is sent founds the team, or renames it."""
     if request.method != "POST":
@@ -78,10 +151,8 @@ def _invited(request: HttpRequest, invitation: Invitation) -> HttpResponse:
     return render(request, "account/invited.html", {"invitation": invitation})
 
 
-@login_required
-@never_cache
+@own_deed
 @sensitive_variables("secret")
-@require_POST
 def invite(request: HttpRequest) -> HttpResponse:
     """Make a link. It is shown on the page of the team that follows, and never again."""
     own, now = _own_team(request), timezone.now()
@@ -92,9 +163,7 @@ def invite(request: HttpRequest) -> HttpResponse:
     return shown_once.redirect_with(invitations.link(secret), request=request, to="team")
 
 
-@login_required
-@never_cache
-@require_POST
+@own_deed
 def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse:
     """End a link that nobody has used."""
     found = get_object_or_404(Invitation, team=_own_team(request), pk=invitation_id)
@@ -106,9 +175,7 @@ def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse
     )
 
 
-@login_required
-@never_cache
-@require_POST
+@own_deed
 def leave(request: HttpRequest) -> HttpResponse:
     """Go out of one's team. Whoever would leave methods to nobody says that they know."""
     _own_team(request)
@@ -119,9 +186,7 @@ def leave(request: HttpRequest) -> HttpResponse:
     return _done(request, lambda: teams.leave(user=user), told="You left the team.")
 
 
-@login_required
-@never_cache
-@require_POST
+@own_deed
 def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Put a member out of the team."""
     own, member = _member(request, handle)
@@ -132,9 +197,7 @@ def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     )
 
 
-@login_required
-@never_cache
-@require_POST
+@own_deed
 def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Let another member own the team."""
     own, member = _member(request, handle)
@@ -147,7 +210,7 @@ def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
 
 @never_cache
 @sensitive_variables("secret")
-@require_http_methods(["GET", "HEAD", "POST"])
+@asks_first
 def join(request: HttpRequest, secret: str) -> HttpResponse:
     """Say who invites and what coming into the team means, and come in. A visitor is told who invites."""
     user, now = cast("User", request.user), timezone.now()

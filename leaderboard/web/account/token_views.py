@@ -1,26 +1,67 @@
 """The page of a person's API tokens."""
 
-from typing import cast
+from typing import Any, cast
 
+from django import forms
 from django.contrib import messages
-from django.contrib.auth.decorators import login_required
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
-from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_variables
-from django.views.decorators.http import require_http_methods, require_POST
 
-from leaderboard.models import ApiToken, User
+from leaderboard.http import own_deed, own_form
+from leaderboard.models import ApiToken, Scope, Split, User
 from leaderboard.people import tokens
 from leaderboard.web.account import shown_once
-from leaderboard.web.account.token_forms import TokenForm
+from leaderboard.web.forms import SiteForm
 
 
-@login_required
-@never_cache
+def _splits() -> list[tuple[str, str]]:
+    names = Split.objects.shown().values_list("pk", flat=True)
+    return [("", "all splits"), *((name, f"{name} only") for name in names)]
+
+
+class TokenForm(SiteForm):
+    """A token's name and limits. What is wrong with them the verb says."""
+
+    name = forms.CharField(
+        help_text="What it is for, such as “nightly CI”.",
+        widget=forms.TextInput(attrs={"maxlength": 80, "autocomplete": "off"}),
+        error_messages={"required": "The token has no name; expected what it is for."},
+    )
+    scopes = forms.MultipleChoiceField(
+        choices=[
+            (Scope.SUBMIT, "submit: submit and withdraw files, edit and publish methods"),
+            (Scope.READ, "read: read results"),
+        ],
+        initial=list(Scope.values),
+        error_messages={"required": "The token has no scope; expected read, submit, or both."},
+    )
+    split = forms.ChoiceField(label="Scope", required=False, choices=_splits)
+    days = forms.IntegerField(
+        label="Expires in (days)",
+        initial=tokens.DAYS,
+        help_text=f"At most {tokens.MAX_DAYS}.",
+        widget=forms.NumberInput(attrs={"min": 1, "max": tokens.MAX_DAYS}),
+        error_messages={
+            "required": f"No number of days was given; expected 1 to {tokens.MAX_DAYS}.",
+            "invalid": f"That is no whole number of days; expected 1 to {tokens.MAX_DAYS}.",
+        },
+    )
+
+    def token(self) -> dict[str, Any]:
+        """What was filled in, under the domain function's names."""
+        fields = self.cleaned_data
+        return {
+            "name": fields["name"],
+            "scopes": fields["scopes"],
+            "split_name": fields["split"],
+            "days": fields["days"],
+        }
+
+
+@own_form
 @sensitive_variables("secret")
-@require_http_methods(["GET", "HEAD", "POST"])
 def token_page(request: HttpRequest) -> HttpResponse:
     """List and make tokens. A new one is shown on the page after its form, and never again."""
     user = cast("User", request.user)
@@ -38,9 +79,7 @@ def token_page(request: HttpRequest) -> HttpResponse:
     return shown_once.render_with(request, "account/tokens.html", context, at="tokens", status=status)
 
 
-@login_required
-@never_cache
-@require_POST
+@own_deed
 def revoke(request: HttpRequest) -> HttpResponse:
     """End one's own token at once."""
     user = cast("User", request.user)

@@ -1,20 +1,20 @@
-"""The page of a board, now or as of a time."""
+"""The page of a board, now, as of a time, or of one edition, and the list of editions."""
 
 from dataclasses import replace
 from typing import Any
 
 from django.http import HttpRequest, HttpResponse
-from django.shortcuts import render
+from django.shortcuts import get_object_or_404, render
 from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards import movement, snapshots
 from leaderboard.boards.boards import Board, UnknownColumn
+from leaderboard.editions import history
 from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
-from leaderboard.web.boards.board_query import BoardQuery
-from leaderboard.web.boards.board_tools import tools
+from leaderboard.web.boards.board_query import BoardQuery, tools
 from leaderboard.web.context_processors import split_or_404
 
 MAIN_SPLIT = "test"
@@ -79,3 +79,28 @@ def _shown(
         given = {name: text for name, text in query.given.items() if name != fault.field}
         return _shown(request, split, edition, replace(query, sort="rank", given=given), faults)
     return board, query
+
+
+@require_safe
+def editions(request: HttpRequest, split: str) -> HttpResponse:
+    """Every edition that ever was a split's board, and why each became it."""
+    found = split_or_404(request, split)
+    log = history.changelog(found)
+    rows = [(past, edition_tables.past_change(past)) for past in history.history(found, log)]
+    return render(request, "boards/editions/editions.html", {"split": found, "rows": rows, "changelog": log})
+
+
+@require_safe
+def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
+    """The board of one edition, for ever."""
+    found = get_object_or_404(snapshots.editions(), split=split, number=number)
+    past = history.record_of(found)
+    return draw_board(
+        request,
+        "boards/editions/edition.html",
+        split=found.split,
+        edition=found,
+        past=past,
+        change=edition_tables.past_change(past),
+        intervals=tables.counted_ranges(found.rules, found.ground_truth.counts),
+    )

@@ -14,7 +14,7 @@ from django.urls import reverse
 
 from evaluator.metrics.metrics import Metric
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.exports.tables import short_authors
 
 Option = dict[str, Any]

@@ -16,8 +16,8 @@ from django.utils.safestring import SafeString
 from evaluator.metrics.metrics import MID
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Entry
-from leaderboard.boards.current import Attempt
+from leaderboard.boards.rows import Entry
+from leaderboard.boards.snapshot_store import Attempt
 from leaderboard.models import Visibility
 from leaderboard.web.boards.chart_options import (
     Chart,

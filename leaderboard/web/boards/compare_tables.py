@@ -10,7 +10,7 @@ from evaluator.metrics.protocol import PRIMARY, grouped_names
 from evaluator.scoring.report import format_published
 from evaluator.scoring.significance import too_few_recordings
 from evaluator.tables.sentences import p_cell
-from leaderboard.boards.boards import Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.scoring.comparisons import Compared, Pair
 from leaderboard.web.boards import profile_chart, svg
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading

@@ -4,9 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Board, flat_scores
+from leaderboard.boards.boards import Board
+from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import history
 from leaderboard.editions.corrections import RescoringProgress
 from leaderboard.editions.preview import ABSENT, Change, Preview
@@ -23,15 +25,6 @@ _WHY_UNSCORABLE: Final = {
 }
 _ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
-
-
-def counted(n: int, singular: str, plural: str = "") -> str:
-    """A count and its noun.
-
-    >>> counted(1, "label"), counted(12, "label"), counted(2000, "entry", "entries")
-    ('1 label', '12 labels', '2,000 entries')
-    """
-    return f"{grouped(n)} {singular if n == 1 else plural or singular + 's'}"
 
 
 def truth_words(change: history.TruthChange | None) -> str:

@@ -7,8 +7,7 @@ from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY, grouped_names, interval_of, metric_of, split_name
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Entry
-from leaderboard.boards.rows import Interval
+from leaderboard.boards.rows import Entry, Interval
 from leaderboard.web.boards.chart_options import (
     Chart,
     Frame,

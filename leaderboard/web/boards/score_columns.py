@@ -18,8 +18,7 @@ from evaluator.metrics.protocol import (
     split_name,
 )
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Entry
-from leaderboard.boards.rows import Interval
+from leaderboard.boards.rows import Entry, Interval
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import BoardQuery
 from leaderboard.web.boards.whiskers import WhiskerScale

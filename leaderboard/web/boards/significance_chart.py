@@ -11,7 +11,7 @@ from evaluator import Difference
 from evaluator.metrics.metrics import MID
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.tables.sentences import p_cell
-from leaderboard.boards.boards import Entry
+from leaderboard.boards.rows import Entry
 from leaderboard.scoring.comparisons import Pair
 from leaderboard.web.boards.chart_options import (
     Chart,

@@ -18,9 +18,9 @@ from evaluator.metrics.protocol import (
     interval_of,
 )
 from evaluator.metrics.protocol import Interval as TTCRange
-from evaluator.scoring.floors import floor_sentence
-from leaderboard.boards.boards import Board, Entry
-from leaderboard.boards.rows import Interval
+from evaluator.scoring.scoring import floor_sentence
+from leaderboard.boards.boards import Board
+from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports.tables import short_authors
 from leaderboard.models import Visibility
 from leaderboard.scoring import verdicts

@@ -1,20 +1,24 @@
-"""The pages of documentation.
+"""The pages of documentation, those that maintainers write, and the wheel of the evaluator.
 
-They ask the database for nothing but the splits of the first page, so they answer without one as well. The
-long ones are compressed here: not every site has a proxy that does so.
+The documentation asks the database for nothing but the splits of the first page, so it answers without one as
+well. Long pages are compressed here: not every site has a proxy that does so.
 """
 
 from typing import Any, Final
 
-from django.http import Http404, HttpRequest, HttpResponse
+from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
 from django.urls import reverse
+from django.urls.converters import StringConverter
 from django.utils import timezone
 from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.http import ANYTHING, Parameters
+from leaderboard.pages import pages
+from leaderboard.pages.pages import PAGES
+from leaderboard.web import markdown
 from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
 
 SEARCH_PARAMETERS: Final[Parameters] = {"q": ANYTHING}
@@ -73,3 +77,37 @@ def api_page(request: HttpRequest) -> HttpResponse:
     """Every operation, parameter and object of the API."""
     context = {"navigation": guides.navigation(), "api": api_reference.reference()}
     return render(request, "docs/api_reference.html", context)
+
+
+class PageConverter(StringConverter):
+    """The name of a page, in an address."""
+
+    regex = "|".join(PAGES)
+
+
+@require_safe
+def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
+    """Rules, contact, privacy, imprint or licence."""
+    version = pages.current(page_name)
+    text = version.text if version else pages.default_text(page_name)
+    context = {"page": PAGES[page_name], "version": version, "text": markdown.page(text)}
+    return render(request, "pages/page.html", context)
+
+
+@require_safe
+def dist(request: HttpRequest) -> HttpResponse:
+    """The line that installs the evaluator, and the digest of what it installs."""
+    wheel = wheels.current()
+    context = {"navigation": guides.navigation(), "wheel": wheel}
+    return render(request, "docs/install.html", context, status=200 if wheel else 404)
+
+
+@require_safe
+def dist_file(request: HttpRequest, wheel_name: str) -> HttpResponseBase:
+    """A wheel, for pip."""
+    wheel = wheels.named(wheel_name)
+    if wheel is None:
+        raise Http404(f"There is no wheel {wheel_name!r}.")
+    return FileResponse(
+        wheel.path.open("rb"), as_attachment=True, filename=wheel.name, content_type="application/zip"
+    )

@@ -9,7 +9,7 @@ from django.conf import settings
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, get_protocol
 from evaluator.problems import PROBLEM_CODES
 from leaderboard.models import Split
-from leaderboard.quotas import deadlines
+from leaderboard.quotas import admissions
 from leaderboard.templatetags.board import size
 
 # What only maintainers meet, when they import ground truth.
@@ -33,7 +33,7 @@ GROUND_TRUTH_CODES: Final = frozenset(
 
 def example_split(splits: Sequence[Split], *, now: datetime) -> Split | None:
     """The split that the commands name: one that takes submissions, or else one that has a manifest."""
-    is_open = (split for split in splits if deadlines.is_open(split, now=now))
+    is_open = (split for split in splits if admissions.is_open(split, now=now))
     return next(is_open, None) or next((split for split in splits if split.has_ground_truth), None)
 
 
@@ -44,7 +44,7 @@ def docs(splits: Sequence[Split], *, now: datetime) -> dict[str, Any]:
     return {
         "example": example.pk if example else "SPLIT",
         "has_manifest": example is not None,
-        "is_open": example is not None and deadlines.is_open(example, now=now),
+        "is_open": example is not None and admissions.is_open(example, now=now),
         "protocol": protocol,
         "boundaries": [boundary.replace("-", "−") for boundary in protocol.boundaries],
         "max_size": size(settings.MAX_PREDICTIONS_BYTES),

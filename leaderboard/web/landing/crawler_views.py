@@ -13,8 +13,8 @@ from django.views.decorators.http import require_safe
 from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import splits_of
-from leaderboard.exports import sitemaps
-from leaderboard.exports.sitemaps import SitemapEntry
+from leaderboard.exports import feeds
+from leaderboard.exports.feeds import SitemapEntry
 from leaderboard.models import Edition, Split, Visibility
 from leaderboard.pages import pages
 from leaderboard.web.docs import api_examples, guides
@@ -64,7 +64,7 @@ def sitemap(request: HttpRequest) -> HttpResponse:
         *(SitemapEntry(_absolute("api_operation", name)) for name in api_examples.EXAMPLES),
         *_of_boards(splits_of(request)),
     ]
-    return HttpResponse(sitemaps.xml(found), content_type="application/xml; charset=utf-8")
+    return HttpResponse(feeds.xml(found), content_type="application/xml; charset=utf-8")
 
 
 def _of_boards(splits: Sequence[Split]) -> Iterator[SitemapEntry]:

@@ -17,7 +17,7 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import bibtex
 from leaderboard.models import Split, User
-from leaderboard.quotas import deadlines
+from leaderboard.quotas import admissions
 from leaderboard.web.boards import board_query, chart_views
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.landing.leaders import lead_words, leaders
@@ -74,7 +74,7 @@ def dates(splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetim
         offers = offers_for(reader, now=now)
         return [SplitDates(offer.split, offer.sentence) for offer in offers]
     return [
-        SplitDates(split, deadlines.sentence_of(split, now=now) or f"Submissions to {split.pk} are open.")
+        SplitDates(split, admissions.sentence_of(split, now=now) or f"Submissions to {split.pk} are open.")
         for split in splits
     ]
 

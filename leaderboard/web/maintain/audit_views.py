@@ -1,10 +1,13 @@
-"""The audit trail for maintainers: a page and two exports."""
+"""The audit trail for maintainers: a page with its filter, and two exports."""
 
 import itertools
 import json
 from collections.abc import Iterator, Mapping
+from datetime import UTC, date, datetime, time, timedelta
+from functools import partial
 from typing import Any
 
+from django import forms
 from django.core.paginator import Paginator
 from django.http import HttpRequest, HttpResponse, StreamingHttpResponse
 from django.shortcuts import render
@@ -13,8 +16,51 @@ from django.views.decorators.http import require_safe
 from evaluator.tables.formats import csv_lines
 from leaderboard import audit
 from leaderboard.models import AuditEvent
-from leaderboard.web.maintain.audit_forms import AuditFilter
+from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_views import maintainers_only
+
+DAY = timedelta(days=1)
+
+
+def _day(label: str) -> forms.DateField:
+    return forms.DateField(
+        label=label,
+        required=False,
+        input_formats=["%Y-%m-%d"],
+        widget=forms.DateInput(attrs={"type": "date"}),
+        error_messages={"invalid": "That is no date; expected one like 2026-11-20."},
+    )
+
+
+def _occurring(name: str) -> list[tuple[str, str]]:
+    words = AuditEvent.objects.order_by(name).values_list(name, flat=True).distinct()
+    return [("", "any"), *((word, word) for word in words)]
+
+
+class AuditFilter(SiteForm):
+    """By whom, what, to what, and when (days of UTC, both included)."""
+
+    actor = forms.CharField(label="Actor (part of the email address)", required=False, max_length=254)
+    verb = forms.ChoiceField(label="Action", required=False, choices=partial(_occurring, "verb"))
+    noun = forms.ChoiceField(label="Object type", required=False, choices=partial(_occurring, "noun"))
+    noun_id = forms.CharField(label="Object ID (prefix)", required=False, max_length=80)
+    since = _day("From")
+    until = _day("To")
+
+    def wanted(self) -> dict[str, Any]:
+        """What was filled in, under the domain function's names."""
+        fields = {name: value for name, value in self.cleaned_data.items() if value}
+        if "since" in fields:
+            fields["since"] = _midnight(fields["since"])
+        if "until" in fields:
+            # The calendar ends with the year 9999, and has no day after its last.
+            fields["until"] = _midnight(min(fields["until"], date.max - DAY) + DAY)
+        return fields
+
+
+def _midnight(day: date) -> datetime:
+    return datetime.combine(day, time(), tzinfo=UTC)
+
 
 PER_PAGE = 100
 COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "names", "previous_hash", "hash")

@@ -13,7 +13,12 @@ from leaderboard.pages import pages
 from leaderboard.pages.pages import MAX_TEXT, PAGES
 from leaderboard.web import markdown
 from leaderboard.web.forms import SiteForm
-from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+from leaderboard.web.maintain.maintainer_views import (
+    form_page,
+    maintainer_of,
+    maintainers_form,
+    maintainers_only,
+)
 
 
 class PageForm(SiteForm):
@@ -40,8 +45,7 @@ def site_pages(request: HttpRequest) -> HttpResponse:
     return render(request, "maintain/pages.html", {"rows": rows, "imprint": pages.IMPRINT})
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
     """The form with the text of a page, or with one that it had; a preview; the texts until now."""
     versions = pages.versions(page_name)

@@ -14,12 +14,13 @@ from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, Js
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_safe
 from django_htmx.http import HttpResponseClientRefresh
 
 from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, preview
 from leaderboard.errors.refusals import NotMaintainer
+from leaderboard.http import asks_first
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
 from leaderboard.pages import pages
 from leaderboard.quotas import rules
@@ -35,7 +36,6 @@ from leaderboard.web.maintain.maintainer_forms import (
 from leaderboard.web.submissions.submission_views import STOP_POLLING
 
 View = Callable[..., HttpResponseBase]
-asks_first = require_http_methods(["GET", "HEAD", "POST"])
 
 
 def maintainers_only(view: View) -> View:
@@ -57,6 +57,11 @@ def maintainers_only(view: View) -> View:
             raise Http404 from refusal
 
     return guarded
+
+
+def maintainers_form(view: View) -> View:
+    """The same for a page with a form."""
+    return maintainers_only(asks_first(view))
 
 
 @maintainers_only
@@ -81,8 +86,7 @@ def hub(request: HttpRequest) -> HttpResponse:
     return render(request, "maintain/hub.html", context)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def open_edition(request: HttpRequest, split: str) -> HttpResponse:
     """Open a draft edition and queue every active submission for it."""
     found = get_object_or_404(Split.objects.select_related("published_edition__ground_truth"), pk=split)
@@ -101,7 +105,9 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """What publishing an edition would change, and how far its re-scoring is."""
-    return render(request, "maintain/edition.html", _comparison(_edition(split, number)))
+    found = _edition(split, number)
+    context = {**_comparison(found), "predecessor": corrections.predecessor(found.split)}
+    return render(request, "maintain/edition.html", context)
 
 
 @maintainers_only
@@ -141,8 +147,7 @@ def preview_json(request: HttpRequest, split: str, number: int) -> HttpResponse:
     )
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Make an edition the board."""
     found = _edition(split, number)
@@ -160,8 +165,7 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
     )
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Make the edition that this one replaced the board again."""
     found = _edition(split, number)
@@ -178,8 +182,7 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
     return form_page(request, "maintain/roll_back.html", form, leaving=found, former=former, **context)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
     """Give up an edition in preparation."""
     found = _edition(split, number)

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Any, Final
 from uuid import UUID
 
+from django import forms
 from django.contrib import messages
 from django.db.models import F, Q
 from django.http import Http404, HttpRequest, HttpResponse
@@ -14,11 +15,56 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Membership, Method, Submission, Team
+from leaderboard.people.names import MAX_NAME
 from leaderboard.submissions import forgetting, moderation
+from leaderboard.submissions.moderation import MAX_REASON
 from leaderboard.web.forms import SiteForm
-from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
-from leaderboard.web.maintain.moderation_forms import DeedForm, MoveForm, RenameForm
+from leaderboard.web.maintain.maintainer_forms import reason_field
+from leaderboard.web.maintain.maintainer_views import (
+    form_page,
+    maintainer_of,
+    maintainers_form,
+    maintainers_only,
+)
 from leaderboard.web.submissions.forms import parse_uuid
+
+
+class DeedForm(SiteForm):
+    """Why."""
+
+    reason = reason_field(
+        "One sentence for the audit log, without names and addresses. The team does not see it.",
+        max_length=MAX_REASON,
+    )
+
+
+class RenameForm(DeedForm):
+    """Another name, or none."""
+
+    name = forms.CharField(
+        label="New name",
+        required=False,
+        max_length=MAX_NAME,
+        help_text="Empty: a name that says nothing, such as Team 3f9c2a.",
+        widget=forms.TextInput(attrs={"autocomplete": "off"}),
+    )
+
+    field_order = ("name", "reason")
+
+
+class MoveForm(DeedForm):
+    """Which team."""
+
+    name = forms.CharField(
+        label="New team",
+        max_length=MAX_NAME,
+        help_text="Name of the team as the boards show it, or its id.",
+        error_messages={"required": "No team was named; expected its name or its id."},
+        widget=forms.TextInput(attrs={"autocomplete": "off"}),
+    )
+
+    field_order = ("name", "reason")
+
 
 MAX_ENTRIES: Final = 200
 _RENAMED: Final = (
@@ -155,8 +201,7 @@ def _with_states(sent: Iterable[Submission]) -> list[Submission]:
     return rows
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def deed(request: HttpRequest, deed_name: str, subject_id: UUID) -> HttpResponse:
     """Say what a deed does, ask for the reason, and do it."""
     if deed_name not in DEEDS:

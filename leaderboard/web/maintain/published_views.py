@@ -14,7 +14,11 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.models import PublishedResult
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
-from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+from leaderboard.web.maintain.maintainer_views import (
+    form_page,
+    maintainer_of,
+    maintainers_form,
+)
 
 
 class PaperForm(SiteForm):
@@ -58,8 +62,7 @@ class RemovalForm(SiteForm):
     reason = reason_field("One sentence for the audit log.", max_length=splits.MAX_REASON)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
     """Take a quoted row off the board."""
     row = get_object_or_404(PublishedResult, split=split, slug=slug, replaced_at=None)
@@ -78,8 +81,7 @@ def remove(request: HttpRequest, split: str, slug: str) -> HttpResponse:
     return form_page(request, "maintain/published_remove.html", form, row=row)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def published(request: HttpRequest) -> HttpResponse:
     """The quoted rows with the day since which they stand; more of them."""
     form = PaperForm(request)

@@ -7,7 +7,7 @@ from django import forms
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.models.quotas import QuotaRules
-from leaderboard.quotas import quotas, spans
+from leaderboard.quotas import quotas
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 
@@ -39,7 +39,7 @@ class SpanField(forms.CharField):
         if not text:
             return timedelta(0)
         try:
-            span = spans.parse(text)
+            span = quotas.parse_span(text)
         except Refused as refusal:
             raise forms.ValidationError(str(refusal)) from refusal
         if not span and not self._may_be_none:

@@ -13,7 +13,12 @@ from django.views.decorators.http import require_safe
 from leaderboard.models import QuotaOverride, Split, Team
 from leaderboard.quotas import quotas, rules
 from leaderboard.web.maintain import quota_tables
-from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+from leaderboard.web.maintain.maintainer_views import (
+    form_page,
+    maintainer_of,
+    maintainers_form,
+    maintainers_only,
+)
 from leaderboard.web.maintain.quota_forms import EndForm, OverrideForm, TeamLookup
 
 PER_PAGE = 50
@@ -51,8 +56,7 @@ def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
     return render(request, "maintain/team_quotas.html", {**context, "are_off": not settings.QUOTAS})
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     """Give a team rules of its own on a split, or others than it has."""
     team, found = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
@@ -71,8 +75,7 @@ def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     return _form(request, form, team=team, split=found, own=own, words=words)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     """Let the split's rules hold for a team again."""
     rows = QuotaOverride.objects.select_related("team", "split", "set_by")

@@ -1,18 +1,28 @@
-"""Splits for maintainers: all of them, a new one, and the policy of one."""
+"""Splits for maintainers: all of them, a new one, the policy of one, and a mail to its teams."""
 
+from django import forms
 from django.contrib import messages
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
+from evaluator.counting import counted
 from leaderboard.benchmark import policy
 from leaderboard.benchmark.policy import Policy
 from leaderboard.editions import new_splits
+from leaderboard.mails import announcements
+from leaderboard.mails.announcements import Announcement
 from leaderboard.models import Split
-from leaderboard.quotas import deadlines
+from leaderboard.quotas import admissions
+from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain import quota_tables
-from leaderboard.web.maintain.maintainer_views import asks_first, form_page, maintainer_of, maintainers_only
+from leaderboard.web.maintain.maintainer_views import (
+    form_page,
+    maintainer_of,
+    maintainers_form,
+    maintainers_only,
+)
 from leaderboard.web.maintain.split_forms import AnnouncementForm, NewSplitForm, PolicyForm
 
 
@@ -22,14 +32,13 @@ def splits(request: HttpRequest) -> HttpResponse:
     """Every split, also those that are switched off."""
     now = timezone.now()
     rows = [
-        (split, deadlines.sentence_of(split, now=now) or "Open.", quota_tables.sentence_of(split))
+        (split, admissions.sentence_of(split, now=now) or "Open.", quota_tables.sentence_of(split))
         for split in Split.objects.select_related("published_edition")
     ]
     return render(request, "maintain/splits.html", {"rows": rows})
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def add(request: HttpRequest) -> HttpResponse:
     """Make a split."""
     form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(Policy(title="")))
@@ -41,8 +50,7 @@ def add(request: HttpRequest) -> HttpResponse:
     return form_page(request, "maintain/split_form.html", form)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def change(request: HttpRequest, split: str) -> HttpResponse:
     """Change the policy of a split."""
     found = get_object_or_404(Split, pk=split)
@@ -55,8 +63,7 @@ def change(request: HttpRequest, split: str) -> HttpResponse:
     return form_page(request, "maintain/split_form.html", form, split=found)
 
 
-@maintainers_only
-@asks_first
+@maintainers_form
 def announcement(request: HttpRequest) -> HttpResponse:
     """Show a line on the pages of every split, or take it away."""
     form = AnnouncementForm.asked(request)
@@ -67,3 +74,58 @@ def announcement(request: HttpRequest) -> HttpResponse:
             messages.success(request, "The announcement was changed on all splits.")
             return redirect("maintain_splits")
     return form_page(request, "maintain/announcement.html", form)
+
+
+class MailForm(SiteForm):
+    """The text of an announcement. The names are those of `announcements.written`."""
+
+    subject = forms.CharField(
+        max_length=announcements.MAX_SUBJECT,
+        help_text="One line. The name of the site stands before it.",
+        error_messages={"required": "No subject was given; expected one line."},
+        widget=forms.TextInput(attrs={"autocomplete": "off"}),
+    )
+    text = forms.CharField(
+        max_length=announcements.MAX_TEXT,
+        help_text="Plain text, at most 5,000 characters. The mail ends with the name of the site and the "
+        "page where one switches such mails off.",
+        error_messages={"required": "No text was given; expected a few sentences."},
+        widget=forms.Textarea(attrs={"rows": 10}),
+    )
+
+
+@maintainers_form
+def mail(request: HttpRequest, split: str) -> HttpResponse:
+    """Write a mail to the teams of a split, preview it, and send it: each is a step of one form."""
+    found = get_object_or_404(Split, pk=split)
+    step = request.POST.get("step", "")
+    if step == "write":
+        initial = {name: request.POST.get(name, "") for name in MailForm.base_fields}
+        return form_page(request, "maintain/mail.html", MailForm(initial=initial), split=found)
+    form = MailForm.asked(request)
+    if form.is_valid():
+        with form.refusals():
+            announcement = announcements.written(split=found, **form.cleaned_data)
+            return _sent(request, announcement) if step == "send" else _preview(request, announcement)
+    return form_page(request, "maintain/mail.html", form, split=found)
+
+
+def _preview(request: HttpRequest, announcement: Announcement) -> HttpResponse:
+    subject, text = announcement.mailed
+    context = {
+        "announcement": announcement,
+        "subject": subject,
+        "text": text,
+        "n_people": len(announcements.left(announcement)),
+    }
+    return render(request, "maintain/mail_preview.html", context)
+
+
+def _sent(request: HttpRequest, announcement: Announcement) -> HttpResponse:
+    """Send it, and say to how many. A second click finds nobody who has not got it."""
+    n_people = announcements.announce(announcement, now=timezone.now(), actor=maintainer_of(request))
+    if n_people:
+        messages.success(request, f"The mail to {counted(n_people, 'person', 'people')} is queued.")
+    else:
+        messages.info(request, "Nothing was sent: everybody who gets this mail has got it already.")
+    return redirect("maintain_splits")

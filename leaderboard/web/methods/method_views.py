@@ -4,16 +4,15 @@ from typing import cast
 from uuid import UUID
 
 from django.contrib import messages
-from django.contrib.auth.decorators import login_required
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
-from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.http import require_safe
 
 from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.errors.refusals import Refused
+from leaderboard.http import own_form
 from leaderboard.methods import details, methods, visibility
 from leaderboard.models import Method, User, Visibility
 from leaderboard.submissions import empty_methods
@@ -50,9 +49,7 @@ def _own(request: HttpRequest, method_id: UUID) -> Method:
     return get_object_or_404(Method.objects.of(request.user).select_related("team"), pk=method_id)
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Say something else of a method."""
     found = _own(request, method_id)
@@ -67,9 +64,7 @@ def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
     )
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Say what deleting an empty method does, and do it; of any other say why it stays."""
     found = _own(request, method_id)
@@ -86,9 +81,7 @@ def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
     return render(request, "methods/delete.html", context, status=422 if refusal else 200)
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
     """Choose who sees a method, look at what they would see, and show it."""
     found = _own(request, method_id)

@@ -11,8 +11,8 @@ from django.urls import reverse
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Entry, flat_scores
 from leaderboard.boards.results import Result
+from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
 from leaderboard.scoring.comparisons import MIN_METHODS
 from leaderboard.submissions.submissions import evaluation_of

@@ -8,7 +8,7 @@ from django.http import HttpRequest, HttpResponse
 from django.utils.functional import SimpleLazyObject
 from django_structlog.middlewares import RequestMiddleware
 
-from leaderboard.ops import http_figures
+from leaderboard.ops import prometheus
 
 # Asked every few seconds by machines; worth a line only when they fail.
 QUIET = frozenset({"/healthz", "/readyz", "/healthy", "/metrics"})
@@ -59,4 +59,4 @@ def _count(request: HttpRequest, response: HttpResponse) -> None:
     found = request.resolver_match
     route = (found.view_name or "unnamed") if found else ("memory" if response.status_code < 400 else "none")
     took_s = time.perf_counter() - request.META.get("tsttc.begun_s", time.perf_counter())
-    http_figures.count(method=request.method or "", route=route, status=response.status_code, took_s=took_s)
+    prometheus.count(method=request.method or "", route=route, status=response.status_code, took_s=took_s)

@@ -1,4 +1,4 @@
-"""Where `TSTTC_REQUIRE_SECOND_FACTOR` is on, the maintainers' pages open to a second factor alone."""
+"""Where `TSTTC_REQUIRE_SECOND_FACTOR` is on, only a second factor makes a session that of a maintainer."""
 
 from collections.abc import Callable
 from typing import Any
@@ -6,8 +6,10 @@ from typing import Any
 from allauth.account.authentication import get_authentication_records
 from django.conf import settings
 from django.contrib import messages
+from django.contrib.auth.models import AnonymousUser
 from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect, resolve_url
+from django.utils.functional import SimpleLazyObject
 from django.utils.http import urlencode
 from django_htmx.http import HttpResponseClientRefresh
 
@@ -16,13 +18,19 @@ from leaderboard.people import second_factor
 
 
 class SecondFactorMiddleware:
-    """Leads from `/maintain/` and `/admin/` to the page that sets up the second factor, or asks for it."""
+    """Leads from `/maintain/` and `/admin/` to the page that sets up the second factor, or asks for it.
+
+    On all other pages and in the API, a session without a code sees and does no more than other people.
+    """
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Nothing to do before the address is resolved."""
+        """Look at the session as soon as somebody asks for its user."""
+        if settings.REQUIRE_SECOND_FACTOR:
+            user = request.user
+            request.user = SimpleLazyObject(lambda: _marked(request, user))  # type: ignore[assignment]  # it is lazy, as Django's own
         return self._get_response(request)
 
     def process_view(
@@ -50,6 +58,12 @@ def _is_for_maintainers(request: HttpRequest) -> bool:
         return False
     name = match.url_name or ""
     return name != "logout" if match.namespace == "admin" else name.startswith("maintain")
+
+
+def _marked(request: HttpRequest, user: User | AnonymousUser) -> User | AnonymousUser:
+    if user.is_authenticated:
+        user.owes_a_code = bool(_missing_step(request, user))
+    return user
 
 
 def _missing_step(request: HttpRequest, user: User) -> str:

@@ -4,6 +4,7 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, Final
 
+from evaluator.counting import counted
 from evaluator.metrics.metrics import MID, Metric
 from evaluator.metrics.protocol import known_metrics
 from evaluator.scoring.report import format_published
@@ -48,8 +49,8 @@ def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
     errors = [metric for metric in known_metrics().values() if metric.name in distribution]
     quantiles = zip(*(distribution[metric.name] for metric in errors), strict=True)
     return {
-        "n_sequences": grouped(content["n_sequences"]),
-        "n_recordings": grouped(content["n_recordings"]),
+        "n_sequences": counted(content["n_sequences"], "sequence"),
+        "n_recordings": counted(content["n_recordings"], "recording"),
         "curve": curve(content["curve"], errors),
         "histogram": histogram(content["histogram"]),
         "errors": errors,
@@ -130,7 +131,7 @@ def _curve_series(run: Sequence[Row], metric: Metric, *, grid: int) -> Iterator[
             (
                 f"{_seconds(row)} s",
                 f"{metric.symbol} {_value_words(row, metric)}",
-                f"{grouped(row['n'])} sequences",
+                counted(row["n"], "sequence"),
             ),
         )
         for middle, row in zip(middles, run, strict=True)
@@ -165,7 +166,7 @@ def histogram(bins: Sequence[Row]) -> Chart:
         return empty("histogram")
     words = [_bin_words(row) for row in bins]
     found = [
-        Mark(i, row["n"], (f"{MID.symbol} {text}", f"{grouped(row['n'])} sequences"))
+        Mark(i, row["n"], (f"{MID.symbol} {text}", counted(row["n"], "sequence")))
         for i, (row, text) in enumerate(zip(bins, words, strict=True))
     ]
     scale = places_axis(_bar_ticks(bins), low=0.0, high=float(len(bins)))

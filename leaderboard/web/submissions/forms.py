@@ -17,7 +17,7 @@ from leaderboard.methods import visibility
 from leaderboard.methods.details import DETAILS
 from leaderboard.models import Method, Split, Submission, Team, User
 from leaderboard.people import teams
-from leaderboard.quotas import admissions, deadlines, quotas
+from leaderboard.quotas import admissions, quotas
 from leaderboard.submissions import search
 from leaderboard.web.methods.method_forms import DetailsForm
 
@@ -42,13 +42,13 @@ def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
 
 
 def _offer(split: Split, *, team: Team | None, user: User, now: datetime) -> SplitChoice:
-    refusal = deadlines.refusal_of(split, now=now) or admissions.refusal_of(team=team, split=split)
+    refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
     if refusal is not None:
         return SplitChoice(
             split, is_open=False, sentence=str(refusal), announcement=split.announcement_at(now)
         )
     quota = quotas.state(team=team, user=user, split=split, now=now)
-    sentence = f"{quota.sentence} {deadlines.closing_of(split)}".strip()
+    sentence = f"{quota.sentence} {admissions.closing_of(split)}".strip()
     return SplitChoice(split, is_open=True, sentence=sentence, announcement=split.announcement_at(now))
 
 

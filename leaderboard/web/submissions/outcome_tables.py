@@ -6,6 +6,7 @@ from urllib.parse import urlencode
 
 from django.urls import reverse
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
 from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import Entry
@@ -141,7 +142,7 @@ def rejected_sentence(quota: Quota | None) -> str:
     if limit is None:
         return "Your quota is not used."
     n_left = max(0, limit - quota.n_rejected)
-    verb = "is" if n_left == 1 else "are"
     return (
-        f"Your quota is not used. Up to {limit} files may be rejected within 24 hours; {n_left} {verb} left."
+        f"Your quota is not used. Up to {counted(limit, 'file')} may be rejected within 24 hours; "
+        f"{counted(n_left, 'is', 'are')} left."
     )

@@ -1,10 +1,9 @@
-"""The pages of submissions: the form, the list, one submission, and its withdrawal."""
+"""The pages of submissions: the form, the list, one submission, its analysis, receipt and withdrawal."""
 
 from typing import Any, cast
 from uuid import UUID
 
 from django.contrib import messages
-from django.contrib.auth.decorators import login_required
 from django.core.paginator import Paginator
 from django.db.models import Prefetch
 from django.http import (
@@ -18,21 +17,22 @@ from django.http import (
 from django.shortcuts import get_object_or_404, redirect, render
 from django.urls import reverse
 from django.utils import timezone
-from django.views.decorators.cache import never_cache
-from django.views.decorators.http import require_http_methods, require_safe
+from django.views.decorators.cache import cache_control
+from django.views.decorators.http import require_safe
 
 from evaluator.predictions import writing
 from leaderboard.editions import history
-from leaderboard.http import is_known
+from leaderboard.http import is_known, own_form, own_page
 from leaderboard.models import Evaluation, Status, Submission, User, Visibility
 from leaderboard.quotas import quotas
+from leaderboard.scoring import analyses
 from leaderboard.storage import manifests
-from leaderboard.submissions import outcomes, search, submissions
+from leaderboard.submissions import outcomes, receipts, search, submissions
 from leaderboard.submissions.submissions import Progress
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.context_processors import split_or_404
 from leaderboard.web.methods import result_tables
-from leaderboard.web.submissions import outcome_tables
+from leaderboard.web.submissions import analysis_charts, outcome_tables
 from leaderboard.web.submissions.forms import SearchForm, SubmissionForm
 from leaderboard.web.submissions.progress import StateLine, state_line
 
@@ -41,9 +41,7 @@ PER_PAGE = 50
 STOP_POLLING = 286
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def submit(request: HttpRequest) -> HttpResponse:
     """Take a prediction file."""
     user = cast("User", request.user)
@@ -83,9 +81,7 @@ def template(request: HttpRequest, split: str) -> HttpResponseBase:
     )
 
 
-@login_required
-@never_cache
-@require_safe
+@own_page
 def submission_list(request: HttpRequest) -> HttpResponse:
     """What the reader's own team has sent."""
     evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
@@ -100,9 +96,7 @@ def submission_list(request: HttpRequest) -> HttpResponse:
     return render(request, "submissions/submissions.html", {"page": page, "table": table, "form": form})
 
 
-@login_required
-@never_cache
-@require_safe
+@own_page
 def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """One submission: its state, then its result or its problems."""
     found, progress, now_shown = _looked_at(request, submission_id)
@@ -111,9 +105,7 @@ def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     )
 
 
-@login_required
-@never_cache
-@require_safe
+@own_page
 def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more.
 
@@ -127,9 +119,7 @@ def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     return render(request, "submissions/state.html", context, status=status)
 
 
-@login_required
-@never_cache
-@require_http_methods(["GET", "HEAD", "POST"])
+@own_form
 def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """Say what withdrawing does, and do it; for the submission's own team."""
     user = cast("User", request.user)
@@ -183,3 +173,39 @@ def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dic
         and found.withdrawn_at is None
         and found.method.visibility != Visibility.PUBLIC,
     }
+
+
+@own_page
+def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
+    """Error by time to contact, its distribution, predicted against true, the worst recordings."""
+    rows = Submission.objects.visible_to(request.user).select_related("method", "split__published_edition")
+    found = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
+    progress = submissions.progress(found)
+    if progress.is_final and progress.state != Status.SCORED:
+        raise Http404("This submission has no score.")
+    closer = analyses.of(submission=found, viewer=request.user)
+    tables = analysis_charts.error_analysis_tables(closer) if closer else None
+    return render(
+        request, "submissions/analysis.html", {"submission": found, "tables": tables, "closer": closer}
+    )
+
+
+@require_safe
+@cache_control(public=True, max_age=3600)
+def receipt_keys(request: HttpRequest) -> HttpResponse:
+    """The public halves of the keys that receipts were ever signed with, as a JSON Web Key Set."""
+    return JsonResponse(receipts.public_keys(), content_type="application/jwk-set+json")
+
+
+@own_page
+def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
+    """The receipt of a score as a file, for the submission's own team."""
+    rows = Submission.objects.of(cast("User", request.user))
+    found = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
+    try:
+        document = receipts.receipt(submission=found)
+    except receipts.NoReceipt as fault:
+        return render(request, "400.html", {"sentence": str(fault)}, status=409)
+    response = JsonResponse(document, json_dumps_params={"indent": 2, "ensure_ascii": False})
+    response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{found.pk}.json"'
+    return response

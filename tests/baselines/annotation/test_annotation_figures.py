@@ -1,7 +1,7 @@
 """The figures of docs/annotation.md show what the annotation computes."""
 
-from baselines.annotation.figures import choice_figure, consensus_figure
 from baselines.drawing import Dot, Figure, Text
+from docs._annotation_figures import choice_figure, consensus_figure
 
 
 def texts(figure: Figure) -> list[str]:

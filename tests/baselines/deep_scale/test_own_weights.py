@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from baselines.deep_scale.estimator import DeepScale
-from baselines.deep_scale.figures import confidence_figure
 from baselines.deep_scale.weights import read_weights
 from baselines.drawing import Line, Picture, Text
 from baselines.folders import read_folder
@@ -15,6 +14,7 @@ from baselines.methods import OWN_WEIGHTS
 from baselines.pixel_mse import PixelMse
 from baselines.rendering.clips import render
 from baselines.simulation import split
+from docs._confidence_figure import confidence_figure
 from evaluator import read_truth
 from tests.baselines.scenes import mean_mid, planted
 

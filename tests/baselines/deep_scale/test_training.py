@@ -146,5 +146,5 @@ def test_a_folder_is_learned_from_in_the_order_of_its_truth(tmp_path: Path) -> N
 def test_a_truth_without_boxes_is_a_problem(tmp_path: Path) -> None:
     folder = made_folder(tmp_path)
     (folder / "truth.csv").write_text(TRUTH + f"0,0007,1,{stamp(9, 5)},0,2.0\n")
-    with pytest.raises(Rejected, match="1 sequences of the ground truth have no boxes, the first is 0007/1/"):
+    with pytest.raises(Rejected, match="The ground truth has 1 sequence without boxes, the first is 0007/1/"):
         FolderSequences.of(read_folder(folder), read_truth(folder / "truth.csv"))

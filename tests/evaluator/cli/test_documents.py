@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 import pytest
 
-from evaluator.cli import EPILOG, main
+from evaluator.cli import EPILOG, own_commands
 from evaluator.cli.exits import MEANINGS, Exit
 from evaluator.cli.gates import OPERATORS
 from evaluator.metrics.protocol import SCORE_NAMES
@@ -34,7 +34,7 @@ def steady(text: str) -> str:
 def options() -> list[tuple[str, str]]:
     return [
         (name, flag)
-        for name, command in main.commands.items()
+        for name, command in own_commands().items()
         for parameter in command.params
         if isinstance(parameter, click.Option)
         for flag in parameter.opts
@@ -54,7 +54,7 @@ def test_guide_names_every_score_and_operator_of_a_gate() -> None:
     assert [name for name in (*SCORE_NAMES, *OPERATORS) if f"`{name}`" not in gate] == []
 
 
-@pytest.mark.parametrize("command", main.commands)
+@pytest.mark.parametrize("command", own_commands())
 def test_guide_has_a_section_for_every_command(command: str) -> None:
     assert f"\n## {command}\n" in GUIDE.read_text()
 

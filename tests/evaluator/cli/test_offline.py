@@ -15,7 +15,7 @@ import click
 import pytest
 
 from evaluator import Rejected, evaluate, read_predictions, read_truth
-from evaluator.cli import main
+from evaluator.cli import own_commands
 from evaluator.metrics.protocol import SCORE_NAMES
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY, Tsttc, process
 
@@ -216,7 +216,7 @@ def test_file_that_cannot_be_read_is_explained(tsttc: Tsttc) -> None:
     assert f"{UNREADABLE} cannot be read: " in result.stderr
 
 
-@pytest.mark.parametrize("command", main.commands)
+@pytest.mark.parametrize("command", own_commands())
 def test_every_command_explains_itself_with_an_example(tsttc: Tsttc, command: str) -> None:
     result = tsttc(command, "--help")
     assert result.exit_code == 0
@@ -229,7 +229,7 @@ def examples() -> list[list[str]]:
     """Every example of every command's help, as words."""
     return [
         shlex.split(line.rpartition("tsttc ")[2], comments=True)
-        for command in main.commands.values()
+        for command in own_commands().values()
         for line in (command.help or "").splitlines()
         if re.match(r" +(\S.* \| )?tsttc ", line)
     ]
@@ -239,7 +239,7 @@ def examples() -> list[list[str]]:
 def test_example_of_the_help_is_called_rightly(words: list[str]) -> None:
     """Parsed as the shell would hand it over; files that are named need not be there."""
     words = list(itertools.takewhile(lambda word: word not in {">", "|"}, words))
-    command = main.commands[words[0]]
+    command = own_commands()[words[0]]
     parser = command.make_parser(click.Context(command))
     found, left, _ = parser.parse_args(words[1:])
     assert left == []

@@ -13,7 +13,7 @@ from click.shell_completion import ShellComplete
 
 from evaluator import read_manifest, read_truth
 from evaluator.cli import main
-from evaluator.cli.heartbeat import signs_of_life
+from evaluator.cli.following import signs_of_life
 from tests.evaluator.cli.console import ID, METHOD_ID, REJECTED_ID
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.toolkit_folders import camera, write_folder
@@ -103,7 +103,7 @@ def test_manifest_of_a_split_comes_from_the_leaderboard_without_a_token(
 def test_truth_of_a_folder_becomes_a_table_with_its_objects(tsttc: Tsttc, tmp_path: Path) -> None:
     folder = write_folder(tmp_path / "folder", {"a.pkl": [camera({7: list(range(6))}, occ_ratio=0.25)]})
     path = tmp_path / "val.csv"
-    assert tsttc("truth", folder, "-o", path).stdout == f"{path}: 1 sequences of 1 recordings.\n"
+    assert tsttc("truth", folder, "-o", path).stdout == f"{path}: 1 sequence of 1 recording.\n"
     found = read_truth(path)
     assert found.digest == json.loads(tsttc("truth", folder, "--json").stdout)["truth_digest"]
     assert found.objects.occ_ratio.tolist() == [0.25]

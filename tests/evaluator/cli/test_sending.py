@@ -12,7 +12,7 @@ from click.testing import Result
 
 from evaluator import read_manifest
 from evaluator.predictions import plausibility
-from evaluator.tables.parquet_tables import parquet_of
+from evaluator.tables.formats import parquet_of
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
 from tests.evaluator.worlds import EXAMPLES, Tsttc, on_terminal, process
 

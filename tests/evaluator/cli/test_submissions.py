@@ -135,7 +135,7 @@ def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(GET, Reply(QUEUED | {"state": "RUNNING", "queue": None}), Reply(SCORED))
     result = submit(tsttc, "--wait")
     assert result.exit_code == 0
-    assert result.stderr == "RUNNING\n"
+    assert result.stderr == "QUEUED, 2 ahead, about 4 s\nRUNNING\n"
     lines = result.stdout.splitlines()
     assert lines[1:3] == ["SCORED: Foo++ on val", ""]
     assert lines[3].split() == COLUMNS
@@ -209,7 +209,7 @@ def test_waiting_job_knows_its_submission_from_the_start(tsttc: Tsttc, site: Rec
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(SCORED))
     result = submit(tsttc, "--wait", "--json")
-    assert result.stderr == f"Submission {ID}  {site.url}/submissions/{ID}/\n"
+    assert result.stderr == f"Submission {ID}  {site.url}/submissions/{ID}/\nQUEUED, 2 ahead, about 4 s\n"
     assert json.loads(result.stdout) == SCORED
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from evaluator import Rejected, convert, read_predictions, scale_ratio_to_ttc
-from evaluator.predictions import packages
+from evaluator.predictions import predictions
 from evaluator.predictions.predictions import sha256_digest
 from tests.evaluator.worlds import EXAMPLES, Tsttc, flat, make_truth
 
@@ -18,7 +18,7 @@ GOOD = flat([1.5, -2.25, 30.0])
 
 def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = None) -> bytes:
     names = {"ts": "ts_ns"}
-    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*packages.NATURAL_KEY, "anno_id")}
+    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*predictions.NATURAL_KEY, "anno_id")}
     values = {"ttc": ["1.5", "-2.25", "3e1"], "scale_ratio": ["0.9", "1.1", "1"], "frame_gap": [5, 5, 1]}
     cells: dict[str, Any] = keys | values | {"note": ["a", '"b,c"', ""]} | (rows or {})
     lines = [",".join(columns), *(",".join(str(cells[name][row]) for name in columns) for row in range(3))]
@@ -26,7 +26,7 @@ def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = No
 
 
 @pytest.mark.parametrize(
-    "columns", [("anno_id", "ttc"), (*packages.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
+    "columns", [("anno_id", "ttc"), (*predictions.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
 )
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("start", [b"", b"\xef\xbb\xbf"])
@@ -93,7 +93,7 @@ def test_faults_of_values_have_the_words_of_json_and_the_key_of_their_row() -> N
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(packages, "MAX_UNPACKED_BYTES", 10_000)
+    monkeypatch.setattr(predictions, "MAX_UNPACKED_BYTES", 10_000)
     bomb = gzip.compress(b" " * 10_001)
     for data in (bomb, gzip.compress(b" " * 9_000) * 3):
         with pytest.raises(Rejected) as caught:
@@ -101,7 +101,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch
         assert [problem.code for problem in caught.value.problems] == ["too-large"]
     assert len(zlib.decompress(gzip.compress(b" " * 10_000), wbits=31)) == 10_000
     with pytest.raises(Rejected) as caught:
-        packages.json_of(b"anno_id,ttc\n" + b"0,1\n" * 6, max_rows=5)
+        predictions.json_of(b"anno_id,ttc\n" + b"0,1\n" * 6, max_rows=5)
     assert [problem.code for problem in caught.value.problems] == ["too-many-members"]
 
 

@@ -8,10 +8,9 @@ import pytest
 
 from evaluator import Rejected, convert, read_manifest, read_predictions
 from evaluator.predictions import parquet as asking
-from evaluator.predictions.packages import json_of
-from evaluator.predictions.predictions import read_sent, sha256_digest
+from evaluator.predictions.predictions import json_of, read_sent, sha256_digest
 from evaluator.predictions.sandbox import answer
-from evaluator.tables.parquet_tables import parquet_of
+from evaluator.tables.formats import parquet_of
 from tests.evaluator.worlds import EXAMPLES, Tsttc, flat
 
 pa: Any = pytest.importorskip("pyarrow", reason="pyarrow is not installed: pip install '.[parquet]'")

@@ -108,7 +108,7 @@ def test_notes_that_no_file_may_hold_are_refused() -> None:
         ({"ttc_s": TTC_S, "scale_ratio": TTC_S}, "Give either ttc_s or scale_ratio"),
         ({"ttc_s": TTC_S, "keys": ["0", "1", "2"]}, "Give either manifest or keys"),
         ({"ttc_s": TTC_S, "manifest": None}, "Give either manifest or keys"),
-        ({"ttc_s": [1.0]}, "There are 1 values for 3 sequences"),
+        ({"ttc_s": [1.0]}, "Found 1 value for 3 sequences"),
         ({"ttc_s": [TTC_S]}, r"shape \(1, 3\); expected \(n,\)"),
         ({"ttc_s": TTC_S, "manifest": None, "keys": ["0", "0", "1"]}, "not distinct"),
         ({"ttc_s": TTC_S, "fps_hz": 2}, "no rate"),

@@ -7,7 +7,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.http import StreamingHttpResponse
 from django.test import Client
 
-from leaderboard.api import board_document, board_views
+from leaderboard.api import board_views
 from leaderboard.api.parsers import UniformJSONRenderer
 from leaderboard.api.serializers import BoardSerializer
 from leaderboard.boards import boards, snapshots
@@ -31,14 +31,14 @@ def filled(edition: Edition, owner: User) -> list[Method]:
 def test_the_pieces_are_the_bytes_of_the_whole(
     filled: list[Method], edition: Edition, rows_at_once: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(board_document, "ROWS_AT_ONCE", rows_at_once)
+    monkeypatch.setattr(board_views, "ROWS_AT_ONCE", rows_at_once)
     full = boards.board(split=edition.split, viewer=AnonymousUser())
     odd = replace(full.entries[0], description='"]}\u2028\\ \x00 é 🙂', team="], [")
     for entries in ((), full.entries[:1], (odd, *full.entries), (*full.entries, odd)):
         board = replace(full, entries=entries)
         for has_intervals in (False, True):
             told = BoardSerializer(board, context={"has_intervals": has_intervals}).data
-            pieces = list(board_document.pieces(board, has_intervals=has_intervals))
+            pieces = list(board_views.pieces(board, has_intervals=has_intervals))
             assert b"".join(pieces) == UniformJSONRenderer().render(told)
 
 
@@ -80,7 +80,7 @@ def test_a_board_read_in_parts_is_the_board(
 ) -> None:
     whole = boards.public_rows(split=edition.split, edition=edition)
     for size in (1, 2, 5):
-        monkeypatch.setattr("leaderboard.db.parts.in_parts.__kwdefaults__", {"size": size})
+        monkeypatch.setattr("leaderboard.db.bulk.in_parts.__kwdefaults__", {"size": size})
         assert boards.public_rows(split=edition.split, edition=edition) == whole
 
 

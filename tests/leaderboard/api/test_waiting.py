@@ -73,6 +73,7 @@ def ended() -> None:
     """Once no watcher runs any more: what one does, or raises, belongs to the test that started it."""
     for thread in threading.enumerate():
         if thread.name == "watcher":
+            thread._started.wait(PATIENCE_S)  # type: ignore[attr-defined]
             thread.join(PATIENCE_S)
             assert not thread.is_alive(), "nobody waits, and a watcher goes on"
 
@@ -208,6 +209,17 @@ def test_who_asks_again_and_again_keeps_nobody_else_in_memory(
     for asker in (stubborn, *others, stubborn):
         assert not full.hold(asker, wait_s=1, is_gone=stays)
     assert set(full._turned_away) == {stubborn}
+
+
+def test_who_finds_no_place_keeps_the_connection_to_the_database() -> None:
+    prepared: list[int] = []
+
+    def wait(n_places: int) -> bool:
+        watcher = long_poll.Watcher(look=set, n_places=lambda: n_places, every_s=0.01)
+        return watcher.hold(uuid4(), wait_s=1, is_gone=stays, prepare=lambda: prepared.append(n_places))
+
+    assert (wait(0), wait(1)) == (False, True)
+    assert prepared == [1]
 
 
 def test_without_a_place_the_present_state_comes_with_retry_after(

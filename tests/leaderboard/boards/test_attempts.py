@@ -7,6 +7,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
 from leaderboard.boards import boards
+from leaderboard.boards.rows import Entry
 from leaderboard.methods import visibility
 from leaderboard.models import Edition, Method, Split, User
 from tests import builders
@@ -16,7 +17,7 @@ pytestmark = pytest.mark.slow
 ANYBODY = AnonymousUser()
 
 
-def rows(viewer: Any = ANYBODY) -> dict[str, boards.Entry]:
+def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:
     split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
     return {entry.method: entry for entry in boards.board(split=split, viewer=viewer).entries}
 

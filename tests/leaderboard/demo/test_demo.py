@@ -15,8 +15,7 @@ import evaluator
 from evaluator import INTERVALS
 from leaderboard.boards import boards
 from leaderboard.demo import seed
-from leaderboard.demo.runs import N_RECORDINGS, N_SEQUENCES
-from leaderboard.demo.truth import SHAPE, demo_split
+from leaderboard.demo.runs import N_RECORDINGS, N_SEQUENCES, SHAPE, demo_split
 from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Split, Status, Submission, User

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from evaluator.cli import main
 from evaluator.metrics.metrics import MID
 from evaluator.metrics.scale import scale_ratio_to_ttc
-from leaderboard.demo import seed, truth
+from leaderboard.demo import runs, seed
 from leaderboard.demo.make_runs import AllRuns, RenderedFolder
 from leaderboard.demo.runs import FRAMES, N_SEQUENCES, RUNS, SEED, Run
 from tests.evaluator.worlds import REPOSITORY
@@ -31,7 +31,7 @@ def drawn() -> NDArray[np.int64]:
 
 
 def test_estimates_that_are_made_anew_are_those_that_are_kept(drawn: NDArray[np.int64]) -> None:
-    split = truth.demo_split()
+    split = runs.demo_split()
     worker = AllRuns(folder=RenderedFolder.of(split, seed=SEED, rows=drawn.tolist()), runs=RUNS)
     made = np.array([worker(row)[1] for row in drawn.tolist()])
     kept = np.stack([run.kept()[drawn] for run in RUNS], axis=1)
@@ -65,7 +65,7 @@ def test_every_sequence_has_an_estimate_that_can_be_submitted(run: Run) -> None:
 
 
 def test_methods_come_in_the_order_of_the_paper() -> None:
-    ttc_s = truth.demo_split().truth.ttc_s
+    ttc_s = runs.demo_split().truth.ttc_s
     errors = {
         run.name: float(np.mean(MID.errors(scale_ratio_to_ttc(run.kept(), fps_hz=2), ttc_s))) for run in RUNS
     }
@@ -77,7 +77,7 @@ def test_the_demo_needs_no_opencv() -> None:
 import sys; sys.modules["cv2"] = None
 import django; django.setup()
 from leaderboard.demo import seed
-from leaderboard.demo.truth import demo_split
+from leaderboard.demo.runs import demo_split
 print(len(seed.predictions_file(seed.ENTRIES[0], truth=demo_split().truth)))
 """
     done = subprocess.run(

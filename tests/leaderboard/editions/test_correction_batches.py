@@ -8,7 +8,7 @@ from django.core.files.base import ContentFile
 from django.utils import timezone
 
 import evaluator
-from leaderboard.boards import boards
+from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import ground_truth
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status
 from leaderboard.ops import broker
@@ -42,7 +42,7 @@ def assert_all_scored_once(edition: Edition) -> None:
     truth = truth_values.load(edition.ground_truth_id)
     rows = Evaluation.objects.filter(edition=edition).select_related("submission__method")
     assert {row.status for row in rows} == {Status.SCORED}
-    found = {row.submission.method.name: boards.flat_scores(row) for row in rows}
+    found = {row.submission.method.name: flat_scores(row) for row in rows}
     assert found == {
         crowd.method_name(number): crowd.published_scores(truth, number) for number in range(N_SUBMISSIONS)
     }

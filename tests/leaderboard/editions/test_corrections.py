@@ -11,7 +11,7 @@ from django.core.management import CommandError, call_command
 from django.utils import timezone
 
 from evaluator import Predictions, Rejected, evaluate, published, read_truth
-from leaderboard.boards import boards
+from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import corrections
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import (
@@ -64,7 +64,7 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
         )
         report = evaluate(values, truth, keep_bags=True)
         expected = {name: published(value, decimals=1) for name, value in report.flat().items()}
-        assert boards.flat_scores(found) == expected
+        assert flat_scores(found) == expected
         # To the last bit, also of what is not published.
         assert found.report_digest == f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}"
         assert report.bags is not None
@@ -255,7 +255,7 @@ def test_single_system_error_can_be_retried_and_unblocks_publishing(
     broken = Evaluation.objects.filter(edition=edition).first()
     Evaluation.objects.filter(pk=broken.pk).update(status=Status.SYSTEM_ERROR)
     broken.scores.all().delete()
-    with pytest.raises(Refused, match="1 submissions"):
+    with pytest.raises(Refused, match="1 submission is neither"):
         publish(edition)
     lifecycle.retry(evaluation=broken, actor=maintainer)
     builders.score_all()

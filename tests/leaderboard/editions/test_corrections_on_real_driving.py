@@ -16,7 +16,7 @@ import pytest
 from django.utils import timezone
 
 import evaluator
-from leaderboard.boards import boards
+from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import ground_truth, preview
 from leaderboard.editions.history import TruthChange
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
@@ -155,7 +155,7 @@ def test_a_file_for_the_new_manifest_is_scored_in_the_new_edition_as_offline(
     states = dict(submission.evaluations.values_list("edition__number", "status"))
     assert states == {1: Status.REJECTED, 2: Status.SCORED}
     new = Evaluation.objects.get(submission=submission, edition=edition)
-    assert boards.flat_scores(new) == tsttc_score(file, truth=path).scores
+    assert flat_scores(new) == tsttc_score(file, truth=path).scores
     old = Evaluation.objects.get(submission=submission, edition=published)
     assert old.n_problems == 301
     assert old.problems[0]["message"].startswith("301 sequences have no value")

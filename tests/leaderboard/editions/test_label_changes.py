@@ -43,7 +43,7 @@ def test_a_dry_run_says_what_would_change_and_keeps_nothing(edition: Edition, tm
         diff=tmp_path / "diff.csv",
         stdout=out,
     )
-    assert "1 sequences added, 1 removed, 1 changed" in out.getvalue()
+    assert "1 sequence added, 1 removed, 1 changed" in out.getvalue()
     assert "Nothing was kept." in out.getvalue()
     with (tmp_path / "diff.csv").open(newline="") as file:
         rows = {row["recording"]: row for row in csv.DictReader(file)}

@@ -14,7 +14,7 @@ from django.apps import apps
 
 from evaluator import Manifest, evaluate, published, read_manifest, read_predictions, read_truth
 from evaluator.scoring.report import Report
-from leaderboard.boards import boards
+from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import preview
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from leaderboard.scoring import recording_sums
@@ -79,7 +79,7 @@ def offline(said: Said, path: Path) -> dict[str, float | None]:
 def scores(submission: Submission, edition: Edition) -> dict[str, float | None]:
     found = submission.evaluations.get(edition=edition)
     assert found.status == Status.SCORED, found.problems
-    return boards.flat_scores(found)
+    return flat_scores(found)
 
 
 def first() -> Edition:

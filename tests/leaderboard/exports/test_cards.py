@@ -13,7 +13,7 @@ from leaderboard.exports import card_drawing, cards
 from leaderboard.exports.cards import Card, CardRow
 from leaderboard.models import CardPicture, Edition, Method, Submission, User
 from leaderboard.scoring import worker
-from leaderboard.workers import pictures, queue
+from leaderboard.workers import queue, upkeep
 from tests import builders, pages
 
 FALLBACK = "/static/card.jpg"
@@ -49,8 +49,8 @@ def test_a_name_that_the_font_cannot_write_has_no_card_of_its_own() -> None:
 def test_a_worker_draws_each_card_once_and_pages_show_it(sent: Submission, client: Client) -> None:
     for address in addresses(sent):
         assert client.get(address)["Location"] == FALLBACK
-    assert pictures.draw(now=timezone.now()) == 4  # three boards and a method
-    assert pictures.draw(now=timezone.now()) == 0
+    assert upkeep.draw(now=timezone.now()) == 4  # three boards and a method
+    assert upkeep.draw(now=timezone.now()) == 0
     for address in addresses(sent):
         answer = client.get(address)
         assert (answer.status_code, answer["Content-Type"]) == (200, "image/png")
@@ -84,12 +84,12 @@ def test_no_card_names_a_method_that_is_private_or_anonymous(
 
 @pytest.mark.slow
 def test_a_card_that_no_longer_holds_is_shown_to_nobody_and_removed(sent: Submission, client: Client) -> None:
-    pictures.draw(now=timezone.now())
+    upkeep.draw(now=timezone.now())
     before = set(CardPicture.objects.values_list("digest", flat=True))
     Method.objects.update(name="Bar")
     builders.board_changed("test")
     assert client.get(addresses(sent)[1])["Location"] == FALLBACK
-    pictures.draw(now=timezone.now())
+    upkeep.draw(now=timezone.now())
     after = set(CardPicture.objects.values_list("digest", flat=True))
     assert before - after
     assert after == set(cards.present())
@@ -101,8 +101,8 @@ def test_a_card_that_cannot_be_drawn_is_not_tried_again(
 ) -> None:
     sent = builders.submit(owner, builders.predictions(edition), method="接触时间")
     builders.score_all()
-    pictures.draw(now=timezone.now())
-    assert pictures.draw(now=timezone.now()) == 0
+    upkeep.draw(now=timezone.now())
+    assert upkeep.draw(now=timezone.now()) == 0
     assert client.get(addresses(sent)[1])["Location"] == FALLBACK
 
 
@@ -116,7 +116,7 @@ def test_of_many_workers_one_draws_when_it_is_time(sent: Submission) -> None:
 
 
 def test_a_worker_that_is_to_stop_draws_no_further_card(sent: Submission) -> None:
-    assert pictures.draw(now=timezone.now(), is_stopping=lambda: True) == 0
+    assert upkeep.draw(now=timezone.now(), is_stopping=lambda: True) == 0
 
 
 def test_cards_wait_while_this_process_decides_a_submission(sent: Submission) -> None:
@@ -127,5 +127,5 @@ def test_cards_wait_while_this_process_decides_a_submission(sent: Submission) ->
         return len(asked) > 3
 
     with worker._in_hand:
-        assert pictures.draw(now=timezone.now(), is_stopping=is_stopping) == 0
-    assert pictures.draw(now=timezone.now()) > 0
+        assert upkeep.draw(now=timezone.now(), is_stopping=is_stopping) == 0
+    assert upkeep.draw(now=timezone.now()) > 0

@@ -12,6 +12,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.boards import boards
+from leaderboard.boards.rows import Entry
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import visibility
 from leaderboard.methods.details import stated
@@ -41,7 +42,7 @@ def split() -> Split:
     return Split.objects.select_related("published_edition__ground_truth").get(pk="test")
 
 
-def rows(viewer: Any = ANYBODY) -> dict[str, boards.Entry]:
+def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:
     return {entry.method: entry for entry in boards.board(split=split(), viewer=viewer).entries}
 
 

@@ -1,6 +1,7 @@
 """`leaderboard.ops.broker`: a nudge never fails and never keeps anybody waiting for long."""
 
 import socket
+import threading
 from collections.abc import Iterator
 
 import pytest
@@ -11,7 +12,7 @@ from pytest_django import DjangoCaptureOnCommitCallbacks
 from leaderboard import tasks, versions
 from leaderboard.models import Edition, User
 from leaderboard.ops import broker
-from leaderboard.ops.broker import CircuitBreaker
+from leaderboard.ops.broker import CircuitBreaker, News
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -93,6 +94,8 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return True
 
     monkeypatch.setattr(broker, "_sent", send)
+    monkeypatch.setattr(broker, "_connections", object)
+    monkeypatch.setattr(broker, "_news", News(lambda: send("work_off"), every_s=0))
     return told
 
 
@@ -119,3 +122,19 @@ def test_a_change_on_every_board_is_one_message(
     with django_capture_on_commit_callbacks(execute=True), transaction.atomic():
         versions.changed_everywhere()
     assert told == ["work_off"]
+
+
+def test_of_many_messages_at_once_the_first_is_sent_and_one_for_all_others() -> None:
+    told = threading.Semaphore(0)
+    news = News(told.release, every_s=0.5)
+    assert [news.is_first() for _ in range(50)] == [True, *[False] * 49]
+    assert told.acquire(timeout=60)
+    assert not told.acquire(blocking=False)
+
+
+def test_what_comes_after_the_message_for_all_others_is_told_again() -> None:
+    told = threading.Semaphore(0)
+    news = News(told.release, every_s=0.05)
+    assert news.is_first()
+    for _ in range(3):
+        assert news.is_first() or told.acquire(timeout=60)

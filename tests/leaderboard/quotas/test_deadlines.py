@@ -11,7 +11,7 @@ from rest_framework.test import APIClient
 
 from leaderboard import versions
 from leaderboard.models import BoardVersion, Edition, Split, User
-from leaderboard.quotas import deadlines
+from leaderboard.quotas import admissions
 from leaderboard.workers import queue
 from tests import builders, pages
 from tests.leaderboard.api.test_submissions import client_of, post
@@ -95,7 +95,7 @@ def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> No
     before = versions.state()
     assert versions.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
     assert versions.state() == before
-    assert deadlines.sentence_of(Split.objects.get(pk="test"), now=timezone.now()) == ""
+    assert admissions.sentence_of(Split.objects.get(pk="test"), now=timezone.now()) == ""
 
 
 # --- what filters leave -----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from datetime import timedelta
 from typing import Any
 
 import pytest
-from django.db import transaction
+from django.db import connection, transaction
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -279,7 +279,8 @@ def test_thousands_of_random_steps_break_no_promise(edition: Edition, owner: Use
     run_state_machine_as_test(
         Life,
         settings=settings(
-            max_examples=50,
+            # The steps are the same on both databases: on the other one they look for faults of its SQL.
+            max_examples=50 if connection.vendor == "sqlite" else 20,
             stateful_step_count=60,
             deadline=None,
             suppress_health_check=list(HealthCheck),

@@ -209,7 +209,7 @@ def test_rejected_is_the_files_fault(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.REJECTED)
     rejected = progress(row)
-    assert rejected.sentence == "The file is at fault: it has a problem, so it was not scored."
+    assert rejected.sentence == "The file is at fault: it has 1 problem, so it was not scored."
     assert not rejected.fault_is_ours
 
 

@@ -178,6 +178,25 @@ class TestAtOnce:
         assert number > 5
 
 
+def test_a_method_that_another_request_makes_meanwhile_is_the_same_method(
+    edition: Edition, owner: User
+) -> None:
+    teams.team_of(user=owner)
+    first = [lambda: builders.send(owner, file_of(b"first"), method="Foo")]
+
+    def makes_it(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
+        found = execute(sql, *rest)
+        if first and '"leaderboard_method"."name" = ' in sql:
+            first.pop()()
+        return found
+
+    with connection.execute_wrapper(makes_it):
+        second = builders.send(owner, file_of(b"second"), method="Foo")
+    assert not first
+    assert set(Submission.objects.values_list("method", flat=True)) == {second.submission.method_id}
+    assert Submission.objects.count() == 2
+
+
 def is_number(wanted: int, found: int, sql: str) -> bool:
     """Whether this is the statement of that number."""
     return found == wanted

@@ -13,7 +13,7 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
 
-from leaderboard.models import AuditEvent, Mail, User
+from leaderboard.models import AuditEvent, Edition, Mail, User
 from leaderboard.submissions import forgetting
 from tests import builders
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -151,10 +151,21 @@ def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
 # --- maintainers -----------------------------------------------------------------------------------------
 
 
-def test_maintainers_who_must_have_one_are_led_to_it(keeper: User, phone: Phone, settings: Settings) -> None:
+def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before(
+    keeper: User, owner: User, edition: Edition, phone: Phone, settings: Settings
+) -> None:
     early = signed_in(keeper)
     assert early.get("/maintain/").status_code == 200
+    sent = builders.send(owner, builders.predictions(edition)).submission  # private
+    of_another = (
+        f"/submissions/{sent.pk}/",
+        f"/api/v1/submissions/{sent.pk}",
+        f"/methods/{sent.method_id}/",
+        f"/api/v1/methods/{sent.method_id}",
+    )
+    assert {early.get(path).status_code for path in of_another} == {200}
     settings.REQUIRE_SECOND_FACTOR = True
+    assert {early.get(path).status_code for path in of_another} == {404}
     for path in ("/maintain/", "/maintain/audit/", "/admin/", "/admin/leaderboard/user/"):
         assert early.get(path).headers["Location"] == "/accounts/2fa/totp/activate/"
     assert early.post("/maintain/queue/retry/").headers["Location"] == "/accounts/2fa/totp/activate/"
@@ -169,9 +180,10 @@ def test_maintainers_who_must_have_one_are_led_to_it(keeper: User, phone: Phone,
         assert asked == "/accounts/2fa/reauthenticate/?next=%2Fmaintain%2F%3Fx%3D1"
         page = assert_sound(session.get(asked))
         assert page.one("input", name="next").attributes["value"] == "/maintain/?x=1"
-        sent = {"code": phone.code(), "next": "/maintain/?x=1"}
-        assert session.post("/accounts/2fa/reauthenticate/", sent).headers["Location"] == "/maintain/?x=1"
+        code = {"code": phone.code(), "next": "/maintain/?x=1"}
+        assert session.post("/accounts/2fa/reauthenticate/", code).headers["Location"] == "/maintain/?x=1"
         assert session.get("/maintain/").status_code == session.get("/admin/").status_code == 200
+        assert {session.get(path).status_code for path in of_another} == {200}
 
     refused = client.post("/accounts/2fa/totp/deactivate/")
     assert "Maintainers of this site must have a second factor." in refused.text

@@ -8,7 +8,7 @@ from django.test import Client
 from django.urls import reverse
 
 from evaluator.problems import PROBLEM_CODES
-from leaderboard.api import schema_views
+from leaderboard.api import schema
 from leaderboard.errors.problem_codes import API_CODES
 from tests import openapi, pages
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -83,9 +83,9 @@ def test_schema_comes_as_yaml_or_json_and_is_described_once(client: Client, benc
     as_json = client.get(f"{address}?format=json")
     assert as_json["Content-Type"].startswith("application/vnd.oai.openapi+json")
     assert as_json.json()["openapi"] == "3.1.0"
-    n_made = schema_views._written.cache_info().misses
+    n_made = schema._written.cache_info().misses
     assert client.get(address).content == as_yaml.content
-    assert schema_views._written.cache_info().misses == n_made
+    assert schema._written.cache_info().misses == n_made
 
 
 def test_links_between_objects_lead_somewhere(client: Client, benchmark: None) -> None:

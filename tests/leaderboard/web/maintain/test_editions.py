@@ -126,12 +126,14 @@ def test_desk_leads_to_what_failed_by_our_fault(keeper: Client, rescored: Editio
     assert len(listed.one("table", class_="queue").one("tbody").all("tr")) == 4
 
 
-def test_desk_offers_to_roll_back_only_where_there_is_something_to_go_back_to(
-    keeper: Client, rescored: Edition
-) -> None:
-    assert "Roll back" not in said(keeper, HUB)
+def test_pages_offer_only_what_can_be_done_to_an_edition(keeper: Client, rescored: Edition) -> None:
+    for page in (HUB, FIRST):
+        assert "Roll back" not in said(keeper, page)
+    assert "Edition 1 is not in preparation" in said(keeper, f"{FIRST}discard/")
+    assert get(keeper, f"{SECOND}discard/").one("main").all("button")
     publish(rescored)
-    assert "Roll back to edition 1" in said(keeper, HUB)
+    for page in (HUB, SECOND):
+        assert "Roll back to edition 1" in said(keeper, page)
 
 
 def test_desk_names_former_editions(keeper: Client, rescored: Edition) -> None:
