@@ -18,6 +18,7 @@ import pytest
 from baselines.journals import Journal
 from tests.baselines.made_folders import image_path, made_folder
 from tests.evaluator.worlds import REPOSITORY, Tsttc
+from tests.leaderboard.scoring.child_processes import children_of, kernel_says
 from tests.signals import default_signals
 
 pytestmark = [
@@ -112,9 +113,8 @@ def test_ctrl_c_ends_a_run_at_once_and_in_words(folder: Path) -> None:
 
 def test_a_process_that_dies_is_told_in_words(folder: Path) -> None:
     with held_run(folder) as (process, end):
-        children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-        for child in map(int, children):
-            if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes():
+        for child in children_of(process.pid):
+            if "spawn_main" in kernel_says(child, "cmdline"):
                 os.kill(child, signal.SIGKILL)
         assert nobody_reads(end)
         _, complaints = process.communicate(timeout=MOST_S)
