@@ -69,7 +69,11 @@ def providers(**known: tuple[str, str, str]) -> dict[str, dict[str, Any]]:
             given = id_variable if client_id else secret_variable
             FAULTS.append(f"{missing} is not set, and {given} is; expected both or none.")
         if client_id and secret:
-            found[provider] = {"APP": {"name": name, "client_id": client_id, "secret": secret}}
+            found[provider] = {
+                "APP": {"name": name, "client_id": client_id, "secret": secret},
+                # A code that somebody intercepts is worth nothing without what this site kept (RFC 7636).
+                "OAUTH_PKCE_ENABLED": True,
+            }
     return found
 
 

@@ -1,7 +1,9 @@
 """Signing in with ORCID and GitHub: whom it lets in, whom it does not, and what goes wrong over there."""
 
+import base64
 import sys
 from collections.abc import Iterator
+from hashlib import sha256
 from types import ModuleType
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit
@@ -173,6 +175,22 @@ def test_a_second_factor_is_asked_for_whichever_way_one_comes(provider: Provider
     client = Client()
     assert arrive(client).headers["Location"] == "/accounts/2fa/authenticate/"
     assert not is_in(client)
+
+
+@pytest.mark.parametrize("name", ["github", "orcid"])
+def test_a_code_is_exchanged_with_what_this_sign_in_alone_has(
+    provider: Provider, client: Client, name: str
+) -> None:
+    if name == "orcid":
+        provider.orcid()
+    sent = client.post(f"/accounts/{name}/login/", {"process": "login"})
+    asked = parse_qs(urlsplit(sent.headers["Location"]).query)
+    assert asked["code_challenge_method"] == ["S256"]
+    come_back(client, name, code=CODE, state=asked["state"][0])
+    (verifier,) = provider.sent[0][1]["code_verifier"]
+    assert verifier not in sent.headers["Location"]
+    digest = base64.urlsafe_b64encode(sha256(verifier.encode()).digest())
+    assert asked["code_challenge"] == [digest.decode().rstrip("=")]
 
 
 # --- nobody takes an account over ------------------------------------------------------------------------
