@@ -9,10 +9,12 @@ database, the broker and the files, and nothing else, as those on other machines
 Here PostgreSQL has the same processors as the workers, and this process, which only asks whether all are
 decided. So each line says what every party took of them: where their sum is near the number of processors, no
 worker more can be of use on this machine.
+
+What waits behind submissions is left out, as in `rescoring`: a worker that is at it when it is told to end is
+given 20 s to finish, whether it needs them or not, and with four of them the benchmark ran out of its time.
 """
 
 import os
-import subprocess
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -33,14 +35,16 @@ import evaluator
 from leaderboard.db import clock
 from leaderboard.demo.runs import simulate
 from leaderboard.editions import ground_truth
-from leaderboard.models import Evaluation, Status, User
+from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from leaderboard.ops import broker
 from leaderboard.submissions import submissions
-from tests.journeys.production import BIN, REPOSITORY, await_that
+from tests.journeys.production import BIN, Site, await_that, running
 
 N_WORKERS = (1, 2, 4)
 N_SUBMISSIONS, N_TO_WARM = 60, 6
 N_SEQUENCES = 28_600
+# To write one takes longer than to score it, so files share their values and differ in the blanks at the end.
+N_VALUES = 8
 SEED = 20230901
 PATIENCE_S = 600.0
 
@@ -52,10 +56,13 @@ def main() -> None:
     table = Path(settings.DATA_DIR) / "truth.csv"
     table.write_bytes(truth.to_csv())
     ground_truth.import_truth(split_name="test", path=table, now=timezone.now())
+    # Intervals are another benchmark: to the workers, they were computed at a time that is yet to come.
+    Edition.objects.update(inferred_at=timezone.now() + timedelta(days=1))
+    contents = contents_of(truth)
     try:
         for n in N_WORKERS:
-            warm_ids = queue_for_later(truth, name=f"to warm {n}", n=N_TO_WARM * n)
-            ids = queue_for_later(truth, name=f"for {n}", n=N_SUBMISSIONS)
+            warm_ids = queue_for_later(contents, name=f"to warm {n}", n=N_TO_WARM * n)
+            ids = queue_for_later(contents, name=f"for {n}", n=N_SUBMISSIONS)
             name = f"scale_out_{n}_{'worker' if n == 1 else 'workers'}"
             # What else the machine is doing, without which the rates cannot be read.
             print(f"{name}_load_before = {os.getloadavg()[0]:.1f} processes", flush=True)
@@ -82,13 +89,19 @@ def used_by_party(workers: Sequence[int]) -> dict[str, float]:
     }
 
 
-def queue_for_later(truth: evaluator.GroundTruth, *, name: str, n: int) -> list[UUID]:
+def contents_of(truth: evaluator.GroundTruth) -> list[bytes]:
+    """A few prediction files."""
+    rng = np.random.default_rng(SEED)
+    noise = rng.lognormal(0, 0.15, (N_VALUES, truth.n_sequences))
+    return [evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * row) for row in noise]
+
+
+def queue_for_later(contents: Sequence[bytes], *, name: str, n: int) -> list[UUID]:
     """Send different files while nobody works, none of them due yet; returns their evaluations."""
     user, _ = User.objects.get_or_create(email="scale-out@example.org")
-    rng = np.random.default_rng([SEED, *name.encode()])
-    for i in range(n):
-        ttc_s = truth.ttc_s * rng.lognormal(0, 0.15, truth.n_sequences)
-        data = evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s)
+    n_before = Submission.objects.count()
+    for i in range(n_before, n_before + n):
+        data = contents[i % len(contents)] + b" " * (i // len(contents))
         submissions.submit(
             user=user,
             split_name="test",
@@ -120,30 +133,24 @@ def rate(ids: Sequence[UUID]) -> float:
 @contextmanager
 def workers(n: int) -> Iterator[list[int]]:
     """So many worker processes, all of them up, by their numbers; ended with the context."""
-    processes: list[int] = []
-    begun: list[subprocess.Popen[bytes]] = []
-    logs = [Path(settings.DATA_DIR) / f"worker-{n}-{i}.log" for i in range(n)]
+    site = Site(
+        url="", directory=Path(settings.DATA_DIR), environment=os.environ | {"TSTTC_LOG_LEVEL": "INFO"}
+    )
+    command = (str(BIN / "celery"), "--app=leaderboard", "worker", "--concurrency=1")
+    names = [f"worker-{n}-{i}" for i in range(n)]
     with ExitStack() as started:
-        for i, path in enumerate(logs):
-            log = started.enter_context(path.open("wb"))
-            command = [str(BIN / "celery"), "--app=leaderboard", "worker", "--concurrency=1"]
-            command += [f"--hostname=scale-{i}@%h", "--without-gossip", "--without-mingle"]
-            worker = subprocess.Popen(
-                command,
-                cwd=REPOSITORY,
-                env={**os.environ, "TSTTC_LOG_LEVEL": "INFO"},
-                stdout=log,
-                stderr=log,
-                stdin=subprocess.DEVNULL,
+        begun = [
+            started.enter_context(
+                running(site, name, *command, f"--hostname={name}@%h", "--without-gossip", "--without-mingle")
             )
-            started.callback(end, worker)
-            processes.append(worker.pid)
-            begun.append(worker)
+            for name in names
+        ]
+        logs = [site.directory / f"{name}.log" for name in names]
         await_that(lambda: all(b" ready." in path.read_bytes() for path in logs), what="the workers are up")
-        # All at once: each finishes what it has in hand, which takes seconds.
+        # All at once: each takes a moment to end.
         for worker in begun:
             started.callback(worker.terminate)
-        yield processes
+        yield [worker.pid for worker in begun]
 
 
 def database_server() -> list[int]:
@@ -178,14 +185,3 @@ def _text_of(path: Path) -> str:
         return path.read_text()
     except (FileNotFoundError, ProcessLookupError):
         return ""
-
-
-def end(worker: "subprocess.Popen[bytes]") -> None:
-    """Ask a worker to finish, and make it if it does not."""
-    worker.terminate()
-    try:
-        worker.wait(timeout=60)
-    finally:
-        if worker.poll() is None:
-            worker.kill()
-            worker.wait()
