@@ -12,8 +12,11 @@ from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import Split, User
 from leaderboard.models.benchmark import Listing
+from leaderboard.models.quotas import excess
 
 MAX_DESCRIPTION: Final = 1000
+MAX_POSITION: Final = 32767
+POSITION_FAULT: Final = f"The position is %(show_value)s; expected a whole number from 0 to {MAX_POSITION:,}."
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +107,8 @@ def checked(split: Split, policy: Policy) -> Split:
     values["announcement"] = " ".join(
         clean_text("announcement", policy.announcement, limit=300, required=False).split()
     )
+    for field, fault in _out_of_range(policy).items():
+        raise Refused("bad-value", fault, field=field)
     for name, value in values.items():
         setattr(split, name, value)
     try:
@@ -115,6 +120,13 @@ def checked(split: Split, policy: Policy) -> Split:
             "bad-value", error.message_dict[field][0], field=field if field in NAMES else ""
         ) from None
     return split
+
+
+def _out_of_range(policy: Policy) -> dict[str, str]:
+    faults = excess(quota_limit=policy.quota_limit, quota_rejected_limit=policy.quota_rejected_limit)
+    if not 0 <= policy.position <= MAX_POSITION:
+        faults["position"] = POSITION_FAULT % {"show_value": policy.position}
+    return faults
 
 
 def changed(before: Policy, after: Policy) -> Mapping[str, tuple[Any, Any]]:

@@ -13,6 +13,23 @@ from leaderboard.models.people import Team, User
 MAX_SPAN: Final = timedelta(days=3650)
 """The longest window, and the longest gap: ten years."""
 
+MAX_COUNT: Final = 1_000_000
+"""The largest limit that somebody can set. One that stands in the database from before holds."""
+EXCESS: Final = {
+    "quota_limit": f"The limit is %(show_value)s submissions; expected at most {MAX_COUNT:,}, or none.",
+    "quota_rejected_limit": f"The limit is %(show_value)s rejected files; "
+    f"expected at most {MAX_COUNT:,}, or none.",
+}
+
+
+def excess(**counts: int | None) -> dict[str, str]:
+    """By field of `QuotaRules`, what is found and expected of each limit that is too large to be set."""
+    return {
+        name: EXCESS[name] % {"show_value": count}
+        for name, count in counts.items()
+        if count is not None and count > MAX_COUNT
+    }
+
 
 class QuotaRules(models.Model):
     """Four limits. Each counts submissions of one team to one split."""

@@ -27,7 +27,7 @@ from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
-from leaderboard.models.quotas import MAX_SPAN
+from leaderboard.models.quotas import MAX_SPAN, excess
 from leaderboard.models.submissions import MAX_POISON_STRIKES
 from leaderboard.quotas.rules import UNLIMITED, Rules, rules_of
 
@@ -320,7 +320,8 @@ def override(
         "quota_min_gap": min_gap,
         "quota_rejected_limit": rejected_limit,
     }
-    for name, fault in QuotaOverride(**rules).faults().items():
+    too_large = excess(quota_limit=limit, quota_rejected_limit=rejected_limit)
+    for name, fault in {**QuotaOverride(**rules).faults(), **too_large}.items():
         raise Refused("bad-value", fault, field=name)
     with transaction.atomic():
         # Before the row that names it: whoever ends the team holds it.

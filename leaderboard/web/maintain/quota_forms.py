@@ -6,12 +6,11 @@ from typing import Any, Final
 from django import forms
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.models.quotas import QuotaRules
+from leaderboard.models.quotas import EXCESS, MAX_COUNT, QuotaRules
 from leaderboard.quotas import quotas
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 
-MAX_COUNT: Final = 1_000_000
 _FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The team does not see it."
 
 
@@ -47,8 +46,8 @@ class SpanField(forms.CharField):
         return span
 
 
-def count_field(label: str, help_text: str) -> forms.IntegerField:
-    """A limit that may be left out."""
+def count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
+    """A limit that may be left out; `name` is its field in `QuotaRules`."""
     return forms.IntegerField(
         label=label,
         required=False,
@@ -59,7 +58,7 @@ def count_field(label: str, help_text: str) -> forms.IntegerField:
         error_messages={
             "invalid": "That is not a whole number; expected 0 or more, or an empty field.",
             "min_value": "The number is negative; expected 0 or more, or an empty field.",
-            "max_value": f"That is too many; expected at most {MAX_COUNT:,}, or nothing.",
+            "max_value": EXCESS[name],
         },
     )
 
@@ -67,7 +66,7 @@ def count_field(label: str, help_text: str) -> forms.IntegerField:
 class OverrideForm(SiteForm):
     """Four limits and why this team has them. The names are those of `quotas.override`."""
 
-    limit = count_field("Submissions", "Within the window. Empty: no limit; 0: none.")
+    limit = count_field("quota_limit", "Submissions", "Within the window. Empty: no limit; 0: none.")
     window = SpanField(
         may_be_none=False,
         help_text="Length of the rolling window, for example 30 days or 24 hours.",
@@ -78,7 +77,9 @@ class OverrideForm(SiteForm):
         may_be_none=True,
         help_text="Minimum time between two submissions. Empty: none.",
     )
-    rejected_limit = count_field("Rejected or cancelled files", "Within 24 hours. Empty: no limit.")
+    rejected_limit = count_field(
+        "quota_rejected_limit", "Rejected or cancelled files", "Within 24 hours. Empty: no limit."
+    )
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)
 
     @staticmethod

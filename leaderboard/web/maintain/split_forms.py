@@ -7,7 +7,7 @@ from typing import Any, Final
 from django import forms
 
 from leaderboard.benchmark import moments
-from leaderboard.benchmark.policy import MAX_DESCRIPTION, NAMES, Policy
+from leaderboard.benchmark.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, POSITION_FAULT, Policy
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Split
 from leaderboard.models.benchmark import Listing
@@ -66,8 +66,9 @@ class PolicyForm(SiteForm):
     listing = forms.ChoiceField(choices=_LISTINGS)
     position = forms.IntegerField(
         min_value=0,
-        max_value=32767,
+        max_value=MAX_POSITION,
         initial=0,
+        error_messages=dict.fromkeys(("min_value", "max_value"), POSITION_FAULT),
         help_text="Splits are listed by this number.",
         widget=forms.NumberInput(attrs={"inputmode": "numeric"}),
     )
@@ -84,7 +85,9 @@ class PolicyForm(SiteForm):
         coerce=int,
         help_text="Decimals of its next edition. Each decimal reveals more of hidden values.",
     )
-    quota_limit = count_field("Submissions", "Of a team, within the window. Empty: no limit; 0: none.")
+    quota_limit = count_field(
+        "quota_limit", "Submissions", "Of a team, within the window. Empty: no limit; 0: none."
+    )
     quota_window = SpanField(
         label="Window",
         may_be_none=False,
@@ -96,7 +99,9 @@ class PolicyForm(SiteForm):
         may_be_none=True,
         help_text="Minimum time between two submissions of a team. Empty: none.",
     )
-    quota_rejected_limit = count_field("Rejected or cancelled files", "Within 24 hours. Empty: no limit.")
+    quota_rejected_limit = count_field(
+        "quota_rejected_limit", "Rejected or cancelled files", "Within 24 hours. Empty: no limit."
+    )
     needs_admission = forms.BooleanField(
         label="By admission", required=False, help_text="Only admitted teams submit to it."
     )

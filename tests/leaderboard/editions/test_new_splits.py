@@ -39,6 +39,8 @@ NEW = {
     "quota_min_gap": "",
     "quota_rejected_limit": "5",
 }
+TOO_FAR = "The position is 99999; expected a whole number from 0 to 32,767."
+TOO_MANY = "The limit is 1000000000000 rejected files; expected at most 1,000,000, or none."
 PUBLIC = (
     *("/", "/board/val/", "/board/val/charts/", "/board/val.csv", "/board/val/editions/", "/sitemap.xml"),
     *("/feed.atom", "/docs/", "/compare/", "/api/v1/splits", "/board/val/feed.atom"),
@@ -133,7 +135,8 @@ def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Clien
         "opens_at": ("2099-03-01 10:00", "has no time zone"),
         "quota_window": ("-3 days", "'-3 days' is no span of time"),
         "quota_limit": ("-1", "The number is negative"),
-        "position": ("99999", "less than or equal to 32767"),
+        "position": ("99999", TOO_FAR),
+        "quota_rejected_limit": (str(10**12), TOO_MANY),
     }
     for field, (value, sentence) in bad.items():
         refused = keeper.post(ADD, {**NEW, "name": "other", field: value})
@@ -157,6 +160,9 @@ def test_command_makes_a_split_that_opens_with_its_import_and_refuses_in_a_sente
         (("a", "--title", "N", "--open", "--closes", "2020-01-01 00:00 UTC"), "is in the past"),
         (("a", "--title", "N", "--open", "--window", "0 days"), "The window is 0:00:00"),
         (("a", "--title", "N", "--open", "--limit", "-2"), "'-2' is not a whole number"),
+        # The words of the page.
+        (("a", "--title", "N", "--open", "--rejected-limit", str(10**12)), TOO_MANY),
+        (("a", "--title", "N", "--open", "--position", "99999"), TOO_FAR),
     ):
         with pytest.raises(CommandError, match=sentence):
             call_command("add_split", *arguments)

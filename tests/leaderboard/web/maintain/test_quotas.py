@@ -268,7 +268,7 @@ def test_spans_are_written_in_words(keeper: Client, team: Team, text: str, span:
     [
         ("limit", "many", "That is not a whole number"),
         ("limit", "-1", "The number is negative"),
-        ("limit", "1000001", "That is too many"),
+        ("limit", "1000001", "The limit is 1000001 submissions; expected at most 1,000,000, or none."),
         ("rejected_limit", "2.5", "That is not a whole number"),
         ("window", "", "No window was given"),
         ("window", "3 fortnights", "'3 fortnights' is no span of time"),
