@@ -15,6 +15,7 @@ from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, label_changes
 from leaderboard.management.arguments import RefusingCommand
 from leaderboard.models import Edition, Split
+from leaderboard.storage import files
 
 
 class Command(RefusingCommand):
@@ -96,7 +97,12 @@ class Command(RefusingCommand):
             )
         if options["diff"]:
             lines = csv_lines((row.as_row for row in rows), columns=label_changes.COLUMNS)
-            options["diff"].write_text("".join(lines), encoding="utf-8", newline="")
+            try:
+                # It has values of the ground truth: for its owner only.
+                with files.replacing(options["diff"]) as unfinished:
+                    unfinished.write_text("".join(lines), encoding="utf-8", newline="")
+            except OSError as fault:
+                raise CommandError(f"{options['diff']} cannot be written: {fault.strerror}") from fault
 
     def _follow(self, edition: Edition) -> None:
         """One line that renews itself on a terminal, one line a change elsewhere."""

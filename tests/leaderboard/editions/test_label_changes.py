@@ -1,6 +1,7 @@
 """A correction can be looked at before anything is kept, and manifests of former editions stay to be had."""
 
 import csv
+import stat
 from io import StringIO
 from pathlib import Path
 
@@ -45,6 +46,8 @@ def test_a_dry_run_says_what_would_change_and_keeps_nothing(edition: Edition, tm
     )
     assert "1 sequence added, 1 removed, 1 changed" in out.getvalue()
     assert "Nothing was kept." in out.getvalue()
+    # It has values of the ground truth.
+    assert stat.S_IMODE((tmp_path / "diff.csv").stat().st_mode) == 0o600
     with (tmp_path / "diff.csv").open(newline="") as file:
         rows = {row["recording"]: row for row in csv.DictReader(file)}
     assert len(rows) == 3
@@ -61,6 +64,13 @@ def test_a_dry_run_without_labels_is_refused(edition: Edition, tmp_path: Path) -
         call_command("open_edition", "test", dry_run=True)
     with pytest.raises(CommandError, match="no published edition to compare with"):
         call_command("open_edition", "val", dry_run=True, truth=tmp_path / "any.csv")
+
+
+def test_a_diff_that_cannot_be_written_is_refused_in_a_sentence(edition: Edition, tmp_path: Path) -> None:
+    truth = builders.truth_csv(tmp_path / "same.csv")
+    (tmp_path / "taken").mkdir()
+    with pytest.raises(CommandError, match=r"taken cannot be written: Is a directory"):
+        call_command("open_edition", "test", truth=truth, dry_run=True, diff=tmp_path / "taken")
 
 
 def test_the_manifest_of_a_former_edition_stays_to_be_had(rescored: Edition, client: Client) -> None:
