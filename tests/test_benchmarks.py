@@ -34,9 +34,9 @@ def test_a_report_is_read_as_it_was_written() -> None:
     )
 
 
-def test_all_benchmarks_together_take_twelve_minutes_at_most() -> None:
+def test_all_benchmarks_together_take_fourteen_minutes_at_most() -> None:
     assert set(bench.LIMITS_S) <= {path.stem for path in bench.FOLDER.glob("*.py")}
-    assert sum(bench.LIMITS_S.values()) <= 720
+    assert sum(bench.LIMITS_S.values()) <= 840
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are found in /proc")
