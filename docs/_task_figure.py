@@ -66,18 +66,19 @@ def task_figure(
 def _add_equations(figure: Figure, ratio: float, ttc_s: float, *, y: float) -> None:
     """The scale ratio and the time to contact: side by side, or below each other on two lines each."""
     colours = figure.theme
-    scale = ("size in the reference ÷ size in the target", f"= α = {_ratio(ratio)}")
-    time = ("time to contact τ = 1 / (2 Hz · (1/α − 1))", f"= {seconds(ttc_s)}")
+    sizes, time = "size in the reference ÷ size in the target", "time to contact τ = 1 / (2 Hz · (1/α − 1))"
     if figure.width < _WIDE:
-        lines = [
-            (text, colour) for texts, colour in ((scale, colours.mark), (time, colours.ink)) for text in texts
-        ]
+        # No line begins with "=": each can be read without the one above.
+        scale = (sizes, f"is the scale ratio α = {_ratio(ratio)}")
+        lines = [(text, colours.mark) for text in scale]
+        lines += [(text, colours.ink) for text in (time, f"so τ = {seconds(ttc_s)}")]
         for i, (text, colour) in enumerate(lines):
-            figure.shapes.append(Text(text, MARGIN, y + 24 * i, colour, 15.5, is_bold=i < 2))
+            figure.shapes.append(Text(text, MARGIN, y + 24 * i, colour, 15.5, is_bold=i < len(scale)))
         return
+    right = figure.width - MARGIN
     figure.shapes += [
-        Text(" ".join(scale), MARGIN, y, colours.mark, 18, is_bold=True),
-        Text(" ".join(time), figure.width - MARGIN, y, colours.ink, 18, anchor="end"),
+        Text(f"{sizes} = α = {_ratio(ratio)}", MARGIN, y, colours.mark, 18, is_bold=True),
+        Text(f"{time} = {seconds(ttc_s)}", right, y, colours.ink, 18, anchor="end"),
     ]
 
 

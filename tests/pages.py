@@ -8,7 +8,7 @@ from django.http import HttpResponse, HttpResponseBase
 from django.test import Client
 
 OUR_SCRIPT = re.compile(r"/static/[\w./-]+\.js")
-VOID = {"col", "meta", "link", "input", "br", "hr", "img", "path", "rect", "source", "mspace"}
+VOID = {"col", "meta", "link", "input", "br", "hr", "img", "path", "rect", "source", "mspace", "wbr"}
 
 
 @dataclass

@@ -69,6 +69,16 @@ def ticked(text: str) -> SafeString:
     return format_html_join("", "{}", ((piece,) for piece in pieces))
 
 
+@register.filter
+def breakable(path: str) -> SafeString:
+    """A path that may go on in the next line after each of its slashes, as HTML.
+
+    >>> breakable("/api/v1")
+    '/<wbr>api/<wbr>v1'
+    """
+    return format_html_join(SafeString("/<wbr>"), "{}", ((part,) for part in path.split("/")))
+
+
 @register.simple_tag
 def day(at: datetime) -> SafeString:
     """The day, with time and zone on hover."""

@@ -122,7 +122,8 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
                 # Of a fence the attributes stand at the code within, beside the button that copies it.
                 token.type, token.attrs = "fence", {**token.attrs, "class": "aligned", "tabindex": 0}
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
-            texts.append(_plain(token))
+            # A search shows a table as one line, in which nothing else would tell cells apart.
+            texts.append(_plain(token) + " ·" * (tokens[at - 1].type in {"th_open", "td_open"}))
         elif token.type in {"th_open", "td_open"}:
             if "right" in str(token.attrs.pop("style", "")):
                 token.attrSet("class", "number")

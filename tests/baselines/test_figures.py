@@ -94,7 +94,8 @@ def test_the_task_figure_shows_six_frames_and_says_the_scale_ratio(clip: Clip, n
     boxes = [shape for shape in figure.shapes if isinstance(shape, Line)]
     assert (len(pictures), len(boxes)) == (6, 6)
     assert all(picture.x + picture.width <= figure.width for picture in pictures)
-    assert "= α = 0.800" in texts(figure)
+    assert "α = 0.800" in texts(figure)
+    assert [line for line in texts(figure).splitlines() if line.startswith("=")] == []
     assert "= 2.0 s" in texts(figure)
 
 

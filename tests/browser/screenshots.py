@@ -102,8 +102,11 @@ VIEWS: Final = {
     "submission-rejected": "/submissions/{rejected_id}/",
     "publish": "/methods/{method_id}/visibility/?visibility=PUBLIC",
     "docs-found": "/docs/search/?q=quota",
+    "docs-not-found": "/docs/search/?q=nothing+like+it",
     "nothing": "/nowhere/",
 }
+# What no address shows unless something fails; they are shown there in the place of an answer.
+FAILURES: Final = "/failures/"
 
 
 @dataclass(frozen=True)
@@ -115,6 +118,7 @@ class Demo:
     named: dict[str, str]  # addresses by the names of their patterns
     email: str
     password: str
+    failures: dict[str, str]  # pages by their names
 
 
 @contextmanager
@@ -130,7 +134,14 @@ def demo() -> Iterator[Demo]:
             await_that(lambda: nothing_waits(site), what="the demo is scored", patience_s=PATIENCE_S)
             known, named = json.loads(site.manage("shell", "-v0", "-c", ASK).splitlines()[-1])
             await_that(lambda: nothing_waits(site), what="the methods are compared", patience_s=PATIENCE_S)
-        yield Demo(site, known, named, login[1], login[2])
+        named |= asked(site, f"states.make('demo', {login[1]!r})")
+        yield Demo(site, known, named, login[1], login[2], asked(site, "states.failures()"))
+
+
+def asked(site: Site, call: str) -> dict[str, str]:
+    """What a function of `tests.browser.states` answers in a process of the site."""
+    said = site.manage("shell", "-v0", "-c", f"from tests.browser import states; print({call})")
+    return dict(json.loads(said.splitlines()[-1]))
 
 
 def nothing_waits(site: Site) -> bool:
@@ -149,8 +160,17 @@ def signed_in(browser: Browser, demo: Demo, *, email: str, password: str) -> Bro
 def sights(browser: Browser, demo: Demo) -> Iterator[tuple[BrowserContext, dict[str, str]]]:
     """Everybody that there is with the pages that nobody before could see, by name."""
     views = {name: view.format(**demo.known) for name, view in VIEWS.items()}
-    left = {"nothing": views["nothing"]} | demo.named | views
-    yield browser.new_context(base_url=demo.site.url), {"nothing": left.pop("nothing")}
+    left = demo.named | views
+    # These are answered with a code that says what is wrong, so they are not among the pages that are there.
+    wrong = {name: left.pop(name) for name in ("nothing", "board-wrong-filter", "invitation-over")}
+    yield browser.new_context(base_url=demo.site.url), wrong
+    failing = browser.new_context(base_url=demo.site.url)
+    for name, page in demo.failures.items():
+        failing.route(
+            f"**{FAILURES}{name}",
+            lambda route, _, page=page: route.fulfill(body=page, content_type="text/html"),
+        )
+    yield failing, {name: FAILURES + name for name in demo.failures}
     for context in (
         browser.new_context(base_url=demo.site.url),
         signed_in(browser, demo, email=demo.email, password=demo.password),

@@ -79,7 +79,7 @@ def _guides() -> Iterator[Findable]:
                 title=document.title,
                 heading="" if is_title else part.heading.text,
                 address=reverse("guide", args=[name]) + ("" if is_title else f"#{part.heading.anchor}"),
-                text=" ".join(part.text.split()),
+                text=" ".join(part.text.split()).removesuffix(" ·"),
                 code=" ".join(part.code.split()),
                 factor=_OF_BACKGROUND if name.startswith(_BACKGROUND) else 1.0,
             )

@@ -125,12 +125,14 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     user = cast("User", request.user)
     own = Submission.objects.filter(method__team__memberships__user=user)
     found = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
+    before = submissions.progress(found)
     if request.method == "POST" and submissions.withdraw(submission=found, actor=user, now=timezone.now()):
-        messages.success(request, "The submission is withdrawn.")
+        done = "withdrawn" if before.is_final else "cancelled"
+        messages.success(request, f"The submission is {done}.")
     if request.method == "POST" or not outcomes.can_be_withdrawn(found):
         return redirect("submission", found.pk)
-    is_waiting = not submissions.progress(found).is_final
-    return render(request, "submissions/withdraw.html", {"submission": found, "is_waiting": is_waiting})
+    said = {"is_waiting": not before.is_final, "is_failed": before.fault_is_ours}
+    return render(request, "submissions/withdraw.html", {"submission": found, **said})
 
 
 def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:

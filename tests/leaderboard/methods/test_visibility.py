@@ -255,7 +255,7 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     assert "Secret sauce is now public." in pages.page(response).one("main").text
     assert Method.objects.get().visibility == Visibility.PUBLIC
     left = pages.page(client.get(address)).one("main")
-    assert "Public, permanently." in left.text
+    assert "Public: everyone sees the method, permanently." in left.text
     assert left.all("form") == []
 
 

@@ -112,14 +112,14 @@ def test_the_maintainers_form_previews_saves_and_brings_back_earlier_texts(
     keeper: Client, benchmark: None
 ) -> None:
     form = assert_sound(keeper.get(RULES))
-    assert "These rules apply" in form.one("textarea").text
+    assert "apply to every submission" in form.one("textarea").text
     sent = {"text": "# Ours\r\n\r\n<script>alert(1)</script>", "replaces": "0"}
     preview = assert_sound(keeper.post(RULES, {**sent, "preview": "1"})).one("section", class_="preview")
     assert preview.text == "Ours <script>alert(1)</script>"
     assert not PageVersion.objects.exists()
     assert keeper.post(RULES, sent).headers["Location"] == "/rules/"
     assert "Ours" in shown(keeper)
-    assert "These rules apply" in assert_sound(keeper.get(f"{RULES}?version=0")).one("textarea").text
+    assert "apply to every submission" in assert_sound(keeper.get(f"{RULES}?version=0")).one("textarea").text
     assert "# Ours" in assert_sound(keeper.get(f"{RULES}?version=1")).one("textarea").text
     stale = keeper.post(RULES, {**sent, "text": "Other."})
     assert stale.status_code == 422

@@ -145,11 +145,11 @@ def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
     nearest = min(printed, key=lambda row: abs((row.scores["mid"] or 0) - mid(inferred[1])))
     root = look(signed_in, inferred[1])
     own, published = beside(root)
-    assert own[0].startswith("M1.05 your team’s best other method, 20")
+    assert own[0].startswith("M1.05, your team’s best other method, 20")
     gap = round(mid(inferred[1]) - mid(inferred[0]), 1)
     assert gap > 0
     assert own[1:3] == [f"{mid(inferred[0]):.1f}", f"+{gap:.1f}"]
-    assert published[0].startswith(f"{nearest.method} nearest row from a paper, Shi et al.")
+    assert published[0].startswith(f"{nearest.method}, nearest row from a paper, Shi et al.")
     assert nearest.scores["mid"] is not None
     gap = round(mid(inferred[1]) - nearest.scores["mid"], 1)
     assert published[2] == (f"+{gap:.1f}" if gap > 0 else f"−{-gap:.1f}")
@@ -159,7 +159,7 @@ def test_it_stands_beside_the_teams_best_other_and_the_nearest_published_row(
 def test_the_best_is_beside_the_second_best_of_its_team(
     signed_in: Client, inferred: list[Submission]
 ) -> None:
-    assert beside(look(signed_in, inferred[0]))[0][0].startswith("M1.1 ")
+    assert beside(look(signed_in, inferred[0]))[0][0].startswith("M1.1, ")
 
 
 def test_another_method_of_the_team_is_not_compared_with_where_values_are_hidden(
@@ -187,7 +187,7 @@ def test_another_submission_of_the_same_method_is_not_compared_with_itself(
     made = [builders.submit(owner, builders.predictions(edition, factor=f)) for f in (1.2, 1.1)]
     builders.score_all()
     root = look(signed_in, made[1])
-    assert beside(root)[0][0].startswith("Foo your team’s best other")
+    assert beside(root)[0][0].startswith("Foo, your team’s best other")
     assert [a for a in root.all("a") if a.attributes["href"].startswith("/compare/")] == []
 
 

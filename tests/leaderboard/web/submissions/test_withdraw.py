@@ -6,11 +6,12 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.models import AuditEvent, Edition, Evaluation, Publication, Status, Submission, User
+from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Publication, Status, Submission, User
 from leaderboard.scoring import lifecycle
 from leaderboard.submissions import submissions
 from tests import builders, pages
 from tests.editions import changed_on, corrected, extended, open_edition, publish, roll_back
+from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.test_every_page import assert_sound
 
 pytestmark = pytest.mark.slow
@@ -162,6 +163,38 @@ def test_team_withdraws_and_is_told_when(
     sent.refresh_from_db()
     assert notices(client, sent)[0].startswith(f"Withdrawn by its team on {sent.withdrawn_at:%Y-%m-%d}")
     assert AuditEvent.objects.get(verb="withdrawn").actor == user
+
+
+def test_withdrawn_result_offers_no_row_for_a_paper_and_is_said_to_be_on_no_board(
+    signed_in: Client, sent: Submission
+) -> None:
+    Method.objects.filter(pk=sent.method_id).update(visibility="PRIVATE")
+    before = pages.page(signed_in.get(address(sent))).one("main")
+    assert [each.attributes["id"] for each in before.all("code") if each.attributes.get("id")] == [
+        "latex-row"
+    ]
+    assert "only your team sees this result, here and on the" in before.text
+    signed_in.post(address(sent, "withdraw/"))
+    after = assert_sound(signed_in.get(address(sent))).one("main")
+    assert [each for each in after.all("code") if each.attributes.get("id")] == []
+    assert "only your team sees this result" not in after.text
+
+
+def test_what_waits_or_failed_is_cancelled_in_words_of_its_own(
+    signed_in: Client, edition: Edition, owner: User
+) -> None:
+    failed = builders.submit(owner, builders.predictions(edition), method="Failed")
+    queue_rows.strike_out()
+    waiting = builders.submit(owner, builders.predictions(edition), method="Waiting")
+    for submission, words, told in (
+        (failed, "it failed by an error on our side and has no values", "withdrawn"),
+        (waiting, "It is cancelled and not scored", "cancelled"),
+    ):
+        main = assert_sound(signed_in.get(address(submission, "withdraw/"))).one("main")
+        assert words in main.text
+        assert "Its values leave the board" not in main.text
+        done = signed_in.post(address(submission, "withdraw/"), follow=True)
+        assert f"The submission is {told}." in pages.page(done).one("div", class_="messages").text
 
 
 def test_next_best_of_the_method_stands_for_it(signed_in: Client, sent: Submission, owner: User) -> None:
