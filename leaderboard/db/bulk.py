@@ -13,6 +13,8 @@ from typing import Any, Final, TypeVar
 from django.db import connection
 from django.db.models import AutoField, Field, Model, QuerySet
 
+from leaderboard.db import prepared
+
 Fields = Sequence["Field[Any, Any]"]
 Rows = Sequence[Sequence[Any]]
 
@@ -63,7 +65,7 @@ def _execute(fields: Fields, rows: Rows, *, by_column: str, by_row: str) -> None
         [field.get_db_prep_save(value, connection) for value in column]
         for field, column in zip(fields, zip(*rows, strict=True), strict=True)
     ]
-    with connection.cursor() as cursor:
+    with prepared.cursor() as cursor:
         if connection.vendor == "postgresql":
             cursor.execute(by_column, columns)
         else:

@@ -13,6 +13,8 @@ from django.core.exceptions import EmptyResultSet
 from django.db import connection
 from django.db.models import QuerySet
 
+from leaderboard.db import prepared
+
 Made = Callable[..., "QuerySet[Any, tuple[Any, ...]]"]
 _STAND_IN = uuid.UUID("8a0e6f1c-6d1b-4f5e-9a51-0d7c3f2b9e64")
 
@@ -27,19 +29,25 @@ def rows(make: Made, *, of: uuid.UUID | None = None, **constants: Hashable) -> l
     if connection.vendor != "postgresql":
         return list(make(of, **constants))
     try:
-        sql, parameters = _made(make, tuple(constants.items()))
+        sql, n_parameters = _made(make, tuple(constants.items()))
     except EmptyResultSet:
         return []
-    with connection.cursor() as cursor:
-        cursor.execute(sql, [of if value == _STAND_IN else value for value in parameters])
+    with prepared.cursor() as cursor:
+        cursor.execute(sql, [of] * n_parameters)
         return list(cursor.fetchall())
 
 
 @lru_cache(maxsize=64)
-def _made(make: Made, constants: tuple[tuple[str, Hashable], ...]) -> tuple[str, tuple[Any, ...]]:
-    """The SQL, and its parameters with a stand-in for what differs."""
+def _made(make: Made, constants: tuple[tuple[str, Hashable], ...]) -> tuple[str, int]:
+    """The SQL, and how often what differs stands in it.
+
+    What never differs is written into it: for a status that PostgreSQL learns only later, it could not plan
+    with the index of those that have it.
+    """
     compiler = make(_STAND_IN, **dict(constants)).query.get_compiler(connection=connection)
     sql, parameters = compiler.as_sql()
     if compiler.get_converters(column for column, _, _ in compiler.select):
         raise TypeError(f"{make.__qualname__} asks for a column that needs converting")
-    return sql, tuple(parameters)
+    with connection.cursor() as cursor:
+        texts = ["%s" if value == _STAND_IN else cursor.mogrify("%s", [value]) for value in parameters]
+    return sql % tuple(texts), sum(value == _STAND_IN for value in parameters)

@@ -33,6 +33,13 @@ def test_rows_are_those_of_the_orm_whatever_is_asked_for(edition: Edition, owner
             assert repeated.rows(of_one, of=pk, statuses=statuses) == expected
 
 
+def test_only_what_differs_is_a_parameter_so_that_an_index_of_a_status_serves() -> None:
+    if connection.vendor == "postgresql":
+        sql, n_parameters = repeated._made(of_one, (("statuses", frozenset({"QUEUED"})),))
+        assert n_parameters == sql.count("%s") == 1
+        assert "IN ('QUEUED')" in sql
+
+
 def test_a_column_that_needs_converting_is_refused(edition: Edition) -> None:
     if connection.vendor != "postgresql":
         assert repeated.rows(with_json, of=uuid.uuid4()) == []
