@@ -68,6 +68,8 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     truth = evaluator.read_truth(path)
     old = split.published_edition.ground_truth if split.published_edition else None
     counts = _compared(old, truth)
+    # Before anything is written: the mark of hidden values would stay on those of an open split.
+    _require_own(split, GroundTruth.objects.filter(digest=truth.digest).first())
     truth_values.save(truth, is_hidden=split.is_hidden)
     files.save_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
     with transaction.atomic():
@@ -88,17 +90,21 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
                 "imported_by": actor,
             },
         )
-        if row.split_id != split.truth_split_id:
-            raise Refused(
-                "edition-refused",
-                f"This ground truth belongs to the split {row.split_id!r} already; a split that shares it is "
-                f"made with: manage.py add_split NAME --same-truth-as {row.split_id}",
-            )
+        _require_own(split, row)
         if old is not None and counts is not None:
             _keep_comparison(old, row, counts)
         if is_new:
             audit.record(verb="imported", noun="GroundTruth", noun_id=row.pk, actor=actor)
     return row
+
+
+def _require_own(split: Split, row: GroundTruth | None) -> None:
+    if row is not None and row.split_id != split.truth_split_id:
+        raise Refused(
+            "edition-refused",
+            f"This ground truth belongs to the split {row.split_id!r} already; a split that shares it is "
+            f"made with: manage.py add_split NAME --same-truth-as {row.split_id}",
+        )
 
 
 def _compared(old: GroundTruth | None, truth: evaluator.GroundTruth) -> Comparison | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
+from django.conf import settings
 from django.core.management import CommandError, call_command
 from django.utils import timezone
 
@@ -92,10 +93,13 @@ def test_other_truth_for_an_open_split_is_refused(tmp_path: Path) -> None:
 
 
 def test_one_truth_belongs_to_one_split(tmp_path: Path) -> None:
-    builders.import_truth(tmp_path)
-    with pytest.raises(Refused, match="belongs to the split 'test' already"):
-        builders.import_truth(tmp_path, split="val")
-    assert not Edition.objects.filter(split="val").exists()
+    builders.import_truth(tmp_path, split="val")
+    kept = sorted(settings.GROUND_TRUTH_DIR.iterdir())
+    with pytest.raises(Refused, match="belongs to the split 'val' already"):
+        builders.import_truth(tmp_path, split="test")
+    assert not Edition.objects.filter(split="test").exists()
+    # Else the mark of hidden values, which stays, would end the error analysis of the open split.
+    assert sorted(settings.GROUND_TRUTH_DIR.iterdir()) == kept
 
 
 def test_faulty_truth_is_refused_with_its_problems_and_changes_nothing(tmp_path: Path) -> None:
