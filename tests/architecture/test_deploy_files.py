@@ -66,7 +66,10 @@ def test_units_start_programs_that_there_are_without_privileges(path: Path) -> N
 def test_only_the_worker_can_read_the_ground_truth() -> None:
     web = (DEPLOY / "systemd/tsttc-web.service").read_text()
     worker = (DEPLOY / "systemd/tsttc-worker.service").read_text()
-    assert "InaccessiblePaths=-/var/lib/tsttc/ground-truth" in web
+    hidden = re.findall(r"^InaccessiblePaths=(.*)$", web, re.MULTILINE)
+    # The sums per recording are as private as the values, and the backup has the values.
+    assert hidden == ["-/var/lib/tsttc/ground-truth -/var/lib/tsttc/bags -/srv/tsttc-backup"]
+    assert "InaccessiblePaths=-/srv/tsttc-backup" in worker
     assert "ReadOnlyPaths=/var/lib/tsttc/ground-truth" in worker
 
 
