@@ -12,6 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import psycopg
 import pytest
 
 import evaluator
@@ -21,6 +22,7 @@ from tests.prepared import migrated_database
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
+FACTORS = "SELECT user_id, type, data, created_at FROM mfa_authenticator ORDER BY id"
 People = Callable[[Site], Visitor]
 Programs = Callable[[Site, str], Program]
 
@@ -187,9 +189,19 @@ def test_figures_follow_what_is_scored(
 
 
 def test_a_backup_of_the_running_site_comes_back_byte_for_byte_in_a_fresh_place(
-    site: Site, tmp_path: Path
+    site: Site, people: People, truth: evaluator.GroundTruth, tmp_path: Path
 ) -> None:
     folder = tmp_path / "backup"
+    gil = people(site)
+    gil.sign_up(email="gil@example.org", name="Gil")
+    gil.submit(split="test", method="Kept", data=predictions(truth, factor=1.2))
+    with psycopg.connect(site.environment["TSTTC_DATABASE_URL"]) as database:
+        database.execute(
+            "INSERT INTO mfa_authenticator (user_id, type, data, created_at) SELECT id, 'totp', "
+            """'{"secret": "%s"}', now() FROM leaderboard_user WHERE email = 'gil@example.org'""" % ("A" * 32)
+        )
+        factors = database.execute(FACTORS).fetchall()
+    assert len(factors) == 1
     assert " 1 board;" in site.manage("backup", str(folder))
     kept = json.loads((folder / "backup.json").read_text())
     files = site.directory / "files"
@@ -200,6 +212,8 @@ def test_a_backup_of_the_running_site_comes_back_byte_for_byte_in_a_fresh_place(
     with migrated_database() as url:
         place = {"TSTTC_DATABASE_URL": url, "TSTTC_DATA_DIR": str(tmp_path / "new")}
         said = replace(site, environment=site.environment | place).manage("restore", str(folder))
+        with psycopg.connect(url) as database:
+            assert database.execute(FACTORS).fetchall() == factors
     # It holds every file, the audit trail and each published board against the backup, and fails otherwise.
     assert "1 board is the same byte for byte" in said
     assert "cannot be checked here" not in said
