@@ -111,7 +111,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
-            parts.append(Part(heading, " ".join(texts), " ".join(code)))
+            parts.append(Part(heading, " ".join(filter(None, texts)), " ".join(code)))
             words = _plain(tokens[at + 1])
             heading, texts = TextHeading(int(token.tag[1]), words, _anchor(words, anchors)), []
             code = []
@@ -122,14 +122,13 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
                 # Of a fence the attributes stand at the code within, beside the button that copies it.
                 token.type, token.attrs = "fence", {**token.attrs, "class": "aligned", "tabindex": 0}
         elif token.type == "inline" and tokens[at - 1].type != "heading_open":
-            # A search shows a table as one line, in which nothing else would tell cells apart.
-            texts.append(_plain(token) + " ·" * (tokens[at - 1].type in {"th_open", "td_open"}))
+            texts.append(_cell(token) if tokens[at - 1].type in {"th_open", "td_open"} else _plain(token))
         elif token.type in {"th_open", "td_open"}:
             if "right" in str(token.attrs.pop("style", "")):
                 token.attrSet("class", "number")
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
-    parts.append(Part(heading, " ".join(texts), " ".join(code)))
+    parts.append(Part(heading, " ".join(filter(None, texts)), " ".join(code)))
     html = parser.renderer.render(tokens, parser.options, {})
     html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")
     # The parser escapes what is no markup of its own.
@@ -143,6 +142,12 @@ def _plain(token: Token) -> str:
         for child in token.children or ()
         if child.type in {"text", "code_inline", "softbreak", "hardbreak"}
     )
+
+
+def _cell(token: Token) -> str:
+    """The text of a cell; a search shows a table as one line, where nothing else would tell them apart."""
+    words = _plain(token)
+    return f"{words} ·" if any(map(str.isalnum, words)) else ""
 
 
 def _anchor(words: str, taken: set[str]) -> str:

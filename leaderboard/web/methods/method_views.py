@@ -14,7 +14,7 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.errors.refusals import Refused
 from leaderboard.http import own_form
 from leaderboard.methods import details, methods, visibility
-from leaderboard.models import Method, User, Visibility
+from leaderboard.models import Method, Split, Submission, User, Visibility
 from leaderboard.submissions import empty_methods
 from leaderboard.web.boards import export_views
 from leaderboard.web.methods.method_forms import MethodForm, ShowForm
@@ -29,6 +29,7 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
     achieved = results.results(method=found, viewer=request.user, splits=splits_of(request))
     profile = results.profile(method=found, viewer=request.user)
     is_mine = Method.objects.of(request.user).filter(pk=found.pk).exists()
+    sent_to = _sent_to(request, found) if is_mine and not achieved else None
     context = {
         "profile": profile,
         "details": details.words(profile.details),
@@ -38,10 +39,18 @@ def method(request: HttpRequest, method_id: UUID) -> HttpResponse:
         "can_be_deleted": is_mine and empty_methods.can_be_deleted(found),
         "method_id": found.pk,
         "results": [method_result(result) for result in achieved],
-        "board_split": achieved[0].split.pk if achieved else "",
+        "sent_to": sent_to,
+        "board_split": achieved[0].split.pk if achieved else sent_to.pk if sent_to else "",
         **export_views.of_method(achieved),
     }
     return render(request, "methods/method.html", context)
+
+
+def _sent_to(request: HttpRequest, method: Method) -> Split | None:
+    """The split that the last file of a method was sent to: the board of one that has no score."""
+    sent = Submission.objects.of(cast("User", request.user)).filter(method=method).select_related("split")
+    last = sent.order_by("-submitted_at").first()
+    return last.split if last else None
 
 
 def _own(request: HttpRequest, method_id: UUID) -> Method:

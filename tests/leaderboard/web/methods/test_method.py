@@ -87,6 +87,17 @@ def test_method_without_a_score_says_so(client: Client, edition: Edition, owner:
     assert "no scored submission" in get(client, submission.method).one("main").text
 
 
+def test_method_without_a_score_leads_to_the_board_that_its_file_was_sent_to(
+    signed_in: Client, edition: Edition, owner: User, tmp_path: Path
+) -> None:
+    builders.import_truth(tmp_path, split="val", seed=1)
+    sent = builders.send(owner, b"{}", split="val", method="Nothing scored").submission
+    root = pages.page(signed_in.get(f"/methods/{sent.method_id}/"))
+    trail = root.one("p", class_="trail").one("a")
+    assert (trail.text, trail.attributes["href"]) == ("Validation", "/board/val/")
+    assert root.one("nav", class_="site-nav").all("a")[0].attributes["href"] == "/board/val/"
+
+
 def test_private_method_is_marked_for_its_team(
     client: Client, method: Method, owner: User, teammate: User
 ) -> None:
