@@ -10,13 +10,13 @@ are parsed into a dictionary.
 All ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
 result, and answer None for everything else: finding words for a fault is the strict reading's business.
 
-Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has 2n
-quotation marks, (2) what stands between each odd one and the next is, byte for byte, the key of another
-sequence of the manifest, and a colon follows, (3) each but the first is preceded by a comma and the same
-white space, the first by `{` and white space, and (4) the text with all these keys blanked, and the outer
-braces turned into brackets, is a JSON list of n numbers: it is cut at commas that precede a key, and each
-piece is a list of as many numbers as it had keys. By (4) there are n - 1 commas, by (3) each stands directly
-before a key; so every part between commas holds one key, at its front, and one number.
+Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has n colons,
+(2) what stands before each is, byte for byte, the key of another sequence of the manifest with its quotation
+marks, (3) each key but the first is preceded by a comma and the same white space, the first by `{` and white
+space, and (4) the text with all these keys blanked, and the outer braces turned into brackets, is a JSON list
+of n numbers: it is cut at commas that precede a key, and each piece is a list of as many numbers as it had
+keys. By (4) there are n - 1 commas, by (3) each stands directly before a key; so every part between commas
+holds one key, at its front, and one number.
 
 The second way is exact for the same reasons: a key's row is what stands from an odd quotation mark to one
 byte behind the next one, and is, byte for byte, the next key of the manifest; a number's row is all that
@@ -54,10 +54,7 @@ Octets = NDArray[np.uint8]
 _WHITE_SPACE: Final = b" \t\r\n"
 _PAD: Final = b" " * WORD_BYTES
 _CELL_PAD: Final = b" " * MAX_CELL_BYTES
-_SPACES: Final = np.frombuffer(_PAD, dtype="<u8")[0]
-_SPACE, _QUOTE = _PAD[0], ord('"')
-_SELECT_FROM: Final = tuple(np.uint64((2**64 - 1) ^ ((1 << 8 * first) - 1)) for first in range(WORD_BYTES))
-"""Selects the bytes of a word from one position on."""
+_SPACE, _QUOTE, _COLON, _BRACKETS = ord(" "), ord('"'), ord(":"), b"[]"
 
 _MAX_AROUND: Final = 64 * 1024
 """At most so much text may stand around the predictions of an envelope that is read by columns."""
@@ -68,8 +65,14 @@ _BLOCK: Final = 1 << 19
 """So many bytes of a file with natural keys are read at once: they stay in the processor's cache."""
 
 _STRETCH: Final = 1 << 17
-_KEYS: Final = 1 << 11
-"""So many bytes of other files are searched for marks at once, and so many keys and numbers are read."""
+"""So many bytes of other files are searched for colons at once, ..."""
+_KEYS: Final = 1 << 14
+"""... so many keys are compared, ..."""
+_NUMBERS: Final = 1 << 11
+"""... and so many numbers exist as Python objects."""
+
+_MAX_BETWEEN: Final = 64
+"""At most so many bytes may a comma and the white space behind it have."""
 
 _PLACEHOLDER: Final = "predictions, read by columns"
 
@@ -144,12 +147,11 @@ def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
         return None
     buffer = bytearray(_PAD)
     buffer += text
-    quotes = _quotes(buffer, 2 * n)
-    if quotes is None:
+    colons = _colons(buffer, n)
+    if colons is None:
         return None
-    opens, closes = quotes[::2], quotes[1::2]
-    rows = _blank_keys(buffer, keys, opens, closes)
-    values = None if rows is None else _numbers_by_part(buffer, opens)
+    rows = _blank_keys(buffer, keys, colons)
+    values = None if rows is None else _numbers_by_part(buffer, colons)
     if values is None:
         return None
     if isinstance(rows, slice):
@@ -159,99 +161,78 @@ def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
     return aligned, "anno_id"
 
 
-def _quotes(buffer: bytearray, n: int) -> Rows | None:
-    """The places of the quotation marks, or None unless there are n."""
+def _colons(buffer: bytearray, n: int) -> Rows | None:
+    """The places of the colons, or None unless there are n."""
     octets = np.frombuffer(buffer, dtype=np.uint8)
-    quotes, n_found = np.empty(n, dtype=np.intp), 0
+    colons, n_found = np.empty(n, dtype=np.intp), 0
     for start in range(0, len(octets), _STRETCH):
-        part = np.flatnonzero(octets[start : start + _STRETCH] == _QUOTE)
+        part = np.flatnonzero(octets[start : start + _STRETCH] == _COLON)
         stop = n_found + len(part)
         if stop > n:
             return None
-        np.add(part, start, out=quotes[n_found:stop])
+        np.add(part, start, out=colons[n_found:stop])
         n_found = stop
-    return quotes if n_found == n else None
+    return colons if n_found == n else None
 
 
-def _blank_keys(buffer: bytearray, keys: KeyWords, opens: Rows, closes: Rows) -> Rows | slice | None:
-    """Turn keys and the outer braces into spaces; the row of each key, or None if any is odd."""
+def _blank_keys(buffer: bytearray, keys: KeyWords, colons: Rows) -> Rows | slice | None:
+    """Turn the keys before these colons into spaces; the row of each, or None if any is odd."""
+    octets = np.frombuffer(buffer, dtype=np.uint8)
     # The eight bytes from each position of the buffer on, as one word.
     windows: Words = np.ndarray((len(buffer) - 7,), dtype="<u8", buffer=buffer, strides=(1,))
-    if not _separated(buffer, windows, opens):
-        return None
-    rows: Rows | slice = slice(None)
-    if _are_in_order(windows, keys, opens, closes):
-        for part in _parts(len(opens)):
-            _blank(windows, closes[part], _masks_in_order(windows, keys, opens, closes, part))
-    else:
-        found = keys.find(windows[closes - 6], closes - opens - 1)
-        if found is None:
+    n, rows, between = len(colons), None, None
+    for part in _parts(n, _KEYS):
+        starts = colons[part] - 7
+        words = windows[starts]
+        blank = keys.blank(words, part)
+        if blank is None:
+            # From here on the keys stand in another order than the manifest's.
+            rows = np.arange(n) if rows is None else rows
+            rows[part] = keys.likely_rows(words)
+            blank = keys.blank(words, rows[part])
+        if blank is None:
             return None
-        rows = found[0]
-        _blank(windows, closes, found[1])
-    octets = np.frombuffer(buffer, dtype=np.uint8)
-    if not keys.fits:
-        octets[opens] = _SPACE
-    buffer[buffer.index(b"{")] = buffer[-1] = _SPACE
-    return rows
+        opens = starts + 5
+        opens -= blank.n_digits
+        following = opens if part.start else opens[1:]
+        if between is None and len(following):
+            between = _between(bytes(buffer[colons[0] : following[0]]))
+        if not (octets[opens] == _QUOTE).all() or not _follow(octets, following, between):
+            return None
+        if part.start == 0 and buffer[len(_PAD) : opens[0]].strip(_WHITE_SPACE) != b"{":
+            return None
+        if not keys.fits:
+            octets[opens] = _SPACE
+        # Where values are so short that windows overlap, a window brings back the end of the key before it:
+        # its colon is no JSON then, and the dictionary takes over.
+        windows[starts] = blank.words
+    if rows is None:
+        return slice(None)
+    return rows if int(np.bincount(rows, minlength=n).max()) == 1 else None
 
 
-def _parts(n: int) -> Iterator[slice]:
-    """All of n keys, so many at once that what is computed of them stays in the processor's cache."""
-    return (slice(first, min(first + _KEYS, n)) for first in range(0, n, _KEYS))
+def _parts(n: int, size: int) -> Iterator[slice]:
+    """All of n keys, `size` at once: what is computed of them stays small."""
+    return (slice(first, min(first + size, n)) for first in range(0, n, size))
 
 
-def _are_in_order(windows: Words, keys: KeyWords, opens: Rows, closes: Rows) -> bool:
-    """Whether the keys between these quotation marks are the manifest's, in its order."""
-    parts = _parts(len(opens))
-    return all(_masks_in_order(windows, keys, opens, closes, part) is not None for part in parts)
-
-
-def _masks_in_order(windows: Words, keys: KeyWords, opens: Rows, closes: Rows, part: slice) -> Words | None:
-    n_digits = closes[part] - opens[part] - 1
-    return keys.masks_in_order(windows[closes[part] - 6], n_digits, row=part.start)
-
-
-def _blank(windows: Words, closes: Rows, masks: Words | None) -> None:
-    """Turn the keys before these quotation marks into spaces."""
-    # Where values are so short that windows overlap, a window brings back the end of the key before it: its
-    # colon is no JSON then, and the dictionary takes over.
-    if masks is not None:
-        starts = closes - 6
-        windows[starts] = (windows[starts] & ~masks) | (_SPACES & masks)
-
-
-def _numbers_by_part(buffer: bytearray, opens: Rows) -> Floats | None:
-    """The numbers between keys that are blank and began at `opens`; a comma precedes each but the first."""
-    values, text = np.empty(len(opens)), memoryview(buffer)
-    for part in _parts(len(opens)):
-        begin, is_last = int(opens[part.start]), part.stop == len(opens)
-        piece = bytes(text[begin:] if is_last else text[begin : int(opens[part.stop])])
-        if not is_last:
-            piece = piece.rstrip(_WHITE_SPACE).removesuffix(b",")
-        numbers = _numbers(b"[%b]" % piece, part.stop - part.start)
+def _numbers_by_part(buffer: bytearray, colons: Rows) -> Floats | None:
+    """The numbers behind keys that are blank and ended at `colons`; a comma precedes each but the first."""
+    n = len(colons)
+    values, text = np.empty(n), memoryview(buffer)
+    for part in _parts(n, _NUMBERS):
+        first, last = int(colons[part.start]), len(buffer) - 1
+        if part.stop < n:
+            last = buffer.rindex(b",", first, int(colons[part.stop]))
+        buffer[first], buffer[last] = _BRACKETS
+        numbers = _numbers(text[first : last + 1], part.stop - part.start)
         if numbers is None:
             return None
         values[part] = numbers
     return values
 
 
-def _separated(buffer: bytearray, windows: Words, opens: NDArray[np.intp]) -> bool:
-    """Whether each opening mark follows a comma and the same white space, but the first the brace."""
-    if buffer[len(_PAD) : opens[0]].strip(_WHITE_SPACE) != b"{":
-        return False
-    if len(opens) == 1:
-        return True
-    before = bytes(buffer[opens[1] - 7 : opens[1]]).rstrip(_WHITE_SPACE)
-    if before[-1:] != b",":
-        return False
-    mask = _SELECT_FROM[len(before) - 1]
-    ends = windows[opens[1:] - 7]
-    ends &= mask
-    return bool((ends == ends[0]).all())
-
-
-def _numbers(text: bytes | bytearray, n: int) -> Floats | None:
+def _numbers(text: bytes | memoryview, n: int) -> Floats | None:
     """The float64 values of a JSON list of n numbers, or None for anything else."""
     try:
         # Packing is the fastest way into an array; it also counts.
@@ -295,7 +276,8 @@ def _by_spelling(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | No
 def _between(first: bytes) -> bytes | None:
     """The comma and the white space at the end of the first member, or None for anything else."""
     number = first.rstrip(_WHITE_SPACE)
-    return first[len(number) - 1 :] if number[-1:] == b"," else None
+    between = first[len(number) - 1 :]
+    return between if number[-1:] == b"," and len(between) <= _MAX_BETWEEN else None
 
 
 def _follow(block: Octets, opens: Rows, between: bytes | None) -> bool:

@@ -30,10 +30,15 @@ def _mask(n_digits: int) -> int:
 _MASKS: Final = np.array([0, *map(_mask, range(1, MAX_DIGITS + 1))], dtype=np.uint64)
 """By number of digits: selects the bytes of a word that belong to the key, the last ones."""
 
-_DIGITS: Final = np.array(
-    [0, *((2**48 - 1) ^ (2 ** (8 * (MAX_DIGITS - n)) - 1) for n in range(1, MAX_DIGITS + 1))], dtype=np.uint64
-)
-"""By number of digits: selects them."""
+_SPACES: Final = np.frombuffer(b" " * WORD_BYTES, dtype="<u8")[0]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BlankKeys:
+    """Words of a file without their keys, (m,), and how many digits each key had, (m,)."""
+
+    words: Words
+    n_digits: NDArray[np.uint8]
 
 
 class KeyWords:
@@ -55,32 +60,24 @@ class KeyWords:
         """The words of these ids, or None when one has more than six digits."""
         return cls(anno_id) if int(anno_id.max()) < 10**MAX_DIGITS else None
 
-    def masks_in_order(self, windows: Words, n_digits: Rows, *, row: int) -> Words | None:
-        """The masks that select the keys in the words that end with them, (m,), whose keys have `n_digits`
-        characters; or None unless these are the keys from `row` on.
-        """
-        rows = slice(row, row + len(windows))
-        if not np.array_equal(n_digits, self._n_digits[rows]):
-            return None
-        masks = _MASKS[n_digits]
-        return masks if np.array_equal(windows & masks, self._words[rows]) else None
+    def blank(self, words: Words, rows: Rows | slice) -> BlankKeys | None:
+        """The words, (m,), with spaces in place of the keys of these rows; None unless they end with them.
 
-    def find(self, windows: Words, n_digits: Rows) -> tuple[Rows, Words] | None:
-        """Match the words that end with the keys of a file, (n,), whose keys have `n_digits` characters.
-
-        Returns the row of each key and the masks that select the keys; or None unless every row is matched
-        once.
+        A key of six digits leaves its opening quotation mark to the caller.
         """
-        if int(n_digits.min()) < 1 or int(n_digits.max()) > MAX_DIGITS:
+        n_digits = self._n_digits[rows]
+        masks = _MASKS.take(n_digits)
+        rest = words ^ self._words[rows]
+        if (rest & masks).any():
             return None
-        masks = _MASKS[n_digits]
-        rows = self._row_of_number[np.minimum(_numbers(windows, n_digits), len(self._row_of_number) - 1)]
-        seen = np.zeros(len(self._words), dtype=bool)
-        seen[rows] = True
-        # Whatever stood in the file, it is a key only if it is the very word of the row it led to.
-        if seen.all() and np.array_equal(windows & masks, self._words[rows]):
-            return rows, masks
-        return None
+        masks &= _SPACES
+        rest |= masks
+        return BlankKeys(rest, n_digits)
+
+    def likely_rows(self, words: Words) -> Rows:
+        """The only rows whose keys the words, (m,), may end with."""
+        numbers = _numbers(words)
+        return self._row_of_number[np.minimum(numbers, len(self._row_of_number) - 1)]
 
     @cached_property
     def _row_of_number(self) -> Rows:
@@ -179,11 +176,15 @@ def _spell(anno_id: NDArray[np.int64], n_digits: Rows) -> Words:
     return octets.view("<u8").ravel()
 
 
-def _numbers(windows: Words, n_digits: Rows) -> Words:
-    """The decimal numbers in the words, all digits at once; words without a number give any number."""
-    x = (windows & _DIGITS[n_digits]) << np.uint64(16)
-    # Pairs of digits, then of two digits, then of four: each product puts high · base + low into the upper
-    # half.
-    x = ((x & np.uint64(0x0F0F0F0F0F0F0F0F)) * np.uint64(10 * 2**8 + 1)) >> np.uint64(8)
+def _numbers(words: Words) -> Words:
+    """The decimal numbers before the last two bytes of words; words without a number give any number."""
+    other = (words ^ np.uint64(0x303030303030)) & np.uint64(0xF0F0F0F0F0F0)
+    # The last byte that is no digit sets all bits before it.
+    for n_bits in (1, 2, 4, 8, 16, 32):
+        other |= other >> np.uint64(n_bits)
+    x = (words & ~other & np.uint64(0x0F0F0F0F0F0F)) << np.uint64(16)
+    # All digits at once: pairs, then pairs of two digits, then of four. Each product puts high · base + low
+    # into the upper half.
+    x = (x * np.uint64(10 * 2**8 + 1)) >> np.uint64(8)
     x = ((x & np.uint64(0x00FF00FF00FF00FF)) * np.uint64(100 * 2**16 + 1)) >> np.uint64(16)
     return ((x & np.uint64(0x0000FFFF0000FFFF)) * np.uint64(10_000 * 2**32 + 1)) >> np.uint64(32)

@@ -235,27 +235,9 @@ def test_names_that_json_writes_in_another_way_are_read_too(name: str) -> None:
     assert_equivalent(raw.encode(), manifest)
 
 
-TOKENS = [
-    '"0"',
-    '"1"',
-    '"2"',
-    '"5"',
-    '"42"',
-    ":",
-    ",",
-    "{",
-    "}",
-    "[",
-    "]",
-    " ",
-    "\n",
-    "5.3",
-    "1",
-    "e",
-    "-",
-    "null",
-]
-TOKENS += ["true", "NaN", '"', "\\", "\\u0030", '"unit"', '"ttc"', '"predictions"', '"fps"', "0", "\x00", "é"]
+TOKENS = ['"0"', '"1"', '"2"', '"5"', '"42"', ":", ",", "{", "}", "[", "]", " ", "\n", "5.3", "1", "e", "-"]
+TOKENS += ["null", "true", "NaN", '"', "\\", "\\u0030", '"unit"', '"ttc"', '"predictions"', '"fps"', "0"]
+TOKENS += ["\x00", "é"]
 
 
 @pytest.mark.slow
@@ -354,6 +336,41 @@ def test_many_sequences_in_any_order_read_the_same_both_ways() -> None:
         data = flat(members)
         assert_equivalent(data, manifest, by_columns=True)
         assert read_predictions(data, manifest=manifest).ttc_s[order].tolist() == values.tolist()
+
+
+@pytest.mark.parametrize("size", [1, 2, 7, 64])
+def test_keys_read_part_by_part_read_the_same_both_ways(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(columns, "_STRETCH", 11 * size)
+    monkeypatch.setattr(columns, "_KEYS", size)
+    monkeypatch.setattr(columns, "_NUMBERS", size)
+    for manifest in (LONG, WIDE):
+        n = manifest.n_sequences
+        last_two_swapped = [*range(n - 2), n - 1, n - 2]
+        for order in (range(n), last_two_swapped, [*range(n)[::-1]]):
+            members = {manifest.anno_id_keys[row]: row + 0.25 for row in order}
+            for separators in ((",", ":"), (", ", ": "), (",\n    ", ": ")):
+                data = json.dumps(members, separators=separators)
+                assert_equivalent(data.encode(), manifest, by_columns=True)
+                assert_equivalent(data.replace(".25,", ".25 ,").encode(), manifest)
+                for key in manifest.anno_id_keys[-3:]:
+                    doubled = data.replace(f'"{key}"', f'"{manifest.anno_id_keys[0]}"')
+                    assert_equivalent(doubled.encode(), manifest)
+                    assert read_column(doubled.encode(), manifest) is None
+
+
+def test_a_key_of_six_digits_needs_its_first_quotation_mark() -> None:
+    data = json.dumps(dict.fromkeys(WIDE.anno_id_keys, 2.5))
+    assert_equivalent(data.encode(), WIDE, by_columns=True)
+    for faulty in (data.replace('"999999"', '5999999"'), data.replace('"999999"', ' 999999"')):
+        assert read_column(faulty.encode(), WIDE) is None
+
+
+@pytest.mark.parametrize("n_spaces", [0, 63, 64, 10_000])
+@pytest.mark.parametrize("natural", [False, True])
+def test_any_white_space_between_members_reads_the_same_both_ways(n_spaces: int, natural: bool) -> None:
+    keys = LONG.natural_keys if natural else LONG.anno_id_keys
+    data = json.dumps(dict.fromkeys(keys, 2.5), separators=("," + " " * n_spaces, ":"))
+    assert_equivalent(data.encode(), LONG, by_columns=True)
 
 
 def test_rates_and_ratios_are_converted_the_same_both_ways() -> None:
