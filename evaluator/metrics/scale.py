@@ -75,7 +75,12 @@ def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
     """
     tau = np.asarray(ttc_s, dtype=np.float64)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        return np.asarray(1.0 / ((1.0 / (tau * 10.0) + 1.0) + 1e-6))
+        ratio = np.asarray(tau * 10.0)
+        np.divide(1.0, ratio, out=ratio)
+        ratio += 1.0
+        ratio += 1e-6
+        np.divide(1.0, ratio, out=ratio)
+    return ratio
 
 
 def exact_log(values: Floats) -> Floats:
@@ -83,5 +88,6 @@ def exact_log(values: Floats) -> Floats:
     with np.errstate(invalid="ignore"):
         positive = values > 0
     logs = np.full(values.shape, math.nan)
-    logs[positive] = np.fromiter(map(math.log, values[positive].data), dtype=np.float64)
+    of_positive = values[positive]
+    logs[positive] = np.fromiter(map(math.log, of_positive.data), dtype=np.float64, count=len(of_positive))
     return logs
