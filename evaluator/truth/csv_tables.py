@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evaluator.arguments import Source, data_of
 from evaluator.problems import Findings, quoted, reject
@@ -274,7 +275,11 @@ def _whole(name: str, text: str, findings: Findings, where: str) -> int:
 
 
 def save_store(
-    path: str | os.PathLike[str], *, table: Table, manifest_digest: str, truth_digest: str | None = None
+    path: str | os.PathLike[str],
+    *,
+    columns: Mapping[str, NDArray[Any]],
+    manifest_digest: str,
+    truth_digest: str | None = None,
 ) -> None:
     """Write columns and digests as an `.npz` without pickled objects, sealed by a sum of all of them.
 
@@ -283,14 +288,10 @@ def save_store(
     arrays: dict[str, Any] = {
         "format": np.array(_STORE_FORMAT),
         "manifest_digest": np.array(manifest_digest),
-        "anno_id": np.array(table.anno_id, dtype=np.int64),
-        "bag_stamp": np.array(table.bag_stamp, dtype=np.str_),
-        "cam_id": np.array(table.cam_id, dtype=np.str_),
-        "ts_ns": np.array(table.ts_ns, dtype=np.int64),
-        "track_id": np.array(table.track_id, dtype=np.str_),
+        **columns,
     }
     if truth_digest is not None:
-        arrays |= {"truth_digest": np.array(truth_digest), "ttc_s": np.array(table.ttc_s, dtype=np.float64)}
+        arrays["truth_digest"] = np.array(truth_digest)
     arrays["seal"] = np.array(_seal(arrays))
     with Path(path).open("wb") as file:  # an open file, since numpy would add ".npz" to other names
         np.savez(file, **arrays)

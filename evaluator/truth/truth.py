@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -93,8 +93,8 @@ class Manifest:
 
     def _each_natural_key(self) -> Iterator[str]:
         # A memory view gives one integer after the other, where a list would hold them all.
-        columns = zip(self.bag_stamp, self.cam_id, self.ts_ns.data, self.track_id, strict=True)
-        return (f"{bag}/{cam}/{ts}/{track}" for bag, cam, ts, track in columns)
+        columns = zip(self.bag_stamp, self.cam_id, map(str, self.ts_ns.data), self.track_id, strict=True)
+        return map("/".join, columns)
 
     @cached_property
     def anno_id_keys(self) -> tuple[str, ...]:
@@ -162,7 +162,18 @@ class Manifest:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz` that `load` reads back exactly."""
-        save_store(path, table=self.to_table(), manifest_digest=self.digest)
+        save_store(path, columns=self._columns, manifest_digest=self.digest)
+
+    @cached_property
+    def _columns(self) -> dict[str, NDArray[Any]]:
+        """What `save` writes, and that of the ground truth as well."""
+        return {
+            "anno_id": self.anno_id,
+            "bag_stamp": np.array(self.bag_stamp, dtype=np.str_),
+            "cam_id": np.array(self.cam_id, dtype=np.str_),
+            "ts_ns": self.ts_ns,
+            "track_id": np.array(self.track_id, dtype=np.str_),
+        }
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Manifest:
@@ -253,9 +264,8 @@ class GroundTruth:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz` that `load` reads back exactly."""
-        save_store(
-            path, table=self.to_table(), manifest_digest=self.manifest.digest, truth_digest=self.digest
-        )
+        columns = {**self.manifest._columns, "ttc_s": self.ttc_s}
+        save_store(path, columns=columns, manifest_digest=self.manifest.digest, truth_digest=self.digest)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> GroundTruth:

@@ -71,7 +71,7 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
     # Before anything is written: the mark of hidden values would stay on those of an open split.
     _require_own(split, GroundTruth.objects.filter(digest=truth.digest).first())
     truth_values.save(truth, is_hidden=split.is_hidden)
-    files.save_manifest(digest=truth.manifest.digest, csv=truth.manifest.to_csv())
+    files.save_manifest(truth.manifest)
     with transaction.atomic():
         row, is_new = GroundTruth.objects.get_or_create(
             digest=truth.digest,

@@ -19,7 +19,7 @@ from django.core.files.base import ContentFile, File
 from django.core.files.storage import FileSystemStorage, Storage, storages
 from numpy.typing import NDArray
 
-from evaluator import Predictions
+from evaluator import Manifest, Predictions
 from leaderboard.models import SentFile
 
 CHUNK_BYTES = 1 << 20
@@ -255,10 +255,10 @@ def _checked(data: bytes) -> bytes:
     return values if hashlib.sha256(values).digest() == digest else b""
 
 
-def save_manifest(*, digest: str, csv: bytes) -> None:
-    """Keep a public manifest."""
-    if not store().exists(manifest_name(digest)):
-        store().save(manifest_name(digest), ContentFile(csv))
+def save_manifest(manifest: Manifest) -> None:
+    """Keep a public manifest, as CSV. Corrections of labels have the one that is there."""
+    if not store().exists(manifest_name(manifest.digest)):
+        store().save(manifest_name(manifest.digest), ContentFile(manifest.to_csv()))
 
 
 @contextmanager

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from django.conf import settings as configured
+from django.core.files.base import ContentFile
 from django.core.management import CommandError, call_command
 
 from leaderboard.backups import backup, contents, restore
@@ -98,8 +99,8 @@ def test_what_the_store_does_not_have_is_missing_and_what_is_there_is_not_copied
     tmp_path: Path,
 ) -> None:
     folder = tmp_path / "backup"
-    files.save_manifest(digest="sha256:ab", csv=b"anno_id\n")
     name = files.manifest_name("sha256:ab")
+    files.store().save(name, ContentFile(b"anno_id\n"))
     digest = backup.keep(folder, name, {})
     copy = folder / contents.FILES / name
     first = copy.stat().st_ino
