@@ -3,9 +3,8 @@
 Each finding is one sentence; all of them come at once. None has an address or a password in it.
 """
 
-import difflib
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any, Final
 from urllib.parse import urlsplit
 
@@ -17,30 +16,13 @@ from django.http.request import validate_host
 
 from leaderboard.ops import environment, health
 
-# What others read: gunicorn, the proxy, the command `tsttc` and the tests.
-_OF_OTHERS: Final = frozenset(
-    {
-        "TSTTC_WEB_BIND",
-        "TSTTC_WEB_THREADS",
-        "TSTTC_SITE_HOST",
-        "TSTTC_MAX_REQUEST_SIZE",
-        "TSTTC_URL",
-        "TSTTC_TOKEN",
-        "TSTTC_TOKEN_FILE",
-        "TSTTC_REQUIRE_SERVICES",
-        "TSTTC_SHARED_DATA",
-        "TSTTC_DATABASE_ALONE",
-        "TSTTC_SCHEMATHESIS",
-    }
-)
-_OF_TESTS: Final = "TSTTC_TEST_"
 _BROKERS: Final = ("redis://", "rediss://", "redis+socket://", "amqp://", "amqps://")
 
 
 def check_variables(app_configs: object = None, **kwargs: Any) -> list[CheckMessage]:
     """What is wrong with the variables, as far as they can be read."""
     found: list[CheckMessage] = [
-        Caution(sentence, id="leaderboard.W002") for sentence in misspelt(os.environ)
+        Caution(sentence, id="leaderboard.W002") for sentence in environment.misspelt(os.environ)
     ]
     if not environment.PRODUCTION:
         return found
@@ -70,17 +52,6 @@ def check_services(app_configs: object = None, **kwargs: Any) -> list[CheckMessa
         if not settings.FILES_URL and not _can_be_written(str(settings.FILES_DIR)):
             found.append(f"TSTTC_FILES_DIR is {settings.FILES_DIR}, which this account cannot write to.")
     return [Error(sentence, id="leaderboard.E003") for sentence in found]
-
-
-def misspelt(names: Iterable[str]) -> list[str]:
-    """A sentence for each `TSTTC_…` among these that nobody reads, with the name that may be meant."""
-    known = environment.ASKED | _OF_OTHERS
-    sentences = []
-    for name in sorted(names):
-        if name.startswith("TSTTC_") and name not in known and not name.startswith(_OF_TESTS):
-            near = difflib.get_close_matches(name, known, n=1)
-            sentences.append(f"{name} is read by nothing" + (f"; did you mean {near[0]}?" if near else "."))
-    return sentences
 
 
 def _addresses() -> Iterator[str]:

@@ -3,14 +3,15 @@
 Imported by `leaderboard/settings.py` alone, before Django is configured.
 """
 
+import difflib
 import os
 import stat
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from contextlib import suppress
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
 from tempfile import mkstemp
-from typing import Any
+from typing import Any, Final
 
 import environ
 from django.core.exceptions import ImproperlyConfigured
@@ -19,6 +20,23 @@ FAULTS: list[str] = []
 """What is wrong with the variables, as sentences: all of it is said at once, by `require_sound`."""
 ASKED: set[str] = set()
 """The variables that somebody reads."""
+# What others read: gunicorn, the proxy, the command `tsttc` and the tests. Each is named without its prefix.
+_OF_OTHERS: Final = frozenset(
+    {
+        "WEB_BIND",
+        "WEB_THREADS",
+        "SITE_HOST",
+        "MAX_REQUEST_SIZE",
+        "URL",
+        "TOKEN",
+        "TOKEN_FILE",
+        "REQUIRE_SERVICES",
+        "SHARED_DATA",
+        "DATABASE_ALONE",
+        "SCHEMATHESIS",
+    }
+)
+_PREFIX: Final = "TSTTC_"
 
 
 class Environment(environ.Env):
@@ -82,17 +100,32 @@ def _parsed(name: str, text: str, parse: Callable[[str], dict[str, Any]], exampl
         found = parse(text) if text else {}
     except (ValueError, KeyError, LookupError, ImproperlyConfigured):
         found = {}
-    if text and not found.get("ENGINE", found.get("EMAIL_BACKEND")):
+    is_nowhere = "smtp" in found.get("EMAIL_BACKEND", "") and not found["EMAIL_HOST"]
+    if text and (is_nowhere or not found.get("ENGINE", found.get("EMAIL_BACKEND"))):
         # Without the text: it may have a password.
         FAULTS.append(f"{name} is not understood; expected an address such as {example}.")
     return found
 
 
+def misspelt(names: Iterable[str]) -> list[str]:
+    """A sentence for each `TSTTC_…` among these that nobody reads, with the name that may be meant."""
+    known = ASKED | {_PREFIX + name for name in _OF_OTHERS}
+    sentences = []
+    for name in sorted(names):
+        if name.startswith(_PREFIX) and name not in known and not name.startswith(f"{_PREFIX}TEST_"):
+            near = difflib.get_close_matches(name, known, n=1)
+            sentences.append(f"{name} is read by nothing" + (f"; did you mean {near[0]}?" if near else "."))
+    return sentences
+
+
 def require_sound() -> None:
-    """Say everything that is wrong with the variables. Raises `ImproperlyConfigured`."""
+    """Say everything that is wrong with the variables. Raises `ImproperlyConfigured`.
+
+    Names that nobody reads are no fault, but why a variable is not set may be that it is misspelt.
+    """
     if FAULTS:
         # Django may read the settings twice; each fault is said once.
-        raise ImproperlyConfigured("\n".join(dict.fromkeys(FAULTS)))
+        raise ImproperlyConfigured("\n".join([*dict.fromkeys(FAULTS), *misspelt(os.environ)]))
 
 
 env = Environment()

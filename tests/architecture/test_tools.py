@@ -70,11 +70,14 @@ def test_all_that_is_wrong_with_a_deployment_is_said_at_once(production: dict[st
         "TSTTC_MAX_PREDICTIONS_BYTES": "20MB",
         "TSTTC_DATABASE_URL": "swordfish",
         "TSTTC_METRICS_NETWORKS": "home",
+        "TSTTC_EMAIL_URL": "smtp+tls:/swordfish",
+        "TSTTC_SECRETKEY": "swordfish",
     }
     said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
     assert [name for name in wrong if name not in said] == []
     assert "Traceback" not in said
     assert "swordfish" not in said
+    assert "TSTTC_SECRETKEY is read by nothing; did you mean TSTTC_SECRET_KEY?" in said
     wrong = {"TSTTC_SITE_URL": "foo", "TSTTC_BROKER_URL": "bar", "TSTTC_EMAIL_URL": "", "TSTTC_QUOTA": "1"}
     wrong |= {"TSTTC_FILES_DIR": str(REPOSITORY / "manage.py" / "files")}
     said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
