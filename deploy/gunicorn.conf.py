@@ -34,6 +34,11 @@ if "PROMETHEUS_MULTIPROC_DIR" not in os.environ:
     os.environ["PROMETHEUS_MULTIPROC_DIR"] = tempfile.mkdtemp(prefix="tsttc-figures-")
 
 
+def when_ready(server: Any) -> None:
+    """Say where: with a socket for each process, gunicorn's own line names no address."""
+    server.log.info("Each process listens at %s", bind)
+
+
 def on_exit(server: Any) -> None:
     """The figures end with the processes."""
     shutil.rmtree(os.environ["PROMETHEUS_MULTIPROC_DIR"], ignore_errors=True)

@@ -23,6 +23,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
 from django.http import HttpRequest
+from django.urls import reverse
 from django.utils import timezone
 
 from leaderboard.mails import outbox
@@ -51,6 +52,13 @@ class AccountAdapter(DefaultAccountAdapter):
             template_prefix, email, {**given, "current_site": ConfiguredSite(), **links}
         )
         outbox.send_or_keep(message=message, now=timezone.now())
+
+    def get_login_redirect_url(self, request: HttpRequest) -> str:
+        """Where somebody goes who signed in without a page in mind: a maintainer to what waits for them."""
+        user = request.user
+        if isinstance(user, User) and user.is_maintainer:
+            return reverse("maintain")
+        return str(super().get_login_redirect_url(request))
 
     def pre_authenticate(self, request: HttpRequest, **credentials: Any) -> None:
         """Count one try. Raises allauth's validation error once there were too many wrong ones."""

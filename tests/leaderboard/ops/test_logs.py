@@ -7,6 +7,7 @@ import logging.config
 import runpy
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -158,6 +159,17 @@ def test_every_handler_of_the_real_configurations_takes_secrets_out(
         for handler in configuration["handlers"].values():
             made = formatters.configure_formatter(dict(configuration["formatters"][handler["formatter"]]))
             assert isinstance(made, logs.CleanFormatter)
+
+
+def test_the_log_says_where_the_web_processes_listen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setenv("PROMETHEUS_MULTIPROC_DIR", str(tmp_path))
+    monkeypatch.setenv("TSTTC_WEB_BIND", "127.0.0.1:8123")
+    gunicorn = runpy.run_path(str(Path(settings.BASE_DIR) / "deploy/gunicorn.conf.py"))
+    with caplog.at_level(logging.INFO, logger="test"):
+        gunicorn["when_ready"](SimpleNamespace(log=logging.getLogger("test")))
+    assert "127.0.0.1:8123" in caplog.text
 
 
 def test_run_that_fails_by_our_fault_is_found_by_its_submission(

@@ -207,6 +207,19 @@ def test_nobody_reads_or_writes_second_factors_in_the_administration(keeper: Use
         assert client.get(f"/admin/{model}/").status_code == 404
 
 
+def test_a_maintainer_who_signs_in_comes_to_what_waits_and_others_to_the_form(
+    keeper: User, owner: User, phone: Phone
+) -> None:
+    assert (sign_in(Client(), keeper), sign_in(Client(), owner)) == ("/maintain/", "/submit/")
+    form = {"login": keeper.email, "password": PASSWORD, "next": "/board/test/"}
+    assert Client().post("/accounts/login/", form).headers["Location"] == "/board/test/"
+    set_up(signed_in(keeper), phone)
+    client = Client()
+    sign_in(client, keeper)
+    asked = client.post("/accounts/2fa/authenticate/", {"code": phone.code()})
+    assert asked.headers["Location"] == "/maintain/"
+
+
 # --- help, and a person's data ---------------------------------------------------------------------------
 
 
