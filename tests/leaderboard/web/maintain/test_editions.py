@@ -131,6 +131,10 @@ def test_pages_offer_only_what_can_be_done_to_an_edition(keeper: Client, rescore
         assert "Roll back" not in said(keeper, page)
     assert "Edition 1 is not in preparation" in said(keeper, f"{FIRST}discard/")
     assert get(keeper, f"{SECOND}discard/").one("main").all("button")
+    current = get(keeper, f"{FIRST}publish/").one("main")
+    assert "Edition 1 is the current board already, so it cannot be published." in current.text
+    assert current.all("button") == []
+    assert get(keeper, f"{SECOND}publish/").one("main").all("button")
     publish(rescored)
     for page in (HUB, SECOND):
         assert "Roll back to edition 1" in said(keeper, page)
