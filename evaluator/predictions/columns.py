@@ -250,10 +250,14 @@ def _by_spelling(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | No
     values = np.empty(n)
     between: bytes | None = None
     while start < len(text):
-        block = text[start : start + _BLOCK]
-        octets = np.frombuffer(block + _CELL_PAD, dtype=np.uint8)
-        quotes = np.flatnonzero(octets == _QUOTE)
-        is_last = start + len(block) == len(text)
+        size = len(text) - start
+        is_last = size <= _BLOCK + MAX_CELL_BYTES
+        if is_last:
+            octets = np.frombuffer(text[start:] + _CELL_PAD, dtype=np.uint8)
+        else:
+            size = _BLOCK
+            octets = np.frombuffer(text, dtype=np.uint8, count=size + MAX_CELL_BYTES, offset=start)
+        quotes = np.flatnonzero(octets[:size] == _QUOTE)
         # All but the last block end before the key that the next one begins with.
         n_members = (len(quotes) - (0 if is_last else 1)) // 2
         if n_members < 1 or row + n_members > n:
@@ -261,15 +265,15 @@ def _by_spelling(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | No
         opens, closes = quotes[: 2 * n_members : 2], quotes[1 : 2 * n_members : 2]
         following = quotes[2 : 2 * n_members + (not is_last) : 2]
         if between is None and len(following):
-            between = _between(block[: following[0]])
+            between = _between(octets[: following[0]].tobytes())
         if not _follow(octets, following, between) or not keys.is_at(octets, opens, closes, row=row):
             return None
-        ends = np.append(following, len(block) - 1) if is_last else following
+        ends = np.append(following, size - 1) if is_last else following
         part = _numbers_between(octets, closes + 2, ends, is_last=is_last)
         if part is None:
             return None
         values[row : row + n_members] = part
-        start, row = start + (len(block) if is_last else int(ends[-1])), row + n_members
+        start, row = start + (size if is_last else int(ends[-1])), row + n_members
     return (values, "natural_key") if row == n else None
 
 

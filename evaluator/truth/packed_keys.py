@@ -20,6 +20,16 @@ MAX_DIGITS: Final = 6
 MAX_CELL_BYTES: Final = 128
 _BATCH: Final = 1 << 11
 _CELL_PAD: Final = b" " * MAX_CELL_BYTES
+_EVERY_BYTE: Final = 2**64 // 255
+
+_FILLING: Final = np.array(
+    [
+        2**64 - 2 ** (8 * min(max(n_bytes, 0), WORD_BYTES))
+        for n_bytes in range(-MAX_CELL_BYTES, MAX_CELL_BYTES + 1)
+    ],
+    dtype=np.uint64,
+)
+"""By the number of bytes up to the end of a piece, from -128 on: selects the bytes of a word behind it."""
 
 
 def _mask(n_digits: int) -> int:
@@ -117,7 +127,9 @@ class KeyText:
         """Whether the keys from `row` on stand between these quotation marks, (m,), each with its colon."""
         rows = slice(row, row + len(opens))
         lengths = self.lengths[rows]
-        if not np.array_equal(closes + 2 - opens, lengths):
+        n_bytes = closes - opens
+        n_bytes += 2
+        if not np.array_equal(n_bytes, lengths):
             return False
         found = cells_of(octets, opens, lengths, filling=0, n_words=self.cells.shape[1])
         return found is not None and np.array_equal(found, self.cells[rows])
@@ -152,14 +164,15 @@ def cells_of(
     # One copy of fixed length for each piece, which is much faster than to select bytes.
     windows = np.ndarray((len(octets) - n_bytes + 1,), dtype=f"V{n_bytes}", buffer=octets, strides=(1,))
     cells: Words = windows[starts].view("<u8").reshape(len(starts), -1)
-    is_filling = np.arange(n_bytes) >= np.arange(n_bytes + 1)[:, np.newaxis]
-    masks = np.where(is_filling, np.uint8(255), np.uint8(0)).view("<u8")
+    kept = np.uint64((0xFF ^ filling) * _EVERY_BYTE)
     # Words in which even the shortest piece has no filling stay as they are.
-    first = int(lengths.min()) // WORD_BYTES
-    last_words, masks = cells[:, first:], masks[:, first:]
-    last_words &= (~masks).take(lengths, axis=0)
-    if filling:
-        last_words |= (masks & np.uint64(filling * (2**64 // 255))).take(lengths, axis=0)
+    for at in range(int(lengths.min()) // WORD_BYTES, n_bytes // WORD_BYTES):
+        # Word by word, since to take a row for each piece takes longer.
+        masks = _FILLING[MAX_CELL_BYTES - WORD_BYTES * at :].take(lengths)
+        column = cells[:, at]
+        column |= masks
+        masks &= kept
+        column ^= masks
     return cells
 
 
