@@ -110,7 +110,10 @@ class Scorer:
     @cached_property
     def _n_out_of_range(self) -> int:
         """Sequences that lie in no range of the protocol."""
-        return self._truth.n_outside(self._protocol.intervals)
+        is_inside = np.zeros(self._truth.n_sequences, dtype=bool)
+        for interval in self._protocol.intervals:
+            is_inside[self._slices[interval.name]] = True
+        return len(is_inside) - int(np.count_nonzero(is_inside))
 
     @cached_property
     def _recordings(self) -> NDArray[np.int64]:
