@@ -41,6 +41,7 @@ class Chart:
     has_intervals: bool = False
     is_zoomable: bool = False
     is_low: bool = False  # it has so little in it that half the height will do
+    note: str = ""  # in a sentence, what it leaves out
 
     @property
     def has_links(self) -> bool:

@@ -42,6 +42,8 @@ from leaderboard.web.boards.chart_series import (
 # Below the front, where its names are: this part of the whole height.
 _ROOM: Final = 0.15
 SUBMITTED, QUOTED = "Submissions", "Published results"
+# Behind a front. More marks are a blot, and a board of ten thousand made a page of 7 MB of them.
+MAX_BEHIND: Final = 500
 
 
 # --- a front and what lies behind it ---------------------------------------------------------------------
@@ -73,6 +75,16 @@ def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Plac
         found.append(_Placed(x, y, entry, place, is_front=y < best))
         best = min(best, y)
     return found
+
+
+def _drawn(found: Sequence[_Placed]) -> tuple[list[_Placed], str]:
+    """The front, and of what lies behind it those with the lowest MiD; and what to say of the others."""
+    behind = sorted((each for each in found if not each.is_front), key=lambda each: each.y)
+    if len(behind) <= MAX_BEHIND:
+        return list(found), ""
+    left_out = set(map(id, behind[MAX_BEHIND:]))
+    drawn = [each for each in found if id(each) not in left_out]
+    return drawn, f"Shown are the {len(drawn):,} with the lowest MiD, or on the line, of {len(found):,}."
 
 
 def _front_series(
@@ -146,7 +158,7 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
     ]
     placed += [(_ms(told(at)), value, entry, _time_words(at, is_short=is_short)) for entry, value, at in sent]
-    found = _with_front(placed)
+    found, note = _drawn(_with_front(placed))
     first, last = _time_range([told(at) for at in moments], [year for *_, year in quoted])
     series, names = _front_series(found, line="Best so far", praise="the best when it came", end=_ms(last))
     frame = Frame(
@@ -167,6 +179,7 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         ),
         numbers=(3,),
         is_zoomable=True,
+        note=note,
     )
 
 
@@ -255,12 +268,14 @@ def _time_title(first: datetime, last: datetime) -> str:
 
 def latency(entries: Sequence[Entry]) -> Chart:
     """MiD against latency, of the methods that state one; the front is what nothing beats in both."""
-    found = _with_front(
-        (latency_ms, value, entry, f"{latency_ms:g} ms")
-        for entry in entries
-        if entry.is_visible_to_all
-        and (latency_ms := entry.details["latency_ms"]) is not None
-        and (value := entry.scores[PRIMARY]) is not None
+    found, note = _drawn(
+        _with_front(
+            (latency_ms, value, entry, f"{latency_ms:g} ms")
+            for entry in entries
+            if entry.is_visible_to_all
+            and (latency_ms := entry.details["latency_ms"]) is not None
+            and (value := entry.scores[PRIMARY]) is not None
+        )
     )
     if not found:
         return empty("latency")
@@ -289,4 +304,5 @@ def latency(entries: Sequence[Entry]) -> Chart:
             for each, value in zip(found, _value_cells(found), strict=True)
         ),
         numbers=(2, 4),
+        note=note,
     )

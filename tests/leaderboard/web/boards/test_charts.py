@@ -6,6 +6,7 @@ from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import pytest
 from django.contrib.auth.models import AnonymousUser
@@ -244,3 +245,22 @@ def test_rejected_file_has_no_closer_look(client: Client, open_split: Submission
     builders.score_all()
     client.force_login(owner)
     assert client.get(f"/submissions/{sent.pk}/analysis/").status_code == 404
+
+
+def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(
+    edition: Edition, entries: list[Submission], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shown = snapshots.board(split=edition.split, viewer=AnonymousUser()).entries
+    (first, *_) = [entry for entry in shown if entry.method_id is not None]
+    began = timezone.now()
+    attempts = [
+        Attempt(first.method_id, uuid4(), began + timedelta(days=day), {"mid": mid})
+        for day, mid in enumerate((60.0, 90.0, 80.0, 50.0, 70.0))
+    ]
+    whole = charts.progress([first], attempts)
+    assert (len(whole.rows), whole.note) == (5, "")
+    monkeypatch.setattr(charts, "MAX_BEHIND", 2)
+    chart = charts.progress([first], attempts)
+    assert [float(row[3].partition(">")[2].partition("<")[0]) for row in chart.rows] == [60, 80, 50, 70]
+    assert chart.note == "Shown are the 4 with the lowest MiD, or on the line, of 5."
+    assert sum(len(each["data"]) for each in chart.options["baseOption"]["series"][1:]) >= 4
