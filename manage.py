@@ -2,6 +2,7 @@
 """Command-line entry of the leaderboard."""
 
 import os
+import signal
 import sys
 
 
@@ -16,9 +17,14 @@ def main() -> None:
 
     try:
         execute_from_command_line(sys.argv)
+        sys.stdout.flush()
     except ImproperlyConfigured as fault:
         # A sentence for each variable; where in the code it was read helps nobody.
         sys.exit(f"The settings are wrong:\n{fault}")
+    except BrokenPipeError:
+        # Whoever read the output, as `head` does, has left: the shell's number for that, and nothing to say.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(128 + signal.SIGPIPE)
 
 
 def make_receipt_key() -> None:
