@@ -176,13 +176,15 @@ class Scorer:
 
     def _errors(self, predictions: Predictions) -> _Errors:
         truth = self._truth
+        # Made with the first file of a truth, and better before the arrays below need memory too.
+        true_log = truth.ascending_log_scale_ratio
         predicted, n_truncated = _truncate(predictions.ttc_s[truth.ascending_rows], self._protocol)
         alpha = scale_ratio_10hz(predicted)
         # One comparison each way: NaN fails both, so NaN, 0 (α₁₀ is 0 or -0 there) and undefined MiD end up
         # here.
         if not (alpha.min() > 0.0 and alpha.max() < np.inf):
             _refuse(predictions, self._protocol)
-        terms = Terms(predicted, truth.ascending_ttc_s, alpha, truth.ascending_log_scale_ratio)
+        terms = Terms(predicted, truth.ascending_ttc_s, alpha, true_log)
         errors = {metric.name: metric.function(terms) for metric in self._protocol.metrics}
         return _Errors(errors, n_truncated)
 
