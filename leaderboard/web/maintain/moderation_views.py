@@ -45,7 +45,7 @@ class RenameForm(DeedForm):
         label="New name",
         required=False,
         max_length=MAX_NAME,
-        help_text="Empty: a name that says nothing, such as Team 3f9c2a.",
+        help_text="Empty: a name that says nothing, such as Team 3f9c2a or Method 3f9c2a.",
         widget=forms.TextInput(attrs={"autocomplete": "off"}),
     )
 
