@@ -1,5 +1,6 @@
 """A headless Chromium, and what a page may not do in it."""
 
+import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -87,7 +88,8 @@ def sign_in(page: Page, email: str, *, password: str = PASSWORD) -> None:
     page.get_by_label("Email").fill(email)
     page.get_by_label("Password", exact=True).fill(password)
     page.get_by_role("button", name="Sign in").click()
-    page.wait_for_url("**/submit/")
+    # Where people submit, and where maintainers see what waits for them.
+    page.wait_for_url(re.compile("/(submit|maintain)/$"))
 
 
 FOCUSED_NAME = """() => {

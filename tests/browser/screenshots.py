@@ -151,6 +151,7 @@ def nothing_waits(site: Site) -> bool:
 def signed_in(browser: Browser, demo: Demo, *, email: str, password: str) -> BrowserContext:
     """A context in which somebody is."""
     context = browser.new_context(base_url=demo.site.url)
+    context.set_default_timeout(PATIENCE_S * 1000)  # a busy machine is no fault
     page = context.new_page()
     sign_in(page, email, password=password)
     page.close()
