@@ -10,11 +10,11 @@ Here PostgreSQL has the same processors as the workers, and this process, which 
 decided. So each line says what every party took of them: where their sum is near the number of processors, no
 worker more can be of use on this machine.
 
-What waits behind submissions is left out, as in `rescoring`: a worker that is at it when it is told to end is
-given 20 s to finish, whether it needs them or not, and with four of them the benchmark ran out of its time.
+What waits behind submissions is left out, as in `rescoring`.
 """
 
 import os
+import signal
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
@@ -147,9 +147,9 @@ def workers(n: int) -> Iterator[list[int]]:
         ]
         logs = [site.directory / f"{name}.log" for name in names]
         await_that(lambda: all(b" ready." in path.read_bytes() for path in logs), what="the workers are up")
-        # All at once: each takes a moment to end.
+        # Asked to end, each would take 20 s: it has a task in hand, if only to look whether anything waits.
         for worker in begun:
-            started.callback(worker.terminate)
+            started.callback(os.killpg, worker.pid, signal.SIGKILL)
         yield [worker.pid for worker in begun]
 
 
