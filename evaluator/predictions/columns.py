@@ -184,7 +184,7 @@ def _blank_keys(buffer: bytearray, keys: KeyWords, colons: Rows) -> Rows | slice
     for part in _parts(n, _KEYS):
         starts = colons[part] - 7
         words = windows[starts]
-        blank = keys.blank(words, part)
+        blank = keys.blank(words, part) if rows is None else None
         if blank is None:
             # From here on the keys stand in another order than the manifest's.
             rows = np.arange(n) if rows is None else rows
