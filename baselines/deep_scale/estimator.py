@@ -104,6 +104,7 @@ def cut(frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, use: Use) 
         boxes,
         max_scale=float(network_scales()[-1]),
         max_box_px=use.max_box_px,
+        min_box_px=use.min_box_px,
         margin_px=use.margin_px,
         n_cells=use.n_cells,
     )

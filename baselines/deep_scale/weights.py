@@ -63,7 +63,7 @@ class Use:
 
     `similarity` of two feature vectors: the paper words "cosine", the toolkit's weights are for "dot".
     `n_cells` is the paper's target size. Frames are shrunk until the longer side of the target's box has
-    `max_box_px`. Crops have `margin_px` around what is compared.
+    `max_box_px`, or enlarged until it has `min_box_px`. Crops have `margin_px` around what is compared.
     `decoding` is how a scale ratio is made of what the network says (`estimator.DeepScale`).
     """
 
@@ -72,6 +72,7 @@ class Use:
     max_box_px: float = 120.0
     margin_px: float = 16.0
     decoding: Decoding = "head"
+    min_box_px: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,11 +166,11 @@ def _read_card(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 def _read_use(found: object) -> Use:
     """How the card says that the weights are to be used; raises `Rejected`."""
-    # Cards that were written before there was a choice have no decoding.
+    # Cards that were written before there was a choice have neither decoding nor a least size.
     known = {each.name for each in fields(Use)}
-    if isinstance(found, dict) and known - {"decoding"} <= found.keys() <= known:
+    if isinstance(found, dict) and known - {"decoding", "min_box_px"} <= found.keys() <= known:
         use = Use(**found)
-        numbers = (use.n_cells, use.max_box_px, use.margin_px)
+        numbers = (use.n_cells, use.max_box_px, use.min_box_px, use.margin_px)
         if (
             use.similarity in ("dot", "cosine")
             and use.decoding in DECODINGS
@@ -177,6 +178,7 @@ def _read_use(found: object) -> Use:
             and all(type(number) in (int, float) for number in numbers)
             and 1 <= use.n_cells <= 100
             and 8 <= use.max_box_px <= 400
+            and 0 <= use.min_box_px <= use.max_box_px
             and 0 <= use.margin_px <= 64
         ):
             return use

@@ -181,6 +181,21 @@ def own_entries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
             ).encode(),
             '"use" in card.json',
         ),
+        (
+            CARD,
+            json.dumps(
+                {
+                    "use": {
+                        "similarity": "dot",
+                        "n_cells": 9,
+                        "max_box_px": 40,
+                        "min_box_px": 41,
+                        "margin_px": 8,
+                    }
+                }
+            ).encode(),
+            '"use" in card.json',
+        ),
     ],
 )
 def test_a_faulty_own_file_is_a_problem_in_words(
