@@ -76,7 +76,8 @@ def breakable(path: str) -> SafeString:
     >>> breakable("/api/v1")
     '/<wbr>api/<wbr>v1'
     """
-    return format_html_join(SafeString("/<wbr>"), "{}", ((part,) for part in path.split("/")))
+    *folders, last = path.split("/")
+    return format_html("{}{}", format_html_join("", "{}/<wbr>", ((part,) for part in folders)), last)
 
 
 @register.simple_tag

@@ -7,7 +7,7 @@ from django.test.utils import CaptureQueriesContext
 from leaderboard.db import prepared
 from leaderboard.models import Split
 
-pytestmark = pytest.mark.django_db
+pytestmark = [pytest.mark.django_db, pytest.mark.usefixtures("benchmark")]
 
 NAMES = "SELECT name FROM leaderboard_split WHERE name = %s"
 KEPT = "SELECT count(*) FROM pg_prepared_statements WHERE statement LIKE %s"

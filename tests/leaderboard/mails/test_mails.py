@@ -119,7 +119,7 @@ def test_a_superuser_can_sign_in_without_a_mail(away: Settings, client: Client) 
     root.set_password("a-long-enough-word")
     root.save()
     answer = client.post("/accounts/login/", {"login": root.email, "password": "a-long-enough-word"})
-    assert answer["Location"] == "/submit/"
+    assert answer["Location"] == "/maintain/"
     assert not Mail.objects.exists()
 
 
