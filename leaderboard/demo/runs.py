@@ -65,6 +65,7 @@ class Run:
 
 RUNS = (
     Run("alignment", "alignment"),
+    Run("deep-scale", "deep-scale"),
     Run("tracking", "tracking"),
     Run("pixel-mse", "pixel-mse"),
     Run("pixel-mse-toolkit", "pixel-mse", {"variant": "toolkit"}),

@@ -141,6 +141,16 @@ ENTRIES = (
         details=_measured(2, latency_ms=15.4),
     ),
     DemoEntry(
+        team="Baselines on pixels",
+        method="Deep Scale, our weights",
+        description=(
+            "The paper's network with the weights that come with this project. They were trained on other "
+            "rendered sequences, and on nothing else: on the road, the network is worse than here."
+        ),
+        run=get_run("deep-scale"),
+        details=_measured(2, latency_ms=100, n_parameters=83_832, paper_url=_PAPER),
+    ),
+    DemoEntry(
         team="Demo team",
         method="First try",
         description="A file with the faults that first files have; see its page for the list.",
