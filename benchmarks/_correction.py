@@ -32,6 +32,7 @@ from tests import crowd
 # Each question takes a millisecond of the processors that the workers have.
 POLL_S = 0.03
 PATIENCE_S = 600.0
+REST_S = 0.5
 
 
 @dataclass(frozen=True)
@@ -94,9 +95,10 @@ def leave_what_waits_behind() -> None:
 def correct(*, split: str, truth: evaluator.GroundTruth, directory: Path, pids: Sequence[int]) -> Corrected:
     """Open an edition with this ground truth beside the board, and wait until the workers have scored all.
 
-    `pids` are their processes.
+    `pids` are their processes, which are at rest when the clock starts.
     """
     path = _written(truth, directory)
+    _await_rest(pids)
     before_s = time.process_time() + sum(map(processor_s, pids))
     # The command that opens an edition begins in a new process, which has read nothing yet.
     truth_values.load.cache_clear()
@@ -117,6 +119,14 @@ def correct(*, split: str, truth: evaluator.GroundTruth, directory: Path, pids: 
     assert n == Submission.objects.filter(split=split).count()
     assert Score.objects.filter(evaluation__edition=edition).count() == n * len(evaluator.SCORE_NAMES)
     return Corrected(edition=edition, truth=truth, open_s=open_s, total_s=total_s, processor_s=used_s)
+
+
+def _await_rest(pids: Sequence[int]) -> None:
+    """Wait until the processes have done what waited behind the correction before this one."""
+    before_s = -1.0
+    while (used_s := sum(map(processor_s, pids))) > before_s:
+        before_s = used_s
+        time.sleep(REST_S)
 
 
 def check(corrected: Corrected, *, first: evaluator.GroundTruth, n: int) -> None:

@@ -1,6 +1,6 @@
 """The measurement of `benchmarks/scale_out.py`, run in a process that has the site's settings.
 
-60 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued before any
+120 submissions of 28,600 sequences each, against made-up ground truth, are stored and queued before any
 worker is started, not yet due. Each worker then scores a few others, so that what a process reads and starts
 once, the ground truth and the server of its readers, is not counted. Then all become due at once, and the
 clock runs, by the database, until the last is decided: no file is sent meanwhile. The workers share the
@@ -41,7 +41,7 @@ from leaderboard.submissions import submissions
 from tests.journeys.production import BIN, Site, await_that, running
 
 N_WORKERS = (1, 2, 4)
-N_SUBMISSIONS, N_TO_WARM = 60, 6
+N_SUBMISSIONS, N_TO_WARM = 120, 6
 N_SEQUENCES = 28_600
 # To write one takes longer than to score it, so files share their values and differ in the blanks at the end.
 N_VALUES = 8

@@ -17,6 +17,7 @@ from django.db import DataError, IntegrityError, InterfaceError, OperationalErro
 from evaluator import Rejected, Report, published
 from evaluator.predictions.plausibility import warnings_of
 from evaluator.problems import FileWarning
+from evaluator.scoring.report import RecordingSums
 from evaluator.scoring.scoring import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
 from leaderboard.scoring import lifecycle, recording_sums, sandbox
@@ -168,6 +169,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     except (OSError, TruthDamaged):
         return list(leases)
     outcomes: list[tuple[Lease, Outcome]] = []
+    sums: list[tuple[SentFile, RecordingSums | None]] = []
     rest: list[Lease] = []
     for lease in leases:
         file = sent[lease.evaluation_id]
@@ -182,7 +184,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         try:
             if predictions is not None:
                 report = scorer.report(predictions, keep_bags=True)
-                recording_sums.save(edition, file=file, bags=report.bags)
+                sums.append((file, report.bags))
                 warnings = warned.get(lease.evaluation_id)
                 if warnings is None:
                     warnings = warnings_of(predictions)
@@ -194,6 +196,9 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         rest.append(lease)
     if outcomes:
         _retry_on_disconnect(lambda: lifecycle.finalise_many(outcomes))
+    # The board waits for the outcomes, and nobody for the sums: what is missing of them is made anew.
+    for file, bags in sums:
+        recording_sums.save(edition, file=file, bags=bags)
     log.info("rescored", edition=str(edition), n_scored=len(outcomes), n_to_read=len(rest))
     return rest
 
