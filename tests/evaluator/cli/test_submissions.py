@@ -251,6 +251,11 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
         (Reply(problem("The file is empty.", where="file"), 422), 1, "Error: The file is empty."),
         (Reply(b"<html>", 400), 1, "The server refused (400: Bad Request)."),
         (
+            Reply(b"<html>nginx</html>", 413),
+            1,
+            "The server takes no file of this size (413: Request Entity Too Large).\nThe page http://",
+        ),
+        (
             Reply(problem("5 a day; the next slot opens at noon."), 429, {"Retry-After": "7200"}),
             5,
             "Error: 5 a day; the next slot opens at noon.\nTry again in 2 h.\n",
