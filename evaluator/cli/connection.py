@@ -170,7 +170,8 @@ def _words_for(error: Refused) -> str:
     if error.status in {401, 403}:
         return f"The server does not accept the token ({error.status}: {error.title})."
     if error.status == 413:
-        return f"The server takes no file of this size ({error.status}: {error.title})."
+        size = "its page “Submit” says how large a file may be"
+        return f"The server takes no file of this size ({error.status}: {error.title}); {size}."
     return f"The server refused ({error.status}: {error.title})."
 
 
@@ -178,8 +179,6 @@ def _hint_for(error: Refused, *, url: str) -> str:
     again = f"Try again in {duration(error.retry_after_s)}." if error.retry_after_s else ""
     if error.status == 401:
         return f"Create a token at {url.rstrip('/')}/tokens/, then: tsttc login, or set {TOKEN_VARIABLE}."
-    if error.status == 413 and not error.detail:
-        return f"The page {url.rstrip('/')}/submit/ says how large a file may be."
     if error.status == 403 and error.code in WORDS_OF_403:
         return f"Create a token with this scope at {url.rstrip('/')}/tokens/"
     if error.status == 404:

@@ -250,11 +250,7 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
         (Reply(problem("No such split 'x'.", where="split"), 422), 2, "Error: No such split 'x'."),
         (Reply(problem("The file is empty.", where="file"), 422), 1, "Error: The file is empty."),
         (Reply(b"<html>", 400), 1, "The server refused (400: Bad Request)."),
-        (
-            Reply(b"<html>nginx</html>", 413),
-            1,
-            "The server takes no file of this size (413: Request Entity Too Large).\nThe page http://",
-        ),
+        (Reply(b"<html>nginx</html>", 413), 1, "its page “Submit” says how large a file may be."),
         (
             Reply(problem("5 a day; the next slot opens at noon."), 429, {"Retry-After": "7200"}),
             5,
