@@ -82,5 +82,12 @@ def dates(splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetim
 def _leading(main: Split) -> dict[str, Any]:
     """What the page tells of the main board: only what everybody sees, whoever reads."""
     board = snapshots.board(split=main, viewer=AnonymousUser())
-    fronts = [row for row in chart_views.progress(board).rows if row[-1]]
-    return {"board": board, "leaders": leaders(board), "lead": lead_words(board), "fronts": fronts}
+    progress = chart_views.progress(board)
+    fronts = [row for row in progress.rows if row[-1]]
+    return {
+        "board": board,
+        "leaders": leaders(board),
+        "lead": lead_words(board),
+        "fronts": fronts,
+        "note": progress.note,
+    }

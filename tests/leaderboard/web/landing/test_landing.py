@@ -1,6 +1,7 @@
 """The landing page: what time to contact is, who leads and how certainly, and where to go from there."""
 
 import json
+import re
 from datetime import timedelta
 
 import pytest
@@ -10,6 +11,7 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from leaderboard.models import Edition, PublishedResult, Split, Submission, User
+from leaderboard.web.boards import charts
 from leaderboard.web.landing.landing_views import main_split
 from leaderboard.web.middleware import page_cache
 from tests import board_rows, builders, pages
@@ -54,6 +56,13 @@ def test_the_leaders_are_the_first_rows_of_the_main_board(client: Client, benchm
     assert [row.one("span", class_="number").text for row in rows] == [row[2] for row in board]
     names = [row.one("p", class_="name").text for row in rows]
     assert all(row[1].startswith(name) for row, name in zip(board, names, strict=True))
+
+
+def test_a_chart_that_leaves_entries_out_says_so(
+    client: Client, benchmark: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(charts, "MAX_BEHIND", 0)
+    assert re.search(r"Shown are the \d with the lowest MiD, or on the line, of \d\.", landing(client).text)
 
 
 def test_a_private_method_leads_nowhere_on_it_not_even_for_its_own_team(
