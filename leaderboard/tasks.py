@@ -6,6 +6,7 @@
 import random
 
 from celery import shared_task
+from django.db import close_old_connections
 from django.utils import timezone
 
 from leaderboard.scoring import worker
@@ -18,10 +19,12 @@ from leaderboard.workers import backlog, queue  # noqa: F401 - only its errors a
 @shared_task(name="leaderboard.tasks.nudge")
 def nudge(*_: object) -> None:
     """Decide the most urgent waiting evaluation."""
+    close_old_connections()
     worker.run_next(rng=random.Random())  # noqa: S311 - jitter, not a secret
 
 
 @shared_task(name="leaderboard.tasks.work_off")
 def work_off(*_: object) -> None:
     """Do what waits behind submissions: boards to draw, intervals, comparisons, analyses."""
+    close_old_connections()
     backlog.work_off(now=timezone.now(), rng=random.Random())  # noqa: S311 - jitter, not a secret
