@@ -251,9 +251,9 @@ CELERY_TASK_TIME_LIMIT = int(WALL_S) + 60
 CELERY_WORKER_PREFETCH_MULTIPLIER = 1
 CELERY_WORKER_MAX_MEMORY_PER_CHILD = env.int("TSTTC_WORKER_MAX_MEMORY_KB", default=1_000_000)
 CELERY_WORKER_SOFT_SHUTDOWN_TIMEOUT = 20
-# Celery closes the connection to the database around every task, unless told to wait for so many. A new one costs
-# PostgreSQL more than a submission, and has none of the statements that were kept. `leaderboard/tasks.py` closes
-# those that are lost or older than CONN_MAX_AGE.
+# Celery closes the connection to the database around every task, unless told to wait for so many. A new
+# one costs PostgreSQL more than a submission, and has none of the statements that were kept.
+# `leaderboard/tasks.py` closes those that are lost or older than CONN_MAX_AGE.
 CELERY_DB_REUSE_MAX = 1_000_000
 CELERY_WORKER_HIJACK_ROOT_LOGGER = False
 
