@@ -135,10 +135,18 @@ def print_memory(url: str, master: int, *, name: str) -> None:
         ):
             for headers in (GZIP, {}):
                 http.get(path, headers=headers)
-    children = Path(f"/proc/{master}/task/{master}/children").read_text().split()
-    lines = Path(f"/proc/{children[0]}/status").read_text().splitlines()
-    peak_kb = next(int(line.split()[1]) for line in lines if line.startswith("VmHWM"))
-    print(f"{name}_web_peak_memory = {peak_kb / 1e3:.0f} MB", flush=True)
+    print(f"{name}_web_peak_memory = {memory_mb(web_process(master), 'VmHWM'):.0f} MB", flush=True)
+
+
+def web_process(master: int) -> Path:
+    """What the kernel says of the process that answers; `master` is the one that has started it."""
+    return Path("/proc", Path(f"/proc/{master}/task/{master}/children").read_text().split()[0])
+
+
+def memory_mb(process: Path, name: str) -> float:
+    """VmRSS, what it has, or VmHWM, the most that it has had."""
+    lines = (process / "status").read_text().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith(name)) / 1e3
 
 
 @contextmanager

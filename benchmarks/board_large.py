@@ -3,12 +3,13 @@
 `python -m benchmarks board_large`
 """
 
+import itertools
 import os
 
 import httpx
 
 from benchmarks import board
-from benchmarks.board import API, GZIP, asked_ms, filled, print_memory, serving
+from benchmarks.board import API, GZIP, asked_ms, filled, memory_mb, print_memory, serving, web_process
 
 N_ENTRIES = int(os.environ.get("BENCH_LARGE_ENTRIES", "10000"))
 
@@ -24,7 +25,21 @@ def main() -> None:
             print(f"board_large_page_size = {len(page.content) / 1e3:.0f} KB")
             size = len(http.get(API).content)
             print(f"board_large_json_size = {size / 1e6:.1f} MB", flush=True)
+            print_growth(http, pid=process.pid)
         print_memory(url, process.pid, name="board_large")
+
+
+def print_growth(http: httpx.Client, *, pid: int) -> None:
+    """What hundreds of different answers take, beyond the rows that the process has already."""
+    web = web_process(pid)
+    (web / "clear_refs").write_text("5", encoding="ascii")  # the peak is counted from here on
+    before_mb = memory_mb(web, "VmRSS")
+    for page, (sort, headers) in itertools.product(range(1, 101), [("mid", GZIP), ("-rte", {})]):
+        http.get("/board/test/", params={"page": page, "sort": sort}, headers=headers).raise_for_status()
+    for headers in (GZIP, {}):
+        for path in (API, f"{API}?sort=-rte", "/board/test.csv"):
+            http.get(path, headers=headers).raise_for_status()
+    print(f"board_large_growth_of_206_answers = {memory_mb(web, 'VmHWM') - before_mb:.0f} MB", flush=True)
 
 
 if __name__ == "__main__":

@@ -154,7 +154,7 @@ def measure_memory(truth: GroundTruth, files: dict[str, bytes], n: int) -> None:
 
 
 def print_peak(way: str, truth_path: str, file_path: str) -> None:
-    """In a process that has read a small file: bytes by which the peak rises while a file becomes a report."""
+    """In a process that has read a small file: bytes by which the peak rises while one becomes a report."""
     truth = GroundTruth.load(truth_path)
     data = Path(file_path).read_bytes()
     # What is loaded once, code above all, is no part of what a file costs.
