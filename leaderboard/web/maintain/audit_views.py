@@ -2,10 +2,11 @@
 
 import itertools
 import json
+import re
 from collections.abc import Iterator, Mapping
 from datetime import UTC, date, datetime, time, timedelta
 from functools import partial
-from typing import Any
+from typing import Any, Final
 
 from django import forms
 from django.core.paginator import Paginator
@@ -63,6 +64,7 @@ def _midnight(day: date) -> datetime:
 
 
 PER_PAGE = 100
+DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
 COLUMNS = ("id", "at", "actor", "verb", "noun", "noun_id", "details", "names", "previous_hash", "hash")
 
 
@@ -83,12 +85,12 @@ def events(request: HttpRequest, kind: str = "") -> HttpResponse | StreamingHttp
 
 
 def _told(event: AuditEvent, names: Mapping[str, str]) -> list[tuple[str, str]]:
-    """The details as a person reads them; what is empty says nothing."""
+    """The details as a person reads them: digests by their beginning, and nothing of what is empty."""
     told = {
         name: ", ".join(map(str, value)) if isinstance(value, list) else value
         for name, value in event.details.items()
     } | {name: text or "(blanked)" for name, text in _named(event, names).items()}
-    return [(name, str(value)) for name, value in told.items() if value not in ("", None)]
+    return [(name, DIGEST.sub(r"\1…", str(value))) for name, value in told.items() if value not in ("", None)]
 
 
 def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:

@@ -115,6 +115,17 @@ def test_the_exports_hold_every_column_and_the_chain(keeper: Client, trail: None
     assert "no-store" in response.headers["Cache-Control"]
 
 
+def test_the_page_has_the_beginning_of_a_digest_and_the_exports_have_all_of_it(
+    keeper: Client, owner: User
+) -> None:
+    digest = f"sha256:{'0123456789abcdef' * 4}"
+    audit.record(verb="v", noun="n", noun_id="1", actor=owner, details={"report_digest": digest})
+    [[*_, told, _]] = rows(keeper.get(PAGE))
+    assert told == "report_digest: sha256:01234567…"
+    assert digest in text_of(keeper.get(CSV))
+    assert digest in text_of(keeper.get(JSON))
+
+
 def test_no_cell_of_the_table_is_a_formula(keeper: Client, owner: User) -> None:
     audit.record(verb="v", noun="n", noun_id="=cmd|' /C calc'!A0", actor=owner)
     [row] = csv.DictReader(io.StringIO(text_of(keeper.get(CSV))))
