@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from baselines.boxes import centre_of, expand, scale_ratio_of_boxes, size_of
 from baselines.clips import TARGET, Box, Clip, Image
 from baselines.estimates import Estimate, Unusable
+from baselines.kernels import Kernel
 from baselines.patches import boxes_of_pair, is_flat
 from baselines.pixel_mse import PixelMse
 
@@ -31,9 +32,6 @@ Positions = NDArray[np.float64]
 
 _BLUR: Final = 0.6
 """Standard deviation of the sampling kernel, in steps between samples: enough to keep aliasing away."""
-
-_REACH: Final = 3.0
-"""The kernel is cut off here, in standard deviations."""
 
 _RANGE: Final = (0.4, 2.5)
 """Scale ratios outside this range are an alignment with something else."""
@@ -195,30 +193,6 @@ def _weights(errors: Floats) -> Floats:
     """(n,): Geman and McClure's weights; an error of twice the standard deviation of most has a quarter."""
     scale = max(_LEAST_SCALE, 2 * 1.4826 * float(np.median(np.abs(errors))))
     return np.asarray(1 / (1 + np.square(errors / np.float32(scale))) ** 2)
-
-
-@dataclass(frozen=True, slots=True)
-class Kernel:
-    """How one axis of a frame is sampled: a Gaussian about each position, cut off where the frame ends.
-
-    `weights` (n, k) times the pixels of the slice `pixels` (k,) gives the samples; `slopes` gives their
-    derivatives by position.
-    """
-
-    pixels: slice
-    weights: Floats
-    slopes: Floats
-
-    @classmethod
-    def at(cls, positions: Positions, *, blur: float, length: int) -> Kernel:
-        """The kernel for ascending `positions` (n,) in an axis of `length` pixels, whose edges repeat."""
-        inside = np.clip(positions, 0, length - 1)
-        first = max(0, int(inside[0] - _REACH * blur))
-        last = min(length, int(inside[-1] + _REACH * blur) + 2)
-        distance = ((np.arange(first, last) - inside[:, None]) / blur).astype(np.float32)
-        weights = np.exp(-0.5 * distance * distance)
-        weights /= weights.sum(axis=1, keepdims=True)
-        return cls(slice(first, last), weights, weights * distance / np.float32(blur))
 
 
 def _offsets(length: float, step: float) -> Positions:
