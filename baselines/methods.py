@@ -184,8 +184,8 @@ METHODS: Final[tuple[Method, ...]] = (
                 "decoding",
                 "auto",
                 "The head's mean over four scale ratios, as published; the peak of the features' similarity; "
-                "or what the weights' card says, which is the peak for ours.",
-                choices=("auto", "head", "peak"),
+                "a fit of the features; or what the weights' card says, which is the peak for ours.",
+                choices=("auto", "head", "peak", "fit"),
             ),
         ),
     ),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -59,6 +59,12 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
     type=click.FloatRange(0, 1e6),
     default=0.0,
     help="Adds so many times |ln α̂ − ln α| to the loss.",
+)
+@default_option(
+    "--fit-weight",
+    type=click.FloatRange(0, 1e6),
+    default=0.0,
+    help="Adds so many times the error of the fit, in MiD, to the loss.",
 )
 @default_option("--similarity", type=click.Choice(["cosine", "dot"]), default="cosine")
 @default_option(
@@ -119,6 +125,8 @@ def train(
     from baselines.deep_scale.weights import Use, read_weights  # noqa: PLC0415 -- as above
 
     wanted = Use(*(recipe.pop(name) for name in ("similarity", "n_cells", "max_box_px", "margin_px")))
+    if recipe["fit_weight"]:
+        wanted = replace(wanted, decoding="fit")
     with naming(start or out):
         weights = read_weights(start) if start else None
     source = _folder_source(folder) if folder else _rendered(n_sequences, seed=1000 + recipe["seed"])

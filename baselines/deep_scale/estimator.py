@@ -13,10 +13,12 @@ from numpy.typing import NDArray
 
 from baselines.clips import TARGET, Clip, Image
 from baselines.deep_scale.crops import Crop, CropPair, cut_pair
+from baselines.deep_scale.fit import fitted_scale_ratio
 from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Array, Operations, Sampling, features, similarities
 from baselines.deep_scale.peak import peak_scale_ratio
 from baselines.deep_scale.weights import N_SCALES, Decoding, Use, Weights, read_weights
+from baselines.detection import scale_ratio_of_two
 from baselines.estimates import Estimate
 from baselines.methods import OWN_WEIGHTS
 from baselines.patches import boxes_of_pair, require_centre_inside
@@ -39,8 +41,9 @@ class DeepScale:
 
     `device` is "numpy", or where torch is to compute: "cpu" or "cuda". `decoding` is how the scale ratio
     comes about: "head" is the paper's mean over the four surest of 20, "peak" searches the features finely
-    near it (`peak`), and "auto" is what the weights' card says; the toolkit's have the head. Raises
-    `Rejected` for weights that are at fault, `OSError`, and `ValueError` for a device that is not there.
+    near it (`peak`), "fit" lays the features of the reference on those of the target from there (`fit`), and
+    "auto" is what the weights' card says; the toolkit's have the head. Raises `Rejected` for weights that are
+    at fault, `OSError`, and `ValueError` for a device that is not there.
     """
 
     def __init__(
@@ -57,7 +60,8 @@ class DeepScale:
 
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
         """Raises `Unusable` where a box is missing, too small, or has its centre outside of the image."""
-        pair = self.crops(clip, frame_gap=frame_gap)
+        frames, boxes = _usable(clip, frame_gap=frame_gap)
+        pair = cut(frames, boxes, use=self._use)
         maps = network_features(self._operations, [pair])
         confidences = self._confidences(pair, maps)
         best = best_of(-confidences, n_top=N_TOP)
@@ -73,15 +77,14 @@ class DeepScale:
                 n_cells=self._use.n_cells,
                 similarity=self._use.similarity,
             )
+        elif self._use.decoding == "fit":
+            starts = (scale_ratio, scale_ratio_of_two(*boxes, measure="sqrt-area"))
+            scale_ratio = fitted_scale_ratio(self._operations, frames, boxes, starts=starts)
         return Estimate(scale_ratio, confidence=float(confidences[best[0]]))
 
     def crops(self, clip: Clip, *, frame_gap: int) -> CropPair:
         """What the network sees; raises as a call does."""
-        boxes = boxes_of_pair(clip, frame_gap=frame_gap)
-        frames = clip.colour(TARGET - frame_gap), clip.colour(TARGET)
-        for image, box, name in zip(frames, boxes, ("reference", "target"), strict=True):
-            require_centre_inside(image, box, name=name)
-        return cut(frames, boxes, use=self._use)
+        return cut(*_usable(clip, frame_gap=frame_gap), use=self._use)
 
     def confidences(self, pair: CropPair) -> Floats:
         """(20,): how sure the network is of each scale ratio, between 0 and 1."""
@@ -90,6 +93,15 @@ class DeepScale:
     def _confidences(self, pair: CropPair, maps: tuple[Array, Array]) -> Floats:
         logits = self._operations.values(logits_of(self._operations, [pair], maps, use=self._use))[0]
         return np.asarray(0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64)))
+
+
+def _usable(clip: Clip, *, frame_gap: int) -> tuple[tuple[Image, Image], tuple[Floats, Floats]]:
+    """Frames in colour and boxes of reference and target; raises as a call does."""
+    boxes = boxes_of_pair(clip, frame_gap=frame_gap)
+    frames = clip.colour(TARGET - frame_gap), clip.colour(TARGET)
+    for image, box, name in zip(frames, boxes, ("reference", "target"), strict=True):
+        require_centre_inside(image, box, name=name)
+    return frames, boxes
 
 
 def network_scales() -> Floats:

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from baselines.clips import TARGET, Clip, Image
 from baselines.deep_scale.crops import CropPair
 from baselines.deep_scale.estimator import cut, network_scales
+from baselines.deep_scale.fit_samples import FitSample, fit_sample
+from baselines.deep_scale.network import Operations
 from baselines.deep_scale.weights import Use
 from baselines.estimates import Unusable
 from baselines.folders import SequenceFolder
@@ -55,10 +57,11 @@ class Pair:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """What the network sees of a pair, and what it should say."""
+    """What the network sees of a pair, and what it should say; and what the fit sees, where it learns too."""
 
     crops: CropPair
     scale_ratio: float
+    fit: FitSample | None = None
 
 
 class Source(Protocol):
@@ -67,6 +70,11 @@ class Source(Protocol):
     @property
     def truth(self) -> GroundTruth:
         """The ground truth, in the order of the rows."""
+        ...
+
+    @property
+    def scale_ratios(self) -> Floats:
+        """(n,): α of the rows' pairs, as exactly as they are known."""
         ...
 
     def clip(self, row: int) -> Clip:
@@ -86,6 +94,11 @@ class RenderedSequences:
     def truth(self) -> GroundTruth:
         """As of a source."""
         return self.split.truth
+
+    @property
+    def scale_ratios(self) -> Floats:
+        """As of a source: of the distances. A time to contact says less where the vehicle brakes."""
+        return self.split.gap_m[:, TARGET] / self.split.gap_m[:, TARGET - FRAME_GAP]
 
     def clip(self, row: int) -> Clip:
         """As of a source."""
@@ -117,6 +130,11 @@ class FolderSequences:
             raise reject("missing-keys", message)
         return cls(folder, truth, [row_of[key] for key in truth.manifest.natural_keys])
 
+    @property
+    def scale_ratios(self) -> Floats:
+        """As of a source."""
+        return ttc_to_scale_ratio(self.truth.ttc_s, fps_hz=fps_of_gap(FRAME_GAP))
+
     def clip(self, row: int) -> Clip:
         """As of a source; asking for a frame raises `SequenceFault` where it cannot be had."""
         return self.folder.clip(self.rows[row], cache=self._cache)
@@ -133,20 +151,21 @@ def usable_pair(source: Source, row: int, *, scale_ratio: float) -> Pair:
 
 
 def batches(
-    source: Source, *, use: Use, size: int, rng: np.random.Generator
+    source: Source, *, use: Use, size: int, rng: np.random.Generator, fitting: Operations | None = None
 ) -> Iterator[tuple[int, list[Sample]]]:
     """Batches of an epoch, each with the number of sequences it stands for: all rows once, in a random order.
 
-    Sequences that cannot be used, or whose α the network cannot say, are left out.
+    Sequences that cannot be used, or whose α the network cannot say, are left out. With the network as
+    `fitting`, samples have what the fit learns from.
     """
-    scale_ratios = ttc_to_scale_ratio(source.truth.ttc_s, fps_hz=fps_of_gap(FRAME_GAP))
+    scale_ratios = source.scale_ratios
     rows = rng.permutation(len(scale_ratios))
     for first in range(0, len(rows), size * _N_SORTED):
         chosen = rows[first : first + size * _N_SORTED]
         samples = [
-            sample
+            _sample(pair, use=use, fitting=fitting, rng=rng)
             for row in chosen.tolist()
-            if (sample := _sample(source, row, float(scale_ratios[row]), use=use, rng=rng)) is not None
+            if (pair := _pair(source, row, float(scale_ratios[row]), rng=rng)) is not None
         ]
         samples.sort(key=lambda sample: sample.crops.reference.pixels.size)
         starts = range(0, len(samples), size)
@@ -156,19 +175,23 @@ def batches(
             yield n_after - n_before, samples[starts[place] : starts[place] + size]
 
 
-def _sample(
-    source: Source, row: int, scale_ratio: float, *, use: Use, rng: np.random.Generator
-) -> Sample | None:
+def _pair(source: Source, row: int, scale_ratio: float, *, rng: np.random.Generator) -> Pair | None:
     if not can_say(scale_ratio):
         return None
     try:
-        pair = usable_pair(source, row, scale_ratio=scale_ratio)
+        return augmented(usable_pair(source, row, scale_ratio=scale_ratio), rng=rng)
     except Unusable:
         return None
-    pair = augmented(pair, rng=rng)
+
+
+def _sample(pair: Pair, *, use: Use, fitting: Operations | None, rng: np.random.Generator) -> Sample:
+    frames, scale_ratio = (pair.reference, pair.target), pair.scale_ratio
     shrunk = float(use.max_box_px * _SHRINKING ** rng.random())
-    wanted = Use(use.similarity, use.n_cells, shrunk, use.margin_px)
-    return Sample(cut((pair.reference, pair.target), pair.boxes, use=wanted), pair.scale_ratio)
+    crops = cut(frames, pair.boxes, use=Use(use.similarity, use.n_cells, shrunk, use.margin_px))
+    if fitting is None:
+        return Sample(crops, scale_ratio)
+    fit = fit_sample(frames, pair.boxes, scale_ratio=scale_ratio, operations=fitting, rng=rng)
+    return Sample(crops, scale_ratio, fit)
 
 
 def can_say(scale_ratio: float) -> bool:

@@ -13,7 +13,9 @@ import hashlib
 import json
 import math
 import pickle
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal
@@ -24,6 +26,9 @@ import torch.nn.functional as F  # noqa: N812 -- torch's own name for it
 from numpy.typing import NDArray
 
 from baselines.deep_scale.estimator import N_TOP, cut, network_logits, network_scales
+from baselines.deep_scale.fit import equations, evened, fitted_scale_ratio, solution, weighting
+from baselines.deep_scale.fit_samples import FitSample
+from baselines.deep_scale.network import features
 from baselines.deep_scale.samples import Sample, Source, batches, usable_pair
 from baselines.deep_scale.torch_layers import TorchLayers
 from baselines.deep_scale.weights import SHAPES, Use, Weights, write_weights
@@ -44,6 +49,12 @@ _LAST_SHARE: Final = 0.01
 
 _MOMENTUM: Final = 0.9
 
+_MID_OF_FIT: Final = 2000.0
+"""|ln α̂ − ln α| over five frames, times this, is MiD (10⁴ for one frame)."""
+
+_OUTLIER_MID: Final = 30.0
+"""Errors beyond this count by their logarithm: those of a vehicle that is hidden, or of a label."""
+
 
 class DeviceMissing(Exception):
     """torch cannot use a graphics card here."""
@@ -55,7 +66,8 @@ class Recipe:
 
     The learning rate of a batch is `lr_per_pair` times its size. It grows for the first epoch of 36, falls as
     a cosine, and stays low for the last four; of fewer epochs, in the first and last parts. `ratio_weight`
-    adds |ln α̂ − ln α| to the loss, so many times; the paper has none.
+    adds |ln α̂ − ln α| to the loss, so many times, and `fit_weight` what a step of the fit errs, in MiD; the
+    paper has neither.
     """
 
     epochs: int = 36
@@ -64,6 +76,7 @@ class Recipe:
     optimizer: Optimizer = "sgd"
     weight_decay: float = 5e-4
     ratio_weight: float = 0.0
+    fit_weight: float = 0.0
     seed: int = 0
     use: Use = field(default_factory=lambda: Use(similarity="cosine"))
 
@@ -117,9 +130,14 @@ class Validation:
                 return scale_ratio_of_two(boxes[0], boxes[5], measure="sqrt-area")
             except Unusable:
                 return 1.0
-        crops = cut((pair.reference, pair.target), pair.boxes, use=use)
+        frames = pair.reference, pair.target
         with torch.no_grad():
-            return float(mean_scale_ratio(network_logits(operations, [crops], use=use))[0])
+            logits = network_logits(operations, [cut(frames, pair.boxes, use=use)], use=use)
+            found = float(mean_scale_ratio(logits)[0])
+            if use.decoding == "fit":
+                starts = (found, scale_ratio_of_two(*pair.boxes, measure="sqrt-area"))
+                found = fitted_scale_ratio(operations, frames, pair.boxes, starts=starts)
+        return found
 
 
 def mean_scale_ratio(logits: torch.Tensor) -> torch.Tensor:
@@ -188,10 +206,33 @@ class Network:
         )
         self.optimizer.zero_grad()
         loss.backward()
+        fits = [sample.fit for sample in samples if sample.fit is not None]
+        error = self._learn_to_fit(fits) if fits else 0.0
         length = torch.nn.utils.clip_grad_norm_(self._learned, MAX_GRADIENT)
         if bool(torch.isfinite(length)):
             self.optimizer.step()
-        return float(loss.detach())
+        return float(loss.detach()) + self.recipe.fit_weight * error
+
+    def _learn_to_fit(self, samples: Sequence[FitSample]) -> float:
+        """Adds the gradients of what the fit errs in the mean, in MiD, and returns that.
+
+        Batches are normalised as in inference: each pair is a batch of its own, of its own size. The pairs
+        are learned from side by side.
+        """
+        operations = TorchLayers(self.tensors)
+        learned = [
+            tensor for name, tensor in self.tensors.items() if tensor.requires_grad and "head" not in name
+        ]
+
+        def one(sample: FitSample) -> tuple[float, Sequence[torch.Tensor]]:
+            error = fit_error(operations, sample) / len(samples)
+            return float(error.detach()), torch.autograd.grad(self.recipe.fit_weight * error, learned)
+
+        with _one_thread_each() as n_threads, ThreadPoolExecutor(n_threads) as threads:
+            errors, gradients = zip(*threads.map(one, samples), strict=True)
+        for tensor, *parts in zip(learned, *gradients, strict=True):
+            tensor.grad = torch.stack(parts).sum(0) if tensor.grad is None else tensor.grad + sum(parts)
+        return float(sum(errors))
 
     def operations(self) -> TorchLayers:
         """The network as it infers."""
@@ -203,6 +244,17 @@ class Network:
         return Weights(tensors, self.recipe.use, card)
 
 
+@contextmanager
+def _one_thread_each() -> Iterator[int]:
+    """What torch does within takes one thread. Gives the number of those that it may take."""
+    n_threads = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield n_threads
+    finally:
+        torch.set_num_threads(n_threads)
+
+
 def _loss(logits: torch.Tensor, scale_ratios: Sequence[float], *, ratio_weight: float) -> torch.Tensor:
     wanted = torch.as_tensor(labels(scale_ratios), dtype=torch.float32, device=logits.device)
     loss = F.binary_cross_entropy_with_logits(logits, wanted, reduction="sum") / len(scale_ratios)
@@ -210,6 +262,18 @@ def _loss(logits: torch.Tensor, scale_ratios: Sequence[float], *, ratio_weight: 
         true = torch.as_tensor(scale_ratios, dtype=torch.float32, device=logits.device)
         loss = loss + ratio_weight * (mean_scale_ratio(logits).log() - true.log()).abs().mean()
     return loss
+
+
+def fit_error(operations: TorchLayers, sample: FitSample) -> torch.Tensor:
+    """How far a step of the fit is from what is lacking, in MiD; large errors count less."""
+    target, reference = (evened(maps) for maps in features(operations, operations.constant(sample.pixels)))
+    rows, columns = (operations.constant(offsets) for offsets in sample.grid.offsets())
+    design, errors = equations(torch, target, reference, grid=sample.grid, offsets=(rows, columns))
+    metric, weights = weighting(torch, design.detach(), errors.detach())
+    step = solution(torch, metric @ design, metric @ errors, weights)
+    error = _MID_OF_FIT * (step[0] - sample.lacking).abs()
+    beyond = _OUTLIER_MID * (1 + (error.clamp(min=1.0) / _OUTLIER_MID).log())
+    return torch.where(error < _OUTLIER_MID, error, beyond)
 
 
 def train(
@@ -242,7 +306,8 @@ def train(
     for number in range(len(epochs), recipe.epochs):
         rng = np.random.default_rng([recipe.seed, number])
         losses: list[float] = []
-        for n_new, samples in batches(source, use=recipe.use, size=recipe.batch, rng=rng):
+        fitting = network.operations() if recipe.fit_weight else None
+        for n_new, samples in batches(source, use=recipe.use, size=recipe.batch, rng=rng, fitting=fitting):
             rate = recipe.learning_rate(n_done / (recipe.epochs * n_rows))
             losses += [network.learn(samples, learning_rate=rate)] * len(samples)
             n_done += n_new

@@ -27,7 +27,7 @@ CARD: Final = "card.json"
 _HEADER_BYTES: Final = 128
 """Of an `.npy` file."""
 
-Decoding = Literal["head", "peak"]
+Decoding = Literal["head", "peak", "fit"]
 DECODINGS: Final[tuple[Decoding, ...]] = get_args(Decoding)
 
 Tensors = Mapping[str, NDArray[np.float32]]

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from baselines.clips import Clip
+from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.samples import FolderSequences, RenderedSequences, Sample, batches, usable_pair
 from baselines.deep_scale.weights import Use, read_weights
 from baselines.folders import read_folder
+from baselines.methods import OWN_WEIGHTS
 from baselines.simulation import split
 from evaluator import read_truth, ttc_to_scale_ratio
 from evaluator.problems import Rejected
@@ -75,6 +77,44 @@ def test_thirty_steps_halve_the_loss(training: Any, samples: list[Sample]) -> No
     assert losses[-1] <= 0.5 * losses[0]
 
 
+@pytest.fixture(scope="module")
+def fit_samples(source: RenderedSequences) -> list[Sample]:
+    """All pairs of the source, with what the fit learns from."""
+    own = NumpyLayers(read_weights(OWN_WEIGHTS).tensors)
+    found = batches(source, use=SMALL, size=4, rng=np.random.default_rng(0), fitting=own)
+    return [sample for _, batch in found for sample in batch]
+
+
+def test_on_our_features_a_step_finds_more_than_half_of_what_is_lacking(
+    training: Any, fit_samples: list[Sample]
+) -> None:
+    own = training.TorchLayers(
+        {name: training.torch.from_numpy(each) for name, each in read_weights(OWN_WEIGHTS).tensors.items()}
+    )
+    fits = [sample.fit for sample in fit_samples if sample.fit is not None]
+    assert len(fits) == len(fit_samples)
+    errors = [float(training.fit_error(own, fit)) for fit in fits]
+    lacking = 2000 * np.abs([fit.lacking for fit in fits])
+    assert np.mean(errors) < 0.5 * np.mean(lacking)
+
+
+def test_the_network_learns_to_fit(training: Any, fit_samples: list[Sample]) -> None:
+    recipe = training.Recipe(optimizer="adam", fit_weight=1.0, use=SMALL)
+    network = training.Network(training.new_tensors(seed=0), recipe=recipe, device="cpu")
+    few = sorted(fit_samples, key=lambda sample: sample.fit.pixels.size if sample.fit else 0)[:3]
+    losses = [network.learn(few, learning_rate=3e-3) for _ in range(12)]
+    assert min(losses[-3:]) <= 0.5 * losses[0]
+
+
+def test_rendered_pairs_have_the_scale_ratio_of_their_distances(source: RenderedSequences) -> None:
+    of_labels = ttc_to_scale_ratio(source.truth.ttc_s, fps_hz=2.0)
+    apart = np.abs(np.log(source.scale_ratios / of_labels))
+    assert np.median(apart) < 1e-4  # most vehicles keep their speed
+    boxes = np.stack([source.clip(row).boxes[[0, 5]] for row in range(16)])
+    widths = boxes[..., 2] - boxes[..., 0]
+    np.testing.assert_allclose(source.scale_ratios, widths[:, 0] / widths[:, 1], rtol=0.2)
+
+
 class Ended(Exception):
     """What ends a training here."""
 
@@ -88,7 +128,9 @@ def test_an_ended_training_goes_on_as_if_nothing_had_been(
 ) -> None:
     rows = slice(0, 4)
     few = SimpleNamespace(
-        truth=SimpleNamespace(ttc_s=source.truth.ttc_s[rows], n_sequences=4, digest="few"), clip=source.clip
+        truth=SimpleNamespace(n_sequences=4, digest="few"),
+        scale_ratios=source.scale_ratios[rows],
+        clip=source.clip,
     )
     recipe = training.Recipe(epochs=2, batch=4, optimizer="adam", lr_per_pair=1e-3, use=SMALL)
     validation = SimpleNamespace(scores=lambda *_, **__: {"overall": {"mid": 1.0, "rte": 1.0}})
@@ -111,7 +153,9 @@ def test_a_source_without_a_usable_sequence_is_a_problem(
     training: Any, source: RenderedSequences, tmp_path: Path
 ) -> None:
     near = SimpleNamespace(
-        truth=SimpleNamespace(ttc_s=np.array([0.2, -0.5]), n_sequences=2, digest="near"), clip=source.clip
+        truth=SimpleNamespace(n_sequences=2, digest="near"),
+        scale_ratios=ttc_to_scale_ratio(np.array([0.2, -0.5]), fps_hz=2.0),
+        clip=source.clip,
     )
     with pytest.raises(Rejected, match="None of the 2 sequences can be learned from"):
         training.train(

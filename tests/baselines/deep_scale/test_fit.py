@@ -1,0 +1,102 @@
+"""The estimate from a fit: which scale ratio it finds, from where, and when it is used."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from baselines.boxes import box_around, centre_of, size_of
+from baselines.clips import Clip, Image
+from baselines.deep_scale.estimator import DeepScale
+from baselines.deep_scale.fit import Grid, Place, equations, fitted_scale_ratio, solution, weighting
+from baselines.deep_scale.layers import NumpyLayers
+from baselines.deep_scale.network import Operations
+from baselines.deep_scale.weights import read_weights, write_weights
+from baselines.methods import OWN_WEIGHTS
+from tests.baselines.scenes import Floats, planted
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def operations() -> Operations:
+    """The network with the weights of the package."""
+    return NumpyLayers(read_weights(OWN_WEIGHTS).tensors)
+
+
+def pair(clip: Clip) -> tuple[tuple[Image, Image], tuple[Floats, Floats]]:
+    """Frames and boxes of reference and target."""
+    return (clip.colour(0), clip.colour(5)), (clip.boxes[0], clip.boxes[5])
+
+
+@pytest.mark.parametrize("scale_ratio", [0.7, 0.95, 1.17])
+def test_a_planted_scale_ratio_is_found_to_a_thousandth(scale_ratio: float) -> None:
+    found = DeepScale(decoding="fit")(planted(scale_ratio), frame_gap=5).scale_ratio
+    assert found == pytest.approx(scale_ratio, rel=1e-3)
+
+
+def test_small_boxes_are_enlarged_and_their_scale_ratio_is_found() -> None:
+    clip = planted(0.95, box_px=(30.0, 24.0), shift=(1.0, -0.6))
+    assert DeepScale(decoding="fit")(clip, frame_gap=5).scale_ratio == pytest.approx(0.95, rel=5e-3)
+    assert Grid.over(clip.boxes[5], box_px=80.0).pixel_size == pytest.approx(0.5)
+
+
+def test_a_card_can_name_the_fit(tmp_path: Path) -> None:
+    own = read_weights(OWN_WEIGHTS)
+    write_weights(tmp_path / "w.npz", replace(own, use=replace(own.use, decoding="fit")))
+    clip = planted(0.9)
+    named, fit, auto = (
+        estimator(clip, frame_gap=5).scale_ratio
+        for estimator in (DeepScale(weights=tmp_path / "w.npz"), DeepScale(decoding="fit"), DeepScale())
+    )
+    assert named == fit != auto
+
+
+def test_of_two_starts_the_one_is_chosen_whose_features_are_alike(operations: Operations) -> None:
+    frames, boxes = pair(planted(0.95))
+    for starts in ((0.7, 0.94), (0.94, 0.7)):
+        found = fitted_scale_ratio(operations, frames, boxes, starts=starts)
+        assert found == pytest.approx(0.95, rel=1e-3)
+
+
+def test_boxes_that_lie_beside_the_vehicle_hardly_change_the_estimate(operations: Operations) -> None:
+    frames, boxes = pair(planted(0.95))
+    beside = box_around(centre_of(boxes[0]) + np.array([4.0, -3.0]), size_of(boxes[0]))
+    found = fitted_scale_ratio(operations, frames, (beside, boxes[1]), starts=[0.95])
+    assert found == pytest.approx(0.95, rel=2e-3)
+
+
+def test_without_texture_the_estimate_stays_at_the_start(operations: Operations) -> None:
+    _, boxes = pair(planted(0.95))
+    grey = np.full((240, 320, 3), 90, dtype=np.uint8)
+    assert fitted_scale_ratio(operations, (grey, grey), boxes, starts=[0.93]) == pytest.approx(0.93)
+
+
+def test_a_step_says_by_how_much_a_pattern_is_too_large_and_shifted() -> None:
+    grid = Grid.over(np.array([0.0, 0, 40, 40]), box_px=40.0)
+    rows, columns = grid.offsets()
+    growth, shift_x, shift_y = 0.01, 0.2, -0.1
+
+    def pattern(x: Floats, y: Floats) -> Floats:
+        phases = np.arange(1, 25)[:, None, None]
+        return np.sin(0.05 * phases + 0.11 * x + 0.02 * phases * y / 3) + np.cos(0.09 * y - 0.05 * phases)
+
+    x, y = np.meshgrid(columns, rows)
+    target = pattern(x, y)
+    # What lies at u in the target lies at (1 + growth) u + shift in the reference.
+    reference = pattern((x - shift_x) / (1 + growth), (y - shift_y) / (1 + growth))
+    design, errors = equations(np, target, reference, grid=grid, offsets=(rows, columns))
+    metric, weights = weighting(np, design, errors)
+    step = solution(np, metric @ design, metric @ errors, weights)
+    np.testing.assert_allclose(step, [growth, shift_x, shift_y], rtol=0.02)
+
+
+def test_a_place_moves_by_the_step_but_not_too_far() -> None:
+    grid = Grid.over(np.array([0.0, 0, 80, 60]), box_px=40.0)
+    place = Place(0.9, np.array([100.0, 50.0]))
+    moved = grid.moved(place, np.array([0.01, 1.0, -0.5]))
+    assert moved.scale_ratio == pytest.approx(0.9 * np.exp(0.01))
+    np.testing.assert_allclose(moved.centre, place.centre + 0.9 * grid.pixel_size * np.array([1.0, -0.5]))
+    far = grid.moved(place, np.array([5.0, 0.0, 0.0]))
+    assert far == replace(far, scale_ratio=pytest.approx(0.9 * np.exp(0.08)))
