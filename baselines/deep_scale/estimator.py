@@ -18,7 +18,6 @@ from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Array, Operations, Sampling, features, similarities
 from baselines.deep_scale.peak import peak_scale_ratio
 from baselines.deep_scale.weights import N_SCALES, Decoding, Use, Weights, read_weights
-from baselines.detection import scale_ratio_of_two
 from baselines.estimates import Estimate
 from baselines.methods import OWN_WEIGHTS
 from baselines.patches import boxes_of_pair, require_centre_inside
@@ -78,8 +77,7 @@ class DeepScale:
                 similarity=self._use.similarity,
             )
         elif self._use.decoding == "fit":
-            starts = (scale_ratio, scale_ratio_of_two(*boxes, measure="sqrt-area"))
-            scale_ratio = fitted_scale_ratio(self._operations, frames, boxes, starts=starts)
+            scale_ratio = fitted_scale_ratio(self._operations, frames, boxes, near=scale_ratio)
         return Estimate(scale_ratio, confidence=float(confidences[best[0]]))
 
     def crops(self, clip: Clip, *, frame_gap: int) -> CropPair:

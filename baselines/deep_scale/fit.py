@@ -33,13 +33,14 @@ from baselines.clips import Image
 from baselines.deep_scale.crops import MAX_ENLARGEMENT
 from baselines.deep_scale.layers import LEAST_NORM
 from baselines.deep_scale.network import Array, Operations, features
+from baselines.detection import scale_ratio_of_two
 from baselines.kernels import Kernel
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
 
 COARSE_PX: Final = 32.0
-"""The longer side of the box in the first steps: from there a step reaches farther, and costs a quarter."""
+"""The longer side of the box in the first steps: there a step reaches farther, and costs less than half."""
 
 FINE_PX: Final = 64.0
 """The longer side of the box in the last steps."""
@@ -58,6 +59,9 @@ _BLUR: Final = 0.8
 
 _MAX_STEP: Final = 0.08
 """ln α changes by no more than this in a step, and the edges of the box by no more than this share."""
+
+_STARTS: Final = (0.4, 2.5)
+"""Scale ratios outside this range are those of wrong boxes."""
 
 _N_WEIGHINGS: Final = 3
 _COVARIANCE_RIDGE: Final = 0.1
@@ -147,29 +151,39 @@ def fitted_scale_ratio(
     frames: tuple[Image, Image],
     boxes: tuple[Floats, Floats],
     *,
-    starts: Sequence[float],
+    near: float,
 ) -> float:
-    """α of a pair: reference and target (in colour), and their boxes (4,) in pixels.
+    """α of a pair: reference and target (in colour), and their boxes (4,) in pixels; `near` is the head's.
 
-    The steps begin at each of the scale ratios `starts`; on the coarse grid the one is chosen whose features
-    are most alike.
+    The steps begin there and at the ratio of the boxes' sizes. On the coarse grid the start is chosen whose
+    features are more alike. Raises `Unusable` for boxes without a size.
     """
-    reference, target = frames
-    places = [Place(start, centre_of(boxes[0])) for start in starts]
+    starts = np.clip([near, scale_ratio_of_two(*boxes, measure="sqrt-area")], *_STARTS)
+    places = [Place(start, centre_of(boxes[0])) for start in starts.tolist()]
     for box_px in (COARSE_PX, FINE_PX):
-        grid = Grid.over(boxes[1], box_px=box_px)
-        wanted = _features(operations, grid.cut(target, Place(1.0, centre_of(boxes[1]))))
-        fits = [_approached(operations, reference, place, grid=grid, target=wanted) for place in places]
+        fits = _fits(operations, frames, boxes[1], places, box_px=box_px)
         places = [min(fits, key=attrgetter("unlike")).place]
     return places[0].scale_ratio
 
 
 def shown_at(operations: Operations, frames: tuple[Image, Image], box: Floats, place: Place) -> Place:
     """The place in the reference frame to which the steps on the coarse grid lead from this one."""
+    return _fits(operations, frames, box, [place], box_px=COARSE_PX)[0].place
+
+
+def _fits(
+    operations: Operations,
+    frames: tuple[Image, Image],
+    box: Floats,
+    places: Sequence[Place],
+    *,
+    box_px: float,
+) -> list[Fit]:
+    """Where the steps on a grid over the target's box lead from each of the places in the reference frame."""
     reference, target = frames
-    grid = Grid.over(box, box_px=COARSE_PX)
+    grid = Grid.over(box, box_px=box_px)
     wanted = _features(operations, grid.cut(target, Place(1.0, centre_of(box))))
-    return _approached(operations, reference, place, grid=grid, target=wanted).place
+    return [_approached(operations, reference, place, grid=grid, target=wanted) for place in places]
 
 
 def _approached(operations: Operations, reference: Image, place: Place, *, grid: Grid, target: Pixels) -> Fit:

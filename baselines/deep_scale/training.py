@@ -135,8 +135,7 @@ class Validation:
             logits = network_logits(operations, [cut(frames, pair.boxes, use=use)], use=use)
             found = float(mean_scale_ratio(logits)[0])
             if use.decoding == "fit":
-                starts = (found, scale_ratio_of_two(*pair.boxes, measure="sqrt-area"))
-                found = fitted_scale_ratio(operations, frames, pair.boxes, starts=starts)
+                found = fitted_scale_ratio(operations, frames, pair.boxes, near=found)
         return found
 
 
@@ -205,23 +204,25 @@ class Network:
             logits, [sample.scale_ratio for sample in samples], ratio_weight=self.recipe.ratio_weight
         )
         self.optimizer.zero_grad()
-        loss.backward()
         fits = [sample.fit for sample in samples if sample.fit is not None]
         error = self._learn_to_fit(fits) if fits else 0.0
+        loss.backward()
         length = torch.nn.utils.clip_grad_norm_(self._learned, MAX_GRADIENT)
         if bool(torch.isfinite(length)):
             self.optimizer.step()
         return float(loss.detach()) + self.recipe.fit_weight * error
 
     def _learn_to_fit(self, samples: Sequence[FitSample]) -> float:
-        """Adds the gradients of what the fit errs in the mean, in MiD, and returns that.
+        """Begins the gradients with those of what the fit errs in the mean, in MiD, and returns that.
 
         Batches are normalised as in inference: each pair is a batch of its own, of its own size. The pairs
         are learned from side by side.
         """
         operations = TorchLayers(self.tensors)
         learned = [
-            tensor for name, tensor in self.tensors.items() if tensor.requires_grad and "head" not in name
+            tensor
+            for name, tensor in self.tensors.items()
+            if tensor.requires_grad and name.startswith("backbone.")
         ]
 
         def one(sample: FitSample) -> tuple[float, Sequence[torch.Tensor]]:
@@ -231,7 +232,7 @@ class Network:
         with _one_thread_each() as n_threads, ThreadPoolExecutor(n_threads) as threads:
             errors, gradients = zip(*threads.map(one, samples), strict=True)
         for tensor, *parts in zip(learned, *gradients, strict=True):
-            tensor.grad = torch.stack(parts).sum(0) if tensor.grad is None else tensor.grad + sum(parts)
+            tensor.grad = torch.stack(parts).sum(0)
         return float(sum(errors))
 
     def operations(self) -> TorchLayers:

@@ -53,24 +53,36 @@ def test_a_card_can_name_the_fit(tmp_path: Path) -> None:
     assert named == fit != auto
 
 
-def test_of_two_starts_the_one_is_chosen_whose_features_are_alike(operations: Operations) -> None:
-    frames, boxes = pair(planted(0.95))
-    for starts in ((0.7, 0.94), (0.94, 0.7)):
-        found = fitted_scale_ratio(operations, frames, boxes, starts=starts)
-        assert found == pytest.approx(0.95, rel=1e-3)
+def test_the_start_goes_on_whose_features_are_more_alike(operations: Operations) -> None:
+    frames, (reference, target) = pair(planted(0.95))
+    shrunk = box_around(centre_of(reference), 0.75 * size_of(reference))
+    for near, boxes in ((0.7, (reference, target)), (0.94, (shrunk, target))):
+        assert fitted_scale_ratio(operations, frames, boxes, near=near) == pytest.approx(0.95, rel=1e-3)
 
 
 def test_boxes_that_lie_beside_the_vehicle_hardly_change_the_estimate(operations: Operations) -> None:
     frames, boxes = pair(planted(0.95))
     beside = box_around(centre_of(boxes[0]) + np.array([4.0, -3.0]), size_of(boxes[0]))
-    found = fitted_scale_ratio(operations, frames, (beside, boxes[1]), starts=[0.95])
+    found = fitted_scale_ratio(operations, frames, (beside, boxes[1]), near=0.95)
     assert found == pytest.approx(0.95, rel=2e-3)
 
 
-def test_without_texture_the_estimate_stays_at_the_start(operations: Operations) -> None:
+def test_without_texture_the_estimate_stays_at_a_start(operations: Operations) -> None:
     _, boxes = pair(planted(0.95))
     grey = np.full((240, 320, 3), 90, dtype=np.uint8)
-    assert fitted_scale_ratio(operations, (grey, grey), boxes, starts=[0.93]) == pytest.approx(0.93)
+    found = fitted_scale_ratio(operations, (grey, grey), boxes, near=0.93)
+    assert min(abs(found - 0.93), abs(found - 0.95)) < 1e-6
+
+
+@pytest.mark.parametrize(
+    "sides", [((4.5, 4.5), (220, 160)), ((220, 160), (4.5, 4.5)), ((300, 4.2), (4.2, 200))]
+)
+def test_boxes_that_do_not_belong_together_give_a_number(
+    operations: Operations, sides: tuple[tuple[float, float], tuple[float, float]]
+) -> None:
+    frames, _ = pair(planted(0.95))
+    reference, target = (box_around(np.array([160.0, 120.0]), np.array(each)) for each in sides)
+    assert 0.25 < fitted_scale_ratio(operations, frames, (reference, target), near=0.95) < 4
 
 
 def test_a_step_says_by_how_much_a_pattern_is_too_large_and_shifted() -> None:
