@@ -56,7 +56,7 @@ class ReadOnlyAdmin(admin.ModelAdmin):
 
 
 class AuditedAdmin(admin.ModelAdmin):
-    """What is changed here is told to the audit trail as well: which fields, and what these hold now."""
+    """What is changed here is told to the audit log as well: which fields, and what these hold now."""
 
     audited_fields: ClassVar[Sequence[str]] = ()
 
@@ -279,7 +279,7 @@ class UserAdmin(AuditedAdmin, DjangoUserAdmin):
         return super().has_delete_permission(request, obj)
 
 
-# What else maintainers do with overrides, and ask the audit trail, they do at `/maintain/`.
+# What else maintainers do with overrides, and ask the audit log, they do at `/maintain/`.
 for model in (AuditEvent, Edition, GroundTruth, Membership, PublishedResult, QuotaOverride):
     admin.site.register(model, ReadOnlyAdmin)
 

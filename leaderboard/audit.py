@@ -1,4 +1,4 @@
-"""The audit trail: who did what to what, when. Rows are only added, and soon sealed into a chain of hashes.
+"""The audit log: who did what to what, when. Rows are only added, and soon sealed into a chain of hashes.
 
 A verb writes its event in its own transaction and waits for nobody. The sweep seals what is not sealed yet:
 it binds each event to the one before it by its hash. What holds until then says

@@ -91,7 +91,7 @@ def django_db_modify_db_settings(
 
 @pytest.fixture(scope="session")
 def django_db_setup(django_db_setup: None, django_db_blocker: DjangoDbBlocker) -> Iterator[None]:
-    """The test database, in which a transactional test may empty the audit trail when it ends."""
+    """The test database, in which a transactional test may empty the audit log when it ends."""
     if connection.vendor == "postgresql":
         with django_db_blocker.unblock(), connection.cursor() as cursor:
             cursor.execute(f"ALTER TABLE {emptying.AUDIT_TRAIL} DISABLE TRIGGER audit_no_truncate")

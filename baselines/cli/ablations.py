@@ -37,8 +37,8 @@ def ablate(
 ) -> None:
     """Run Pixel MSE on FOLDER for each value of one setting, and print its scores beside the paper's.
 
-    The paper's numbers are of TSTTC's validation split. A folder of other drives has other errors; what
-    compares is how they change from one value to the next. The paper has no table for the expansion.
+    The paper's numbers are of TSTTC's validation split. On other recordings the errors are different:
+    compare only how they change from one value to the next. The paper has no table for the expansion.
 
     \b
     Examples:

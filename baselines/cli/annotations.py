@@ -37,8 +37,9 @@ if TYPE_CHECKING:
     "--depth",
     type=click.Choice(("checked", "measured", "consensus")),
     default="checked",
-    help="Of a frame that disagrees with the frames before it: as measured unless it jumped by more than a "
-    "vehicle can, always as measured, or always that of their line.",
+    help="Depth of a frame that disagrees with the line through the frames before it. checked: as measured, "
+    "unless it jumped by more than a vehicle can; measured: always as measured; consensus: always on the "
+    "line.",
 )
 @default_option(
     "--tolerance",
@@ -134,7 +135,7 @@ def _in_words(annotation: Annotation, output: Path, *, has_radar: bool) -> Itera
     yield f"The velocities of 3, 5 and 10 frames agree in {_n(agree, 'sequence')}."
     yield (
         f"They differ in {by_radar + without:,}: radar decides {by_radar:,}, "
-        f"and {without:,} without radar have that of 10 frames."
+        f"and {without:,} without radar have the velocity of 10 frames."
     )
     if has_radar and counts["without_radar"]:
         yield f"The radar has no velocity for {_n(counts['without_radar'], 'observation')}."

@@ -36,7 +36,7 @@ def noise(*, source: Path, n_frames: int, as_json: bool) -> None:
 
     FOLDER has annotation files or a truth.csv; TRUTH is a ground-truth file with the labels of successive
     frames, as `tsttc baseline annotate --overlapping` writes it. A method that is always right has about
-    this error: it is the floor of a board.
+    this error.
 
     \b
     Examples:
@@ -76,7 +76,7 @@ def _in_words(found: Sequence[LabelNoise], n_frames: int) -> Iterator[str]:
     yield from aligned(rows, align="<>..")
     yield ""
     yield "MiD ×10⁻⁴. Jitter: between a label and the label 0.1 s before, less 0.1 s. Noise: the mean error"
-    yield "of a label that explains the jitter, and about the score of a method that is always right."
+    yield "of a label that explains the jitter. A method that is always right scores about as much."
     shared = "have nothing in common" if n_frames == 1 else f"share {n_frames - 1} of their {n_frames} frames"
     yield f"It assumes that successive labels {shared}, that frames err independently, and that"
     yield "nothing accelerates: acceleration looks like noise, and an error that lasts is not seen."

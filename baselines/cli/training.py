@@ -58,13 +58,13 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
     "--ratio-weight",
     type=click.FloatRange(0, 1e6),
     default=0.0,
-    help="Adds so many times |ln α̂ − ln α| to the loss.",
+    help="Weight of |ln α̂ − ln α| in the loss.",
 )
 @default_option(
     "--fit-weight",
     type=click.FloatRange(0, 1e6),
     default=0.0,
-    help="Adds so many times the error of the fit, in MiD, to the loss.",
+    help="Weight of the error of the fit, in MiD, in the loss.",
 )
 @default_option("--similarity", type=click.Choice(["cosine", "dot"]), default="cosine")
 @default_option(
@@ -79,7 +79,7 @@ _FILE = click.Path(exists=True, dir_okay=False, path_type=Path)
     "max_box_px",
     type=click.FloatRange(16, 400),
     default=120.0,
-    help="Larger boxes are shrunk to so many pixels.",
+    help="Larger boxes are shrunk to this size in pixels.",
 )
 @default_option(
     "--margin",

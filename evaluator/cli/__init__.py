@@ -120,6 +120,6 @@ Exit codes:
 def main() -> None:
     """Check, score and submit time-to-contact predictions for the TSTTC benchmark.
 
-    check, score, plot, compare --truth, convert, manifest, truth and published need files alone; the others
-    speak to the leaderboard.
+    check, score, plot, compare --truth, convert, manifest, truth and published work offline; the other
+    commands contact the leaderboard.
     """

@@ -146,7 +146,7 @@ def publish(
     """
     if reveal_at and visibility == "public":
         raise click.UsageError(
-            "A public method has no date of reveal: --reveal-at belongs to --as anonymous."
+            "With --as public, the method becomes public at once; use --reveal-at only with --as anonymous."
         )
     with connect(url, with_token=True) as client:
         found = client.own_method(method)

@@ -123,7 +123,7 @@ def manifest(
 ) -> None:
     """Write the manifest of TRUTH_OR_FOLDER: every column of the ground truth but the values.
 
-    With --split, the leaderboard gives that of a split; that needs no token.
+    With --split, the command gets the manifest of that split from the leaderboard; it needs no token.
 
     TRUTH_OR_FOLDER is a CSV file or a folder of the toolkit's annotations. The manifest lists
     the anno_id and the natural key of every sequence, without true values. For a folder, the command reports

@@ -126,7 +126,9 @@ def _standing(board: Board, method_id: str) -> str:
     shell_complete=suggestions.methods,
     help="Only this method, by name or id.",
 )
-@default_option("-n", "--limit", type=click.IntRange(min=1), default=20, help="At most so many.")
+@default_option(
+    "-n", "--limit", type=click.IntRange(min=1), default=20, help="Largest number of submissions."
+)
 @url_option
 @json_option
 def list_submissions(*, split: str | None, method: str | None, limit: int, url: str, as_json: bool) -> None:
@@ -182,7 +184,7 @@ def _table(found: Sequence[Submission]) -> list[str]:
 def withdraw(*, submission_id: str, yes: bool, url: str, as_json: bool) -> None:
     """Withdraw submission ID. This cannot be undone.
 
-    A submission that waits is cancelled. One on a board leaves a row that says so.
+    A waiting submission is cancelled. A submission on a board leaves a row that is marked as withdrawn.
 
     \b
     Example:

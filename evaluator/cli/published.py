@@ -25,7 +25,7 @@ FORMATS: Final = ("csv", "latex", "markdown", "json")
 )
 @json_option
 def published(*, name: str | None, as_format: str, as_json: bool) -> None:
-    """Show TABLE of the paper, or without one list all of them.
+    """Show TABLE of the paper; without TABLE, list all tables.
 
     Values are those that the paper prints. Where it contradicts itself, a note says so. Needs no network.
 

@@ -167,7 +167,7 @@ def plot(
 ) -> None:
     """Draw a figure of PREDICTIONS, one or more files or - for standard input. Needs matplotlib.
 
-    Several files are drawn into one figure: name the files as the legend is to name the methods.
+    Several files are drawn into one figure; the legend names each method after its file.
 
     \b
     Examples:

@@ -42,7 +42,7 @@ MINE = OpenApiParameter(
     "mine",
     str,
     enum=list(tables.WITH_INTERVALS),
-    description="`0` or `no`: without the rows that only your team sees, as everybody gets the board.",
+    description="`0` or `no`: the public board, without the rows that only your team sees.",
 )
 PARAMETERS = {
     "sort": one_of(*boards.SORTS),

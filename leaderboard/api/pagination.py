@@ -23,7 +23,11 @@ QUERY = {"limit": NEVER, "after": NEVER}
 PARAMETERS = [
     OpenApiParameter("limit", int, description=f"Rows per page, 1 to {MOST}; default {MOST}."),
     response_header("Link", str, 'The next page, rel="next"; absent on the last page.', statuses=[200]),
-    OpenApiParameter("after", str, description="The page after this row, as named by the header `Link`."),
+    OpenApiParameter(
+        "after",
+        str,
+        description="The page after this row: the value of `after` in the header `Link` of the page before.",
+    ),
 ]
 
 
@@ -67,7 +71,9 @@ def page_of(rows: QuerySet[Row], request: Request, *, order: str) -> Page[Row]:
 
 
 def _row(rows: QuerySet[Row], after: str) -> Row:
-    error = BadValue("bad-cursor", "after", after, "the row that the header Link of the page before names")
+    error = BadValue(
+        "bad-cursor", "after", after, "the value of `after` in the header Link of the page before"
+    )
     try:
         row = rows.filter(pk=after).first()
     except (ValueError, OverflowError, ValidationError):

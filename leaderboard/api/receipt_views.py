@@ -103,7 +103,7 @@ class FileView(APIView):
         operation_id="submission_file", responses={(200, "application/octet-stream"): bytes, **errors(404)}
     )
     def get(self, request: Request, submission_id: str) -> HttpResponseBase:
-        """The bytes as your team sent them. Other teams' files do not exist, also for maintainers."""
+        """The bytes as your team sent them. The file of another team gives 404, also for maintainers."""
         submission = _own(request, submission_id)
         name = files.predictions_name(submission.digest)
         if not files.store().exists(name):

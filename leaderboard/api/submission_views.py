@@ -132,7 +132,7 @@ class SubmissionView(APIView):
         responses={200: SubmissionSerializer, **errors(400, 404)},
     )
     def get(self, request: Request, submission_id: UUID) -> Response:
-        """State, then scores or problems. Other teams' submissions do not exist."""
+        """State, then scores or problems. The submission of another team gives 404."""
         wait_s = _wait_s(request)
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         found = get_object_or_404(rows, pk=submission_id)

@@ -144,7 +144,7 @@ def _migrate_to(contents: Contents) -> None:
 
 def _load_tables(cursor: CursorWrapper, folder: Path, parts: list[RowFile]) -> None:
     names = [sql.Identifier(part.name) for part in parts]
-    # The triggers of the audit trail refuse to empty it; only its owner can say so.
+    # The triggers of the audit log refuse to empty it; only its owner can say so.
     switch = sql.SQL("ALTER TABLE {} {} TRIGGER USER")
     for name in names:
         _execute(cursor, switch.format(name, sql.SQL("DISABLE")))

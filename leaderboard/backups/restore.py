@@ -80,14 +80,14 @@ def _require_no_others(private: Path, kept: Contents) -> None:
 
 
 def _verified_boards(kept: Contents) -> int:
-    """Hold files, audit trail and boards against the backup. Returns how many boards; raises `NoBackup`."""
+    """Hold files, audit log and boards against the backup. Returns how many boards; raises `NoBackup`."""
     faults = []
     for name, digest in kept.files.items():
         with files.store().open(name, "rb") as file:
             if contents.digest_of(file) != digest:
                 faults.append(f"{contents.FILES}/{name} has other bytes")
     trail = audit.verify(expected_hash=kept.audit if int(kept.audit, 16) else "")
-    faults += [f"the audit trail: {each.what}" for each in trail.breaks]
+    faults += [f"the audit log: {each.what}" for each in trail.breaks]
     is_same_version = kept.migrations == contents.applied_migrations()
     if is_same_version:
         changed = contents.same_boards(kept.boards, contents.board_digests())

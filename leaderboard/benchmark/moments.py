@@ -25,7 +25,7 @@ def parse(text: str, *, field: str = "") -> datetime:
     if found is None:
         raise _refused(f"{text[:60]!r} is no date with a time", f"one like {EXAMPLE}", field)
     if not found[3]:
-        raise _refused(f"{text[:60]!r} has no time zone", f"{_ZONES} behind it", field)
+        raise _refused(f"{text[:60]!r} has no time zone", f"{_ZONES} after the time", field)
     try:
         local = datetime.fromisoformat(f"{found[1]} {found[2]}")
     except ValueError:
@@ -39,8 +39,8 @@ def parse(text: str, *, field: str = "") -> datetime:
     except OverflowError:
         raise _refused(f"{text[:60]!r} is outside of the calendar", f"one like {EXAMPLE}", field) from None
     if len(there) != 1:
-        how = "twice, because" if there else "never:"
-        what = f"The clocks of {found[3]} show {found[1]} {found[2]} {how} they are changed then"
+        how = "occurs twice" if there else "does not occur"
+        what = f"The time {found[1]} {found[2]} {how} in {found[3]}, because the clocks change then"
         raise _refused(what, "an offset like +01:00, or UTC", field)
     return there.pop()
 

@@ -176,8 +176,8 @@ def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) ->
         if not is_replacing:
             raise Refused(
                 "bad-value",
-                f"The row {row['slug']!r} of {row['split_id']} is there already and differs in "
-                f"{', '.join(changed)}; expected the same, or that it is to be replaced (--replace).",
+                f"The board of {row['split_id']} already has the row {row['slug']!r}, which differs in "
+                f"{', '.join(changed)}; expected the same content, or the choice to replace it (--replace).",
                 field="is_replacing",
             )
         PublishedResult.objects.filter(pk=there.pk).update(replaced_at=now)

@@ -36,7 +36,7 @@ TEAMS = {
 _PAPER = "https://arxiv.org/abs/2309.01539"
 _RENDERED = (
     "The frames are rendered, not filmed. Rendered vehicles are flat: they do not turn, shine or bend, "
-    "which flatters methods that compare brightness."
+    "so methods that compare brightness look better than they are."
 )
 
 

@@ -150,10 +150,10 @@ def _tokens(now: datetime) -> Iterator[Mail]:
     )
     for token in ending.select_related("user"):
         text = (
-            f"Your API token {token.name} ends on {token.expiry:%Y-%m-%d at %H:%M} UTC. Programs that use it "
-            f"are refused from then on. Make a new one before: {_link('tokens')}"
+            f"Your API token {token.name} expires on {token.expiry:%Y-%m-%d at %H:%M} UTC. After that, the "
+            f"site refuses programs that use it. Create a new token before then: {_link('tokens')}"
         )
-        subject = f"Your API token {token.name} ends on {token.expiry:%Y-%m-%d}"
+        subject = f"Your API token {token.name} expires on {token.expiry:%Y-%m-%d}"
         key = f"token:{token.digest[:40]}"
         yield _mail(MailKind.TOKEN, token.user, key=key, subject=subject, text=text, now=now)
 

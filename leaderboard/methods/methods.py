@@ -98,8 +98,8 @@ def require_distinct_name(
     if twin is not None:
         raise Refused(
             "name-taken",
-            f"Your team has a method {twin!r}, which {name!r} looks like; expected that very name, or "
-            "one that cannot be taken for it.",
+            f"The name {name!r} looks like {twin!r}, the name of a method of your team; expected exactly "
+            f"{twin!r}, or a name that looks different.",
             field=field,
         )
 

@@ -86,7 +86,11 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
     if reveal_at is None:
         return
     if visibility != Visibility.ANONYMOUS:
-        raise Refused("bad-value", "A public method has no date of reveal; expected none.", field="reveal_at")
+        raise Refused(
+            "bad-value",
+            "The field 'reveal_at' has a date, but the method becomes public at once; expected no date.",
+            field="reveal_at",
+        )
     if not now < reveal_at <= now + MAX_ANONYMITY:
         raise Refused(
             "bad-value",

@@ -1,4 +1,4 @@
-"""Submissions can be hidden, and names of the audit trail stand in a table where they can be blanked."""
+"""Submissions can be hidden, and names of the audit log stand in a table where they can be blanked."""
 
 import django.db.models.deletion
 import uuid

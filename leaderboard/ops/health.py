@@ -104,7 +104,7 @@ def _database() -> tuple[Check, ...]:
             Check("database", is_ok=False, detail="does not answer"),
             *(
                 Check(name, is_ok=False, detail="unknown: the database does not answer")
-                for name in ("sweep", "ground truth", "audit trail")
+                for name in ("sweep", "ground truth", "audit log")
             ),
         )
     return (
@@ -117,16 +117,20 @@ def _database() -> tuple[Check, ...]:
 
 def _ground_truth(n_without: int) -> Check:
     """Whether the workers can read what they score against; how much waits is nobody's business."""
-    detail = "a worker cannot read that of what waits" if n_without else "the workers read that of what waits"
+    detail = (
+        "a worker cannot read the ground truth of an evaluation that waits"
+        if n_without
+        else "the workers can read the ground truth of all evaluations that wait"
+    )
     return Check("ground truth", is_ok=not n_without, detail=detail)
 
 
 def _audit(age_s: float) -> Check:
-    """Whether sweeps seal the audit trail; an event that was committed late is older than it looks."""
+    """Whether sweeps seal the audit log; an event that was committed late is older than it looks."""
     if not age_s:
-        return Check("audit trail", is_ok=True, detail="sealed", is_vital=False)
+        return Check("audit log", is_ok=True, detail="sealed", is_vital=False)
     detail = f"an event waits to be sealed for {age_s:.0f} s, expected less than {MAX_UNSEALED_AGE_S:.0f} s"
-    return Check("audit trail", is_ok=age_s < MAX_UNSEALED_AGE_S, detail=detail, is_vital=False)
+    return Check("audit log", is_ok=age_s < MAX_UNSEALED_AGE_S, detail=detail, is_vital=False)
 
 
 def _sweep(age_s: float | None) -> Check:

@@ -72,8 +72,8 @@ def clean_name(field: str, text: str) -> str:
     if found.startswith(skeleton(RESERVED)):
         raise Refused(
             "reserved-name",
-            f"The name in '{field}' reads as {RESERVED!r}, which is what methods without a name are called; "
-            "expected another one.",
+            f"The name in '{field}' looks like {RESERVED!r}, which is reserved for methods without a name; "
+            "expected another name.",
             field=field,
         )
     return text

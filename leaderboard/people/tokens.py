@@ -135,7 +135,9 @@ def use(*, secret: str, now: datetime) -> ApiToken:
         )
     row = ApiToken.objects.select_related("user").filter(pk=hash_token(secret)).first()
     if row is None:
-        raise UnusableToken("token-unknown", "The bearer token is none of this leaderboard's.")
+        raise UnusableToken(
+            "token-unknown", "The bearer token is unknown; expected a token of this leaderboard."
+        )
     _require_active(row, now=now)
     if row.last_used_at is None or now - row.last_used_at >= USED_EVERY:
         stale = Q(last_used_at=None) | Q(last_used_at__lte=now - USED_EVERY)

@@ -45,7 +45,9 @@ def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: dat
     with transaction.atomic():
         # Before the row that names it: whoever ends the team holds it.
         if not quotas.lock(team=team):
-            raise Team.DoesNotExist(f"The team {team.name!r} has just ended; expected one that is there.")
+            raise Team.DoesNotExist(
+                f"The team {team.name!r} was deleted a moment ago; expected an existing team."
+            )
         row, _ = Admission.objects.update_or_create(
             team=team, split=split, defaults={"reason": reason, "admitted_by": actor, "admitted_at": now}
         )

@@ -234,8 +234,9 @@ def weigh(
             full_until: f"Your team has used {_n(rules.limit)} to {split.pk}, its quota for "
             f"{span(rules.window)}",
             gap_until: f"Submissions of a team to {split.pk} must be at least {span(rules.min_gap)} apart",
-            rejected_until: f"Your team has used its limit of {counted(len(rejected), 'file')} to {split.pk} "
-            "within 24 hours that were rejected or cancelled, or stopped the process that read them",
+            rejected_until: f"Your team has reached the limit of 24 hours for {split.pk}: "
+            f"{counted(len(rejected), 'file')} that were rejected, were cancelled, or stopped the process "
+            "that read them",
         }
         sentence = f"{said[opens_at]}; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
     return Quota(
@@ -326,7 +327,9 @@ def override(
     with transaction.atomic():
         # Before the row that names it: whoever ends the team holds it.
         if not lock(team=team):
-            raise Team.DoesNotExist(f"The team {team.name!r} has just ended; expected one that is there.")
+            raise Team.DoesNotExist(
+                f"The team {team.name!r} was deleted a moment ago; expected an existing team."
+            )
         row, _ = QuotaOverride.objects.update_or_create(
             team=team, split=split, defaults={**rules, "reason": reason, "set_by": actor, "set_at": now}
         )

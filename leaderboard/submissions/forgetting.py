@@ -1,7 +1,7 @@
 """A person's data: their own export, and the deletion of everything that names them.
 
 Scores and files stay, since ranks and receipts of others rest on them; nothing that is left says whose they
-were. The audit trail has the number of the account, which names nobody once the account is blank.
+were. The audit log has the number of the account, which names nobody once the account is blank.
 """
 
 from datetime import datetime
@@ -151,7 +151,7 @@ def _delete_rows(user: User) -> None:
 
 
 def _blank(user: User) -> None:
-    """The texts of rows that stay: the account's, its submissions' and the audit trail's names."""
+    """The texts of rows that stay: the account's, its submissions' and the audit log's names."""
     user.email = f"{user.pk}@{_NOWHERE}"
     user.name, user.is_active, user.last_login = "", False, None
     # Sessions rest on the password: they all end with it.

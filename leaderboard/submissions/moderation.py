@@ -1,6 +1,6 @@
 """Moderation: what maintainers do to names, entries and accounts of others, each with a reason.
 
-All of it is on the audit trail. Names go from everything that is drawn, because boards are drawn anew from
+All of it is on the audit log. Names go from everything that is drawn, because boards are drawn anew from
 present names; boards as of earlier times show present names too.
 """
 
@@ -171,7 +171,10 @@ def _locked_teams(*wanted: Team) -> list[Team]:
     """These teams, which stay so until the transaction ends. Raises `Refused` where one has ended."""
     found = teams.locked(*wanted)
     if len(found) < len({team.pk for team in wanted}):
-        raise Refused("changed-meanwhile", "The team has just ended; reload the page and choose another one.")
+        raise Refused(
+            "changed-meanwhile",
+            "The team was deleted a moment ago; reload the page and choose another team.",
+        )
     return found
 
 

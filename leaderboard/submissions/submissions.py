@@ -234,7 +234,7 @@ def _token_split(method: Method, changes: Mapping[str, str]) -> TokenSplit:
         "token-split",
         f"The token is valid for one split only, and the field{'s' if len(changes) > 1 else ''} "
         f"{', '.join(map(repr, changes))} would change the method {method.name!r} on every split; expected "
-        "what stands there, nothing, or a token for every split.",
+        "the present value, no value, or a token for every split.",
         field=first,
     )
 

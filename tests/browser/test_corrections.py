@@ -115,7 +115,9 @@ def test_from_opening_to_the_board_and_back(
     with timers_at_rest(keeper):
         decide(keeper, reason="Twelve boxes were wrong.", button="Publish edition 2")
         # The cross closes the message.
-        expect(keeper.locator(".messages[role=status]")).to_have_text(f"Edition 2 is the board of {SPLIT}.×")
+        expect(keeper.locator(".messages[role=status]")).to_have_text(
+            f"Edition 2 is now the board of {SPLIT}.×"
+        )
     expect(keeper.locator(".facts")).to_contain_text("latest change: edition 2, 12 labels corrected")
     assert rows(keeper) != before
     team.goto(submission)

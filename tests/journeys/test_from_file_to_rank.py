@@ -214,7 +214,7 @@ def test_a_backup_of_the_running_site_comes_back_byte_for_byte_in_a_fresh_place(
         said = replace(site, environment=site.environment | place).manage("restore", str(folder))
         with psycopg.connect(url) as database:
             assert database.execute(FACTORS).fetchall() == factors
-    # It holds every file, the audit trail and each published board against the backup, and fails otherwise.
+    # It holds every file, the audit log and each published board against the backup, and fails otherwise.
     assert "1 board is the same byte for byte" in said
     assert "cannot be checked here" not in said
 

@@ -1,4 +1,4 @@
-"""The audit trail: append-only, and sealed into a chain that shows what was done to it."""
+"""The audit log: append-only, and sealed into a chain that shows what was done to it."""
 
 import random
 import re

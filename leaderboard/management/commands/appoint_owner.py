@@ -24,13 +24,13 @@ class Command(RefusingCommand):
         """TEAM, EMAIL, reason."""
         parser.add_argument("team", help="the team's name, as boards show it, or its id")
         parser.add_argument("email", help="of the member who will own it")
-        parser.add_argument("--reason", required=True, help="a sentence for the audit trail")
+        parser.add_argument("--reason", required=True, help="a sentence for the audit log")
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Appoint, and say who owns the team now."""
         reason = options["reason"].strip()
         if not reason:
-            raise CommandError("No reason was given; expected a sentence for the audit trail.")
+            raise CommandError("No reason was given; expected a sentence for the audit log.")
         team = _team(options["team"])
         email = options["email"].strip().lower()
         heir = User.objects.filter(email=email).first()

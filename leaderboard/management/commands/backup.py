@@ -28,7 +28,7 @@ class Command(BaseCommand):
             raise CommandError(f"There is no new backup. {fault}") from fault
         self.stdout.write(
             f"Backed up: {counted(len(made.files), 'file')}, {len(made.ground_truth)} of ground "
-            f"truth, {counted(len(made.boards), 'board')}; last hash of the audit trail {made.audit}"
+            f"truth, {counted(len(made.boards), 'board')}; last hash of the audit log {made.audit}"
         )
         if made.missing:
             raise CommandError(

@@ -15,7 +15,7 @@ class Command(AccountCommand):
     help = "Delete the account of a person and everything that names them. Scores stay."
 
     def handle(self, *args: Any, **options: Any) -> None:
-        """Forget, and say the number by which the audit trail still knows the account."""
+        """Forget, and say the number by which the audit log still knows the account."""
         user = account_of(options)
         reason = options["reason"].strip()
         if not reason:

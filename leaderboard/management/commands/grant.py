@@ -1,6 +1,6 @@
 """`manage.py grant`: let the application's own role work on PostgreSQL, after each `migrate`.
 
-The role owns nothing. It reads and writes every table but two: of the audit trail it reads, adds and seals
+The role owns nothing. It reads and writes every table but two: of the audit log it reads, adds and seals
 rows, of the applied migrations it reads. So a fault in a web process or a worker cannot take the trail's
 triggers off.
 """

@@ -34,7 +34,7 @@ class Command(BaseCommand):
         self.stdout.write(
             f"Restored the backup of {kept.made_at[:16].replace('T', ' ')} UTC. "
             f"{counted(len(kept.files), 'file')} and {len(kept.ground_truth)} of ground truth have "
-            f"their digests, {boards}, and the audit trail is unbroken."
+            f"their digests, {boards}, and the audit log is unbroken."
         )
         if kept.boards and not done.n_boards:
             self.stdout.write(

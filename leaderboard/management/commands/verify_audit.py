@@ -9,7 +9,7 @@ from leaderboard import audit
 
 
 class Command(BaseCommand):
-    """Goes through the audit trail."""
+    """Goes through the audit log."""
 
     help = "Check that no audit event was changed, removed or inserted. Store the printed hash elsewhere."
 

@@ -148,7 +148,7 @@ class SecondFactorAdapter(DefaultMFAAdapter):
         **DefaultMFAAdapter.error_messages,
         "cannot_delete_authenticator": "Maintainers of this site must have a second factor.",
         "cannot_generate_recovery_codes": "Recovery codes need a second factor; set up an app first.",
-        "incorrect_code": "That is not the code of this moment, or it was used already; expected the one "
+        "incorrect_code": "The code is wrong, expired or already used; expected the code "
         "that the app shows now.",
         "unverified_email": "Verify all email addresses of the account before you set up a second factor.",
     }

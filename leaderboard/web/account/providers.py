@@ -138,8 +138,8 @@ class ProviderAdapter(DefaultSocialAccountAdapter):
 
     error_messages = {
         **DefaultSocialAccountAdapter.error_messages,
-        "no_password": "Without it you could not sign in any more; set a password first.",
-        "no_verified_email": "Without it you could not sign in any more; verify an email address first.",
+        "no_password": "Without this account you could no longer sign in; set a password first.",
+        "no_verified_email": "Without this account you could no longer sign in; verify an address first.",
     }
 
     def pre_social_login(self, request: HttpRequest, sociallogin: SocialLogin) -> None:
@@ -184,8 +184,8 @@ def _sentence(name: str, exception: Exception | None, request: HttpRequest) -> s
     if "error" in request.GET:
         return f"{name} refused the sign-in."
     return (
-        "This sign-in was not begun in this browser, was begun more than ten minutes ago, or is over. "
-        "Begin it again."
+        "This sign-in was started in another browser, was started more than ten minutes ago, or is already "
+        "finished. Start the sign-in again."
     )
 
 

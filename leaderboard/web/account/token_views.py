@@ -37,7 +37,7 @@ class TokenForm(SiteForm):
         initial=list(Scope.values),
         error_messages={"required": "The token has no scope; expected read, submit, or both."},
     )
-    split = forms.ChoiceField(label="Scope", required=False, choices=_splits)
+    split = forms.ChoiceField(label="Split", required=False, choices=_splits)
     days = forms.IntegerField(
         label="Expires in (days)",
         initial=tokens.DAYS,

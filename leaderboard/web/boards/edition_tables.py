@@ -21,7 +21,7 @@ from leaderboard.web.boards.tables import BoardTable
 _WHY_UNSCORABLE: Final = {
     "missing-keys": "Edition {} added sequences that its file does not predict.",
     "unknown-keys": "Edition {} removed sequences that its file predicts.",
-    "undefined-error": "Edition {} has a protocol for which its file predicts too close to 0.",
+    "undefined-error": "The protocol of edition {} has no MiD for predictions that are too close to 0.",
 }
 _ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}

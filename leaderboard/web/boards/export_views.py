@@ -32,8 +32,8 @@ from leaderboard.web.context_processors import split_or_404
 _NOT_OURS: Final = ("page",)
 PARAMETERS: Final = {**board_query.PARAMETERS, "intervals": tables.YES_OR_NO, "mine": tables.YES_OR_NO}
 NOBODYS: Final = (
-    "The address asks for your own rows as well (mine=1), and nobody is signed in; expected a session, or "
-    "the address without it."
+    "The address asks for the rows of your team as well (mine=1), but you are not signed in; sign in, or use "
+    "the address without mine=1."
 )
 
 

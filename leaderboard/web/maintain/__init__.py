@@ -1,1 +1,1 @@
-"""Pages of maintainers: editions, queue, quotas, audit trail."""
+"""Pages of maintainers: editions, queue, quotas, audit log."""

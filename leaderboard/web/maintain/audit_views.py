@@ -1,4 +1,4 @@
-"""The audit trail for maintainers: a page with its filter, and two exports."""
+"""The audit log for maintainers: a page with its filter, and two exports."""
 
 import itertools
 import json

@@ -158,7 +158,7 @@ def publish(request: HttpRequest, split: str, number: int) -> HttpResponse:
             corrections.publish(
                 edition=found, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
-            messages.success(request, f"Edition {number} is the board of {split}.")
+            messages.success(request, f"Edition {number} is now the board of {split}.")
             return redirect("board", split)
     return form_page(
         request, "maintain/publish.html", form, unfinished=corrections.unfinished(found), **context
@@ -176,7 +176,9 @@ def roll_back(request: HttpRequest, split: str, number: int) -> HttpResponse:
             corrections.roll_back(
                 split_name=split, now=timezone.now(), actor=maintainer_of(request), **form.cleaned_data
             )
-            messages.success(request, f"The board of {split} is what it was before edition {number}.")
+            messages.success(
+                request, f"Edition {number} was rolled back; the board of {split} is the one before it."
+            )
             return redirect("board", split)
     context = {**_comparison(former), "undone": edition_tables.change_words(former, found)} if former else {}
     return form_page(request, "maintain/roll_back.html", form, leaving=found, former=former, **context)

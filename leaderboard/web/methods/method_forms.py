@@ -82,7 +82,7 @@ class ShowForm(SiteForm):
         widget=forms.RadioSelect(choices=[(choice.value, choice.label) for choice in Visibility]),
     )
     reveal_on = forms.CharField(
-        label="Reveal on",
+        label="Becomes public on",
         required=False,
         help_text="Optional, for anonymous methods: the day (UTC) on which the method becomes public.",
         widget=forms.DateInput(attrs={"type": "date"}),

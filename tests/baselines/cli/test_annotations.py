@@ -28,7 +28,7 @@ def test_the_file_is_ground_truth_and_says_how_each_value_came_about(
         f"{out}: 2 sequences of 1 recording.",
         "Read: 12 observations of 1 track.",
         "The velocities of 3, 5 and 10 frames agree in 2 sequences.",
-        "They differ in 0: radar decides 0, and 0 without radar have that of 10 frames.",
+        "They differ in 0: radar decides 0, and 0 without radar have the velocity of 10 frames.",
     ]
     lines = out.read_text().splitlines()
     assert lines[0] == "anno_id,bag_stamp,cam_id,ts,track_id,ttc,q,frames,inliers,choice"

@@ -127,7 +127,7 @@ def test_a_document_is_imported_once_and_another_content_replaces_only_when_told
     assert AuditEvent.objects.filter(verb="imported").count() == 1
     path.write_text(json.dumps(paper("later", mid=2.0)))
     with pytest.raises(
-        CommandError, match=r"'later' of test is there already and differs in scores; expected the same"
+        CommandError, match="already has the row 'later', which differs in scores; expected the same content"
     ):
         call_command("import_published", str(path))
     assert on_board()["Later"] == 1.0
@@ -192,7 +192,7 @@ def test_the_page_imports_a_paper_with_missing_values_and_says_every_problem_wit
     document["results"]["test"]["later"][0] = 2.0
     refused = send(json.dumps(document).encode())
     assert refused.status_code == 422
-    assert "is there already and differs in scores" in assert_sound(refused).one("div", class_="wrong").text
+    assert "which differs in scores" in assert_sound(refused).one("div", class_="wrong").text
     assert send(json.dumps(document).encode(), is_replacing="on").status_code == 302
     bad = {**document, "columns": ["mid"], "source": {"year": "2026"}}
     sentences = [

@@ -1,4 +1,4 @@
-"""The role of web and workers on PostgreSQL: it does all their work, and cannot touch the audit trail."""
+"""The role of web and workers on PostgreSQL: it does all their work, and cannot touch the audit log."""
 
 import secrets
 from collections.abc import Iterator

@@ -106,7 +106,7 @@ def test_private_rows_take_nobody_s_rank_and_no_mark(own: list[Method], owner: U
 def test_nobody_s_own_rows_are_a_clear_refusal(own: list[Method], form: str, client: Client) -> None:
     answer = client.get(f"/board/test.{form}?mine=1")
     assert answer.status_code == 400
-    assert "nobody is signed in" in pages.page(answer).one("main").text
+    assert "you are not signed in" in pages.page(answer).one("main").text
     assert client.get(f"/board/test.{form}?mine=1", headers={"Authorization": "Bearer x"}).status_code == 400
     assert client.get(f"/board/test.{form}?mine=perhaps").status_code == 400
 

@@ -202,7 +202,7 @@ def test_there_is_no_way_back(method: Method, owner: User, now_is: str, to: str,
 def test_a_date_of_reveal_is_to_come_and_not_too_far(method: Method, owner: User, days: int) -> None:
     with pytest.raises(Refused, match="at most 730 days from now"):
         change(method, "ANONYMOUS", owner, reveal_at=timezone.now() + timedelta(days=days))
-    with pytest.raises(Refused, match="has no date of reveal"):
+    with pytest.raises(Refused, match="becomes public at once; expected no date"):
         change(method, "PUBLIC", owner, reveal_at=timezone.now() + timedelta(days=1))
 
 

@@ -64,7 +64,7 @@ def test_ready_when_database_broker_and_sweep_are_well() -> None:
         "database": True,
         "sweep": True,
         "ground truth": True,
-        "audit trail": True,
+        "audit log": True,
         "broker": True,
     }
 
@@ -85,7 +85,7 @@ def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: 
     at = timezone.now() - timedelta(seconds=seconds_ago)
     AuditEvent.objects.create(at=at, verb="opened", noun="Door", noun_id="1")
     response = Client().get("/healthy")
-    assert (response.status_code, response.json()["checks"]["audit trail"]["ok"]) == (200, is_ok)
+    assert (response.status_code, response.json()["checks"]["audit log"]["ok"]) == (200, is_ok)
     figures = prometheus.exposition().decode()
     assert "tsttc_audit_unsealed 1.0" in figures
     assert re.search(rf"tsttc_audit_unsealed_age_seconds {seconds_ago // 10}[0-9]\.", figures)

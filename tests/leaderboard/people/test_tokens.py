@@ -277,7 +277,7 @@ def test_a_token_for_one_split_changes_nothing_of_a_method(
         assert (status, answer["code"], answer["problems"][0]["where"]) == (403, "token-split", "description")
         assert answer["detail"] == (
             "The token is valid for one split only, and the fields 'description', 'code_url' would "
-            "change the method 'Foo' on every split; expected what stands there, nothing, or a token for "
+            "change the method 'Foo' on every split; expected the present value, no value, or a token for "
             "every split."
         )
 

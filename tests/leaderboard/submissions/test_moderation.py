@@ -75,7 +75,7 @@ def test_renamed_and_masked_names_are_gone_from_board_exports_feed_search_and_th
     assert places(visitor, "Rude Name", *past) == []
     assert places(visitor, f"Method {sent.method_id.hex[:6]}", *past) != []
     assert "Polite Owls 2" in visitor.get("/board/test/").text
-    # The audit trail has the names beside it, for maintainers.
+    # The audit log has the names beside it, for maintainers.
     page = get(keeper, f"/maintain/audit/?noun_id={sent.method_id}").one("main").text
     assert "Rude Name" in page
     assert "Rude" not in json.dumps(list(AuditEvent.objects.values_list("details", flat=True)))
@@ -212,7 +212,7 @@ def test_a_team_that_has_just_ended_is_refused_in_words(edition: Edition, owner:
     sent = published(edition, owner, method="Stays")
     gone = Team(name="Gone")
     told = {"reason": "R.", "actor": None}
-    with pytest.raises(Refused, match="The team has just ended"):
+    with pytest.raises(Refused, match="The team was deleted a moment ago"):
         moderation.move_method(method=sent.method, to=gone, **told)
-    with pytest.raises(Refused, match="The team has just ended"):
+    with pytest.raises(Refused, match="The team was deleted a moment ago"):
         moderation.rename_team(team=gone, name="New", now=timezone.now(), **told)

@@ -343,7 +343,7 @@ def test_who_says_no_or_comes_from_nowhere_is_told_so(provider: Provider, client
     for asked in ({}, {"code": CODE}, {"code": CODE, "state": "x" * 5000}, {"state": state, "code": "\x00"}):
         assert come_back(client, **asked).status_code in {302, 401}
     # A state is good once, in the browser that began.
-    assert_told(come_back(client, code=CODE, state=state), "Begin it again.")
-    assert_told(come_back(Client(), code=CODE, state=begin(client)), "Begin it again.")
+    assert_told(come_back(client, code=CODE, state=state), "Start the sign-in again.")
+    assert_told(come_back(Client(), code=CODE, state=begin(client)), "Start the sign-in again.")
     assert assert_sound(client.get("/accounts/3rdparty/signup/", follow=True))
     assert client.get("/accounts/3rdparty/login/error/").status_code == 401

@@ -72,7 +72,7 @@ def set_up(client: Client, phone: Phone) -> list[str]:
     phone.key = assert_sound(page).one("code", id="key").text
     assert "data:image/svg+xml;base64," in page.text
     wrong = client.post(path, {"code": "000000" if phone.code() != "000000" else "000001"})
-    assert "That is not the code of this moment" in wrong.text
+    assert "The code is wrong, expired or already used" in wrong.text
     assert f'id="key">{phone.key}<' in wrong.text
     done = client.post(path, {"code": phone.code()})
     assert done.headers["Location"] == "/accounts/2fa/recovery-codes/"

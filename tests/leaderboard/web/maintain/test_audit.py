@@ -1,4 +1,4 @@
-"""The audit trail as maintainers look through it and take it along."""
+"""The audit log as maintainers look through it and take it along."""
 
 import csv
 import io
