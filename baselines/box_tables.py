@@ -119,7 +119,7 @@ def _check_unit(boxes: NDArray[np.float64], path: Path, *, is_normalised: bool) 
         raise reject("bad-box", message, path.name)
     if not is_normalised and largest <= 1:
         message = (
-            f"The largest coordinate is {largest:g}, which is no pixel; "
+            f"The largest coordinate is {largest:g}, which is not a pixel; "
             f"expected pixels, or {NORMALISED} as the first line where coordinates are parts of the image."
         )
         raise reject("bad-box", message, path.name)

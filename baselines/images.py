@@ -64,7 +64,7 @@ class ImageCache:
 def decode(path: Path, *, colour: bool, where: str) -> Image:
     """The image of a file: (height, width) grey, or (height, width, 3) with blue first.
 
-    Raises `SequenceFault` for a file that cannot be read, is cut off, or is no image.
+    Raises `SequenceFault` for a file that cannot be read, is cut off, or is not an image.
     """
     try:
         data = path.read_bytes()
@@ -75,7 +75,7 @@ def decode(path: Path, *, colour: bool, where: str) -> Image:
     image = None if fault else _decoded(data, colour=colour)
     if image is None:
         message = (
-            f"The file {fault or 'is no image that OpenCV decodes'}; expected a whole JPEG or PNG image."
+            f"The file {fault or 'is not an image that OpenCV decodes'}; expected a whole JPEG or PNG image."
         )
         raise SequenceFault("image cannot be decoded", Problem("bad-frame", message, where))
     return image

@@ -287,7 +287,7 @@ def _document(receipt: bytes) -> Document:
     try:
         document = _parsed(receipt)
     except ValueError as fault:
-        raise NotVerified("receipt-malformed", f"This is no receipt: {fault}.") from None
+        raise NotVerified("receipt-malformed", f"This is not a receipt: {fault}.") from None
     version = document.get("version")
     if document.get("kind") == KIND and _count(version) and version != VERSION:
         raise NotVerified(

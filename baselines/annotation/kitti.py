@@ -60,7 +60,7 @@ def _read_line(fields: list[str], collected: Collected, *, bag_stamp: str, where
     try:
         truncation, *rest = map(float, (truncated, *fields[6:N_FIELDS]))
     except ValueError as error:
-        message = f"A field is no number: {error}; expected numbers after the type."
+        message = f"A field is not a number: {error}; expected numbers after the type."
         collected.findings.add("bad-field", message, where)
         return
     *box_px, height, width, length, right, down, forward, rotation = rest

@@ -54,7 +54,7 @@ def truth_option(what: str) -> Callable[[Command], Command]:
 def require_writable(out: Path) -> None:
     """Say before the work, not after it, that its result has no place."""
     if not os.access(out.parent, os.W_OK):
-        raise click.BadParameter(f"{out.parent} is no folder that can be written to.", param_hint="--out")
+        raise click.BadParameter(f"{out.parent} is not a folder that can be written to.", param_hint="--out")
 
 
 def n_cores() -> int:

@@ -47,7 +47,7 @@ def json_of(data: bytes) -> bytes:
         raise
     except _FAULTS as error:
         said = (str(error).splitlines() or ["it ends early"])[0].removesuffix(".")
-        raise reject("unreadable", f"The file is no intact Parquet table: {quoted(said)}.") from None
+        raise reject("unreadable", f"The file is not an intact Parquet table: {quoted(said)}.") from None
 
 
 def _columns(schema: Any) -> tuple[list[str], list[str]]:

@@ -173,13 +173,13 @@ def _unpacked(data: bytes) -> bytes:
         try:
             parts.append(reader.decompress(data, MAX_UNPACKED_BYTES + 1 - n_bytes))
         except zlib.error as error:
-            raise reject("not-json", f"The file is no intact gzip archive: {error}.") from None
+            raise reject("not-json", f"The file is not an intact gzip archive: {error}.") from None
         n_bytes += len(parts[-1])
         if n_bytes > MAX_UNPACKED_BYTES:
             message = f"The archive unpacks to more than {MAX_UNPACKED_BYTES:,} bytes; expected at most that."
             raise reject("too-large", message)
         if not reader.eof:
-            raise reject("not-json", "The file is no intact gzip archive: it ends before its content does.")
+            raise reject("not-json", "The file is not an intact gzip archive: it ends too early.")
         data = reader.unused_data.lstrip(b"\x00")
     return b"".join(parts)
 

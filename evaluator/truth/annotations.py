@@ -127,7 +127,7 @@ def _structure_fault(cameras: object) -> str | None:
 
 def _frame_fault(stamp: object, frame: object) -> str | None:
     if not isinstance(stamp, int) and not (isinstance(stamp, float) and math.isfinite(stamp)):
-        return "a timestamp that is no number"
+        return "a timestamp that is not a number"
     if not isinstance(frame, list):
         return f"a {type(frame).__name__} in place of a frame's objects"
     return next(filter(None, map(_object_fault, frame)), None)
@@ -145,13 +145,13 @@ def _object_fault(seen: object) -> str | None:
         if not isinstance(seen[name], str) and not _is_whole(seen[name]):
             return f"an object whose {name} is neither a whole number nor a text"
     if not _is_whole(seen["ts"]) or seen["ts"] < 0:
-        return "an object whose ts is no whole number of nanoseconds"
+        return "an object whose ts is not a whole number of nanoseconds"
     return None
 
 
 def _stamp_fault(stamp: object) -> str | None:
     if not isinstance(stamp, str):
-        return "an object whose bag_stamp is no text"
+        return "an object whose bag_stamp is not text"
     if len(stamp) > _MAX_STAMP:  # a part of it is copied for each sequence
         return f"an object whose bag_stamp is longer than {_MAX_STAMP:,} characters"
     return None

@@ -320,7 +320,7 @@ def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> Stored:
         ) from None
     except _NOT_A_STORE as error:
         raise reject(
-            "unreadable", f"The file is no saved ground truth or manifest: {error}.", path.name
+            "unreadable", f"The file is not a saved ground truth or manifest: {error}.", path.name
         ) from None
     kinds = _STORE_KINDS | ({"ttc_s": "f"} if with_ttc else {})
     digests = {"manifest_digest", "truth_digest"} if with_ttc else {"manifest_digest"}
@@ -332,7 +332,7 @@ def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> Stored:
         or len(next(iter(shapes))) != 1
     ):
         expected = "ground truth" if with_ttc else "manifest"
-        raise reject("unreadable", f"The file is no saved {expected} of this version.", path.name)
+        raise reject("unreadable", f"The file is not a saved {expected} of this version.", path.name)
     columns = {name: arrays[name].tolist() for name in kinds}
     is_sealed = str(arrays.pop("seal", "")) == _seal(arrays)
     stored = Stored(

@@ -45,7 +45,7 @@ def load_plain(data: bytes, *, where: str) -> object:
         raise
     except Exception as error:  # noqa: BLE001 -- "including, but not necessarily limited to", says the manual
         fault = str(error)[:200]
-        raise reject("bad-annotations", f"The file is no intact pickle ({fault}).", where) from None
+        raise reject("bad-annotations", f"The file is not an intact pickle ({fault}).", where) from None
 
 
 class Attributes(dict[Any, Any]):

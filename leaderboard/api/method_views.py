@@ -184,7 +184,7 @@ def _own(request: Request, method_id: UUID) -> Method:
 
 def _fields(request: Request) -> dict[str, Any]:
     if not isinstance(request.data, dict):
-        raise Refused("bad-value", "The body is no JSON object; expected one.")
+        raise Refused("bad-value", "The body is not a JSON object; expected one.")
     return request.data
 
 

@@ -23,7 +23,7 @@ def parse(text: str, *, field: str = "") -> datetime:
     text = text.strip()
     found = _FORM.fullmatch(text)
     if found is None:
-        raise _refused(f"{text[:60]!r} is no date with a time", f"one like {EXAMPLE}", field)
+        raise _refused(f"{text[:60]!r} is not a date with a time", f"one like {EXAMPLE}", field)
     if not found[3]:
         raise _refused(f"{text[:60]!r} has no time zone", f"{_ZONES} after the time", field)
     try:

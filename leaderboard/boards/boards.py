@@ -71,7 +71,7 @@ class BadTime(ValueError):
 
     def __init__(self, text: str) -> None:
         super().__init__(
-            f"{text[:60]!r} is no date or time; expected one such as 2026-11-20 or 2026-11-20T18:00:00Z."
+            f"{text[:60]!r} is not a date or a time; expected one such as 2026-11-20 or 2026-11-20T18:00:00Z."
         )
 
 

@@ -54,7 +54,7 @@ def rate_of(text: str) -> Rate:
     """
     found = _RATE.fullmatch(text)
     if found is None:
-        raise ValueError(f"{text!r} is no rate; expected one such as '600/min'")
+        raise ValueError(f"{text!r} is not a rate; expected one such as '600/min'")
     return Rate(n=int(found["n"]), period_s=_PERIODS_S[found["period"]])
 
 

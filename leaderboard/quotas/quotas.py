@@ -374,7 +374,7 @@ def parse_span(text: str, *, field: str = "") -> timedelta:
     if found is None or not number:
         raise Refused(
             "bad-value",
-            f"{text.strip()[:40]!r} is no span of time; expected one like 30 days, 24 hours or 90 minutes.",
+            f"{text.strip()[:40]!r} is not a span of time; expected one like 30 days or 90 minutes.",
             field=field,
         )
     n, unit = int(number), _UNITS[found[2].lower()]

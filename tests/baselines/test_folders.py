@@ -125,7 +125,7 @@ HEAD = "anno_id,frame,x1,y1,x2,y2\n"
             boxes_text(HEAD + "0,0,.1,.1,.2,.2\n0,5,.1,.1,.2,.3\n"),
             "bad-box",
             "boxes.csv",
-            "The largest coordinate is 0.3, which is no pixel; expected pixels, or #unit=normalised",
+            "The largest coordinate is 0.3, which is not a pixel; expected pixels, or #unit=normalised",
         ),
         (
             boxes_text("#unit=normalised\n" + HEAD + "0,0,10,10,20,20\n"),

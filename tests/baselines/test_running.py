@@ -139,7 +139,7 @@ BOX_0, BOX_5 = "(50, 30, 90, 60)", "(45, 25, 95, 65)"
         (with_image(3, lambda path: path.write_bytes(b"")), "image cannot be decoded", JPG,
          "The file is empty; expected a whole JPEG or PNG image."),
         (with_image(3, lambda path: path.write_bytes(b"no image")), "image cannot be decoded", JPG,
-         "The file is no image that OpenCV decodes; expected a whole JPEG or PNG image."),
+         "The file is not an image that OpenCV decodes; expected a whole JPEG or PNG image."),
         (with_image(3, lambda path: write_image(path, picture(1, 3, size=(80, 48)))),
          "image has another size", JPG,
          "The image has 80×48 pixels; expected 160×96 as in the target frame of its sequence."),

@@ -44,7 +44,7 @@ class Command(RefusingCommand):
         try:
             validate_email(email)
         except ValidationError as fault:
-            raise CommandError(f"{email!r} is no e-mail address.") from fault
+            raise CommandError(f"{email!r} is not an email address.") from fault
         with transaction.atomic():
             secret = tokens.create(
                 user=self._account(email),

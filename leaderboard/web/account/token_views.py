@@ -45,7 +45,7 @@ class TokenForm(SiteForm):
         widget=forms.NumberInput(attrs={"min": 1, "max": tokens.MAX_DAYS}),
         error_messages={
             "required": f"No number of days was given; expected 1 to {tokens.MAX_DAYS}.",
-            "invalid": f"That is no whole number of days; expected 1 to {tokens.MAX_DAYS}.",
+            "invalid": f"That is not a whole number of days; expected 1 to {tokens.MAX_DAYS}.",
         },
     )
 

@@ -29,7 +29,7 @@ def _day(label: str) -> forms.DateField:
         required=False,
         input_formats=["%Y-%m-%d"],
         widget=forms.DateInput(attrs={"type": "date"}),
-        error_messages={"invalid": "That is no date; expected one like 2026-11-20."},
+        error_messages={"invalid": "That is not a date; expected one like 2026-11-20."},
     )
 
 

@@ -52,7 +52,7 @@ def test_a_label_gives_names_and_the_nearest_corner(tmp_path: Path) -> None:
         (["0 7 Car 0 0 0.1 100 100 140 130 1.5 1.8 4.0 3 1 nan 0"], "0003.txt, line 1: y is nan"),
         (["0 7 Car 0 0 0.1"], "0003.txt, line 1: The line has 6 fields; expected the 17"),
         (["x 7 Car 0 0 0.1" + " 1" * 11], '0003.txt, line 1: The frame is "x"'),
-        (["0 7 Car 0 0 0.1" + " 1" * 10 + " x"], "A field is no number: could not convert string"),
+        (["0 7 Car 0 0 0.1" + " 1" * 10 + " x"], "A field is not a number: could not convert string"),
         (["0 8 Cyclist 0 0 0.1" + " 1" * 11], "There are no tracked vehicles"),
         (
             [LINE.format(frame=frame, truncated=0, x=3, z=20, rotation=0) for frame in (4, 3)],

@@ -100,7 +100,7 @@ def test_a_folder_at_fault_exits_1(tsttc: Tsttc, tmp_path: Path) -> None:
         (["detection", "--bins", "20"], "detection has no option --bins; its options are --measure."),
         (["detection", "--gap", "6"], "Invalid value for '--gap'"),
         (["nothing"], "Invalid value for 'METHOD'"),
-        (["detection", "--out", "no/folder/p.json"], "no/folder is no folder that can be written to."),
+        (["detection", "--out", "no/folder/p.json"], "no/folder is not a folder that can be written to."),
         (["pixel-mse", "--expand", "nan"], "--expand is nan; expected a finite number."),
     ],
 )

@@ -153,7 +153,8 @@ def test_board_asks_for_split_and_order_and_prints_json_as_it_came(tsttc: Tsttc,
 
 
 @pytest.mark.parametrize(
-    ("where", "words"), [("sort", "The board cannot be sorted by 'x'."), ("at", "'x' is no date or time.")]
+    ("where", "words"),
+    [("sort", "The board cannot be sorted by 'x'."), ("at", "'x' is not a date or a time.")],
 )
 def test_unknown_order_or_moment_is_wrong_usage_in_the_server_s_words(
     tsttc: Tsttc, site: RecordedSite, where: str, words: str

@@ -66,8 +66,8 @@ def test_ratios_have_the_rate_of_their_row() -> None:
 
 
 FAULTS: dict[str, tuple[bytes, str, str, str]] = {
-    "magic alone": (b"PAR1", "unreadable", "no intact Parquet table", ""),
-    "cut off": (GOOD[:-9], "unreadable", "no intact Parquet table", ""),
+    "magic alone": (b"PAR1", "unreadable", "not an intact Parquet table", ""),
+    "cut off": (GOOD[:-9], "unreadable", "not an intact Parquet table", ""),
     "other columns": (table(x=[1]), "missing-columns", 'has the columns "x"; expected anno_id, or', "line 1"),
     "numbers as text": (
         table(anno_id=[0], ttc=["1.5"]),
@@ -160,7 +160,7 @@ def test_every_command_takes_them(tsttc: Tsttc, tmp_path: Path) -> None:
     path.write_bytes(b"PAR1")
     told = tsttc("check", path, "--manifest", EXAMPLES / "manifest.csv")
     assert told.exit_code == 1
-    assert "no intact Parquet table" in told.stderr
+    assert "not an intact Parquet table" in told.stderr
 
 
 def test_a_machine_without_pyarrow_says_what_to_install(

@@ -302,7 +302,7 @@ def test_saved_files_are_read_wherever_tables_are(tmp_path: Path, write: Write) 
     assert read_manifest(path).digest == truth.manifest.digest
     truth.manifest.save(path)
     assert read_manifest(path).digest == truth.manifest.digest
-    assert rejection(path).problems[0].message == "The file is no saved ground truth of this version."
+    assert rejection(path).problems[0].message == "The file is not a saved ground truth of this version."
 
 
 def test_values_of_extreme_size_survive_keeping(tmp_path: Path) -> None:

@@ -135,5 +135,5 @@ def test_date_means_its_end_and_a_time_its_moment(text: str, moment: datetime) -
 
 @pytest.mark.parametrize("text", ["", "soon", "2026-13-40", "0001-01-01T00:00:00+14:00", "2026-11-20T25:00"])
 def test_what_is_no_moment_is_named_as_such(text: str) -> None:
-    with pytest.raises(boards.BadTime, match="is no date or time; expected one such as 2026-11-20"):
+    with pytest.raises(boards.BadTime, match="is not a date or a time; expected one such as 2026-11-20"):
         boards.parse_time(text)

@@ -131,9 +131,9 @@ def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Clien
     bad = {
         "name": ("Test 2", "The name 'Test 2' cannot be used"),
         "title": ("", "No title was given"),
-        "closes_at": ("2099-03-01", "is no date with a time"),
+        "closes_at": ("2099-03-01", "is not a date with a time"),
         "opens_at": ("2099-03-01 10:00", "has no time zone"),
-        "quota_window": ("-3 days", "'-3 days' is no span of time"),
+        "quota_window": ("-3 days", "'-3 days' is not a span of time"),
         "quota_limit": ("-1", "The number is negative"),
         "position": ("99999", TOO_FAR),
         "quota_rejected_limit": (str(10**12), TOO_MANY),
@@ -352,7 +352,7 @@ def test_a_moment_has_a_zone(text: str, moment: str) -> None:
 @pytest.mark.parametrize(
     ("text", "fault"),
     [
-        ("2027-03-01", "is no date with a time"),
+        ("2027-03-01", "is not a date with a time"),
         ("2027-03-01 23:59", "has no time zone"),
         ("2027-02-30 23:59 UTC", "is not in the calendar"),
         ("2027-03-01 23:59 CST", "There is no time zone 'CST'"),

@@ -54,5 +54,5 @@ def test_address_without_an_account_gets_one_without_a_password(db: None) -> Non
 
 
 def test_what_is_no_address_is_refused(db: None) -> None:
-    with pytest.raises(CommandError, match="'nobody' is no e-mail address"):
+    with pytest.raises(CommandError, match="'nobody' is not an email address"):
         create_token("nobody")

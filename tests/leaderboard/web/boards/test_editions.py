@@ -113,7 +113,7 @@ def test_board_as_it_stood_at_a_time(client: Client, entries: list[Submission]) 
 def test_no_time_is_a_clear_400(client: Client, benchmark: None, at: str) -> None:
     response = client.get("/board/test/", {"at": at})
     assert response.status_code == 400
-    assert "is no date or time" in pages.page(response).one("main").text
+    assert "is not a date or a time" in pages.page(response).one("main").text
 
 
 def test_no_time_at_all_is_now_on_the_page_and_to_programs(client: Client, entries: list[Submission]) -> None:
