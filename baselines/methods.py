@@ -183,9 +183,9 @@ METHODS: Final[tuple[Method, ...]] = (
             Parameter(
                 "decoding",
                 "auto",
-                "The head's mean over four scale ratios, as published; the peak of the features' similarity; "
-                "a fit of the features; or what the weights' card says, which is the peak for ours.",
-                choices=("auto", "head", "peak", "fit"),
+                "head: the head's mean over four scale ratios, as published; fit: a fit of the features; "
+                "auto: as the card of the weights says, which is fit for ours.",
+                choices=("auto", "head", "fit"),
             ),
         ),
     ),

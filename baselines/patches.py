@@ -47,14 +47,11 @@ class Window:
     origin: Floats
     pixel_size: Floats
 
-    def resized(self, pixel_size: float) -> Window:
-        """The same part with pixels of about `pixel_size` old ones: means of several, so that texture does
-        not alias; smaller ones are interpolated, bicubic.
-        """
+    def shrunk(self, pixel_size: float) -> Window:
+        """The same part with pixels of about `pixel_size` old ones, means, so that texture does not alias."""
         rows, columns = self.pixels.shape[:2]
         n_columns, n_rows = max(1, round(columns / pixel_size)), max(1, round(rows / pixel_size))
-        interpolation = cv2.INTER_AREA if pixel_size >= 1.0 else cv2.INTER_CUBIC
-        pixels = cv2.resize(self.pixels, (n_columns, n_rows), interpolation=interpolation)
+        pixels = cv2.resize(self.pixels, (n_columns, n_rows), interpolation=cv2.INTER_AREA)
         growth = np.array([columns / n_columns, rows / n_rows])
         return Window(np.asarray(pixels, dtype=np.float32), self.origin, self.pixel_size * growth)
 
@@ -80,8 +77,8 @@ class Window:
 
 
 def cut(image: Image, *, centre: ArrayLike, size: ArrayLike, pixel_size: float = 1.0) -> Window:
-    """The window about `centre` that has at least this size, with pixels of about this size, in pixels of the
-    frame.
+    """The window about `centre` that has at least this size, with pixels of about this size, at least 1, in
+    pixels of the frame.
     """
     # Plain numbers: for two of them, NumPy takes ten times as long.
     (x, y), (width, height) = np.asarray(centre).tolist(), np.asarray(size).tolist()
@@ -89,7 +86,7 @@ def cut(image: Image, *, centre: ArrayLike, size: ArrayLike, pixel_size: float =
     top, bottom = _ends(y, height / 2 + pixel_size)
     pixels = with_border(image, (left, top), (right, bottom))
     window = Window(pixels, np.array([left, top], dtype=np.float64), np.ones(2))
-    return window.resized(pixel_size) if pixel_size != 1.0 else window
+    return window.shrunk(pixel_size) if pixel_size > 1.0 else window
 
 
 def _ends(middle: float, half: float) -> tuple[int, int]:

@@ -179,7 +179,7 @@ class Comparison:
         patch = cv2.resize(self.patch, (int(n_cells[0]), int(n_cells[1])), interpolation=cv2.INTER_AREA)
         return replace(
             self,
-            reference=self.reference.resized(ratio),
+            reference=self.reference.shrunk(ratio),
             patch=np.asarray(patch, dtype=np.float64),
             cell_px=self.cell_px * self.patch.shape[::-1] / n_cells,
         )

@@ -49,7 +49,7 @@ def open_archive(data: bytes) -> zipfile.ZipFile:
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OverflowError, EOFError, NotImplementedError):
-        message = "The file is no whole zip; expected weights of this project or a checkpoint of torch."
+        message = "The file is not a complete zip file; expected our weights or a checkpoint of torch."
         raise reject("bad-weights", message) from None
     entries = archive.infolist()
     n_bytes = sum(entry.file_size for entry in entries)
@@ -99,7 +99,7 @@ def _unpickled(archive: zipfile.ZipFile, name: str) -> object:
         raise
     except Exception as error:  # noqa: BLE001 -- "including, but not necessarily limited to", says the manual
         fault = str(error)[:200]
-        message = f"The checkpoint's data.pkl is no intact pickle of tensors ({fault})."
+        message = f"The checkpoint's data.pkl is not an intact pickle of tensors ({fault})."
         raise reject("bad-weights", message) from None
 
 

@@ -7,7 +7,6 @@ times faster. Outside of the frame its border is repeated, so that no sequence i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +15,6 @@ from baselines.boxes import MAX_EXPANSION, Floats, box_around, centre_of, expand
 from baselines.clips import Image
 from baselines.deep_scale.network import MAX_SHIFT
 from baselines.patches import cut
-
-MAX_ENLARGEMENT: Final = 2.0
-"""Of a frame: more shows nothing that the frame does not have."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -46,23 +42,19 @@ def cut_pair(
     *,
     max_scale: float,
     max_box_px: float,
-    min_box_px: float = 0.0,
     margin_px: float,
     n_cells: int,
 ) -> CropPair:
     """Crops of two frames in colour for scale ratios up to `max_scale`.
 
     `boxes` are those of reference and target. Both frames are shrunk by the same ratio where the longer side
-    of the target's expanded box is over `max_box_px`, and enlarged where it is under `min_box_px`, at
-    most `MAX_ENLARGEMENT` times. The crops have `margin_px` more on each side than is compared in `n_cells`
-    cells: features near the edge of a crop have seen zeros.
+    of the target's expanded box is over `max_box_px`. The crops have `margin_px` more on each side than is
+    compared in `n_cells` cells: features near the edge of a crop have seen zeros.
     """
     height, width = target.shape[:2]
     ratio = shared_expansion(*boxes, width_px=width, height_px=height, at_most=MAX_EXPANSION)
     size = size_of(expand(boxes[1], ratio))
-    longer = float(np.max(size))
-    wanted = min(max(longer, min_box_px), max_box_px, longer * MAX_ENLARGEMENT)
-    pixel_size = longer / wanted
+    pixel_size = max(1.0, float(np.max(size)) / max_box_px)
     reach = max_scale * (n_cells + 2 * MAX_SHIFT) / n_cells
     margin = 2 * margin_px * pixel_size
     return CropPair(

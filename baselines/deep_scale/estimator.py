@@ -16,7 +16,6 @@ from baselines.deep_scale.crops import Crop, CropPair, cut_pair
 from baselines.deep_scale.fit import fitted_scale_ratio
 from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Array, Operations, Sampling, features, similarities
-from baselines.deep_scale.peak import peak_scale_ratio
 from baselines.deep_scale.weights import N_SCALES, Decoding, Use, Weights, read_weights
 from baselines.estimates import Estimate
 from baselines.methods import OWN_WEIGHTS
@@ -39,9 +38,9 @@ class DeepScale:
     """The baseline with the weights that come with the package, or with those of a file.
 
     `device` is "numpy", or where torch is to compute: "cpu" or "cuda". `decoding` is how the scale ratio
-    comes about: "head" is the paper's mean over the four surest of 20, "peak" searches the features finely
-    near it (`peak`), "fit" lays the features of the reference on those of the target from there (`fit`), and
-    "auto" is what the weights' card says; the toolkit's have the head. Raises `Rejected` for weights that are
+    comes about: "head" is the paper's mean over the four surest of 20, "fit" lays the features of the
+    reference on those of the target from there (`fit`), and "auto" is what the weights' card says; the
+    toolkit's have the head. Raises `Rejected` for weights that are
     at fault, `OSError`, and `ValueError` for a device that is not there.
     """
 
@@ -60,23 +59,10 @@ class DeepScale:
     def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
         """Raises `Unusable` where a box is missing, too small, or has its centre outside of the image."""
         frames, boxes = _usable(clip, frame_gap=frame_gap)
-        pair = cut(frames, boxes, use=self._use)
-        maps = network_features(self._operations, [pair])
-        confidences = self._confidences(pair, maps)
+        confidences = self.confidences(cut(frames, boxes, use=self._use))
         best = best_of(-confidences, n_top=N_TOP)
         scale_ratio = float(np.average(self._scales[best], weights=confidences[best]))
-        if self._use.decoding == "peak":
-            target, reference = (self._operations.values(each)[0] for each in maps)
-            spacing = float(self._scales[1] - self._scales[0])
-            scale_ratio = peak_scale_ratio(
-                pair,
-                (target, reference),
-                near=scale_ratio,
-                limits=(float(self._scales[0]) - spacing, float(self._scales[-1]) + spacing),
-                n_cells=self._use.n_cells,
-                similarity=self._use.similarity,
-            )
-        elif self._use.decoding == "fit":
+        if self._use.decoding == "fit":
             scale_ratio = fitted_scale_ratio(self._operations, frames, boxes, near=scale_ratio)
         return Estimate(scale_ratio, confidence=float(confidences[best[0]]))
 
@@ -86,10 +72,7 @@ class DeepScale:
 
     def confidences(self, pair: CropPair) -> Floats:
         """(20,): how sure the network is of each scale ratio, between 0 and 1."""
-        return self._confidences(pair, network_features(self._operations, [pair]))
-
-    def _confidences(self, pair: CropPair, maps: tuple[Array, Array]) -> Floats:
-        logits = self._operations.values(logits_of(self._operations, [pair], maps, use=self._use))[0]
+        logits = self._operations.values(network_logits(self._operations, [pair], use=self._use))[0]
         return np.asarray(0.5 + 0.5 * np.tanh(0.5 * logits.astype(np.float64)))
 
 
@@ -114,7 +97,6 @@ def cut(frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, use: Use) 
         boxes,
         max_scale=float(network_scales()[-1]),
         max_box_px=use.max_box_px,
-        min_box_px=use.min_box_px,
         margin_px=use.margin_px,
         n_cells=use.n_cells,
     )
@@ -122,27 +104,10 @@ def cut(frames: tuple[Image, Image], boxes: tuple[Floats, Floats], *, use: Use) 
 
 def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Use) -> Array:
     """(b, 20): the network's outputs for a batch, before the sigmoid, as an array of the operations."""
-    return logits_of(operations, pairs, network_features(operations, pairs), use=use)
-
-
-def network_features(operations: Operations, pairs: Sequence[CropPair]) -> tuple[Array, Array]:
-    """(b, 24, h, w) of the targets and of the references.
-
-    Crops smaller than the greatest of the batch repeat their right and lower border.
-    """
-    target = stacked([pair.target for pair in pairs])
-    reference = stacked([pair.reference for pair in pairs])
-    return (
-        features(operations, operations.constant(target)),
-        features(operations, operations.constant(reference)),
+    target, reference = (
+        features(operations, operations.constant(stacked(crops)))
+        for crops in ([pair.target for pair in pairs], [pair.reference for pair in pairs])
     )
-
-
-def logits_of(
-    operations: Operations, pairs: Sequence[CropPair], maps: tuple[Array, Array], *, use: Use
-) -> Array:
-    """(b, 20): `network_logits` of pairs whose features are known."""
-    target, reference = maps
     sampling = [
         Sampling.of(
             target_box=pair.target.box,

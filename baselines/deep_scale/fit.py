@@ -30,7 +30,6 @@ from numpy.typing import NDArray
 
 from baselines.boxes import centre_of, size_of
 from baselines.clips import Image
-from baselines.deep_scale.crops import MAX_ENLARGEMENT
 from baselines.deep_scale.layers import LEAST_NORM
 from baselines.deep_scale.network import Array, Operations, features
 from baselines.detection import scale_ratio_of_two
@@ -50,6 +49,9 @@ _N_STEPS: Final = 2
 
 _EXPANSION: Final = 1.1
 """The box is so many times as large: its edges show more than what is inside."""
+
+_MAX_ENLARGEMENT: Final = 2.0
+"""Of a frame: more shows nothing that the frame does not have."""
 
 _MARGIN_PX: Final = 10
 """On each side of what is compared: features at the edge of a crop have seen zeros, which do not move."""
@@ -97,7 +99,7 @@ class Grid:
         """For a box (4,) whose longer side gets `box_px`, or less: frames are enlarged at most twice."""
         size = _EXPANSION * size_of(box)
         longer = float(np.max(size))
-        pixel_size = longer / min(box_px, MAX_ENLARGEMENT * longer)
+        pixel_size = longer / min(box_px, _MAX_ENLARGEMENT * longer)
         columns, rows = (max(4, round(side / pixel_size)) for side in size.tolist())
         n_columns, n_rows = (side + side % 2 + 2 * _MARGIN_PX for side in (columns, rows))
         return cls(

@@ -27,7 +27,7 @@ CARD: Final = "card.json"
 _HEADER_BYTES: Final = 128
 """Of an `.npy` file."""
 
-Decoding = Literal["head", "peak", "fit"]
+Decoding = Literal["head", "fit"]
 DECODINGS: Final[tuple[Decoding, ...]] = get_args(Decoding)
 
 Tensors = Mapping[str, NDArray[np.float32]]
@@ -63,7 +63,7 @@ class Use:
 
     `similarity` of two feature vectors: the paper words "cosine", the toolkit's weights are for "dot".
     `n_cells` is the paper's target size. Frames are shrunk until the longer side of the target's box has
-    `max_box_px`, or enlarged until it has `min_box_px`. Crops have `margin_px` around what is compared.
+    `max_box_px`. Crops have `margin_px` around what is compared.
     `decoding` is how a scale ratio is made of what the network says (`estimator.DeepScale`).
     """
 
@@ -72,7 +72,6 @@ class Use:
     max_box_px: float = 120.0
     margin_px: float = 16.0
     decoding: Decoding = "head"
-    min_box_px: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +135,7 @@ def _read_own(archive: zipfile.ZipFile) -> Weights:
             )
             findings.add("bad-weights", message)
         elif (values := _array(read_entry(archive, entry.filename, n_bytes=n_bytes), shape)) is None:
-            findings.add("bad-weights", f"The tensor {name} is no array {shape} of float32.")
+            findings.add("bad-weights", f"The tensor {name} is not an array {shape} of float32.")
         else:
             tensors[name] = values
     findings.raise_if_any()
@@ -160,17 +159,17 @@ def _read_card(archive: zipfile.ZipFile) -> dict[str, Any]:
     except (ValueError, RecursionError):
         card = None
     if not isinstance(card, dict):
-        raise reject("bad-weights", f"{CARD} is no JSON object.")
+        raise reject("bad-weights", f"{CARD} is not a JSON object.")
     return card
 
 
 def _read_use(found: object) -> Use:
     """How the card says that the weights are to be used; raises `Rejected`."""
-    # Cards that were written before there was a choice have neither decoding nor a least size.
+    # Cards that were written before there was a choice have no decoding.
     known = {each.name for each in fields(Use)}
-    if isinstance(found, dict) and known - {"decoding", "min_box_px"} <= found.keys() <= known:
+    if isinstance(found, dict) and known - {"decoding"} <= found.keys() <= known:
         use = Use(**found)
-        numbers = (use.n_cells, use.max_box_px, use.min_box_px, use.margin_px)
+        numbers = (use.n_cells, use.max_box_px, use.margin_px)
         if (
             use.similarity in ("dot", "cosine")
             and use.decoding in DECODINGS
@@ -178,7 +177,6 @@ def _read_use(found: object) -> Use:
             and all(type(number) in (int, float) for number in numbers)
             and 1 <= use.n_cells <= 100
             and 8 <= use.max_box_px <= 400
-            and 0 <= use.min_box_px <= use.max_box_px
             and 0 <= use.margin_px <= 64
         ):
             return use

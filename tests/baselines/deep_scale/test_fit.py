@@ -1,7 +1,6 @@
 """The estimate from a fit: which scale ratio it finds, from where, and when it is used."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from baselines.deep_scale.estimator import DeepScale
 from baselines.deep_scale.fit import Grid, Place, equations, fitted_scale_ratio, solution, weighting
 from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Operations
-from baselines.deep_scale.weights import read_weights, write_weights
+from baselines.deep_scale.weights import read_weights
 from baselines.methods import OWN_WEIGHTS
 from tests.baselines.scenes import Floats, planted
 
@@ -42,15 +41,13 @@ def test_small_boxes_are_enlarged_and_their_scale_ratio_is_found() -> None:
     assert Grid.over(clip.boxes[5], box_px=80.0).pixel_size == pytest.approx(0.5)
 
 
-def test_a_card_can_name_the_fit(tmp_path: Path) -> None:
-    own = read_weights(OWN_WEIGHTS)
-    write_weights(tmp_path / "w.npz", replace(own, use=replace(own.use, decoding="fit")))
+def test_the_card_of_weights_says_how_they_are_decoded() -> None:
+    assert read_weights(OWN_WEIGHTS).use.decoding == "fit"
     clip = planted(0.9)
-    named, fit, auto = (
-        estimator(clip, frame_gap=5).scale_ratio
-        for estimator in (DeepScale(weights=tmp_path / "w.npz"), DeepScale(decoding="fit"), DeepScale())
+    auto, fit, head = (
+        DeepScale(decoding=decoding)(clip, frame_gap=5).scale_ratio for decoding in ("auto", "fit", "head")
     )
-    assert named == fit != auto
+    assert auto == fit != head
 
 
 def test_the_start_goes_on_whose_features_are_more_alike(operations: Operations) -> None:
