@@ -49,7 +49,7 @@ def open_archive(data: bytes) -> zipfile.ZipFile:
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
     except (zipfile.BadZipFile, ValueError, OverflowError, EOFError, NotImplementedError):
-        message = "The file is not a complete zip file; expected our weights or a checkpoint of torch."
+        message = "The file is not a complete zip; expected this project's weights or a torch checkpoint."
         raise reject("bad-weights", message) from None
     entries = archive.infolist()
     n_bytes = sum(entry.file_size for entry in entries)

@@ -46,7 +46,7 @@ def test_faulty_weights_are_said_before_the_folder_is_read(
     assert result.exit_code == 1
     assert result.stderr.splitlines() == [
         f"Error: {path} is rejected: 1 problem",
-        "  1. The file is not a complete zip file; expected our weights or a checkpoint of torch.",
+        "  1. The file is not a complete zip; expected this project's weights or a torch checkpoint.",
     ]
     assert not (tmp_path / "p.json").exists()
 

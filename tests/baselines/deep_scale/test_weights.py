@@ -111,8 +111,8 @@ FAULTY: dict[str, tuple[Callable[[], bytes], str]] = {
     ),
     "a number for a model": (lambda: checkpoint(TENSORS, pickled=b"\x80\x02I1\n."), 'has no "model"'),
     "a cut pickle": (lambda: checkpoint(TENSORS, pickled=model(TENSORS)[:900]), "not an intact pickle"),
-    "a cut zip": (lambda: checkpoint(TENSORS)[:-40], "The file is not a complete zip file"),
-    "no zip": (lambda: b"weights", "The file is not a complete zip file"),
+    "a cut zip": (lambda: checkpoint(TENSORS)[:-40], "The file is not a complete zip"),
+    "no zip": (lambda: b"weights", "The file is not a complete zip"),
     "another zip": (lambda: zipped({"a": b"b"}), "The zip has no data.pkl"),
     "a long pickle": (
         lambda: zipped({"c/data.pkl": bytes(MAX_PICKLE_BYTES + 1)}),
