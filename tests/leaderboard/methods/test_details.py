@@ -144,7 +144,7 @@ def test_a_name_changes_until_it_is_public_and_is_no_other_ones_of_the_team(
         methods.edit(method=method, changes={"name": "Bar"}, actor=owner)
     data = builders.predictions(edition, factor=1.4)
     hidden = builders.submit(owner, data, method="Hidden", visibility="PRIVATE").method
-    with pytest.raises(Refused, match="Your team has a method 'Foo'"):
+    with pytest.raises(Refused, match="looks like 'Foo', the name of a method of your team"):
         methods.edit(method=hidden, changes={"name": "F0o"}, actor=owner)
     assert methods.edit(method=hidden, changes={"name": "Seen"}, actor=owner).name == "Seen"
     assert builders.submit(stranger, data, method="F0o").method.team != method.team

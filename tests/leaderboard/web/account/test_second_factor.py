@@ -93,7 +93,7 @@ def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: Use
     assert sign_in(other, owner) == "/accounts/2fa/authenticate/"
     assert other.get("/submissions/").status_code == 302, "the password alone opens nothing"
     assert_sound(other.get("/accounts/2fa/authenticate/"))
-    assert "That is not the code" in other.post("/accounts/2fa/authenticate/", {"code": "12345"}).text
+    assert "The code is wrong" in other.post("/accounts/2fa/authenticate/", {"code": "12345"}).text
     code = phone.code()
     assert other.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 302
     assert other.get("/submissions/").status_code == 200

@@ -81,7 +81,7 @@ def test_the_list_tells_name_use_and_end(signed_in: Client, benchmark: None) -> 
         ({"scopes": ["read", "admin"]}, "scopes", "admin is not one of the available choices"),
         ({"days": "0"}, "days", "expires after 0 days; expected 1 to 365"),
         ({"days": "366"}, "days", "expires after 366 days; expected 1 to 365"),
-        ({"days": "soon"}, "days", "no whole number of days"),
+        ({"days": "soon"}, "days", "not a whole number of days"),
         ({"split": "nowhere"}, "split", "nowhere"),
     ],
 )
