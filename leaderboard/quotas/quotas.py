@@ -234,7 +234,7 @@ def weigh(
             full_until: f"Your team has used {_n(rules.limit)} to {split.pk}, its quota for "
             f"{span(rules.window)}",
             gap_until: f"Submissions of a team to {split.pk} must be at least {span(rules.min_gap)} apart",
-            rejected_until: f"Your team has reached the limit of 24 hours for {split.pk}: "
+            rejected_until: f"Your team has reached its limit for {split.pk}: within 24 hours, "
             f"{counted(len(rejected), 'file')} that were rejected, were cancelled, or stopped the process "
             "that read them",
         }
