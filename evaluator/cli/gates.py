@@ -152,8 +152,11 @@ def undecided(why: str, *, hint: str = "") -> Failure:
 
 
 def named(board: Board, name: str) -> BoardEntry:
-    """The board's row of a method, by name or id; raises Failure for none, or more than one."""
-    rows = [entry for entry in board.entries if name in {entry.method, entry.method_id}]
+    """The board's row of a method, by id or name; raises Failure for none, or more than one.
+
+    A row that is quoted from a paper comes before a method of the same name: only teams can change names.
+    """
+    rows = rows_named(board, name)
     if len(rows) == 1:
         return rows[0]
     if not rows:
@@ -164,13 +167,20 @@ def named(board: Board, name: str) -> BoardEntry:
             code="unknown-method",
             hint=f"List them with: tsttc board {board.split}",
         )
-    ids = ", ".join(f"{entry.method_id or 'published'} ({printable(entry.team or '')})" for entry in rows)
+    ids = ", ".join(f"{entry.id or entry.method_id} ({printable(entry.team or '')})" for entry in rows)
     raise Failure(
         f"The board of {board.split} has {len(rows)} methods called {printable(name)!r}: {ids}; "
         "expected an id.",
         exit_code=Exit.USAGE,
         code="ambiguous-method",
     )
+
+
+def rows_named(board: Board, name: str) -> list[BoardEntry]:
+    """The rows with this id; else the quoted rows of this name; else all rows of this name."""
+    by_id = [entry for entry in board.entries if name in {entry.id, entry.method_id}]
+    by_name = [entry for entry in board.entries if name == entry.method]
+    return by_id or [entry for entry in by_name if entry.kind == "published"] or by_name
 
 
 def rival(
@@ -181,7 +191,7 @@ def rival(
     None where it is the file's `own` method, and nothing of it is on the board yet.
     """
     board = client.board(split)
-    if method == own and all(method not in {entry.method, entry.method_id} for entry in board.entries):
+    if method == own and not rows_named(board, method):
         words = f"{printable(method)} is not on the board of {split} yet; nothing to compare with."
         click.echo(words, err=True)
         return None

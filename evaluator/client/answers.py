@@ -102,6 +102,8 @@ class Interval(msgspec.Struct, frozen=True, kw_only=True):
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One row of a board: scores by their names, None where a TTC range has no value.
 
+    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`.
+
     `decimals` are those that its values are printed with; None from a server that does not say.
 
     `pseudonym` is that of an anonymous row of one's own team, which others see under it; else None.
@@ -109,6 +111,7 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
 
     method: str
     scores: dict[str, float | None]
+    id: str | None = None
     decimals: int | None = None
     method_id: str | None = None
     rank: int | None = None

@@ -304,6 +304,10 @@ class EntrySerializer(serializers.Serializer[Entry]):
     rank = serializers.IntegerField(
         allow_null=True, help_text="By published MiD, shared by ties; null: no MiD."
     )
+    id = serializers.CharField(
+        help_text="Names this row for good: the method's id, or of a quoted row `published:` and its short "
+        "name, as `published:deep-scale`."
+    )
     method = serializers.CharField(help_text="Name of the method.")
     method_id = serializers.UUIDField(allow_null=True, help_text=METHOD_ID)
     team = serializers.CharField(help_text="Name of the team.")

@@ -76,6 +76,7 @@ class Entry:
     date: datetime | None = None
     year: int | None = None
     method_id: UUID | None = None
+    slug: str = ""  # of a quoted row: its short name in the file of published results
     submission_id: UUID | None = None
     evaluation_id: UUID | None = None
     paper_url: str = ""
@@ -94,6 +95,11 @@ class Entry:
     shown_at: datetime | None = None  # since when everybody sees its method
     withdrawn_at: datetime | None = None  # a tombstone: the row stays, without values
     unscorable: str = ""  # of a former edition: the code of why the published one cannot score the file
+
+    @property
+    def id(self) -> str:
+        """The name of the row that nobody else can take: a method's id, or `published:` and a slug."""
+        return str(self.method_id) if self.method_id else f"published:{self.slug}"
 
     @property
     def is_unscorable(self) -> bool:
@@ -135,6 +141,7 @@ def published_entry(result: PublishedResult, *, rules: Protocol) -> Entry:
     """The row of a result that is printed in a paper, on a board of this protocol."""
     return Entry(
         kind="published",
+        slug=result.slug,
         method=result.method_name,
         team=result.authors,
         description=result.description,

@@ -17,12 +17,14 @@ from django.db import transaction
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods.methods import require_team
-from leaderboard.models import Method, Team, User, Visibility
+from leaderboard.models import Method, PublishedResult, Team, User, Visibility
 from leaderboard.people import teams
+from leaderboard.people.names import MAX_NAME, confusable_with
 
 log = structlog.get_logger(__name__)
 
 MAX_ANONYMITY = timedelta(days=730)
+_ROOM_FOR_A_NUMBER = 10
 
 
 def choices(method: Method) -> tuple[Visibility, ...]:
@@ -83,6 +85,7 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
         )
     if visibility == Visibility.PUBLIC:
         teams.require_showable(method.team)
+        _require_name_of_its_own(method)
     if reveal_at is None:
         return
     if visibility != Visibility.ANONYMOUS:
@@ -127,8 +130,44 @@ def reveal_due(*, now: datetime) -> int:
                 continue
             # Read only now: the method may have moved to another team until it was locked.
             teams.show_name_in_any_case(Team.objects.get(methods=method_id))
+            _number_taken_name(Method.objects.get(pk=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
             versions.changed_by_methods([method_id], is_addition=True)
         n_revealed += 1
     return n_revealed
+
+
+def _require_name_of_its_own(method: Method) -> None:
+    """Raise `Refused` where readers would take the method for another row of the boards.
+
+    CI jobs name the method that they compare with: a second row of that name would break them.
+    """
+    twin = _public_twin(method.name, but=method)
+    if twin is not None:
+        raise Refused(
+            "name-taken",
+            f"The boards already have a method {twin!r}, and {method.name!r} looks like it; expected another "
+            "name. Rename your method before you publish it.",
+            field="visibility",
+        )
+
+
+def _number_taken_name(method: Method) -> None:
+    """Add a number to the name of a method that becomes public by itself, where the name is taken."""
+    before, number = method.name, 1
+    while _public_twin(method.name, but=method):
+        number += 1
+        method.name = f"{before[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
+    if number > 1:
+        method.save(update_fields=["name"])
+        details = {"reason": "another method used this name on the boards first"}
+        names = {"from": before, "to": method.name}
+        audit.record(verb="renamed", noun="Method", noun_id=method.pk, details=details, names=names)
+
+
+def _public_twin(name: str, *, but: Method) -> str | None:
+    """A public method or a quoted row whose name looks like this one."""
+    quoted = PublishedResult.objects.filter(replaced_at=None).values_list("method_name", flat=True)
+    public = Method.objects.filter(visibility=Visibility.PUBLIC).exclude(pk=but.pk)
+    return confusable_with(name, [*quoted, *public.values_list("name", flat=True)])

@@ -165,6 +165,18 @@ def test_file_may_be_held_against_a_row_of_a_paper(tsttc: Tsttc, site: RecordedS
     assert "is quoted from a paper" in undecided.stderr
 
 
+def test_row_of_a_paper_comes_before_methods_that_took_its_name(tsttc: Tsttc, site: RecordedSite) -> None:
+    quoted = entry("Deep Scale", 14.4, method_id=None, kind="published") | {"id": "published:deep-scale"}
+    taken = entry("Deep Scale", 99.0, method_id=OTHER) | {"id": OTHER}
+    site.put(BOARD, board(taken, quoted, taken | {"method_id": METHOD, "id": METHOD}))
+    scored(site, mid=15.0)
+    for name in ("Deep Scale", "published:deep-scale"):
+        result = submit(tsttc, "--fail-if-worse-than", name)
+        assert result.exit_code == 6, result.stderr
+        assert "MiD is 15.00, and Deep Scale has 14.4" in result.stderr
+    assert submit(tsttc, "--fail-if-worse-than", OTHER).exit_code == 0
+
+
 def test_first_file_of_a_method_has_nothing_of_its_own_to_be_worse_than(
     tsttc: Tsttc, site: RecordedSite
 ) -> None:

@@ -147,7 +147,8 @@ def test_a_name_changes_until_it_is_public_and_is_no_other_ones_of_the_team(
     with pytest.raises(Refused, match="looks like 'Foo', the name of a method of your team"):
         methods.edit(method=hidden, changes={"name": "F0o"}, actor=owner)
     assert methods.edit(method=hidden, changes={"name": "Seen"}, actor=owner).name == "Seen"
-    assert builders.submit(stranger, data, method="F0o").method.team != method.team
+    other = builders.submit(stranger, data, method="F0o", visibility="PRIVATE").method
+    assert other.team != method.team
     with pytest.raises(Refused, match="looks like"):
         builders.submit(owner, data, method="FOO")
 

@@ -25,6 +25,7 @@ from leaderboard.models import (
     User,
     Visibility,
 )
+from leaderboard.people import teams
 from leaderboard.submissions import submissions
 from leaderboard.workers import queue
 from tests import builders, pages
@@ -336,3 +337,57 @@ def test_nonsense_is_refused_and_changes_nothing(
     status, told = ask(client, method, builders.token(owner), body)
     assert status in {400, 422}, told
     assert Method.objects.get().visibility == Visibility.PRIVATE
+
+
+# --- names of others ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["Deep Scale", "deep  scale", "Deep Scаle"])
+def test_method_cannot_be_published_under_the_name_of_a_quoted_row(
+    client: Client, method: Method, owner: User, name: str
+) -> None:
+    Method.objects.filter(pk=method.pk).update(name=name)
+    method.refresh_from_db()
+    client.force_login(owner)
+    with pytest.raises(Refused) as refused:
+        change(method, Visibility.PUBLIC, owner)
+    assert (refused.value.code, refused.value.field) == ("name-taken", "visibility")
+    assert "The boards already have a method 'Deep Scale'" in str(refused.value)
+    page = client.get(f"/methods/{method.pk}/visibility/?visibility=PUBLIC")
+    assert page.status_code == 422
+    assert b"The boards already have a method" in page.content
+    method.refresh_from_db()
+    assert method.visibility == Visibility.PRIVATE
+
+
+def test_method_cannot_be_published_under_the_name_of_another_public_method(
+    method: Method, owner: User, stranger: User
+) -> None:
+    change(method, Visibility.PUBLIC, owner)
+    other = Method.objects.create(team=teams.team_of(user=stranger), name="Secret Sauce")
+    with pytest.raises(Refused, match="'Secret sauce', and 'Secret Sauce' looks like it"):
+        change(other, Visibility.PUBLIC, stranger)
+    # Under a pseudonym it takes nobody's name.
+    assert change(other, Visibility.ANONYMOUS, stranger).visibility == Visibility.ANONYMOUS
+
+
+def test_taken_name_gets_a_number_where_a_method_becomes_public_by_itself(
+    method: Method, owner: User
+) -> None:
+    now = timezone.now()
+    change(method, Visibility.ANONYMOUS, owner, reveal_at=now + timedelta(days=1))
+    Method.objects.filter(pk=method.pk).update(name="Deep Scale")
+    assert visibility.reveal_due(now=now + timedelta(days=2)) == 1
+    method.refresh_from_db()
+    assert (method.name, method.visibility) == ("Deep Scale 2", Visibility.PUBLIC)
+    renamed = AuditEvent.objects.get(verb="renamed", noun_id=str(method.pk))
+    assert renamed.details["reason"] == "another method used this name on the boards first"
+
+
+def test_quoted_row_has_an_id_that_no_method_can_take(client: Client, method: Method, owner: User) -> None:
+    change(method, Visibility.PUBLIC, owner)
+    entries = client.get("/api/v1/splits/test/board").json()["entries"]
+    ids = {entry["method"]: entry["id"] for entry in entries}
+    assert ids["Deep Scale"] == "published:deep-scale"
+    assert ids["Secret sauce"] == str(method.pk)
+    assert len(set(ids.values())) == len(entries)
