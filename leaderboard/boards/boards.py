@@ -210,7 +210,7 @@ def public_rows(
 ) -> tuple[Entry, ...]:
     """The rows that everybody sees, ranked and marked, untouched by readers and private methods.
 
-    `supposed` is a method with a visibility that it does not have yet: the rows as they would be then.
+    `assuming_visible` is a method with a visibility that it does not have yet: the rows would be these then.
     """
     quoted = PublishedResult.objects.on_board(split, edition, at=at)
     entries = [published_entry(result, rules=rules_of(edition)) for result in quoted]

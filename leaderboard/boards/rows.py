@@ -207,8 +207,10 @@ def submitted_entry(
 def public_reason(problems: Iterable[Mapping[str, str]]) -> str:
     """The public code of the reason why an edition cannot score a file that another one scored.
 
-    >>> reason_told([{"code": "not-finite"}, {"code": "missing-keys"}]), reason_told([{"code": "not-finite"}])
-    ('missing-keys', 'other')
+    >>> public_reason([{"code": "not-finite"}, {"code": "missing-keys"}])
+    'missing-keys'
+    >>> public_reason([{"code": "not-finite"}])
+    'other'
     """
     codes = (problem["code"] for problem in problems)
     return next((code for code in codes if code in _REASONS_TOLD), OTHER_REASON)

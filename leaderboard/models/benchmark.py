@@ -172,7 +172,7 @@ class Split(QuotaRules):
 
     @property
     def has_ground_truth(self) -> bool:
-        """Whether there is something to score against; `quotas.deadlines` says when files are taken."""
+        """Whether there is something to score against; `quotas.admissions` says when files are taken."""
         return self.published_edition_id is not None
 
 

@@ -9,7 +9,7 @@ from datetime import UTC, datetime, time
 def truncate_to_day(at: datetime, *, is_masked: bool) -> datetime:
     """The time as everybody is told it: of an anonymous method the beginning of its day.
 
-    >>> told(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
+    >>> truncate_to_day(datetime(2026, 11, 21, 15, 4, 5, tzinfo=UTC), is_masked=True).isoformat()
     '2026-11-21T00:00:00+00:00'
     """
     return datetime.combine(at.astimezone(UTC).date(), time.min, tzinfo=UTC) if is_masked else at

@@ -50,7 +50,7 @@ class MethodQuerySet(models.QuerySet["Method"]):
     def shown(self, *, at: datetime | None = None) -> Self:
         """Methods that everybody sees, under their name or a pseudonym; with `at` those shown by then.
 
-        Anonymous ones by the end of that day (see leaderboard/days.py).
+        Anonymous ones by the end of that day (see leaderboard/models/days.py).
         """
         rows = self.exclude(visibility=Visibility.PRIVATE)
         if at is None:

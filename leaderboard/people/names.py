@@ -35,9 +35,9 @@ _MAX_MARKS = 2
 def skeleton(name: str) -> str:
     """What a name looks like, as a key: names with the same one are taken for each other.
 
-    >>> look("Foo  Lab") == look("ｆｏｏ lab") == look("Fоο Lаb")
+    >>> skeleton("Foo  Lab") == skeleton("ｆｏｏ lab") == skeleton("Fоο Lаb")
     True
-    >>> look("Foo Lab 2") == look("Foo Lab 3")
+    >>> skeleton("Foo Lab 2") == skeleton("Foo Lab 3")
     False
     """
     folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name))
@@ -45,7 +45,7 @@ def skeleton(name: str) -> str:
 
 
 def clean_name(field: str, text: str) -> str:
-    """A name as it is kept and shown. Raises `texts.Refused` for what is none, or hides what it says."""
+    """A name as it is kept and shown. Raises `Refused` for what is none, or hides what it says."""
     text = clean_text(field, _with_plain_spaces(text), limit=MAX_NAME)
     n_marks = 0
     for character in text:
@@ -80,7 +80,7 @@ def clean_name(field: str, text: str) -> str:
 
 
 def require_rename_possible(*, renamed_at: datetime | None, now: datetime) -> None:
-    """Raise `texts.Refused` for what was renamed lately: each new name voids what is remembered."""
+    """Raise `Refused` for what was renamed lately: each new name voids what is remembered."""
     if renamed_at is None or now >= renamed_at + settings.RENAME_AFTER:
         return
     again_at = renamed_at + settings.RENAME_AFTER

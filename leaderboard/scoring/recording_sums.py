@@ -68,7 +68,7 @@ def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> Non
 
 
 def load(edition: Edition, *, file: SentFile) -> Floats | None:
-    """The sums that were kept, (G, 10); None if they are not all there."""
+    """The sums that were kept, (G, columns); None if they are not all there."""
     shape = edition.ground_truth.n_recordings, len(edition.rules.score_names)
     try:
         data = path(edition, file=file).read_bytes()
@@ -82,7 +82,7 @@ def load(edition: Edition, *, file: SentFile) -> Floats | None:
 def sums_of(edition: Edition, *, file: SentFile) -> Floats:
     """The sums of a scored file, kept or made anew, (G, columns).
 
-    Raises what `aligned.read` raises.
+    Raises what `sandbox.read` raises.
     """
     kept = load(edition, file=file)
     if kept is not None:

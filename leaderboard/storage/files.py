@@ -191,7 +191,7 @@ def save_predictions(
 
 
 def require_unchanged(upload: "File[bytes]", *, digest: str) -> None:
-    """Keep an uploaded file again if it was removed meanwhile; for whoever has `cleaning.hold`."""
+    """Keep an uploaded file again if it was removed meanwhile; the caller holds `orphans.lock`."""
     name = predictions_name(digest)
     if not store().exists(name):
         upload.seek(0)
