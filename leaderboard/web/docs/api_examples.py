@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from textwrap import indent
 from typing import Any, Final
 from urllib.parse import urlencode
 
@@ -68,6 +69,15 @@ class Example:
     command: str = ""
     python: str = ""
     by: str = field(default="owner")  # who asks: "maintainer" has a token of theirs
+
+    def script(self, site: str) -> str:
+        """The Python that runs as it stands; empty where there is none."""
+        if not self.python:
+            return ""
+        token = ', token=os.environ["TSTTC_TOKEN"]' if self.call.has_token else ""
+        imports = "import os\n\nimport evaluator\n\n" if token else "import evaluator\n\n"
+        lines = self.python if "\n" in self.python else f"print({self.python})"
+        return f'{imports}with evaluator.Client(url="{site}"{token}) as client:\n{indent(lines, "    ")}'
 
 
 def _get(path: str, *query: tuple[str, str], has_token: bool = False) -> Call:
@@ -183,7 +193,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         _send("POST", "submissions", form=_FORM),
         'tsttc submit predictions.json --split val --method "Deep TTC" --note "lr 1e-4" --wait',
         'with open("predictions.json", "rb") as file:\n'
-        '    client.submit(file, filename="predictions.json", split="val", method="Deep TTC")',
+        '    print(client.submit(file, filename="predictions.json", split="val", method="Deep TTC"))',
     ),
     "withdraw": Example(
         _send("POST", f"submissions/{SUBMISSION}/withdraw"),
@@ -225,7 +235,7 @@ def shown(operation_id: str) -> dict[str, Any]:
     return {
         "curl": example.call.curl(settings.SITE_URL),
         "command": example.command,
-        "python": example.python,
+        "python": example.script(settings.SITE_URL),
         "answer": _answer(recorded["answer"]),
         "refused_curl": example.refused.curl(settings.SITE_URL),
         "refused": _answer(recorded["refused"]),
