@@ -40,7 +40,19 @@ class Policy:
     quota_rejected_limit: int | None = 20
 
 
+HIDDEN_QUOTA: Final[Mapping[str, Any]] = {
+    "quota_limit": 3,
+    "quota_window": timedelta(days=30),
+    "quota_min_gap": timedelta(hours=24),
+}
+"""The quota of a split with hidden ground truth, unless maintainers choose another one."""
+
 NAMES: Final = tuple(field.name for field in fields(Policy))
+
+
+def first_policy(*, title: str = "", is_hidden: bool) -> Policy:
+    """The policy with which a new split starts: on no page, and with a quota where its values are hidden."""
+    return Policy(title=title, listing=Listing.OFF, **(HIDDEN_QUOTA if is_hidden else {}))
 
 
 def policy_of(split: Split) -> Policy:
@@ -62,6 +74,8 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
             raise Refused("unknown-split", f"There is no split {split_name[:80]!r}; expected one of {known}.")
         before = policy_of(split)
         checked(split, policy)
+        if before.listing == Listing.OFF:
+            require_listable(split)
         after = policy_of(split)
         changes = changed(before, after)
         if changes:
@@ -120,6 +134,17 @@ def checked(split: Split, policy: Policy) -> Split:
             "bad-value", error.message_dict[field][0], field=field if field in NAMES else ""
         ) from None
     return split
+
+
+def require_listable(split: Split) -> None:
+    """Raise `Refused` where a split would appear on pages before it has ground truth."""
+    if split.listing != Listing.OFF and not split.has_ground_truth:
+        raise Refused(
+            "bad-value",
+            f"The split {split.pk!r} has no ground truth and would be listed; expected it to be switched off "
+            f"until its ground truth is imported (manage.py import_truth {split.pk} PATH).",
+            field="listing",
+        )
 
 
 def _out_of_range(policy: Policy) -> dict[str, str]:

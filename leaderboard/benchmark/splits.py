@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 from typing import Any, Final
 
@@ -13,6 +13,7 @@ from django.utils import timezone
 from evaluator.papers.tables import published_tables
 from leaderboard import audit, versions
 from leaderboard.benchmark import papers
+from leaderboard.benchmark.policy import HIDDEN_QUOTA
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import PublishedResult, Split, User
 from leaderboard.models.benchmark import SINCE_EVER
@@ -28,9 +29,7 @@ SPLITS: tuple[dict[str, Any], ...] = (
         "position": 0,
         "is_hidden": True,
         "decimals": 1,
-        "quota_limit": 3,
-        "quota_window": timedelta(days=30),
-        "quota_min_gap": timedelta(hours=24),
+        **HIDDEN_QUOTA,
     },
     {
         "name": "val",

@@ -8,7 +8,7 @@ from django.db import transaction
 from django.db.models import Max
 
 from leaderboard import audit, versions
-from leaderboard.benchmark.policy import Policy, checked
+from leaderboard.benchmark.policy import Policy, checked, require_listable
 from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Publication, Split, User
@@ -72,6 +72,8 @@ def add_split(
             raise Refused(
                 "name-taken", f"There is a split {name!r} already; expected another name.", field="name"
             )
+        if other is None:
+            require_listable(split)
         split.save(force_insert=True)
         audit.record(
             verb="added",

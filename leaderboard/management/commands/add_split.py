@@ -1,13 +1,16 @@
 """`manage.py add_split NAME --title TITLE (--hidden | --open | --same-truth-as SPLIT) …`."""
 
 from argparse import ArgumentParser
+from dataclasses import replace
 from typing import Any
 
 from django.utils import timezone
 
-from leaderboard.benchmark.policy import Policy
+from leaderboard.benchmark.policy import first_policy
 from leaderboard.editions import new_splits
 from leaderboard.management.arguments import RefusingCommand, add_to, given
+from leaderboard.models import Split
+from leaderboard.models.benchmark import Listing
 
 
 class Command(RefusingCommand):
@@ -26,7 +29,8 @@ class Command(RefusingCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Make it, and say what comes next."""
-        policy = Policy(**{"title": "", **given(options)})
+        is_open = options["open"] or not _is_hidden(options["same_truth_as"])
+        policy = replace(first_policy(is_hidden=not is_open), **given(options))
         split = new_splits.add_split(
             name=options["name"],
             policy=policy,
@@ -38,3 +42,10 @@ class Command(RefusingCommand):
         self.stdout.write(f"The split {split.pk} is added.")
         if split.published_edition is None:
             self.stdout.write(f"Import its ground truth: manage.py import_truth {split.pk} PATH")
+        if split.listing == Listing.OFF:
+            self.stdout.write(f"It is on no page until: manage.py change_split {split.pk} --listing listed")
+
+
+def _is_hidden(name: str) -> bool:
+    """Whether the values of the split are hidden; of none or an unknown one, as if they were."""
+    return not Split.objects.filter(pk=name, is_hidden=False).exists()

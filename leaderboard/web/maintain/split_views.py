@@ -9,7 +9,6 @@ from django.views.decorators.http import require_safe
 
 from evaluator.counting import counted
 from leaderboard.benchmark import policy
-from leaderboard.benchmark.policy import Policy
 from leaderboard.editions import new_splits
 from leaderboard.mails import announcements
 from leaderboard.mails.announcements import Announcement
@@ -41,7 +40,7 @@ def splits(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def add(request: HttpRequest) -> HttpResponse:
     """Make a split."""
-    form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(Policy(title="")))
+    form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(policy.first_policy(is_hidden=True)))
     if form.is_valid():
         with form.refusals():
             split = new_splits.add_split(now=timezone.now(), actor=maintainer_of(request), **form.wanted())

@@ -59,6 +59,7 @@ def challenge(edition: Edition) -> Split:
     call_command(
         *("add_split", "challenge", "--title", "Challenge", "--same-truth-as", "test"),
         *("--closes", "2099-03-01 23:59 Europe/Berlin", "--limit", "1", "--window", "7 days"),
+        *("--min-gap", "0 hours", "--listing", "listed"),
         stdout=StringIO(),
     )
     return Split.objects.get(pk="challenge")
@@ -110,6 +111,62 @@ def test_a_corrected_board_leaves_a_challenge_on_the_same_truth_as_it_is_until_i
     values = [client.get(f"/api/v1/splits/{split}/board").json() for split in ("test", "challenge")]
     assert len({own_score(board) for board in values}) == 1
     assert own_score(before) != own_score(values[0])
+
+
+@pytest.mark.parametrize("origin", [["--hidden"], ["--same-truth-as", "test"]])
+def test_new_split_on_hidden_values_starts_off_the_pages_with_the_quota_of_the_test_split(
+    edition: Edition, client: Client, origin: list[str]
+) -> None:
+    said = StringIO()
+    call_command("add_split", "winter", "--title", "Winter", *origin, stdout=said)
+    winter = Split.objects.get(pk="winter")
+    quota = (winter.quota_limit, winter.quota_window, winter.quota_min_gap, winter.quota_rejected_limit)
+    assert quota == (3, timedelta(days=30), timedelta(hours=24), 20)
+    assert winter.listing == "OFF"
+    assert "manage.py change_split winter --listing listed" in said.getvalue()
+    for address in ("/", "/board/test/", "/docs/", "/compare/", "/api/v1/splits", "/sitemap.xml"):
+        assert b"inter" not in client.get(address).content.replace(b"interval", b"").replace(
+            b"Winterthur", b""
+        )
+
+
+def test_new_open_split_has_no_limit_unless_one_is_given(benchmark: None) -> None:
+    call_command("add_split", "night", "--title", "Night", "--open", stdout=StringIO())
+    assert Split.objects.get(pk="night").quota_limit is None
+    call_command("add_split", "day", "--title", "Day", "--hidden", "--limit", "none", stdout=StringIO())
+    assert Split.objects.get(pk="day").quota_limit is None
+
+
+def test_form_of_a_new_split_begins_with_the_quota_of_the_test_split_and_switched_off(
+    keeper: Client, edition: Edition
+) -> None:
+    form = get(keeper, ADD).one("main")
+    values = {
+        each.attributes["name"]: each.attributes.get("value")
+        for each in form.all("input")
+        if "name" in each.attributes
+    }
+    assert (values["quota_limit"], values["quota_window"], values["quota_min_gap"]) == (
+        "3",
+        "30 days",
+        "24 hours",
+    )
+    chosen = [each.attributes["value"] for each in form.all("option") if "selected" in each.attributes]
+    assert "OFF" in chosen
+
+
+def test_split_without_ground_truth_cannot_be_listed(
+    keeper: Client, edition: Edition, tmp_path: Path
+) -> None:
+    answer = keeper.post(ADD, NEW | {"truth": "hidden"})
+    assert answer.status_code == 422
+    assert "has no ground truth and would be listed" in pages.page(answer).one("main").text
+    assert keeper.post(ADD, NEW | {"truth": "hidden", "listing": "OFF"}).status_code == 302
+    with pytest.raises(Refused, match="has no ground truth and would be listed") as refused:
+        change("challenge-2027", listing="LISTED")
+    assert refused.value.field == "listing"
+    builders.import_truth(tmp_path, split="challenge-2027", seed=1)
+    assert change("challenge-2027", listing="LISTED").listing == "LISTED"
 
 
 def own_score(board: dict[str, Any]) -> float:
