@@ -147,6 +147,7 @@ document.addEventListener("drop", (event) => {
 // --- sending ---------------------------------------------------------------------------------------------------
 
 let isBusy = false;
+let hasSessionEnded = false;
 
 function busy(is) {
   isBusy = is;
@@ -184,6 +185,7 @@ function received(request) {
   busy(false);
   const answer = new DOMParser().parseFromString(request.responseText, "text/html");
   if (answer.getElementById("submit")) correct(answer);
+  else if (request.status === 403 || new URL(request.responseURL).pathname !== location.pathname) sessionEnded();
   else replace(answer);
 }
 
@@ -206,6 +208,28 @@ function correct(answer) {
   (first ?? button).focus();
 }
 
+// What was filled in stays here. After signing in elsewhere the form needs a token of the new session.
+function sessionEnded() {
+  hasSessionEnded = true;
+  const link = element("a", "Sign in (new tab)");
+  link.href = `/accounts/login/?next=${encodeURIComponent(location.pathname)}`;
+  link.target = "_blank";
+  const words = element("p", "Your session has ended, and the file was not sent. ");
+  words.append(link, ", then press Submit again here: everything that you filled in is kept.");
+  complain(words);
+  link.focus();
+}
+
+async function renewToken() {
+  const answer = new DOMParser().parseFromString(await (await fetch(location.pathname)).text(), "text/html");
+  const fresh = answer.querySelector("#submit input[name=csrfmiddlewaretoken]");
+  if (!fresh) return false;
+  form.querySelector("input[name=csrfmiddlewaretoken]").value = fresh.value;
+  hasSessionEnded = false;
+  byId("form-errors").replaceChildren();
+  return true;
+}
+
 // Any other answer is a page of its own.
 function replace(answer) {
   const main = answer.querySelector("main");
@@ -218,11 +242,14 @@ function replace(answer) {
 function lost() {
   busy(false);
   progress("", 0);
-  const words = "The connection was lost. You can submit the same file again safely: it counts once.";
-  const told = element("div", "", "form-errors");
-  told.setAttribute("role", "alert");
-  told.append(element("p", words));
-  byId("form-errors").replaceChildren(told);
+  complain(element("p", "The connection was lost. You can submit the same file again safely: it counts once."));
+}
+
+function complain(words) {
+  const alert = element("div", "", "form-errors");
+  alert.setAttribute("role", "alert");
+  alert.append(words);
+  byId("form-errors").replaceChildren(alert);
 }
 
 // A file is sent once its check has ended; one with problems or warnings only if that is asked for once they are in
@@ -239,7 +266,9 @@ form.addEventListener("submit", async (event) => {
       return;
     }
   }
-  send();
+  if (!hasSessionEnded || (await renewToken().catch(() => false))) return send();
+  busy(false);
+  sessionEnded();
 });
 window.addEventListener("pageshow", () => {
   busy(false);

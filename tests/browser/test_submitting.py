@@ -348,6 +348,31 @@ def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: eva
     assert "POST" not in sent
 
 
+def test_form_outlives_a_session_that_has_ended(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
+    sign_up(page, email="late@example.org", name="Late")
+    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.get_by_label("Method", exact=True).fill("Late net")
+    page.get_by_label("Prediction file").set_input_files(
+        {"name": "p.json", "mimeType": "application/json", "buffer": predictions(truth, factor=1.07)}
+    )
+    expect(page.locator("#checked .good")).to_be_visible()
+    page.context.clear_cookies(name="sessionid")
+    page.get_by_role("button", name="Submit").click()
+    alert = page.get_by_role("alert")
+    expect(alert).to_contain_text("Your session has ended, and the file was not sent. Sign in (new tab)")
+    assert page.get_by_label("Method", exact=True).input_value() == "Late net"
+    with page.expect_popup() as opened:
+        alert.get_by_role("link").click()
+    tab = opened.value
+    tab.get_by_label("Email").fill("late@example.org")
+    tab.get_by_label("Password", exact=True).fill(PASSWORD)
+    tab.get_by_role("button", name="Sign in").click()
+    tab.wait_for_url("**/submit/")
+    page.get_by_role("button", name="Submit").click()
+    page.wait_for_url("**/submissions/*/")
+    expect(page.get_by_role("heading", level=1)).to_contain_text("Late net")
+
+
 def test_everything_works_without_script(new_page: NewPage, site: Site, truth: evaluator.GroundTruth) -> None:
     page = new_page(java_script_enabled=False)
     sign_up(page, email="plain@example.org", name="Plain")
