@@ -7,6 +7,7 @@ import evaluator
 from tests.browser.chromium import NARROW, WIDE, tab_to
 from tests.browser.conftest import NewPage
 from tests.browser.inspection import draw_all
+from tests.journeys.production import Site
 
 pytestmark = pytest.mark.browser
 
@@ -33,6 +34,36 @@ def test_first_tab_offers_to_skip_to_the_content(page: Page, truth: evaluator.Gr
     tab_to(page, "Skip to the content")
     page.keyboard.press("Enter")
     assert page.evaluate("document.activeElement.id") == "main"
+
+
+FIVE_SPLITS = """
+from leaderboard.models import Split
+for name, title in (("late-1", "Winter challenge 2027, night drives"), ("late-2", "Summer challenge 2027")):
+    Split.objects.get_or_create(name=name, defaults={"title": title})
+"""
+NO_MORE = "from leaderboard.models import Split; Split.objects.filter(name__startswith='late-').delete()"
+
+
+def test_five_splits_fit_a_phone(new_page: NewPage, site: Site, truth: evaluator.GroundTruth) -> None:
+    site.manage("shell", "-v0", "-c", FIVE_SPLITS)
+    try:
+        page = new_page(viewport={"width": 390, "height": 800})
+        for address in ("/board/late-1/", "/board/late-1/charts/"):
+            page.goto(address)
+            assert page.evaluate("document.documentElement.scrollWidth") <= 390, address
+            for link in page.locator("nav.splits a").all():
+                box = link.bounding_box()
+                assert box is not None
+                assert box["x"] + box["width"] <= 390
+    finally:
+        site.manage("shell", "-v0", "-c", NO_MORE)
+
+
+def test_meanings_of_codes_take_the_width_of_the_page(page: Page, truth: evaluator.GroundTruth) -> None:
+    page.goto("/docs/")
+    meaning = page.locator("dl.codes dd").first.bounding_box()
+    assert meaning is not None
+    assert meaning["width"] > 400
 
 
 def test_what_has_the_focus_can_be_seen(page: Page, truth: evaluator.GroundTruth) -> None:
