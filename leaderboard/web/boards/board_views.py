@@ -55,6 +55,7 @@ def draw_board(
             latest_day=now.date() if edition is None and split.published_edition else None,
         ),
         "exports": export_views.offers(shown, edition, query),
+        "n_withdrawn": sum(entry.withdrawn_at is not None for entry in shown.unfiltered),
     }
     # Who types into the form is no program that got its request wrong: the answer stands at the field.
     status = 400 if faults and not request.headers.get("HX-Request") else 200

@@ -292,6 +292,11 @@ def test_withdrawn_entry_leaves_its_mark_in_every_edition(
     withdrawn_at = Submission.objects.get(pk=entries[0].pk).withdrawn_at
     assert row.one("div", class_="name").text == f"M1.05 withdrawn {withdrawn_at:%Y-%m-%d}"
     assert {cell.text for cell in row.all("td")} - {""} == {"–"}
+    if address != "/board/test/":
+        notices = [each.text for each in get(client, address).all("p", class_="notice")]
+        assert "1 row was withdrawn by its team and has no values any more." in notices
+    promise = "a submission that was withdrawn keeps its row, without values."
+    assert promise in get(client, EDITIONS).one("p", class_="lead").text
 
 
 def test_every_page_that_stays_has_its_own_canonical_address(client: Client, replaced: Edition) -> None:
