@@ -19,7 +19,15 @@ from django.db.models import Case, Exists, F, OuterRef, QuerySet, Subquery, When
 from django.db.models.functions import Now
 
 from leaderboard.db import repeated
-from leaderboard.models import BoardVersion, Evaluation, Snapshot, Split, Submission, Visibility
+from leaderboard.models import (
+    BoardVersion,
+    Evaluation,
+    SiteAnnouncement,
+    Snapshot,
+    Split,
+    Submission,
+    Visibility,
+)
 from leaderboard.ops import broker
 
 # Names who changes boards among PostgreSQL's advisory locks: "board" in ASCII.
@@ -154,13 +162,14 @@ def changed_everywhere() -> None:
 
 
 def times_passed(*, now: datetime) -> int:
-    """Count for each split that it has opened or closed since, or that its announcement has ended.
+    """Count for each split that it has opened or closed since, or that an announcement has ended.
 
     Its pages say so. Returns how many had.
     """
     n_told = 0
-    for split in Split.objects.exclude(opens_at=None, closes_at=None, announcement_ends_at=None):
-        times = (split.opens_at, split.closes_at, split.announcement_ends_at)
+    site_ends_at = SiteAnnouncement.objects.values_list("ends_at", flat=True).first()
+    for split in Split.objects.all():
+        times = (split.opens_at, split.closes_at, split.announcement_ends_at, site_ends_at)
         n_passed = sum(at is not None and at <= now for at in times)
         known = BoardVersion.objects.filter(split=split).values_list("n_times_passed", flat=True).first()
         if n_passed != (known or 0):

@@ -18,6 +18,7 @@ from evaluator.metrics.protocol import (
     metric_of,
 )
 from evaluator.metrics.protocol import Interval as TTCRange
+from leaderboard.boards import snapshots
 from leaderboard.boards.boards import Board
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.methods import details
@@ -218,9 +219,12 @@ class SplitSerializer(serializers.Serializer[Split]):
     )
     opens_at = serializers.DateTimeField(allow_null=True, help_text=OPENS_AT)
     closes_at = serializers.DateTimeField(allow_null=True, help_text=CLOSES_AT)
-    announcement = serializers.SerializerMethodField(help_text="Line of text on its pages now; empty: none.")
+    announcement = serializers.SerializerMethodField(
+        help_text="Text on its pages now: the line of the site and that of the split; empty: none."
+    )
     announcement_ends_at = serializers.DateTimeField(
-        allow_null=True, help_text="When the last announcement ends or ended; null: there was none."
+        allow_null=True,
+        help_text="When the split's own last announcement ends or ended; null: there was none.",
     )
     needs_admission = serializers.BooleanField(help_text="Whether only admitted teams may submit.")
     is_hidden = serializers.BooleanField(help_text="Whether the true values are hidden.")
@@ -240,8 +244,10 @@ class SplitSerializer(serializers.Serializer[Split]):
     )
 
     def get_announcement(self, split: Split) -> str:
-        """The line, unless it has ended."""
-        return split.announcement_at(timezone.now())
+        """The lines that have not ended."""
+        now = timezone.now()
+        lines = (snapshots.site_line_of([split], now=now), split.announcement_at(now))
+        return " ".join(line for line in lines if line)
 
     def get_is_open(self, split: Split) -> bool:
         """Whether there is ground truth and now is between opening and closing."""

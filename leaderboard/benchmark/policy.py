@@ -1,7 +1,7 @@
 """The policy of a split: what maintainers decide about it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, fields
 from datetime import datetime, timedelta
 from typing import Any, Final
 
@@ -10,8 +10,8 @@ from django.db import transaction
 
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
-from leaderboard.models import Split, User
-from leaderboard.models.benchmark import Listing
+from leaderboard.models import SiteAnnouncement, Split, User
+from leaderboard.models.benchmark import NO_END, NO_TEXT, Listing
 from leaderboard.models.quotas import excess
 
 MAX_DESCRIPTION: Final = 1000
@@ -92,10 +92,18 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
 
 
 def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User | None) -> None:
-    """Show one line on the pages of every split until it ends; without a text and an end, none.
+    """Show one line on all pages about splits until it ends; without a text, none.
 
-    Raises `NotMaintainer`, and `Refused` for a text without an end and for an end that is over.
+    The lines of single splits stay beside it. Raises `NotMaintainer`, and `Refused` for a text without an end
+    and for an end that is over.
     """
+    require_maintainer(actor, to="announce something")
+    text = " ".join(clean_text("announcement", text, limit=300, required=False).split())
+    if ends_at is None:
+        if text:
+            raise Refused("bad-value", NO_END, field="announcement_ends_at")
+    elif not text:
+        raise Refused("bad-value", NO_TEXT, field="announcement")
     if ends_at is not None and ends_at <= now:
         raise Refused(
             "bad-value",
@@ -104,9 +112,17 @@ def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User 
             field="announcement_ends_at",
         )
     with transaction.atomic():
-        for split in Split.objects.order_by("name"):
-            wanted = replace(policy_of(split), announcement=text, announcement_ends_at=ends_at)
-            change(split_name=split.pk, policy=wanted, actor=actor)
+        SiteAnnouncement.objects.all().delete()
+        if ends_at is not None:
+            SiteAnnouncement.objects.create(text=text, ends_at=ends_at)
+        audit.record(
+            verb="announced",
+            noun="SiteAnnouncement",
+            noun_id="site",
+            actor=actor,
+            details={"text": text, "ends_at": ends_at.isoformat() if ends_at else None},
+        )
+        versions.changed_everywhere()
 
 
 def checked(split: Split, policy: Policy) -> Split:

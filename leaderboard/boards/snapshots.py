@@ -36,7 +36,17 @@ from leaderboard.boards.snapshot_store import (
     decode,
     encode,
 )
-from leaderboard.models import Edition, Method, Score, Snapshot, Split, Status, Visibility, days
+from leaderboard.models import (
+    Edition,
+    Method,
+    Score,
+    SiteAnnouncement,
+    Snapshot,
+    Split,
+    Status,
+    Visibility,
+    days,
+)
 from leaderboard.models.benchmark import Listing
 from leaderboard.models.methods import MethodQuerySet
 
@@ -80,6 +90,15 @@ def splits_of(request: HttpRequest) -> list[Split]:
     return _shown(_all_splits_of(request))
 
 
+def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
+    """The announcement of the site, as `splits_of` has read it; empty once it has ended."""
+    for split in splits:
+        ends_at: datetime | None = getattr(split, "site_line_ends_at", None)
+        if ends_at is not None and now < ends_at:
+            return str(split.site_line)  # type: ignore[attr-defined]  # an annotation
+    return ""
+
+
 def state_of(request: HttpRequest) -> int:
     """The sum of the versions of all boards as this request found them; see `versions.state`."""
     return versions.state_of(_all_splits_of(request))
@@ -92,6 +111,7 @@ def numbers_of(request: HttpRequest) -> dict[str, int]:
 
 def _all_splits() -> list[Split]:
     rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
+    rows = rows.annotate(**SiteAnnouncement.of_every_row())
     return list(_stamped(rows, to_edition="published_edition__"))
 
 

@@ -16,6 +16,10 @@ from leaderboard.models.quotas import QuotaRules
 SINCE_EVER = datetime(1970, 1, 1, tzinfo=UTC)
 
 
+NO_END = "The announcement has no end; expected an end beside its text."
+NO_TEXT = "The announcement has no text; expected a text beside its end."
+
+
 class Listing(models.TextChoices):
     """Where a split is found."""
 
@@ -124,11 +128,9 @@ class Split(QuotaRules):
         """Raise `ValidationError` for rules that make no sense, alone or beside the split it shares with."""
         super().clean()
         if self.announcement and self.announcement_ends_at is None:
-            message = "The announcement has no end; expected an end beside its text."
-            raise ValidationError({"announcement_ends_at": message})
+            raise ValidationError({"announcement_ends_at": NO_END})
         if self.announcement_ends_at is not None and not self.announcement:
-            message = "The announcement has no text; expected a text beside its end."
-            raise ValidationError({"announcement": message})
+            raise ValidationError({"announcement": NO_TEXT})
         other = self.same_truth_as
         if other is not None and self.is_hidden and self.decimals > other.decimals:
             raise ValidationError(

@@ -10,8 +10,8 @@ from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
 from django.utils.http import url_has_allowed_host_and_scheme
 
-from leaderboard.boards.snapshots import splits_of
-from leaderboard.models import Split
+from leaderboard.boards.snapshots import site_line_of, splits_of
+from leaderboard.models import SiteAnnouncement, Split
 
 _SECTIONS = {
     "home": "home",
@@ -67,15 +67,10 @@ def _board_split(request: HttpRequest) -> str:
 
 def site(request: HttpRequest) -> dict[str, Any]:
     """The frame's context. The splits are asked for only by pages that list them."""
-    match = getattr(request, "resolver_match", None)
-    name = (match.url_name or "") if match else ""
     return {
         "site_name": settings.SITE_NAME,
         "site_url": settings.SITE_URL,
-        "section": next(
-            (section for prefix, section in _PREFIXES.items() if name.startswith(prefix)),
-            _SECTIONS.get(name, ""),
-        ),
+        "section": _section(request),
         # Those that people can sign in with: the word in addresses, and the name that people know.
         "providers": [(name, set_["APP"]["name"]) for name, set_ in settings.SOCIALACCOUNT_PROVIDERS.items()],
         "splits": SimpleLazyObject(lambda: splits_of(request)),
@@ -88,21 +83,30 @@ def site(request: HttpRequest) -> dict[str, Any]:
 
 
 def _announcements(request: HttpRequest) -> list[tuple[str, str]]:
-    """The lines to show, each with the title of its split, or without where all splits have it.
+    """The lines to show: that of the site without a title, and those of splits with the title of theirs.
 
     Only pages that are about splits have them: no other page asks the database for it. A page of one split
-    has the lines of that one.
+    has the line of that one; the form has the line of each split beside it.
     """
-    if not hasattr(request, "splits"):
+    is_form = _section(request) == "submit"
+    if not hasattr(request, "splits") and not is_form:
         return []
-    now, splits, only = timezone.now(), splits_of(request), _board_split(request)
-    titles: dict[str, list[str]] = {}
-    for split in splits:
-        titles.setdefault(split.announcement_at(now), []).append(split.title)
-    if len(titles) == 1:
-        return [("", line) for line in titles if line]
-    own = {split.announcement_at(now) for split in splits if only in {"", split.pk}}
-    return [(", ".join(named), line) for line, named in titles.items() if line and line in own]
+    now, only = timezone.now(), _board_split(request)
+    if is_form:
+        lines = [("", SiteAnnouncement.line_at(now))]
+    else:
+        splits = splits_of(request)
+        own = [(each.title, each.announcement_at(now)) for each in splits if only in {"", each.pk}]
+        lines = [("", site_line_of(splits, now=now)), *own]
+    return [(title, line) for title, line in lines if line]
+
+
+def _section(request: HttpRequest) -> str:
+    match = getattr(request, "resolver_match", None)
+    name = (match.url_name or "") if match else ""
+    return next(
+        (section for prefix, section in _PREFIXES.items() if name.startswith(prefix)), _SECTIONS.get(name, "")
+    )
 
 
 def _came_from(request: HttpRequest) -> str:

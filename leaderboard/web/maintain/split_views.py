@@ -8,11 +8,11 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from evaluator.counting import counted
-from leaderboard.benchmark import policy
+from leaderboard.benchmark import moments, policy
 from leaderboard.editions import new_splits
 from leaderboard.mails import announcements
 from leaderboard.mails.announcements import Announcement
-from leaderboard.models import Split
+from leaderboard.models import SiteAnnouncement, Split
 from leaderboard.quotas import admissions
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain import quota_tables
@@ -65,12 +65,18 @@ def change(request: HttpRequest, split: str) -> HttpResponse:
 @maintainers_form
 def announcement(request: HttpRequest) -> HttpResponse:
     """Show a line on the pages of every split, or take it away."""
-    form = AnnouncementForm.asked(request)
+    current = SiteAnnouncement.objects.first()
+    initial = (
+        {"announcement": current.text, "announcement_ends_at": moments.written(current.ends_at)}
+        if current
+        else {}
+    )
+    form = AnnouncementForm.asked(request, initial=initial)
     if form.is_valid():
         with form.refusals():
             text, ends_at = form.cleaned_data["announcement"], form.cleaned_data["announcement_ends_at"]
             policy.announce(text=text, ends_at=ends_at, now=timezone.now(), actor=maintainer_of(request))
-            messages.success(request, "The announcement was changed on all splits.")
+            messages.success(request, "The announcement was changed.")
             return redirect("maintain_splits")
     return form_page(request, "maintain/announcement.html", form)
 

@@ -16,7 +16,7 @@ from leaderboard.benchmark import moments, policy
 from leaderboard.benchmark.policy import Policy
 from leaderboard.editions import corrections, new_splits
 from leaderboard.errors.refusals import NotMaintainer, Refused
-from leaderboard.models import AuditEvent, Edition, Split, Submission, User
+from leaderboard.models import AuditEvent, Edition, SiteAnnouncement, Split, Submission, User
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.web.maintain.desk import get
@@ -369,22 +369,30 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     for address in ("/", "/board/test/", "/board/val/", "/compare/?split=test"):
         [line] = pages.page(visitor.get(address)).all("p", class_="announcement")
         assert line.text == text
-    assert text in pages.page(keeper.get("/submit/")).one("main").text
+    assert keeper.get("/submit/").text.count("Maintenance &lt;b&gt;today") == 1
+    late = ("add_split", "late", "--title", "Late", "--same-truth-as", "test", "--listing", "listed")
+    call_command(*late, stdout=StringIO())
+    [line] = pages.page(visitor.get("/board/late/")).all("p", class_="announcement")
+    assert line.text == text
     told = visitor.get("/api/v1/splits").json()
     assert {each["announcement"] for each in told} == {text}
+    assert text in pages.get(keeper, page).one("main").one("input", id="id_announcement").attributes["value"]
     change("val", announcement="Val only", announcement_ends_at=timezone.now() + timedelta(hours=1))
-    assert "Validation: Val only" in pages.page(visitor.get("/board/val/")).one("main").text
+    lines = pages.page(visitor.get("/board/val/")).all("p", class_="announcement")
+    assert [line.text for line in lines] == [text, "Validation: Val only"]
     assert "Val only" not in visitor.get("/board/test/").text
     # Its end comes: the next sweep tells remembered pages.
     later = timezone.now() - timedelta(seconds=1)
-    Split.objects.update(announcement_ends_at=later)
-    assert versions.times_passed(now=timezone.now()) == 3
+    Split.objects.filter(pk="val").update(announcement_ends_at=later)
+    SiteAnnouncement.objects.update(ends_at=later)
+    assert versions.times_passed(now=timezone.now()) == 4
     assert "Val only" not in visitor.get("/board/val/").text
     assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
     call_command("set_announcement", "Known error", "--until", "2099-01-01 00:00 AoE", stdout=StringIO())
     assert "Known error" in visitor.get("/board/test/").text
     call_command("set_announcement", stdout=StringIO())
-    assert Split.objects.exclude(announcement="").count() == 0
+    assert not SiteAnnouncement.objects.exists()
+    assert "Known error" not in visitor.get("/board/test/").text
 
 
 # --- moments ---------------------------------------------------------------------------------------------
