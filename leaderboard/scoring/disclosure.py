@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from evaluator import Difference
 from leaderboard.boards.rows import Entry
-from leaderboard.models import Edition, Visibility
+from leaderboard.models import Edition, Submission, Visibility
+from leaderboard.storage import hidden_marks
 
 Floats = NDArray[np.float64]
 
@@ -57,9 +58,14 @@ def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float
     return round(ends[0], decimals) + 0.0, round(ends[1], decimals) + 0.0
 
 
+def _is_hidden(edition: Edition) -> bool:
+    """Whether the ground truth is hidden, for workers: the database cannot call open what is marked."""
+    return edition.split.is_hidden or hidden_marks.is_marked(edition.ground_truth_id)
+
+
 def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floats, Floats]:
     """The ends of the intervals of means as an edition publishes them; NaN where there is none."""
-    if not edition.split.is_hidden:
+    if not _is_hidden(edition):
         return np.round(low, edition.decimals), np.round(high, edition.decimals)
     shown = np.array(
         [
@@ -76,7 +82,7 @@ def published_difference(found: Difference, shown: Difference, *, edition: Editi
     Of a hidden split the ends are coarse and p is only a class. An end never crosses 0 by being rounded: it
     is then one unit of the last digit on its own side, so that 0 is outside exactly where p is below 0.05.
     """
-    if not edition.split.is_hidden or found.low is None or found.high is None:
+    if found.low is None or found.high is None or not _is_hidden(edition):
         return shown
     decimals = edition.decimals
     low, high = coarse_ends(found.low, found.high, decimals=decimals)
@@ -118,6 +124,19 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
             f"{edition.split_id} is hidden. {_POSSIBLE}"
         )
     return ""
+
+
+def why_withheld_by_mark(first: Submission, second: Submission, *, edition: Edition) -> str:
+    """The same for workers: of a pair on a split that the database calls open and the mark calls hidden."""
+    if edition.split.is_hidden or not hidden_marks.is_marked(edition.ground_truth_id):
+        return ""
+    methods = (first.method, second.method)
+    if methods[0].team_id != methods[1].team_id and all(m.visibility == Visibility.PUBLIC for m in methods):
+        return ""
+    return (
+        f"No confidence interval and no p-value: the ground truth of {edition.split_id} was imported as "
+        f"hidden. {_POSSIBLE}"
+    )
 
 
 _POSSIBLE: Final = (

@@ -53,7 +53,7 @@ def test_ends_are_rounded_outwards_to_a_tenth_of_the_width(
 
 
 def published(found: Difference, shown: Difference, *, is_hidden: bool = True) -> Difference:
-    edition = Edition(split=Split(is_hidden=is_hidden), decimals=1)
+    edition = Edition(split=Split(is_hidden=is_hidden), ground_truth_id="sha256:0", decimals=1)
     return disclosure.published_difference(found, shown, edition=edition)
 
 
@@ -185,3 +185,43 @@ def test_page_and_api_say_the_same_words(entries: list[Submission], client: Clie
         assert pair["withheld"] in page.text
         assert pair["differences"]["mid"]["low"] is None
         assert pair["sentence"].endswith(pair["withheld"])
+
+
+# --- whatever the database says --------------------------------------------------------------------------
+
+
+def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
+    entries: list[Submission], edition: Edition, owner: User, rival: Rival, client: Client
+) -> None:
+    """The attack of somebody who has the web process: `is_hidden = false`, and everything made anew."""
+    other = rival(1.07)
+    ask(entries[0], other)
+    builders.infer_all()
+    scores = Score.objects.order_by("pk").values_list("low", "high")
+    before, (told,) = list(scores), Comparison.objects.values_list("differences", flat=True)
+
+    Comparison.objects.all().delete()
+    Score.objects.update(low=None, high=None)
+    Edition.objects.update(inference_digest="")
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    set_visibility(entries[1], Visibility.PRIVATE)
+    own = (entries[0], entries[2]), (entries[0], entries[1])
+    for sent in ((entries[0], other), *own):
+        ask(*sent, viewer=owner)
+    builders.infer_all()
+
+    assert list(scores.all()) == before
+    assert told in Comparison.objects.values_list("differences", flat=True)
+    for sent in own:
+        (pair,) = ask(*sent, viewer=owner).pairs
+        for found in known(pair).values():
+            assert (found.low, found.high, found.p, found.p_below) == (None, None, None, None)
+        assert pair.withheld == (
+            "No confidence interval and no p-value: the ground truth of test was imported as hidden. There, "
+            "only public methods of different teams are compared; compare these two on a split with open "
+            "ground truth, or their files offline with tsttc compare."
+        )
+        query = {"split": "test", "m": [str(each.method_id) for each in sent]}
+        client.force_login(owner)
+        assert client.get("/api/v1/compare", query).json()["pairs"][0]["withheld"] == pair.withheld
+        assert pair.withheld in client.get("/compare/", query).text
