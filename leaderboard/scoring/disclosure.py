@@ -79,18 +79,13 @@ def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floa
 def published_difference(found: Difference, shown: Difference, *, edition: Edition) -> Difference:
     """A difference as an edition publishes it: `found` as it was computed, `shown` rounded to its decimals.
 
-    Of a hidden split the ends are coarse and p is only a class. An end never crosses 0 by being rounded: it
-    is then one unit of the last digit on its own side, so that 0 is outside exactly where p is below 0.05.
+    Of a hidden split the ends are coarse and p is only a class. The ends are rounded outwards, to 0 as well,
+    so that the interval holds what the computed one holds. So 0 may be an end although p is below 0.05, and
+    `p_below` alone says what is significant.
     """
     if found.low is None or found.high is None or not _is_hidden(edition):
         return shown
-    decimals = edition.decimals
-    low, high = coarse_ends(found.low, found.high, decimals=decimals)
-    unit = round(10.0**-decimals, decimals)
-    if shown.difference == 0:
-        low, high = min(low, 0.0), max(high, 0.0)
-    elif shown.is_significant:
-        low, high = (max(low, unit), high) if found.difference > 0 else (low, min(high, -unit))
+    low, high = coarse_ends(found.low, found.high, decimals=edition.decimals)
     low, high = min(low, shown.difference), max(high, shown.difference)
     return replace(shown, low=low, high=high, p=None)
 
