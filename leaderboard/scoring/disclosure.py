@@ -1,10 +1,10 @@
 """Disclosure: how finely intervals and p-values of hidden splits are published, and of which pairs.
 
 Each number that follows from hidden labels tells of them, and a file can be made to be read through such
-numbers. Of a hidden split the ends of intervals are therefore rounded to about a tenth of their width, p is
-told as a class, and only methods that everybody sees by name, of different teams, are compared. Everybody
-gets the same, the teams of the methods as well. `docs/security.md` says what each of these is against, and
-`tests/security/probing.py` measures it.
+numbers. Of a hidden split the ends of intervals are therefore rounded outwards to about a tenth of their
+width (never finer than values are published), p is told as a class, and only methods that everybody sees by
+name, of different teams, are compared. Everybody gets the same, the teams of the methods as well.
+`docs/security.md` says what each of these is against, and `tests/security/probing.py` measures it.
 """
 
 import math
