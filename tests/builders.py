@@ -116,6 +116,12 @@ def board_changed(split: str) -> None:
         versions.changed(split)
 
 
+def open_values(edition: Edition) -> None:
+    """Make hidden values open, as if they had been imported for an open split."""
+    Split.objects.filter(pk=edition.split_id).update(is_hidden=False)
+    truth_values.values_path(edition.ground_truth_id).with_suffix(".hidden").unlink(missing_ok=True)
+
+
 def infer_all() -> int:
     """Do in this process what workers do when no submission waits. Returns how much that was."""
     return backlog.work_off(now=timezone.now(), rng=random.Random(0))

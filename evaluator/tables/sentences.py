@@ -68,6 +68,9 @@ The difference is not significant. The test detects a difference above 2.0 with 
     if found.low is None or found.high is None or found.p_below is None:
         return f"{gap}; there are {too_few_recordings(found.n_effective)} to say whether that is significant."
     ends = _ends(found.difference, found.low, found.high, digits)
+    if found.is_significant and 0 in (found.low, found.high):
+        # So it is on a hidden split alone, where p judges and the ends only say how large.
+        ends += ", rounded outwards"
     told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p, found.p_below)})."
     detectable = found.detectable_difference
     if detectable is None:

@@ -29,11 +29,13 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     difference = serializers.FloatField(help_text="Difference in the column's unit.")
     low = serializers.FloatField(
         allow_null=True,
-        help_text="Lower end of the 95 % confidence interval; null: too few recordings, or withheld.",
+        help_text="Lower end of the 95 % confidence interval, rounded outwards where the ground truth is "
+        "hidden; null: too few recordings, or withheld.",
     )
     high = serializers.FloatField(
         allow_null=True,
-        help_text="Upper end of the 95 % confidence interval; null: too few recordings, or withheld.",
+        help_text="Upper end of the 95 % confidence interval, rounded outwards where the ground truth is "
+        "hidden; null: too few recordings, or withheld.",
     )
     p = serializers.FloatField(
         allow_null=True,
@@ -52,7 +54,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
     is_significant = serializers.BooleanField(
         help_text="Whether p is below 0.05, uncorrected: among many columns and several pairs expect false "
-        "positives."
+        "positives. Where the ground truth is hidden, the interval does not say this: 0 may be an end."
     )
     detectable_difference = serializers.SerializerMethodField(
         help_text="The smallest difference that the test detects with 80 % power; null: this one is "

@@ -17,7 +17,7 @@ from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
 from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
 from leaderboard.scoring import sandbox
-from leaderboard.storage import truth_values
+from leaderboard.storage import hidden_marks, truth_values
 
 Floats = NDArray[np.float64]
 Errors = Mapping[str, Floats]  # of every sequence, by metric
@@ -46,7 +46,7 @@ def of(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | No
 
 def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
     """What stands on the board of an open split and has no analysis, the newest first."""
-    opened = [digest for digest in held if not truth_values.is_marked_hidden(digest)]
+    opened = [digest for digest in held if not hidden_marks.is_marked(digest)]
     boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=opened)
     return (
         Evaluation.objects.filter(
@@ -66,7 +66,7 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
     Nor if its ground truth was imported as a hidden one: then it is a mistake, or worse, to call it open.
     Raises `OSError` if the store or the private directory does not answer.
     """
-    if truth_values.is_marked_hidden(evaluation.edition.ground_truth_id):
+    if hidden_marks.is_marked(evaluation.edition.ground_truth_id):
         return
     truth = truth_values.load(evaluation.edition.ground_truth_id)
     predictions = sandbox.of(evaluation.submission.sent_file, evaluation.edition)

@@ -25,6 +25,8 @@ from leaderboard.scoring import confidence, disclosure, questions, recording_sum
 
 MIN_METHODS, MAX_METHODS = 2, 5
 N_FIRST = 20
+# Beside the differences of a pair of which a worker tells no more, why it does not.
+WITHHELD = "withheld"
 
 
 class BadComparison(Exception):
@@ -201,13 +203,19 @@ def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[tu
 
 def _plain(first: Entry, second: Entry, why: str) -> Pair:
     """The differences of the published values, which everybody can take from the board."""
-    values = ((name, one, second.scores[name]) for name, one in first.scores.items())
-    shown = {
-        name: Difference(round(one - other, first.decimals) + 0.0, None, None, None)
+    shown = _differences_of_values(first.scores, second.scores, decimals=first.decimals)
+    return Pair(first, second, shown, withheld=why)
+
+
+def _differences_of_values(
+    first: Mapping[str, float | None], second: Mapping[str, float | None], *, decimals: int
+) -> dict[str, Difference]:
+    values = ((name, one, second[name]) for name, one in first.items())
+    return {
+        name: Difference(round(one - other, decimals) + 0.0)
         for name, one, other in values
         if one is not None and other is not None
     }
-    return Pair(first, second, shown, withheld=why)
 
 
 def _key(pair: tuple[Entry, Entry]) -> tuple[UUID, UUID]:
@@ -238,7 +246,7 @@ def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
         if name in row.differences
         for found in [Difference(**row.differences[name])]
     }
-    return Pair(first, second, shown)
+    return Pair(first, second, shown, withheld=row.differences.get(WITHHELD, ""))
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
@@ -250,6 +258,23 @@ def compute(row: Comparison, *, now: datetime) -> None:
     Raises what `bags.sums_of` raises; the row waits on then.
     """
     questions.begin(row, now=now)
+    sent = (row.first.submission, row.second.submission)
+    withheld = disclosure.why_withheld_by_mark(*sent, edition=row.edition)
+    one, other = (rows.flat_scores(each) for each in (row.first, row.second))
+    if withheld:
+        shown = _differences_of_values(one, other, decimals=row.edition.decimals)
+    else:
+        shown = _differences(row, one, other)
+    told = {name: asdict(gap) for name, gap in shown.items()} | ({WITHHELD: withheld} if withheld else {})
+    with transaction.atomic():
+        Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=told, computed_at=now)
+        questions.end(row)
+
+
+def _differences(
+    row: Comparison, one: Mapping[str, float | None], other: Mapping[str, float | None]
+) -> dict[str, Difference]:
+    """What is told of each column between these published values, with its interval and p."""
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
     first, second = (recording_sums.sums_of(edition, file=file) for file in sent)
@@ -260,19 +285,13 @@ def compute(row: Comparison, *, now: datetime) -> None:
         names=edition.rules.score_names,
         signs=confidence.generator_of(edition, purpose="signs"),
     )
-    values = [rows.flat_scores(each) for each in (row.first, row.second)]
-    shown = {
+    return {
         name: disclosure.published_difference(
             gap,
             differences.rounded_difference(
-                gap, first=values[0][name], second=values[1][name], decimals=edition.decimals
+                gap, first=one[name], second=other[name], decimals=edition.decimals
             ),
             edition=edition,
         )
         for name, gap in found.items()
     }
-    with transaction.atomic():
-        Comparison.objects.filter(pk=row.pk, computed_at=None).update(
-            differences={name: asdict(gap) for name, gap in shown.items()}, computed_at=now
-        )
-        questions.end(row)

@@ -1,10 +1,10 @@
 """Disclosure: how finely intervals and p-values of hidden splits are published, and of which pairs.
 
 Each number that follows from hidden labels tells of them, and a file can be made to be read through such
-numbers. Of a hidden split the ends of intervals are therefore rounded to about a tenth of their width, p is
-told as a class, and only methods that everybody sees by name, of different teams, are compared. Everybody
-gets the same, the teams of the methods as well. `docs/security.md` says what each of these is against, and
-`tests/security/probing.py` measures it.
+numbers. Of a hidden split the ends of intervals are therefore rounded outwards to about a tenth of their
+width (never finer than values are published), p is told as a class, and only methods that everybody sees by
+name, of different teams, are compared. Everybody gets the same, the teams of the methods as well.
+`docs/security.md` says what each of these is against, and `tests/security/probing.py` measures it.
 """
 
 import math
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from evaluator import Difference
 from leaderboard.boards.rows import Entry
-from leaderboard.models import Edition, Visibility
+from leaderboard.models import Edition, Submission, Visibility
+from leaderboard.storage import hidden_marks
 
 Floats = NDArray[np.float64]
 
@@ -57,9 +58,14 @@ def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float
     return round(ends[0], decimals) + 0.0, round(ends[1], decimals) + 0.0
 
 
+def _is_hidden(edition: Edition) -> bool:
+    """Whether the ground truth is hidden, for workers: the database cannot call open what is marked."""
+    return edition.split.is_hidden or hidden_marks.is_marked(edition.ground_truth_id)
+
+
 def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floats, Floats]:
     """The ends of the intervals of means as an edition publishes them; NaN where there is none."""
-    if not edition.split.is_hidden:
+    if not _is_hidden(edition):
         return np.round(low, edition.decimals), np.round(high, edition.decimals)
     shown = np.array(
         [
@@ -73,18 +79,13 @@ def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floa
 def published_difference(found: Difference, shown: Difference, *, edition: Edition) -> Difference:
     """A difference as an edition publishes it: `found` as it was computed, `shown` rounded to its decimals.
 
-    Of a hidden split the ends are coarse and p is only a class. An end never crosses 0 by being rounded: it
-    is then one unit of the last digit on its own side, so that 0 is outside exactly where p is below 0.05.
+    Of a hidden split the ends are coarse and p is only a class. The ends are rounded outwards, to 0 as well,
+    so that the interval holds what the computed one holds. So 0 may be an end although p is below 0.05, and
+    `p_below` alone says what is significant.
     """
-    if not edition.split.is_hidden or found.low is None or found.high is None:
+    if found.low is None or found.high is None or not _is_hidden(edition):
         return shown
-    decimals = edition.decimals
-    low, high = coarse_ends(found.low, found.high, decimals=decimals)
-    unit = round(10.0**-decimals, decimals)
-    if shown.difference == 0:
-        low, high = min(low, 0.0), max(high, 0.0)
-    elif shown.is_significant:
-        low, high = (max(low, unit), high) if found.difference > 0 else (low, min(high, -unit))
+    low, high = coarse_ends(found.low, found.high, decimals=edition.decimals)
     low, high = min(low, shown.difference), max(high, shown.difference)
     return replace(shown, low=low, high=high, p=None)
 
@@ -118,6 +119,19 @@ def why_withheld(first: Entry, second: Entry, *, edition: Edition) -> str:
             f"{edition.split_id} is hidden. {_POSSIBLE}"
         )
     return ""
+
+
+def why_withheld_by_mark(first: Submission, second: Submission, *, edition: Edition) -> str:
+    """The same for workers: of a pair on a split that the database calls open and the mark calls hidden."""
+    if edition.split.is_hidden or not hidden_marks.is_marked(edition.ground_truth_id):
+        return ""
+    methods = (first.method, second.method)
+    if methods[0].team_id != methods[1].team_id and all(m.visibility == Visibility.PUBLIC for m in methods):
+        return ""
+    return (
+        f"No confidence interval and no p-value: the ground truth of {edition.split_id} was imported as "
+        f"hidden. {_POSSIBLE}"
+    )
 
 
 _POSSIBLE: Final = (

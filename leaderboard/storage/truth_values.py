@@ -10,7 +10,7 @@ from pathlib import Path
 from django.conf import settings
 
 import evaluator
-from leaderboard.storage import files, seeds
+from leaderboard.storage import files, hidden_marks, seeds
 
 
 def values_path(digest: str) -> Path:
@@ -23,18 +23,6 @@ def manifest_path(digest: str) -> Path:
     return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.manifest.npz"
 
 
-def is_marked_hidden(digest: str) -> bool:
-    """Whether the values of this digest were imported as hidden ones, whatever the database says today.
-
-    Who can write into the database could call a split open; the private directory tells workers otherwise.
-    """
-    return _mark_path(digest).exists()
-
-
-def _mark_path(digest: str) -> Path:
-    return Path(settings.GROUND_TRUTH_DIR) / f"{digest.removeprefix('sha256:')}.hidden"
-
-
 def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
     """Write values and manifest to the private directory: whole or not at all, readable by its owner only.
 
@@ -43,7 +31,7 @@ def save(truth: evaluator.GroundTruth, *, is_hidden: bool) -> None:
     directory = Path(settings.GROUND_TRUTH_DIR)
     directory.mkdir(parents=True, exist_ok=True, mode=0o700)
     if is_hidden:
-        _mark_path(truth.digest).touch(mode=0o600)
+        hidden_marks.put(truth.digest)
     for part, target in ((truth, values_path(truth.digest)), (truth.manifest, manifest_path(truth.digest))):
         if not target.exists():
             with files.replacing(target) as path:

@@ -59,7 +59,7 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
     for old, new in ground_truth.uncompared(held=held):
         yield partial(ground_truth.count_changes, old, new)
     asked = questions.waiting(held=held).select_related(
-        "edition__ground_truth", "first__submission", "second__submission"
+        "edition__ground_truth", "edition__split", "first__submission__method", "second__submission__method"
     )
     begun: list[int] = []
     # Asked anew each time: somebody else may have come, whose turn it is.

@@ -14,11 +14,12 @@ range of each sequence. `bits` is what it has learnt: −log2 of the share of hy
 """
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -228,10 +229,25 @@ WAYS: Final[dict[str, tuple[int, Channel | None]]] = {
 }
 
 
+class Mean(NamedTuple):
+    """A mean over readouts, and its standard error."""
+
+    value: float
+    error: float
+
+    def __str__(self) -> str:
+        return f"{self.value:5.1f} ± {self.error:.1f}"
+
+
+def _mean(values: Sequence[float]) -> Mean:
+    error = float(np.std(values, ddof=1) / len(values) ** 0.5) if len(values) > 1 else float("nan")
+    return Mean(float(np.mean(values)), error)
+
+
 def measured(
     *, n_chosen: int, n_sequences: int, n_recordings: int, n_readouts: int, seed: int = 0
-) -> dict[str, tuple[float, float]]:
-    """For each way the mean number of sequences named rightly per readout, and the mean bits."""
+) -> dict[str, tuple[Mean, Mean]]:
+    """For each way the sequences named rightly and the bits, each with its mean and its standard error."""
     found: dict[str, list[Readout]] = {name: [] for name in WAYS}
     for k in range(n_readouts):
         rng = np.random.default_rng((seed, k))
@@ -239,12 +255,40 @@ def measured(
         for name, (decimals, channel) in WAYS.items():
             found[name].append(read(of, decimals=decimals, channel=channel))
     return {
-        name: (
-            float(np.mean([each.n_right for each in readouts])),
-            float(np.mean([each.bits for each in readouts])),
-        )
+        name: (_mean([each.n_right for each in readouts]), _mean([each.bits for each in readouts]))
         for name, readouts in found.items()
     }
+
+
+def bits_moved_alike(
+    *, n_chosen: int, n_sequences: int, n_readouts: int, decimals: int = 1, seed: int = 0
+) -> Mean:
+    """The bits of a file that moves many sequences by one amount, the largest: how many are in each range.
+
+    They are −log2 of the share of all counts that give what is published. No sequence is named by them.
+    """
+    rng = np.random.default_rng((seed, n_chosen))
+    shares = np.append(SHARES, 1 - SHARES.sum())
+    found = []
+    for _ in range(n_readouts):
+        counts = rng.multinomial(n_chosen, shares)[:4]
+        before = rng.uniform(5_000, 6_000, 4)
+        step = LARGEST / (SHARES * n_sequences)
+        unit = 10.0**-decimals
+        told = np.round((before + step * counts) / unit) - np.round(before / unit)
+        off = np.floor((told + 1) * unit / step + 1e-9), np.ceil((told - 1) * unit / step - 1e-9)
+        fits = [np.arange(max(low, 0), min(high, n_chosen) + 1) for high, low in zip(*off, strict=True)]
+        vectors = np.stack(np.meshgrid(*fits, indexing="ij"), axis=-1).reshape(-1, 4)
+        found.append(-float(np.log2(_probability(vectors, n_chosen, shares))))
+    return _mean(found)
+
+
+def _probability(vectors: Floats, n: int, shares: Floats) -> float:
+    """The probability of any of these numbers of sequences in the ranges, of `n` in all."""
+    rest = n - vectors.sum(axis=1)
+    whole = np.column_stack([vectors, rest])[rest >= 0]
+    logs = [math.lgamma(n + 1) - sum(math.lgamma(k + 1) for k in row) for row in whole.tolist()]
+    return float(np.exp(np.array(logs) + whole @ np.log(shares)).sum())
 
 
 def main() -> None:
@@ -272,7 +316,10 @@ def main() -> None:
                 n_readouts=n_readouts,
             )
             for name, (n_right, bits) in table.items():
-                sys.stdout.write(f"  {name:<52} {n_right:5.1f} right, {bits:5.1f} bits\n")
+                sys.stdout.write(f"  {name:<52} {n_right} right, {bits} bits\n")
+    for n_chosen in (100, 1_000):
+        bits = bits_moved_alike(n_chosen=n_chosen, n_sequences=28_600, n_readouts=200)
+        sys.stdout.write(f"28,600 sequences, {n_chosen:,} moved alike: {bits} bits\n")
 
 
 if __name__ == "__main__":

@@ -36,6 +36,30 @@ def test_a_significant_difference_has_both_ends_of_its_interval(
 
 
 @pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        (
+            Difference(-0.1, -0.2, 0.0, None, 0.001),
+            "0.1 lower than B's (95 % confidence interval: 0.0 to 0.2 lower, rounded outwards; p < 0.001).",
+        ),
+        (
+            Difference(3.6, 0.0, 7.5, None, 0.05),
+            "3.6 higher than B's (95 % confidence interval: 0.0 to 7.5 higher, rounded outwards; p < 0.05).",
+        ),
+        (
+            Difference(13.0, 0.0, 26.0, None, 0.05),
+            "13 higher than B's (95 % confidence interval: 0 to 26 higher, rounded outwards; p < 0.05).",
+        ),
+    ],
+)
+def test_an_interval_of_a_hidden_split_that_ends_at_0_says_why_and_p_judges(
+    found: Difference, words: str
+) -> None:
+    assert found.is_significant
+    assert said(found, decimals=1) == f"A's MiD is {words}"
+
+
+@pytest.mark.parametrize(
     ("found", "ends", "detectable"),
     [
         (Difference(-2.0, -2.5, 0.3, 0.0812), "0.3 higher to 2.5 lower", "2.0"),

@@ -3,7 +3,7 @@
 import pytest
 
 from evaluator import SCORE_NAMES
-from leaderboard.models import Comparison, Edition, EditionRanges, Evaluation, Score, Split, Submission
+from leaderboard.models import Comparison, Edition, EditionRanges, Evaluation, Score, Submission
 from leaderboard.scoring import confidence, recording_sums
 from tests import builders
 from tests.leaderboard.scoring.inferred_scores import everything
@@ -44,7 +44,7 @@ def test_every_random_number_of_an_edition_comes_from_its_seed(
     inferred: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     # What a hidden split tells is too coarse to show it.
-    Split.objects.filter(pk="test").update(is_hidden=False)
+    builders.open_values(edition)
     Edition.objects.filter(pk=edition.pk).update(decimals=2)
 
     def everything_drawn() -> list[object]:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 import pytest
 from django.db import transaction
 from django.test import Client
@@ -53,22 +54,43 @@ def test_ends_are_rounded_outwards_to_a_tenth_of_the_width(
 
 
 def published(found: Difference, shown: Difference, *, is_hidden: bool = True) -> Difference:
-    edition = Edition(split=Split(is_hidden=is_hidden), decimals=1)
+    edition = Edition(split=Split(is_hidden=is_hidden), ground_truth_id="sha256:0", decimals=1)
     return disclosure.published_difference(found, shown, edition=edition)
 
 
-def test_zero_is_outside_exactly_where_the_difference_is_significant() -> None:
-    for low, high, p in ((0.03, 7.2, 0.049), (-7.2, -0.03, 0.049), (-0.03, 7.2, 0.051), (0.4, 0.6, 0.0001)):
-        value = round((low + high) / 2, 1)
-        found = Difference(value, low, high, p)
-        told = published(found, found)
-        assert told.low is not None
-        assert told.high is not None
-        assert (told.low > 0 or told.high < 0) == (p < 0.05)
-        assert told.low <= value <= told.high
-        assert told.p is None
-        assert told.is_significant == (p < 0.05)
-        assert published(found, found, is_hidden=False) == found
+@pytest.mark.parametrize(
+    ("low", "high", "p", "ends"),
+    [
+        (0.03, 7.2, 0.049, (0.0, 7.5)),
+        (-7.2, -0.03, 0.049, (-7.5, 0.0)),
+        (-0.03, 7.2, 0.051, (-0.5, 7.5)),
+        (0.4, 0.6, 0.0001, (0.4, 0.6)),
+        (-0.13, -0.01, 0.0001, (-0.2, 0.0)),
+    ],
+)
+def test_ends_of_a_difference_are_rounded_outwards_and_p_alone_judges_it(
+    low: float, high: float, p: float, ends: tuple[float, float]
+) -> None:
+    found = Difference(round((low + high) / 2, 1), low, high, p)
+    told = published(found, found)
+    assert (told.low, told.high) == ends
+    assert told.low <= low
+    assert high <= told.high
+    assert told.p is None
+    assert told.is_significant == (p < 0.05)
+    assert published(found, found, is_hidden=False) == found
+
+
+@pytest.mark.parametrize("decimals", [1, 2])
+def test_an_interval_is_at_most_a_fifth_wider_or_two_units_of_the_last_digit(decimals: int) -> None:
+    unit, widest = 10.0**-decimals, 0.0
+    for width in np.geomspace(0.02, 50, 400).tolist():
+        for low in np.linspace(-1, 1, 41).tolist():
+            ends = disclosure.coarse_ends(low, low + width, decimals=decimals)
+            wider = ends[1] - ends[0] - width
+            assert wider < max(width / 5, 2 * unit) + 1e-6
+            widest = max(widest, wider / width if width < 10 * unit else 0.0)
+    assert widest > 0.2  # so it is not a fifth below ten units
 
 
 def test_what_is_published_alike_is_not_told_apart() -> None:
@@ -110,7 +132,11 @@ def test_p_is_told_as_a_class_in_every_form(entries: list[Submission], rival: Ri
     assert {name: each["p"] for name, each in answer["differences"].items()} == dict.fromkeys(SCORE_NAMES)
     assert answer["differences"]["mid"]["p_below"] == 0.001
     assert "p < 0.001)" in answer["sentence"]
-    assert "&lt; 0.001</td>" in client.get("/compare/", query).text
+    page = client.get("/compare/", query).text
+    assert "&lt; 0.001</td>" in page
+    assert (
+        "so the ends of the intervals are rounded outwards: 0 may be an end although p is below 0.05." in page
+    )
 
 
 # --- of which pairs --------------------------------------------------------------------------------------
@@ -185,3 +211,43 @@ def test_page_and_api_say_the_same_words(entries: list[Submission], client: Clie
         assert pair["withheld"] in page.text
         assert pair["differences"]["mid"]["low"] is None
         assert pair["sentence"].endswith(pair["withheld"])
+
+
+# --- whatever the database says --------------------------------------------------------------------------
+
+
+def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
+    entries: list[Submission], edition: Edition, owner: User, rival: Rival, client: Client
+) -> None:
+    """The attack of somebody who has the web process: `is_hidden = false`, and everything made anew."""
+    other = rival(1.07)
+    ask(entries[0], other)
+    builders.infer_all()
+    scores = Score.objects.order_by("pk").values_list("low", "high")
+    before, (told,) = list(scores), Comparison.objects.values_list("differences", flat=True)
+
+    Comparison.objects.all().delete()
+    Score.objects.update(low=None, high=None)
+    Edition.objects.update(inference_digest="")
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    set_visibility(entries[1], Visibility.PRIVATE)
+    own = (entries[0], entries[2]), (entries[0], entries[1])
+    for sent in ((entries[0], other), *own):
+        ask(*sent, viewer=owner)
+    builders.infer_all()
+
+    assert list(scores.all()) == before
+    assert told in Comparison.objects.values_list("differences", flat=True)
+    for sent in own:
+        (pair,) = ask(*sent, viewer=owner).pairs
+        for found in known(pair).values():
+            assert (found.low, found.high, found.p, found.p_below) == (None, None, None, None)
+        assert pair.withheld == (
+            "No confidence interval and no p-value: the ground truth of test was imported as hidden. There, "
+            "only public methods of different teams are compared; compare these two on a split with open "
+            "ground truth, or their files offline with tsttc compare."
+        )
+        query = {"split": "test", "m": [str(each.method_id) for each in sent]}
+        client.force_login(owner)
+        assert client.get("/api/v1/compare", query).json()["pairs"][0]["withheld"] == pair.withheld
+        assert pair.withheld in client.get("/compare/", query).text

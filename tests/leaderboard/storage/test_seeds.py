@@ -15,8 +15,16 @@ from tests import builders
 
 
 def test_an_open_split_has_the_seed_that_everybody_knows(edition: Edition) -> None:
-    Split.objects.filter(pk="test").update(is_hidden=False)
+    builders.open_values(edition)
     assert seeds.seed_of(Edition.objects.get(pk=edition.pk)) == edition.ground_truth_id
+
+
+def test_hidden_values_keep_their_secret_seed_whatever_the_database_calls_their_split(
+    edition: Edition,
+) -> None:
+    seed = seeds.seed_of(edition)
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    assert seeds.seed_of(Edition.objects.get(pk=edition.pk)) == seed
 
 
 def test_a_hidden_split_has_a_seed_that_only_the_secret_gives(edition: Edition) -> None:

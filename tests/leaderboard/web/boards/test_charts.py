@@ -161,9 +161,9 @@ def test_private_methods_are_in_no_chart_not_even_their_teams(
 
 
 @pytest.fixture
-def compared(entries: list[Submission]) -> list[Submission]:
+def compared(entries: list[Submission], edition: Edition) -> list[Submission]:
     """Entries that may be compared though they are of one team: the labels of their split are open."""
-    Split.objects.filter(pk="test").update(is_hidden=False)
+    builders.open_values(edition)
     builders.infer_all()
     return entries
 

@@ -1,0 +1,22 @@
+"""Whether intervals of hidden splits hold the true difference; `hidden_differences.py` prints the table."""
+
+import numpy as np
+import pytest
+
+from tests.security import hidden_differences
+
+
+@pytest.mark.parametrize("power", hidden_differences.POWERS)
+@pytest.mark.parametrize("delta", hidden_differences.DELTAS)
+def test_published_interval_of_a_small_difference_holds_it(delta: float, power: int) -> None:
+    rng = np.random.default_rng([int(1e3 * delta), power])
+    found = hidden_differences.coverage(delta, power=power, n=300, rule=hidden_differences.now, rng=rng)
+    assert found.of_all >= 0.95
+    assert not found.of_significant < 0.95  # NaN where none is
+
+
+def test_the_former_rule_never_held_a_small_difference_that_it_called_significant() -> None:
+    rng = np.random.default_rng(1)
+    found = hidden_differences.coverage(0.05, power=80, n=300, rule=hidden_differences.before, rng=rng)
+    assert found.significant > 0.2
+    assert found.of_significant == 0
