@@ -40,6 +40,9 @@ def export(*, user: User) -> dict[str, Any]:
     """All that is kept about a person, as plain values: no secret, and nothing about anybody else."""
     team = Team.objects.filter(memberships__user=user).first()
     sent = Submission.objects.filter(submitted_by=user).select_related("method").order_by("submitted_at")
+    # A team that they have left may call a method something else by now, which is not theirs to know.
+    used = Method.objects.filter(submissions__submitted_by=user).select_related("team").distinct()
+    names = {method.pk: method.name if method.is_named_for(user) else None for method in used}
     deeds = AuditEvent.objects.filter(actor=user).order_by("pk")
     return {
         "account": {
@@ -55,7 +58,8 @@ def export(*, user: User) -> dict[str, Any]:
             {
                 "id": str(row.pk),
                 "split": row.split_id,
-                "method": row.method.name,
+                "method_id": str(row.method_id),
+                "method": names[row.method_id],
                 "filename": row.filename,
                 "note": row.note,
                 "digest": row.digest,

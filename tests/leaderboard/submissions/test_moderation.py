@@ -13,6 +13,7 @@ from django.utils import timezone
 
 from leaderboard import audit
 from leaderboard.errors.refusals import NotMaintainer, Refused
+from leaderboard.methods import methods
 from leaderboard.models import (
     AuditEvent,
     AuditText,
@@ -216,3 +217,27 @@ def test_a_team_that_has_just_ended_is_refused_in_words(edition: Edition, owner:
         moderation.move_method(method=sent.method, to=gone, **told)
     with pytest.raises(Refused, match="The team was deleted a moment ago"):
         moderation.rename_team(team=gone, name="New", now=timezone.now(), **told)
+
+
+def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
+    edition: Edition, owner: User, teammate: User
+) -> None:
+    for name, visibility in (("Hers", "PRIVATE"), ("Masked", "ANONYMOUS"), ("Shown", "PUBLIC")):
+        builders.submit(
+            teammate,
+            builders.predictions(edition, factor=1 + len(name) / 10),
+            method=name,
+            visibility=visibility,
+            note="my note",
+        )
+
+    def told() -> dict[str, object]:
+        rows = forgetting.export(user=teammate)["submissions"]
+        assert {(row["note"], row["filename"]) for row in rows} == {("my note", "predictions.json")}
+        return {row["method_id"]: row["method"] for row in rows}
+
+    ids = {method.name: str(method.pk) for method in Method.objects.all()}
+    assert told() == {pk: name for name, pk in ids.items()}
+    teams.leave(user=teammate)
+    methods.edit(method=Method.objects.get(name="Hers"), changes={"name": "NextGenSecret"}, actor=owner)
+    assert told() == {ids["Hers"]: None, ids["Masked"]: None, ids["Shown"]: "Shown"}
