@@ -118,6 +118,8 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
                 "permission-denied",
                 "A maintainer's account cannot be deleted; another maintainer ends the role first.",
             )
+        if row.email == _nowhere(row) and not row.is_active:
+            return  # another request was first
         team = membership.team if membership else None
         heir = team.memberships.exclude(user=row).order_by("-is_owner", "joined_at").first() if team else None
         if team is not None and heir is None:
@@ -139,6 +141,12 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
             versions.changed_by_methods(Method.objects.filter(team=team).shown().values_list("pk", flat=True))
 
 
+def delete_late_rows() -> None:
+    """Delete what requests wrote into the tables of allauth while their account was being deleted."""
+    for model in (EmailAddress, Authenticator, SocialAccount):
+        model.objects.filter(user__is_active=False, user__email__endswith=f"@{_NOWHERE}").delete()
+
+
 def _delete_rows(user: User) -> None:
     """The rows that are the person's alone."""
     ApiToken.objects.filter(user=user).delete()
@@ -156,13 +164,18 @@ def _delete_rows(user: User) -> None:
 
 def _blank(user: User) -> None:
     """The texts of rows that stay: the account's, its submissions' and the audit log's names."""
-    user.email = f"{user.pk}@{_NOWHERE}"
+    user.email = _nowhere(user)
     user.name, user.is_active, user.last_login = "", False, None
     # Sessions rest on the password: they all end with it.
     user.set_unusable_password()
     user.save(update_fields=["email", "name", "is_active", "last_login", "password"])
     Submission.objects.filter(submitted_by=user).update(filename="", note="")
     audit.blank(AuditText.objects.filter(Q(actor=user) | Q(noun="User", noun_id=str(user.pk))))
+
+
+def _nowhere(user: User) -> str:
+    """What stands in a blank account instead of its address."""
+    return f"{user.pk}@{_NOWHERE}"
 
 
 def _moment(at: datetime | None) -> str | None:

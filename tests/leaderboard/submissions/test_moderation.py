@@ -5,6 +5,8 @@ from io import StringIO
 
 import pytest
 from allauth.account.models import EmailAddress
+from allauth.mfa.models import Authenticator
+from allauth.socialaccount.models import SocialAccount
 from django.contrib.admin.models import LogEntry
 from django.core import serializers
 from django.core.management import CommandError, call_command
@@ -27,6 +29,7 @@ from leaderboard.models import (
 )
 from leaderboard.people import teams
 from leaderboard.submissions import forgetting, moderation
+from leaderboard.workers import upkeep
 from tests import builders
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -217,6 +220,20 @@ def test_a_team_that_has_just_ended_is_refused_in_words(edition: Edition, owner:
         moderation.move_method(method=sent.method, to=gone, **told)
     with pytest.raises(Refused, match="The team was deleted a moment ago"):
         moderation.rename_team(team=gone, name="New", now=timezone.now(), **told)
+
+
+def test_what_is_written_into_a_blank_account_is_deleted_with_the_next_cleaning(
+    edition: Edition, owner: User, stranger: User
+) -> None:
+    EmailAddress.objects.create(user=stranger, email="stays@example.org")
+    forgetting.forget(user=owner, reason="R", actor=owner, now=timezone.now())
+    EmailAddress.objects.create(user=owner, email="late@example.org")
+    Authenticator.objects.create(user=owner, type=Authenticator.Type.TOTP, data={})
+    SocialAccount.objects.create(user=owner, provider="github", uid="42")
+    upkeep.clean(now=timezone.now())
+    assert list(EmailAddress.objects.values_list("email", flat=True)) == ["stays@example.org"]
+    assert not Authenticator.objects.exists()
+    assert not SocialAccount.objects.exists()
 
 
 def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
