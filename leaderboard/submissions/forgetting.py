@@ -30,6 +30,7 @@ from leaderboard.models import (
     User,
 )
 from leaderboard.people import teams
+from leaderboard.quotas import mailboxes
 from leaderboard.submissions.moderation import masked
 
 # Addresses below it exist nowhere (RFC 2606).
@@ -120,6 +121,8 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
             )
         if row.email == _nowhere(row) and not row.is_active:
             return  # another request was first
+        # What the mailbox has spent is decided while the account still has it.
+        mailboxes.keep(user=row, now=now)
         team = membership.team if membership else None
         heir = team.memberships.exclude(user=row).order_by("-is_owner", "joined_at").first() if team else None
         if team is not None and heir is None:

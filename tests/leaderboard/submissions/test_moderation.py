@@ -27,6 +27,7 @@ from leaderboard.models import (
     Team,
     User,
 )
+from leaderboard.ops import environment
 from leaderboard.people import teams
 from leaderboard.submissions import forgetting, moderation
 from leaderboard.workers import upkeep
@@ -234,6 +235,16 @@ def test_what_is_written_into_a_blank_account_is_deleted_with_the_next_cleaning(
     assert list(EmailAddress.objects.values_list("email", flat=True)) == ["stays@example.org"]
     assert not Authenticator.objects.exists()
     assert not SocialAccount.objects.exists()
+
+
+def test_the_command_needs_the_key_of_the_web_processes(owner: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(environment, "PRODUCTION", True)
+    monkeypatch.delenv("TSTTC_SECRET_KEY", raising=False)
+    with pytest.raises(CommandError, match="TSTTC_SECRET_KEY is not set; expected the one of the web"):
+        call_command("forget_person", owner.email, "--reason", "R")
+    monkeypatch.setenv("TSTTC_SECRET_KEY", "k")
+    call_command("forget_person", owner.email, "--reason", "R")
+    assert not User.objects.filter(email=owner.email).exists()
 
 
 def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
