@@ -69,6 +69,8 @@ VERBS: Mapping[str, Callable[[Scene], Deed]] = {
         moderation.set_active, user=scene.member, is_active=False, **_told(scene)
     ),
     "forget a person": lambda scene: partial(forgetting.forget, user=scene.member, **_timed(scene)),
+    "forget an owner": lambda scene: partial(forgetting.forget, user=scene.owner, **_timed(scene)),
+    "forget a newcomer": lambda scene: partial(forgetting.forget, user=scene.newcomer, **_timed(scene)),
     "change a split": _change_split,
     "mail the teams": _mail,
     "quote a paper": _quote,

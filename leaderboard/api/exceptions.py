@@ -103,6 +103,8 @@ def _domain_error(exc: Exception) -> Response | None:
     match exc:
         case Refused():
             status = 413 if isinstance(exc, submissions.TooLarge) else 422
+            if exc.code == "account-closed":
+                status = 401
             if exc.code in {"split-not-open", "split-closed", "edition-refused"}:
                 status = 409
             if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):

@@ -117,6 +117,22 @@ class QuotaOverride(QuotaRules):
         return f"{self.team} on {self.split_id}: {super().__str__()}"
 
 
+class SpentMailbox(models.Model):
+    """That a deleted account had a mailbox, which is a keyed hash here; see `quotas.mailboxes`."""
+
+    account = models.ForeignKey(User, on_delete=models.CASCADE, related_name="+")
+    digest = models.CharField(max_length=64, db_index=True)
+    kept_until = models.DateTimeField(db_index=True)
+
+    class Meta:
+        constraints = [
+            models.UniqueConstraint(fields=["account", "digest"], name="mailbox_is_kept_once_per_account"),
+        ]
+
+    def __str__(self) -> str:
+        return f"a mailbox of the deleted account {self.account_id}"
+
+
 class Admission(models.Model):
     """That a team may submit to a split by admission. Written by `leaderboard.quotas.admissions`."""
 

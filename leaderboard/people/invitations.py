@@ -18,7 +18,7 @@ from django.urls import reverse
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, Team, User, Visibility
-from leaderboard.people import teams
+from leaderboard.people import accounts, teams
 from leaderboard.people.names import MAX_NAME, confusable_with
 
 LIFETIME = timedelta(days=7)
@@ -145,6 +145,7 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
     if seen is None:
         raise _nothing()
     with transaction.atomic():
+        accounts.hold_open(user)
         membership = teams.current_membership(user, seen.team)
         invitation = Invitation.objects.select_for_update(no_key=True).filter(pk=seen.pk).first()
         if invitation is None:

@@ -1,7 +1,8 @@
 """Teams: who competes. A person is in one team at a time; somebody alone is a team of one.
 
 What changes who is in a team locks, in this order: the person, the teams by their ids, the invitation. A
-submission locks its team as well, so nobody leaves while a slot of the quota is being counted.
+submission locks the person and the team as well, so nobody leaves while a slot of the quota is being counted.
+Whatever writes a row that belongs to a person locks the account (see `accounts`), as its deletion does.
 """
 
 import secrets
@@ -13,6 +14,7 @@ from django.db.models.functions import Now
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, QuotaOverride, Team, User
+from leaderboard.people import accounts
 from leaderboard.people.names import MAX_NAME, clean_name, require_rename_possible, skeleton
 
 _ROOM_FOR_A_NUMBER = 10
@@ -40,9 +42,10 @@ def team_of(*, user: User) -> Team:
 def create(*, user: User, name: str, now: datetime) -> Team:
     """Found a team under a name of one's choice. Raises `Refused`."""
     name = clean_name("name", name)
-    if current_team_of(user=user) is not None:
-        raise Refused("in-a-team", "You are in a team already; expected somebody who is in none.")
     with transaction.atomic():
+        accounts.hold_open(user)
+        if current_team_of(user=user) is not None:
+            raise Refused("in-a-team", "You are in a team already; expected somebody who is in none.")
         _require_free(name)
         return _created(Team.objects.create(name=name, look=skeleton(name), created_at=now), user)
 
@@ -195,7 +198,7 @@ def locked(*teams: Team | None) -> list[Team]:
 
 def current_membership(user: User, *also: Team) -> Membership | None:
     """Where the person is, with that team and these others locked. Raises `Refused` if that changed."""
-    User.objects.select_for_update(no_key=True).get(pk=user.pk)
+    accounts.hold(user)
     seen = Membership.objects.filter(user=user).select_related("team").first()
     locked(*also, seen.team if seen else None)
     found = Membership.objects.filter(user=user).select_related("team").first()

@@ -15,6 +15,7 @@ from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import ApiToken, Scope, Split, User
+from leaderboard.people import accounts
 
 DAYS = 90
 MAX_DAYS = 365
@@ -52,7 +53,7 @@ def create(
     split = _split(split_name)
     with transaction.atomic():
         # Two at once would both find room for the last one.
-        User.objects.select_for_update(no_key=True).get(pk=user.pk)
+        accounts.hold_open(user)
         n_standing = ApiToken.objects.filter(user=user, revoked_at=None, expiry__gt=now).count()
         if n_standing >= MAX_STANDING:
             raise Refused(

@@ -9,7 +9,8 @@ All files that a team sends within a day, whatever came of them, have a number o
 
 Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
 have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people. One person
-has one account: what is sent from several accounts of one mailbox is sent by one person.
+has one account: what is sent from several accounts of one mailbox is sent by one person, also where they
+have deleted one of them (see `mailboxes`).
 """
 
 import math
@@ -29,12 +30,11 @@ from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
 from leaderboard.models.quotas import MAX_SPAN, excess
 from leaderboard.models.submissions import MAX_POISON_STRIKES
-from leaderboard.quotas.rules import UNLIMITED, Rules, rules_of
+from leaderboard.people import accounts
+from leaderboard.quotas import mailboxes
+from leaderboard.quotas.rules import BYTES_WINDOW, REJECTED_WINDOW, UNLIMITED, Rules, rules_of
 
 __all__ = ["UNLIMITED", "Quota", "QuotaExceeded", "Rules", "override", "require", "rules_of", "span", "state"]
-
-REJECTED_WINDOW = timedelta(hours=24)
-BYTES_WINDOW = timedelta(hours=24)
 
 
 class QuotaExceeded(Exception):
@@ -100,13 +100,14 @@ def lock(*, team: Team) -> bool:
 
 
 def hold_accounts(*, user: User) -> None:
-    """Of somebody in no team, let no account of the same mailbox enter one until the transaction ends.
+    """Let no account of this mailbox enter a team, and nobody delete this one, until the transaction ends.
 
-    Else two of them could each get a team, and both a slot of the quota that they have in common.
+    Else two of them could each get a team, and both a slot of the quota that they have in common. Raises
+    `Refused` for an account that is closed or deleted.
     """
-    if not Membership.objects.filter(user=user).exists():
-        mailbox = User.objects.filter(pk=user.pk).values("mailbox")
-        list(User.objects.select_for_update(no_key=True).filter(mailbox__in=mailbox).order_by("pk"))
+    same = Q(pk=user.pk) | Q(mailbox__in=User.objects.filter(pk=user.pk).values("mailbox"))
+    rows = User.objects.select_for_update(no_key=True).filter(same).order_by("pk")
+    accounts.require_open({row.pk: row for row in rows}[user.pk])
 
 
 def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now: datetime) -> None:
@@ -177,13 +178,15 @@ def _theirs(team: Team | None, user: User) -> Q:
 def _accounts(team: Team | None, user: User) -> QuerySet[User]:
     """The accounts of the team's people, or of this person without a team.
 
-    Where addresses are proved, accounts of one mailbox are one person's. Where they are not, anybody could
-    spend the quota of somebody else under an address that looks like theirs.
+    Where addresses are proved, accounts of one mailbox are one person's, also those that they have deleted.
+    Where they are not, anybody could spend somebody else's quota under an address that looks like theirs.
     """
     people = User.objects.filter(membership__team=team) if team else User.objects.filter(pk=user.pk)
-    if settings.ACCOUNT_EMAIL_VERIFICATION != "mandatory":
+    if not mailboxes.are_proved():
         return people
-    return User.objects.filter(mailbox__in=people.values("mailbox"))
+    same = Q(mailbox__in=people.values("mailbox"))
+    deleted = mailboxes.deleted_accounts(people)
+    return User.objects.filter(same | Q(pk__in=deleted) if deleted else same)
 
 
 def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int, now: datetime) -> Quota:

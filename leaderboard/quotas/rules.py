@@ -40,6 +40,8 @@ class Rules:
         return self.min_gap.total_seconds()
 
 
+REJECTED_WINDOW = timedelta(hours=24)
+BYTES_WINDOW = timedelta(hours=24)
 UNLIMITED = Rules(limit=None, window=timedelta(days=1), min_gap=timedelta(0), rejected_limit=None)
 
 

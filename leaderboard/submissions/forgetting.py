@@ -30,6 +30,7 @@ from leaderboard.models import (
     User,
 )
 from leaderboard.people import teams
+from leaderboard.quotas import mailboxes
 from leaderboard.submissions.moderation import masked
 
 # Addresses below it exist nowhere (RFC 2606).
@@ -40,6 +41,9 @@ def export(*, user: User) -> dict[str, Any]:
     """All that is kept about a person, as plain values: no secret, and nothing about anybody else."""
     team = Team.objects.filter(memberships__user=user).first()
     sent = Submission.objects.filter(submitted_by=user).select_related("method").order_by("submitted_at")
+    # A team that they have left may call a method something else by now, which is not theirs to know.
+    used = Method.objects.filter(submissions__submitted_by=user).select_related("team").distinct()
+    names = {method.pk: method.name if method.is_named_for(user) else None for method in used}
     deeds = AuditEvent.objects.filter(actor=user).order_by("pk")
     return {
         "account": {
@@ -55,7 +59,8 @@ def export(*, user: User) -> dict[str, Any]:
             {
                 "id": str(row.pk),
                 "split": row.split_id,
-                "method": row.method.name,
+                "method_id": str(row.method_id),
+                "method": names[row.method_id],
                 "filename": row.filename,
                 "note": row.note,
                 "digest": row.digest,
@@ -114,6 +119,10 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
                 "permission-denied",
                 "A maintainer's account cannot be deleted; another maintainer ends the role first.",
             )
+        if row.email == _nowhere(row) and not row.is_active:
+            return  # another request was first
+        # What the mailbox has spent is decided while the account still has it.
+        mailboxes.keep(user=row, now=now)
         team = membership.team if membership else None
         heir = team.memberships.exclude(user=row).order_by("-is_owner", "joined_at").first() if team else None
         if team is not None and heir is None:
@@ -135,6 +144,12 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
             versions.changed_by_methods(Method.objects.filter(team=team).shown().values_list("pk", flat=True))
 
 
+def delete_late_rows() -> None:
+    """Delete what requests wrote into the tables of allauth while their account was being deleted."""
+    for model in (EmailAddress, Authenticator, SocialAccount):
+        model.objects.filter(user__is_active=False, user__email__endswith=f"@{_NOWHERE}").delete()
+
+
 def _delete_rows(user: User) -> None:
     """The rows that are the person's alone."""
     ApiToken.objects.filter(user=user).delete()
@@ -152,13 +167,18 @@ def _delete_rows(user: User) -> None:
 
 def _blank(user: User) -> None:
     """The texts of rows that stay: the account's, its submissions' and the audit log's names."""
-    user.email = f"{user.pk}@{_NOWHERE}"
+    user.email = _nowhere(user)
     user.name, user.is_active, user.last_login = "", False, None
     # Sessions rest on the password: they all end with it.
     user.set_unusable_password()
     user.save(update_fields=["email", "name", "is_active", "last_login", "password"])
     Submission.objects.filter(submitted_by=user).update(filename="", note="")
     audit.blank(AuditText.objects.filter(Q(actor=user) | Q(noun="User", noun_id=str(user.pk))))
+
+
+def _nowhere(user: User) -> str:
+    """What stands in a blank account instead of its address."""
+    return f"{user.pk}@{_NOWHERE}"
 
 
 def _moment(at: datetime | None) -> str | None:

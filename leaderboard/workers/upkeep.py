@@ -10,9 +10,10 @@ from django.db.models import F
 from leaderboard.exports import card_drawing, cards
 from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
+from leaderboard.quotas import mailboxes
 from leaderboard.scoring import questions, worker
 from leaderboard.storage import orphans
-from leaderboard.submissions import idempotency
+from leaderboard.submissions import forgetting, idempotency
 
 log = structlog.get_logger(__name__)
 
@@ -36,6 +37,8 @@ def clean(*, now: datetime) -> Cleaned:
     n_keys = idempotency.purge(now=now)
     n_questions = questions.delete_expired(now=now)
     outbox.purge(now=now)
+    mailboxes.delete_expired(now=now)
+    forgetting.delete_late_rows()
     n_files = n_bytes = n_leftovers = 0
     for orphan in orphans.orphans(now=now):
         if orphans.remove(orphan, now=now):

@@ -13,6 +13,7 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.http import own_form, own_page
 from leaderboard.mails import notices
 from leaderboard.models import MailKind, User
+from leaderboard.quotas import mailboxes, quotas
 from leaderboard.submissions import forgetting
 from leaderboard.web.forms import SiteForm
 
@@ -48,7 +49,9 @@ def data(request: HttpRequest) -> HttpResponse:
             logout(request)
             messages.success(request, "Your account is deleted.")
             return redirect("home")
-    return render(request, "account/data.html", {"form": form}, status=422 if form.errors else 200)
+    stays = quotas.span(mailboxes.longest_window()) if mailboxes.are_proved() else ""
+    context = {"form": form, "quota_stays": stays}
+    return render(request, "account/data.html", context, status=422 if form.errors else 200)
 
 
 @own_page

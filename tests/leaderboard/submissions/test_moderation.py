@@ -5,6 +5,8 @@ from io import StringIO
 
 import pytest
 from allauth.account.models import EmailAddress
+from allauth.mfa.models import Authenticator
+from allauth.socialaccount.models import SocialAccount
 from django.contrib.admin.models import LogEntry
 from django.core import serializers
 from django.core.management import CommandError, call_command
@@ -13,6 +15,7 @@ from django.utils import timezone
 
 from leaderboard import audit
 from leaderboard.errors.refusals import NotMaintainer, Refused
+from leaderboard.methods import methods
 from leaderboard.models import (
     AuditEvent,
     AuditText,
@@ -24,8 +27,10 @@ from leaderboard.models import (
     Team,
     User,
 )
+from leaderboard.ops import environment
 from leaderboard.people import teams
 from leaderboard.submissions import forgetting, moderation
+from leaderboard.workers import upkeep
 from tests import builders
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -216,3 +221,51 @@ def test_a_team_that_has_just_ended_is_refused_in_words(edition: Edition, owner:
         moderation.move_method(method=sent.method, to=gone, **told)
     with pytest.raises(Refused, match="The team was deleted a moment ago"):
         moderation.rename_team(team=gone, name="New", now=timezone.now(), **told)
+
+
+def test_what_is_written_into_a_blank_account_is_deleted_with_the_next_cleaning(
+    edition: Edition, owner: User, stranger: User
+) -> None:
+    EmailAddress.objects.create(user=stranger, email="stays@example.org")
+    forgetting.forget(user=owner, reason="R", actor=owner, now=timezone.now())
+    EmailAddress.objects.create(user=owner, email="late@example.org")
+    Authenticator.objects.create(user=owner, type=Authenticator.Type.TOTP, data={})
+    SocialAccount.objects.create(user=owner, provider="github", uid="42")
+    upkeep.clean(now=timezone.now())
+    assert list(EmailAddress.objects.values_list("email", flat=True)) == ["stays@example.org"]
+    assert not Authenticator.objects.exists()
+    assert not SocialAccount.objects.exists()
+
+
+def test_the_command_needs_the_key_of_the_web_processes(owner: User, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(environment, "PRODUCTION", True)
+    monkeypatch.delenv("TSTTC_SECRET_KEY", raising=False)
+    with pytest.raises(CommandError, match="TSTTC_SECRET_KEY is not set; expected the one of the web"):
+        call_command("forget_person", owner.email, "--reason", "R")
+    monkeypatch.setenv("TSTTC_SECRET_KEY", "k")
+    call_command("forget_person", owner.email, "--reason", "R")
+    assert not User.objects.filter(email=owner.email).exists()
+
+
+def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
+    edition: Edition, owner: User, teammate: User
+) -> None:
+    for name, visibility in (("Hers", "PRIVATE"), ("Masked", "ANONYMOUS"), ("Shown", "PUBLIC")):
+        builders.submit(
+            teammate,
+            builders.predictions(edition, factor=1 + len(name) / 10),
+            method=name,
+            visibility=visibility,
+            note="my note",
+        )
+
+    def told() -> dict[str, object]:
+        rows = forgetting.export(user=teammate)["submissions"]
+        assert {(row["note"], row["filename"]) for row in rows} == {("my note", "predictions.json")}
+        return {row["method_id"]: row["method"] for row in rows}
+
+    ids = {method.name: str(method.pk) for method in Method.objects.all()}
+    assert told() == {pk: name for name, pk in ids.items()}
+    teams.leave(user=teammate)
+    methods.edit(method=Method.objects.get(name="Hers"), changes={"name": "NextGenSecret"}, actor=owner)
+    assert told() == {ids["Hers"]: None, ids["Masked"]: None, ids["Shown"]: "Shown"}

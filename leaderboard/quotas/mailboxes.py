@@ -1,0 +1,64 @@
+"""What a mailbox has sent stays sent when its account is deleted.
+
+The submissions stay with the blank account. Beside it stays a keyed hash of each of its mailboxes, so that
+the next account of the same mailbox has spent what this one has. It is deleted once no window of any rule
+reaches back to the last file. The key comes from `SECRET_KEY`: with another one, the hashes match nothing.
+"""
+
+from datetime import datetime, timedelta
+
+from allauth.account.models import EmailAddress
+from django.conf import settings
+from django.db.models import Max, QuerySet
+from django.utils.crypto import salted_hmac
+
+from leaderboard.models import QuotaOverride, SpentMailbox, Split, Submission, User
+from leaderboard.models.people import MAILBOX
+from leaderboard.quotas.rules import BYTES_WINDOW, REJECTED_WINDOW, rules_of
+
+
+def are_proved() -> bool:
+    """Whether addresses are proved here. Where they are not, an address says nothing of who has it."""
+    return bool(settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory")
+
+
+def keep(*, user: User, now: datetime) -> None:
+    """Keep the hashes of an account's mailboxes if it has sent files lately; call it before it is blanked."""
+    sent_at = Submission.objects.filter(submitted_by=user).aggregate(at=Max("submitted_at"))["at"]
+    if sent_at is None or not are_proved():
+        return
+    kept_until = sent_at + longest_window()
+    if kept_until > now:
+        SpentMailbox.objects.bulk_create(
+            SpentMailbox(account=user, digest=digest, kept_until=kept_until)
+            for digest in sorted(_digests(User.objects.filter(pk=user.pk)))
+        )
+
+
+def deleted_accounts(people: QuerySet[User]) -> list[int]:
+    """The deleted accounts of these people's mailboxes."""
+    rows = SpentMailbox.objects.filter(digest__in=_digests(people))
+    return list(rows.values_list("account", flat=True))
+
+
+def delete_expired(*, now: datetime) -> None:
+    """Delete the hashes that no window needs any more."""
+    SpentMailbox.objects.filter(kept_until__lte=now).delete()
+
+
+def longest_window() -> timedelta:
+    """How far back the rules of any split and team look."""
+    own = QuotaOverride.objects.select_related("team", "split")
+    rules = [
+        *(rules_of(team=None, split=split) for split in Split.objects.all()),
+        *(rules_of(team=row.team, split=row.split) for row in own),
+    ]
+    spans = [span for each in rules for span in (each.window, each.min_gap)]
+    return max(REJECTED_WINDOW, BYTES_WINDOW, *spans)
+
+
+def _digests(people: QuerySet[User]) -> set[str]:
+    """The keyed hashes of their mailboxes: that of the primary address, and of every proved one."""
+    proved = EmailAddress.objects.filter(user__in=people, verified=True).annotate(mailbox=MAILBOX)
+    found = people.values_list("mailbox", flat=True).union(proved.values_list("mailbox", flat=True))
+    return {salted_hmac(__name__, mailbox, algorithm="sha256").hexdigest() for mailbox in found}

@@ -1,0 +1,272 @@
+"""What a mailbox has sent stays sent when its account is deleted, and is forgotten with the last window."""
+
+import re
+from datetime import timedelta
+from urllib.parse import urlsplit
+
+import pytest
+from allauth.account.models import EmailAddress
+from allauth.socialaccount.models import SocialAccount
+from django.core import mail, serializers
+from django.core.cache import cache
+from django.core.files.base import ContentFile
+from django.core.management import call_command
+from django.db import connection
+from django.test import Client
+from django.test.utils import CaptureQueriesContext
+from django.utils import timezone
+from pytest_django.fixtures import Settings
+
+from leaderboard.models import Edition, SpentMailbox, Split, Submission, User
+from leaderboard.people import teams
+from leaderboard.quotas import mailboxes, quotas
+from leaderboard.quotas.quotas import QuotaExceeded
+from leaderboard.submissions import forgetting
+from leaderboard.workers import upkeep
+from tests import builders
+from tests.leaderboard.web.test_every_page import assert_sound
+
+pytestmark = pytest.mark.slow
+
+DAY = timedelta(days=1)
+PASSWORD = "kestrel-altimeter-9"
+
+
+@pytest.fixture
+def limited(edition: Edition, settings: Settings) -> Edition:
+    """The test split with three submissions in 30 days, on a site that proves addresses."""
+    Split.objects.filter(pk="test").update(quota_limit=3, quota_window=30 * DAY)
+    settings.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
+    return edition
+
+
+def sign_up(email: str) -> Client:
+    """Somebody who has signed up on the site, proved the address and signed in."""
+    # As if three minutes had passed: until then no other mail is sent to an address.
+    cache.clear()
+    client = Client()
+    client.post("/accounts/signup/", {"email": email, "password1": PASSWORD, "password2": PASSWORD})
+    link = re.search(r"https?://\S+/accounts/confirm-email/\S+", str(mail.outbox[-1].body))
+    assert link is not None
+    client.post(urlsplit(link[0]).path)
+    client.post("/accounts/login/", {"login": email, "password": PASSWORD})
+    assert client.get("/submissions/").status_code == 200
+    return client
+
+
+def delete(client: Client, email: str) -> None:
+    assert client.post("/account/data/", {"email": email}).status_code == 302
+
+
+def status_of_sending(edition: Edition, email: str, factor: float) -> int:
+    """The API's answer to a file of this account."""
+    secret = builders.token(User.objects.get(email=email.lower()))
+    answer = Client().post(
+        "/api/v1/submissions",
+        {
+            "split": "test",
+            "method": f"M{factor}",
+            "file": ContentFile(builders.predictions(edition, factor=factor), name="p.json"),
+        },
+        headers={"Authorization": f"Bearer {secret}"},
+    )
+    builders.score_all()
+    return answer.status_code
+
+
+def account(email: str) -> User:
+    user = User.objects.create_user(email, PASSWORD)
+    EmailAddress.objects.create(user=user, email=user.email, verified=True, primary=True)
+    return user
+
+
+def send(edition: Edition, user: User, *factors: float) -> None:
+    for factor in factors:
+        builders.submit(
+            user, builders.predictions(edition, factor=factor), method=f"M{factor}", visibility="PRIVATE"
+        )
+    builders.score_all()
+
+
+def forget(user: User) -> None:
+    forgetting.forget(user=user, reason="R", actor=user, now=timezone.now())
+
+
+def left(user: User) -> int | None:
+    split = Split.objects.get(pk="test")
+    team = teams.current_team_of(user=user)
+    return quotas.state(team=team, user=user, split=split, now=timezone.now()).left
+
+
+# --- the attack ---------------------------------------------------------------------------------------------
+
+
+def test_whoever_sends_deletes_and_signs_up_again_has_no_other_quota(limited: Edition) -> None:
+    first = sign_up("x@example.org")
+    assert [status_of_sending(limited, "x@example.org", factor) for factor in (1.1, 1.2, 1.3, 1.4)] == [
+        *[201] * 3,
+        429,
+    ]
+    delete(first, "x@example.org")
+    for number, email in enumerate(("x@example.org", "X@Example.org", "x+1@example.org")):
+        again = sign_up(email)
+        assert status_of_sending(limited, email, 2 + number / 10) == 429, email
+        assert "Your team has used 3 submissions to test" in again.get("/submit/?split=test").text
+        delete(again, email.lower())
+    assert status_of_sending(limited, account("y@example.org").email, 3.0) == 201
+
+
+def test_one_mailbox_gets_one_quota_in_a_window_however_often_it_is_deleted(limited: Edition) -> None:
+    n_taken = 0
+    for number in range(4):
+        user = account(f"x+{number}@example.org")
+        for factor in (1.1, 1.2, 1.3):
+            n_taken += status_of_sending(limited, user.email, factor + number) == 201
+        forget(user)
+    assert n_taken == 3
+
+
+def test_an_account_of_a_provider_has_the_quota_of_its_mailbox(limited: Edition) -> None:
+    first = account("x@example.org")
+    SocialAccount.objects.create(user=first, provider="github", uid="42")
+    send(limited, first, 1.1, 1.2, 1.3)
+    forget(first)
+    assert not SocialAccount.objects.exists()
+    second = User.objects.create_user("x@example.org")
+    SocialAccount.objects.create(user=second, provider="orcid", uid="0000-0001")
+    EmailAddress.objects.create(user=second, email=second.email, verified=True, primary=True)
+    with pytest.raises(QuotaExceeded):
+        send(limited, second, 1.4)
+
+
+def test_every_proved_address_of_the_deleted_account_counts_and_others_do_not(limited: Edition) -> None:
+    first = account("x@example.org")
+    EmailAddress.objects.create(user=first, email="proved+1@example.org", verified=True)
+    EmailAddress.objects.create(user=first, email="victim@example.org", verified=False)
+    send(limited, first, 1.1, 1.2)
+    forget(first)
+    theirs = [account(f"{name}@example.org") for name in ("x+2", "proved", "victim")]
+    assert [left(user) for user in theirs] == [1, 1, 3]
+    other = account("other@example.org")
+    EmailAddress.objects.create(user=other, email="X+9@example.org", verified=True)
+    assert left(other) == 1
+
+
+def test_who_is_deleted_by_a_maintainer_has_spent_it_too(limited: Edition, maintainer: User) -> None:
+    for deed in ("page", "command"):
+        user = account(f"{deed}@example.org")
+        send(limited, user, 1.1, 1.2, 1.3)
+        if deed == "page":
+            forgetting.forget(user=user, reason="R", actor=maintainer, now=timezone.now())
+        else:
+            call_command("forget_person", user.email, "--reason", "R")
+        assert left(account(f"{deed}+again@example.org")) == 0
+
+
+def test_rejected_files_and_bytes_are_counted_as_well(limited: Edition, settings: Settings) -> None:
+    Split.objects.filter(pk="test").update(quota_rejected_limit=2)
+    first = account("x@example.org")
+    for number in range(2):
+        builders.send(first, b"{}" + b" " * number)
+    builders.score_all()
+    forget(first)
+    second = account("x+1@example.org")
+    with pytest.raises(QuotaExceeded, match="2 files that were rejected"):
+        send(limited, second, 1.1)
+    Split.objects.filter(pk="test").update(quota_rejected_limit=None)
+    settings.MAX_TEAM_BYTES_PER_DAY = len(builders.predictions(limited, factor=1.1)) + 4
+    with pytest.raises(QuotaExceeded, match="has sent 5 bytes within 24 hours"):
+        send(limited, second, 1.1)
+
+
+def test_the_team_that_somebody_comes_into_has_spent_it_too(limited: Edition, owner: User) -> None:
+    first = account("x@example.org")
+    send(limited, first, 1.1, 1.2)
+    forget(first)
+    team = teams.team_of(user=owner)
+    team.memberships.create(user=account("x+1@example.org"))
+    assert left(owner) == 1
+
+
+# --- what is kept, and how long -----------------------------------------------------------------------------
+
+
+def test_what_is_kept_names_nobody_and_goes_with_the_longest_window(limited: Edition) -> None:
+    first = account("kestrel@example.org")
+    send(limited, first, 1.1)
+    sent_at = Submission.objects.get().submitted_at
+    forget(first)
+    row = SpentMailbox.objects.get()
+    assert (row.account, row.kept_until) == (first, sent_at + 30 * DAY)
+    tables = (SpentMailbox, User, EmailAddress, Submission)
+    everything = "".join(serializers.serialize("json", model._base_manager.all()) for model in tables)
+    assert [text for text in ("kestrel", "example.org") if text in everything] == []
+    upkeep.clean(now=row.kept_until - timedelta(seconds=1))
+    assert SpentMailbox.objects.exists()
+    upkeep.clean(now=row.kept_until)
+    assert not SpentMailbox.objects.exists()
+    assert Submission.objects.get().submitted_by == first
+
+
+def test_the_longest_rule_of_any_team_decides(limited: Edition, owner: User, maintainer: User) -> None:
+    team = teams.team_of(user=owner)
+    builders.override(team, min_gap=45 * DAY, actor=maintainer, now=timezone.now())
+    send(limited, owner, 1.1)
+    forget(owner)
+    assert SpentMailbox.objects.get().kept_until == Submission.objects.get().submitted_at + 45 * DAY
+
+
+def test_who_has_sent_nothing_lately_leaves_nothing(limited: Edition) -> None:
+    first, second = account("x@example.org"), account("y@example.org")
+    forget(first)
+    send(limited, second, 1.1)
+    Submission.objects.update(submitted_at=timezone.now() - 31 * DAY)
+    forget(second)
+    assert not SpentMailbox.objects.exists()
+
+
+def test_where_addresses_are_not_proved_nothing_is_kept_and_nothing_counts(
+    limited: Edition, settings: Settings
+) -> None:
+    first = account("x@example.org")
+    send(limited, first, 1.1, 1.2, 1.3)
+    settings.ACCOUNT_EMAIL_VERIFICATION = "none"
+    forget(first)
+    assert not SpentMailbox.objects.exists()
+    assert left(account("x@example.org")) == 3
+
+
+def test_a_new_secret_key_separates_a_mailbox_from_what_it_had_sent(
+    limited: Edition, settings: Settings
+) -> None:
+    first = account("x@example.org")
+    send(limited, first, 1.1, 1.2, 1.3)
+    forget(first)
+    second = account("x@example.org")
+    assert left(second) == 0
+    settings.SECRET_KEY = "another"
+    assert left(second) == 3
+
+
+def test_to_forget_twice_is_to_forget_once(limited: Edition) -> None:
+    first = account("x@example.org")
+    send(limited, first, 1.1)
+    forget(first)
+    forgetting.forget(user=first, reason="R", actor=None, now=timezone.now())
+    assert SpentMailbox.objects.count() == 1
+
+
+def test_asking_for_a_quota_costs_two_queries_more_at_most(limited: Edition) -> None:
+    user = account("x@example.org")
+    teams.team_of(user=user)
+    with CaptureQueriesContext(connection) as queries:
+        left(user)
+    assert len([each for each in queries if "spentmailbox" in each["sql"]]) == 1
+    assert mailboxes.deleted_accounts(User.objects.filter(pk=user.pk)) == []
+
+
+def test_the_pages_say_what_stays(limited: Edition, signed_in: Client) -> None:
+    for address in ("/account/data/", "/privacy/"):
+        text = " ".join(assert_sound(signed_in.get(address)).one("main").text.split())
+        assert "30 days" in text, address
+        assert "keyed hash of your mailbox" in text, address
