@@ -8,7 +8,7 @@ from django.db import migrations, models
 class Migration(migrations.Migration):
 
     dependencies = [
-        ('leaderboard', '0040_late_boards'),
+        ('leaderboard', '0041_site_announcement'),
     ]
 
     operations = [
