@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -69,6 +70,36 @@ class Difference:
         low = None if self.high is None else 0.0 - self.high
         high = None if self.low is None else 0.0 - self.low
         return Difference(0.0 - self.difference, low, high, self.p, self.p_below, self.n_effective)
+
+
+def told_apart(found: Sequence[Difference]) -> list[bool]:
+    """Which of several differences are significant with all of them tested together (Holm 1979).
+
+    The smallest p is held against 0.05 / m, the next against 0.05 / (m − 1), until one is not below. Where
+    all are 0, any is told apart in at most 5 % of cases. Where p is not told, `p_below` counts as p. What has
+    neither is not tested.
+
+    >>> told_apart([Difference(-1, -2, -0.1, p) for p in (0.02, 0.01, 0.6)])
+    [True, True, False]
+    >>> told_apart([Difference(-1, -2, -0.1, p) for p in (0.02, 0.03, 0.6)])
+    [False, False, False]
+    >>> told_apart([Difference(-1, -2, -0.1, p_below=below) for below in (0.01, 0.01, 1.0)])
+    [True, True, False]
+    """
+    tested = sorted((p, i) for i, each in enumerate(found) if (p := _upper(each)) is not None)
+    apart = [False] * len(found)
+    for n_before, (p, i) in enumerate(tested):
+        n_left = len(tested) - n_before
+        is_below = n_left * p < SIGNIFICANT or (found[i].p is None and n_left * p <= SIGNIFICANT)
+        if not is_below:
+            break
+        apart[i] = True
+    return apart
+
+
+def _upper(found: Difference) -> float | None:
+    """The p of a difference, else what it is below."""
+    return found.p_below if found.p is None else found.p
 
 
 def too_few_recordings(n_effective: float | None) -> str:
