@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
+from uuid import UUID
 
 from django.utils.html import format_html
 
@@ -10,6 +11,7 @@ from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
 from evaluator.scoring.report import format_published
 from evaluator.scoring.significance import told_apart, too_few_recordings
+from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.scoring.comparisons import Compared, Pair
@@ -21,13 +23,16 @@ _DIFFERENCE_PX: Final = 150.0
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
-def comparison(compared: Compared) -> dict[str, Any]:
-    """What was compared, as the compare page places it."""
+def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
+    """What was compared, as the compare page places it; `n_tried` are scored submissions by method."""
     return {
         "compared": compared,
         "verdict": verdict(compared),
         "pairs": [_pair_table(pair) for pair in compared.pairs],
         "profile": profile_chart.profile(compared.entries),
+        "selection": sentences.selection(
+            {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
+        ),
     }
 
 
@@ -94,6 +99,7 @@ def _pair_table(pair: Pair) -> dict[str, Any]:
         "pair": pair,
         "sentence": pair.sentence(),
         "others": pair.others(),
+        "influence": pair.influence(),
         "groups": [
             _difference_group(group, [name for name in names if name in differences], pair, differences)
             for group, names in zip(score_groups(columns), grouped_names(columns).values(), strict=True)
