@@ -161,6 +161,7 @@ def influence(
     left = favours.sum() - np.cumsum(favours[order[:n_favouring]])
     # What is left of rounding is no other sign.
     turned = np.flatnonzero(left < -_NO_SUM * np.abs(favours).sum())
+    n_to_turn = int(turned[0]) + 1 if turned.size else None
     seed = int(rng.integers(_SEEDS))
 
     def is_significant(n_left_out: int) -> bool:
@@ -172,8 +173,8 @@ def influence(
 
     return Influence(
         n_recordings=int((counts > 0).sum()),
-        n_to_undecided=_first_false(is_significant, n_favouring) if is_significant(0) else None,
-        n_to_turn=int(turned[0]) + 1 if turned.size else None,
+        n_to_undecided=_first_false(is_significant, n_to_turn or n_favouring) if is_significant(0) else None,
+        n_to_turn=n_to_turn,
     )
 
 

@@ -51,6 +51,20 @@ def test_the_fewest_recordings_are_those_of_trying_everything(seed: int) -> None
         assert undecided <= found.n_to_undecided <= undecided + 1, "the order makes an upper bound"
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_a_difference_stops_being_significant_before_it_turns(seed: int) -> None:
+    """Without many more the other entry would be significantly better: that is not what is looked for."""
+    rng = np.random.default_rng(seed)
+    gaps = rng.normal(0.3, 1.0, 300)
+    found = influence(gaps, np.ones(300), rng=rng, n_flips=N_FLIPS)
+    assert found.n_to_undecided is not None
+    assert found.n_to_turn is not None
+    assert found.n_to_undecided < found.n_to_turn < 100
+    rest = np.sort(gaps)[: 300 - found.n_to_undecided]
+    p = sign_flips(rest[:, None], np.ones((len(rest), 1)), rng=rng, n_flips=9_999).p[0]
+    assert p == pytest.approx(0.05, abs=0.03)
+
+
 def test_recordings_that_all_favour_one_cannot_turn_the_sign() -> None:
     found = influence(np.arange(1.0, 21), np.ones(20), rng=np.random.default_rng(0), n_flips=N_FLIPS)
     assert found.n_to_turn is None
