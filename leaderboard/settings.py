@@ -81,6 +81,9 @@ INSTALLED_APPS = [
 ]
 MIDDLEWARE = frame.MIDDLEWARE
 ROOT_URLCONF = "leaderboard.urls"
+# The site is at the root of its name. What a request says of another place would be in every link, and in the
+# pages that others are shown from memory.
+FORCE_SCRIPT_NAME = ""
 WSGI_APPLICATION = "leaderboard.wsgi.application"
 TEMPLATES = [
     {
