@@ -191,19 +191,6 @@ def test_the_log_of_the_database_has_no_statement_and_no_value() -> None:
     assert {"log_parameter_max_length=0", "log_parameter_max_length_on_error=0"} <= set(options)
 
 
-def test_only_uploads_are_buffered_whole_and_nobody_sends_for_ever() -> None:
-    text = (REPOSITORY / "deploy/Caddyfile").read_text()
-    uploads = text[text.index("handle @uploads") : text.index("handle {")]
-    others = text[text.index("handle {") :]
-    assert "@uploads path /submit/ /api/v1/submissions\n" in text
-    assert uploads.count("{$TSTTC_MAX_REQUEST_SIZE}") == 2
-    assert "max_size 1MB" in others
-    assert "request_buffers 64KB" in others
-    assert "TSTTC_MAX_REQUEST_SIZE" not in others
-    assert re.search(r"timeouts \{[^}]*read_body \dm", text)
-    assert text.count("{") == text.count("}")
-
-
 def test_secrets_on_disk_are_committed_nowhere_and_in_no_image() -> None:
     assert "/.env" in (REPOSITORY / ".gitignore").read_text().splitlines()
     ignored = (REPOSITORY / ".dockerignore").read_text().splitlines()
