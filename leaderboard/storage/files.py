@@ -5,6 +5,7 @@ It goes through Django's storages, so that workers and web on several machines c
 
 import hashlib
 import os
+import re
 import tempfile
 import time
 from collections.abc import Iterator
@@ -24,6 +25,9 @@ from leaderboard.models import SentFile
 
 CHUNK_BYTES = 1 << 20
 _DIGEST_BYTES = 32
+_NAMES = re.compile(
+    r"predictions/[0-9a-f]{2}/[0-9a-f]{64}\.json|manifests/[0-9a-f]{64}\.csv|aligned/[0-9a-f]{16}/[0-9a-f]{64}\.f8"
+)
 INCOMING = ".incoming"
 LEFTOVER_S = 3600.0
 FRESH = timedelta(hours=12)
@@ -147,6 +151,11 @@ def replacing(target: Path) -> Iterator[Path]:
 def store() -> Storage:
     """The configured file store."""
     return storages["files"]
+
+
+def is_name(text: str) -> bool:
+    """Whether the store keeps a file under this name: it leads nowhere else."""
+    return _NAMES.fullmatch(text) is not None
 
 
 def predictions_name(digest: str) -> str:
