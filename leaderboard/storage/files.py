@@ -28,6 +28,8 @@ _DIGEST_BYTES = 32
 _NAMES = re.compile(
     r"predictions/[0-9a-f]{2}/[0-9a-f]{64}\.json|manifests/[0-9a-f]{64}\.csv|aligned/[0-9a-f]{16}/[0-9a-f]{64}\.f8"
 )
+# Web and workers may be two accounts, which share the group of the directory.
+_FILE_MODE = 0o640
 INCOMING = ".incoming"
 LEFTOVER_S = 3600.0
 FRESH = timedelta(hours=12)
@@ -76,6 +78,7 @@ class DurableFileSystemStorage(FileSystemStorage):
                 for chunk in content.chunks(CHUNK_BYTES):
                     out.write(chunk)
                 out.flush()
+                os.fchmod(out.fileno(), _FILE_MODE)
                 if not isinstance(content, Rebuildable):
                     os.fsync(out.fileno())
             Path(temporary).replace(target)
