@@ -182,7 +182,18 @@ def test_the_password_of_the_broker_is_in_no_command_line_and_it_is_not_root() -
     script = redis["command"][-1]
     assert script.splitlines()[-1] == "exec redis-server /tmp/redis.conf"
     assert "/tmp" in redis["tmpfs"]
-    assert "REDIS_PASSWORD" not in script.splitlines()[-1]
+    # What a shell does by itself has no command line.
+    naming = [line.split()[0] for line in script.splitlines() if "REDIS_PASSWORD" in line]
+    assert naming == ["printf"]
+
+
+def test_the_application_is_an_account_of_the_broker_without_programs_and_without_its_settings() -> None:
+    assert COMPOSE["x-broker"]["TSTTC_BROKER_URL"].startswith("redis://tsttc:")
+    assert mounts(SERVICES["redis"])["/etc/redis/users.acl"] == "./deploy/redis.acl:/etc/redis/users.acl:ro"
+    default, ours = (REPOSITORY / "deploy/redis.acl").read_text().splitlines()
+    assert default == "user default off"
+    assert {"-@scripting", "-@dangerous", "-@admin"} <= set(ours.split())
+    assert "+@all" not in ours
 
 
 def test_the_log_of_the_database_has_no_statement_and_no_value() -> None:
