@@ -81,6 +81,9 @@ INSTALLED_APPS = [
 ]
 MIDDLEWARE = frame.MIDDLEWARE
 ROOT_URLCONF = "leaderboard.urls"
+# The site is at the root of its name. What a request says of another place would be in every link, and in the
+# pages that others are shown from memory.
+FORCE_SCRIPT_NAME = ""
 WSGI_APPLICATION = "leaderboard.wsgi.application"
 TEMPLATES = [
     {
@@ -224,9 +227,9 @@ CELERY_BROKER_URL = required(
     elsewhere="memory://",
 )
 CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any] = {
-    "visibility_timeout": 900,
-    "unacked_restore_interval": 10,
-    "unacked_restore_throttle": 1,
+    # A message that a dying worker held is worth nothing, since workers look by themselves. To restore it,
+    # kombu would run a program in Redis, which deploy/redis.acl does not allow.
+    "ack_emulation": False,
     "socket_timeout": 5,
     "socket_connect_timeout": 2,
     "socket_keepalive": True,
@@ -237,6 +240,8 @@ CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any] = {
     "interval_step": 0.1,
     "interval_max": 0.2,
 }
+# Queues of questions to workers end with their connection; to let them expire as well takes a program too.
+CELERY_CONTROL_QUEUE_EXPIRES = None
 CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
 CELERY_BROKER_CONNECTION_MAX_RETRIES = None
 CELERY_TASK_PUBLISH_RETRY = False
