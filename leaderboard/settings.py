@@ -293,14 +293,25 @@ TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
 ACCOUNT_ADAPTER = "leaderboard.web.account.accounts.AccountAdapter"
 ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
-# Wrong passwords; the keys are an account at an address, and an account (see web/account/accounts.py).
-ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
+# Wrong passwords and wrong codes; the keys are an account at an address, and an account (see
+# web/account/accounts.py and codes.py).
+ACCOUNT_RATE_LIMITS = {
+    "login_failed": "10/m/ip,5/5m/key",
+    "login_failed_anywhere": "30/h/key",
+    "code_failed": "10/m/ip,5/5m/key,50/d/key",
+    "code_failed_anywhere": "50/d/key",
+}
 
 # Whoever changes how one signs in, its owner is told by mail.
 ACCOUNT_EMAIL_NOTIFICATIONS = True
 # Whether maintainers need a second factor for their pages (see web/account/accounts.py).
 REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
 MFA_ADAPTER = "leaderboard.web.account.accounts.SecondFactorAdapter"
+MFA_FORMS = {
+    "authenticate": "leaderboard.web.account.codes.AuthenticateForm",
+    "reauthenticate": "leaderboard.web.account.codes.ReauthenticateForm",
+    "activate_totp": "leaderboard.web.account.codes.ActivateForm",
+}
 # Without a mail server nobody could verify an address.
 MFA_ALLOW_UNVERIFIED_EMAIL = not SENDS_MAIL
 # Accounts elsewhere that people may sign in with (see web/account/providers.py); without a client, none.

@@ -64,7 +64,7 @@ class AccountAdapter(DefaultAccountAdapter):
         """Count one try. Raises allauth's validation error once there were too many wrong ones."""
         super().pre_authenticate(request, **credentials)
         login = _login_of(credentials)
-        if cache.get(_known_address_key(login, ratelimit.get_ip(request))):
+        if cache.get(known_address_key(login, ratelimit.get_ip(request))):
             return
         usage = ratelimit.consume(request, app="allauth.account", action="login_failed_anywhere", key=login)
         if not usage:
@@ -78,9 +78,7 @@ class AccountAdapter(DefaultAccountAdapter):
         user = super().authenticate(request, **credentials)
         if user:
             address = ratelimit.get_ip(request)
-            cache.set(
-                _known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S
-            )
+            cache.set(known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S)
         return user
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
@@ -127,7 +125,8 @@ def _login_of(credentials: dict[str, Any]) -> str:
     return str(credentials.get("email") or credentials.get("username") or "").lower()
 
 
-def _known_address_key(login: str, address: str) -> str:
+def known_address_key(login: str, address: str) -> str:
+    """Where the cache says that this address has signed in here before."""
     # A hash: who signs in from where is nobody's business in a table of the database.
     return "known-address:" + hashlib.sha256(f"{login}\n{address}".encode()).hexdigest()
 

@@ -107,14 +107,60 @@ def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: Use
         assert lost.post("/accounts/2fa/authenticate/", {"code": sent}).status_code == expected
 
 
+def test_the_code_that_set_up_the_app_signs_nobody_in(owner: User, phone: Phone) -> None:
+    client = signed_in(owner)
+    set_up(client, phone)
+    phone.now_s -= 30
+    used = phone.code()
+    replayed = Client()
+    sign_in(replayed, owner)
+    assert "already used" in replayed.post("/accounts/2fa/authenticate/", {"code": used}).text
+    assert replayed.get("/submissions/").status_code == 302
+
+
+# --- who guesses codes -----------------------------------------------------------------------------------
+
+HOME, ATTACKER = "198.51.100.7", "203.0.113.9"
+
+
+def tries(user: User, code: str, *, address: str) -> bool:
+    """Whether this code, sent from this address by somebody who knows the password, opens the account."""
+    client = Client(REMOTE_ADDR=address)
+    sign_in(client, user)
+    return client.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 302
+
+
 def test_who_guesses_codes_is_stopped(owner: User, phone: Phone) -> None:
     set_up(signed_in(owner), phone)
-    client = Client()
+    client = Client(REMOTE_ADDR=ATTACKER)
     sign_in(client, owner)
     for _ in range(5):
         client.post("/accounts/2fa/authenticate/", {"code": "1"})
     assert client.post("/accounts/2fa/authenticate/", {"code": phone.code()}).status_code == 200
     assert client.get("/submissions/").status_code == 302
+
+
+def test_wrong_codes_from_one_address_lock_out_that_address_and_not_the_owner(
+    owner: User, phone: Phone
+) -> None:
+    set_up(signed_in(owner), phone)
+    assert not any(tries(owner, "1", address=ATTACKER) for _ in range(12))
+    assert not tries(owner, phone.code(), address=ATTACKER)
+    assert tries(owner, phone.code(), address=HOME)
+
+
+@pytest.mark.slow
+def test_guesses_of_codes_from_many_addresses_meet_the_limit_of_the_account(
+    owner: User, phone: Phone
+) -> None:
+    set_up(signed_in(owner), phone)
+    assert tries(owner, phone.code(), address=HOME)
+    assert not any(tries(owner, "1", address=f"203.0.113.{n % 10}") for n in range(50))
+    # Also the right code, from an address where nobody has ever given one: that the attacker knows the
+    # password, and so signs in as far as this, makes no address known.
+    assert not tries(owner, phone.code(), address="192.0.2.3")
+    assert not tries(owner, phone.code(), address="203.0.113.10")
+    assert tries(owner, phone.code(), address=HOME)
 
 
 def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
