@@ -302,6 +302,8 @@ ACCOUNT_RATE_LIMITS = {
     "code_failed_anywhere": "50/d/key",
 }
 
+# A mail may take its time. Of codes that it names there are 2.6e10; each is good for three tries.
+ACCOUNT_LOGIN_TIMEOUT = ACCOUNT_LOGIN_BY_CODE_TIMEOUT = 3600
 # Whoever changes how one signs in, its owner is told by mail.
 ACCOUNT_EMAIL_NOTIFICATIONS = True
 # Whether maintainers need a second factor for their pages (see web/account/accounts.py).

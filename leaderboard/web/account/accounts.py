@@ -13,6 +13,7 @@ from urllib.parse import urlsplit, urlunsplit
 
 from allauth.account import forms
 from allauth.account.adapter import DefaultAccountAdapter
+from allauth.account.models import Login
 from allauth.core import context as allauth_context
 from allauth.core.internal import ratelimit
 from allauth.mfa.adapter import DefaultMFAAdapter
@@ -28,6 +29,7 @@ from django.utils import timezone
 
 from leaderboard.mails import outbox
 from leaderboard.models import User
+from leaderboard.people import second_factor
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 
@@ -43,6 +45,11 @@ class ConfiguredSite(RequestSite):
 
 class AccountAdapter(DefaultAccountAdapter):
     """Sends mails, and decides whether somebody may try a password."""
+
+    error_messages = {
+        **DefaultAccountAdapter.error_messages,
+        "incorrect_code": "The code is wrong; expected the code of the last mail that we sent for this.",
+    }
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
         """Send a mail whose links lead to the configured site, now or, if no server takes it, later."""
@@ -80,6 +87,16 @@ class AccountAdapter(DefaultAccountAdapter):
             address = ratelimit.get_ip(request)
             cache.set(known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S)
         return user
+
+    def is_login_by_code_required(self, login: Login) -> bool:
+        """Whether the sign-in also asks for a mailed code: of a maintainer who has to set up an app first.
+
+        Otherwise somebody who knows only the password would set up an app of their own.
+        """
+        user = login.user
+        if not isinstance(user, User) or not second_factor.is_required(user):
+            return False
+        return not second_factor.is_set_up(user)
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
         """How somebody confirms that it is them: with a code if they have a second factor, else by password.
