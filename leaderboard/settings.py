@@ -286,13 +286,25 @@ SENDS_MAIL = bool(env.str("TSTTC_EMAIL_URL", default=""))
 DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
 # Who the pages say answers questions; the pages are edited at /maintain/pages/.
 CONTACT_EMAIL = env.str("TSTTC_CONTACT_EMAIL", default="") or DEFAULT_FROM_EMAIL
-# Without a mail server nobody could follow the link; with one, an address counts once it is proved.
+# Without a mail server nobody would get the code; with one, an address counts once it is proved.
 ACCOUNT_EMAIL_VERIFICATION = "mandatory" if SENDS_MAIL else "none"
+# With a code, which counts only where it was asked for: nobody proves an address for the account of somebody
+# else by following a link, and none is kept before it is proved (see leaderboard/people/addresses.py).
+ACCOUNT_EMAIL_VERIFICATION_BY_CODE_ENABLED = SENDS_MAIL
+ACCOUNT_EMAIL_CONFIRMATION_AUTHENTICATED_REDIRECT_URL = "/accounts/email/"
+# A mail may take its time. Of codes that it names there are 2.6e10; each is good for three tries.
+ACCOUNT_EMAIL_VERIFICATION_BY_CODE_TIMEOUT = 3600
+ACCOUNT_EMAIL_VERIFICATION_SUPPORTS_RESEND = ACCOUNT_LOGIN_BY_CODE_SUPPORTS_RESEND = True
+ACCOUNT_LOGIN_TIMEOUT = ACCOUNT_LOGIN_BY_CODE_TIMEOUT = 3600
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
 ACCOUNT_ADAPTER = "leaderboard.web.account.accounts.AccountAdapter"
-ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
+ACCOUNT_FORMS = {
+    "signup": "leaderboard.web.account.accounts.SignupForm",
+    "confirm_email_verification_code": "leaderboard.web.account.accounts.ConfirmAddressForm",
+    "reset_password": "leaderboard.web.account.accounts.ResetPasswordForm",
+}
 # Wrong passwords and wrong codes; the keys are an account at an address, and an account (see
 # web/account/accounts.py and codes.py).
 ACCOUNT_RATE_LIMITS = {
@@ -302,8 +314,6 @@ ACCOUNT_RATE_LIMITS = {
     "code_failed_anywhere": "50/d/key",
 }
 
-# A mail may take its time. Of codes that it names there are 2.6e10; each is good for three tries.
-ACCOUNT_LOGIN_TIMEOUT = ACCOUNT_LOGIN_BY_CODE_TIMEOUT = 3600
 # Whoever changes how one signs in, its owner is told by mail.
 ACCOUNT_EMAIL_NOTIFICATIONS = True
 # Whether maintainers need a second factor for their pages (see web/account/accounts.py).

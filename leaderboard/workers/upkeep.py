@@ -10,6 +10,7 @@ from django.db.models import F
 from leaderboard.exports import card_drawing, cards
 from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
+from leaderboard.people import addresses
 from leaderboard.scoring import questions, worker
 from leaderboard.storage import orphans
 from leaderboard.submissions import idempotency
@@ -36,6 +37,7 @@ def clean(*, now: datetime) -> Cleaned:
     n_keys = idempotency.purge(now=now)
     n_questions = questions.delete_expired(now=now)
     outbox.purge(now=now)
+    addresses.delete_unproved(now=now)
     n_files = n_bytes = n_leftovers = 0
     for orphan in orphans.orphans(now=now):
         if orphans.remove(orphan, now=now):

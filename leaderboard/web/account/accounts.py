@@ -12,8 +12,8 @@ from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 from allauth.account import forms
-from allauth.account.adapter import DefaultAccountAdapter
-from allauth.account.models import Login
+from allauth.account.adapter import DefaultAccountAdapter, get_adapter
+from allauth.account.models import EmailAddress, Login
 from allauth.core import context as allauth_context
 from allauth.core.internal import ratelimit
 from allauth.mfa.adapter import DefaultMFAAdapter
@@ -23,13 +23,14 @@ from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
+from django.db import transaction
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
 
 from leaderboard.mails import outbox
 from leaderboard.models import User
-from leaderboard.people import second_factor
+from leaderboard.people import addresses, second_factor
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 
@@ -98,6 +99,12 @@ class AccountAdapter(DefaultAccountAdapter):
             return False
         return not second_factor.is_set_up(user)
 
+    def confirm_email(self, request: HttpRequest, email_address: EmailAddress) -> bool:
+        """Whether the address is proved now. Its account may have given way meanwhile."""
+        with transaction.atomic():
+            is_there = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id)
+            return is_there.exists() and bool(super().confirm_email(request, email_address))
+
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
         """How somebody confirms that it is them: with a code if they have a second factor, else by password.
 
@@ -117,7 +124,24 @@ class AccountAdapter(DefaultAccountAdapter):
         )
 
 
-class SignupForm(forms.SignupForm):
+class OwnersAddress(forms.BaseSignupForm):
+    """Of a form that signs up: an address that somebody else has not proved is free."""
+
+    def validate_unique_email(self, value: str) -> str:
+        """The address. Only an account that it belongs to counts as there."""
+        if addresses.accounts_of(value).exists():
+            return str(super().validate_unique_email(value))
+        return value
+
+    def save(self, request: HttpRequest) -> User:
+        """Make the account; what had the address unproved gives way."""
+        with transaction.atomic():
+            addresses.release(address=self.cleaned_data["email"])
+            user: User = super().save(request)
+        return user
+
+
+class SignupForm(OwnersAddress, forms.SignupForm):
     """Signs up; an address that has an account already gets a mail, and the same answer."""
 
     def clean(self) -> dict[str, Any]:
@@ -136,6 +160,29 @@ class SignupForm(forms.SignupForm):
         if self.account_already_exists:
             make_password(self.cleaned_data["password1"])
         return super().try_save(request)
+
+
+class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
+    """The mailed code that proves an address."""
+
+    def clean_code(self) -> Any:
+        """The code. With the right one, nobody who has not proved the address keeps the owner from it."""
+        forms.BaseConfirmCodeForm.clean_code(self)
+        if self.user is None:  # the account gave way, or there is none
+            raise get_adapter().validation_error("incorrect_code")
+        addresses.release(address=self.email, to=self.user)
+        return super().clean_code()
+
+
+class ResetPasswordForm(forms.ResetPasswordForm):
+    """Mails a link to an address that belongs to an account."""
+
+    def clean_email(self) -> Any:
+        """The address. An account that nobody confirmed is none: whoever made it may have another way in."""
+        address = super().clean_email()
+        theirs = set(addresses.accounts_of(address))
+        self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]
+        return address
 
 
 def _login_of(credentials: dict[str, Any]) -> str:
