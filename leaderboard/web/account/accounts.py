@@ -181,7 +181,7 @@ class ResetPasswordForm(forms.ResetPasswordForm):
         """The address. An account that nobody confirmed is none: whoever made it may have another way in."""
         address = super().clean_email()
         theirs = set(addresses.accounts_of(address))
-        self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]
+        self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]  # allauth sets it here alone
         return address
 
 
