@@ -17,6 +17,7 @@ from django.core.management.utils import get_random_secret_key
 from leaderboard.api import settings
 from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
+from leaderboard.web.account import allauth_settings
 from leaderboard.web.middleware import frame
 
 BASE_DIR = Path(__file__).resolve().parent.parent
@@ -276,12 +277,8 @@ AUTH_PASSWORD_VALIDATORS = [
 LOGIN_URL = "account_login"
 LOGIN_REDIRECT_URL = "/submit/"
 LOGOUT_REDIRECT_URL = "/"
-ACCOUNT_USER_MODEL_USERNAME_FIELD = None
-ACCOUNT_LOGIN_METHODS = {"email"}
-ACCOUNT_SIGNUP_FIELDS = ["email*", "password1*", "password2*"]
-ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.account.team_views.SignupNameForm"
 ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
-ACCOUNT_SESSION_REMEMBER = True
+vars().update(allauth_settings.SETTINGS)
 EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default="consolemail://"))
 vars().update(EMAIL_CONFIG)
 # Somebody waits on a page meanwhile; what is not sent within it is sent later.
@@ -291,21 +288,16 @@ SENDS_MAIL = bool(env.str("TSTTC_EMAIL_URL", default=""))
 DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
 # Who the pages say answers questions; the pages are edited at /maintain/pages/.
 CONTACT_EMAIL = env.str("TSTTC_CONTACT_EMAIL", default="") or DEFAULT_FROM_EMAIL
-# Without a mail server nobody could follow the link; with one, an address counts once it is proved.
+# Without a mail server nobody would get the code; with one, an address counts once it is proved.
 ACCOUNT_EMAIL_VERIFICATION = "mandatory" if SENDS_MAIL else "none"
+# With a code, which counts only where it was asked for: nobody proves an address for the account of somebody
+# else by following a link, and none is kept before it is proved (see leaderboard/people/addresses.py).
+ACCOUNT_EMAIL_VERIFICATION_BY_CODE_ENABLED = SENDS_MAIL
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
-ACCOUNT_ADAPTER = "leaderboard.web.account.accounts.AccountAdapter"
-ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
-# Wrong passwords; the keys are an account at an address, and an account (see web/account/accounts.py).
-ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
-
-# Whoever changes how one signs in, its owner is told by mail.
-ACCOUNT_EMAIL_NOTIFICATIONS = True
 # Whether maintainers need a second factor for their pages (see web/account/accounts.py).
 REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
-MFA_ADAPTER = "leaderboard.web.account.accounts.SecondFactorAdapter"
 # Without a mail server nobody could verify an address.
 MFA_ALLOW_UNVERIFIED_EMAIL = not SENDS_MAIL
 # Accounts elsewhere that people may sign in with (see web/account/providers.py); without a client, none.
@@ -313,16 +305,6 @@ SOCIALACCOUNT_PROVIDERS = environment.providers(
     orcid=("ORCID", "TSTTC_ORCID_CLIENT_ID", "TSTTC_ORCID_CLIENT_SECRET"),
     github=("GitHub", "TSTTC_GITHUB_CLIENT_ID", "TSTTC_GITHUB_CLIENT_SECRET"),
 )
-SOCIALACCOUNT_ADAPTER = "leaderboard.web.account.providers.ProviderAdapter"
-SOCIALACCOUNT_FORMS = {
-    "signup": "leaderboard.web.account.providers.ProviderSignupForm",
-    "disconnect": "leaderboard.web.account.providers.ConnectedForm",
-}
-# Who signs up reads of the rules first, and chooses a name.
-SOCIALACCOUNT_AUTO_SIGNUP = False
-# Another way into the account: whoever finds an open session does not add one.
-SOCIALACCOUNT_REAUTHENTICATION_REQUIRED = True
-SOCIALACCOUNT_REQUESTS_TIMEOUT = 5
 
 # --- API -------------------------------------------------------------------------------------------------
 

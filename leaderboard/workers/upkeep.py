@@ -10,6 +10,7 @@ from django.db.models import F
 from leaderboard.exports import card_drawing, cards
 from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
+from leaderboard.people import addresses
 from leaderboard.quotas import mailboxes
 from leaderboard.scoring import questions, worker
 from leaderboard.storage import orphans
@@ -39,6 +40,7 @@ def clean(*, now: datetime) -> Cleaned:
     outbox.purge(now=now)
     mailboxes.delete_expired(now=now)
     forgetting.delete_late_rows()
+    addresses.delete_unproved(now=now)
     n_files = n_bytes = n_leftovers = 0
     for orphan in orphans.orphans(now=now):
         if orphans.remove(orphan, now=now):
