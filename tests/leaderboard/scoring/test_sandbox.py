@@ -132,6 +132,24 @@ def test_file_that_needs_too_much_memory_ends_the_child_alone(
     assert not children()
 
 
+@pytest.mark.parametrize(
+    "data",
+    [
+        gzip.compress(b"", mtime=0) * 900_000,
+        b"anno_id,ttc" + b"".join(b",c%d" % i for i in range(300_000)) + b"\n",
+        gzip.compress(b"anno_id,ttc\n" + b"\n" * 60_000_000),
+    ],
+    ids=["members", "columns", "lines"],
+)
+def test_archives_and_tables_of_too_many_parts_are_refused_within_a_second_of_processor_time(
+    read: Read, settings: Settings, data: bytes
+) -> None:
+    settings.CHILD_CPU_S = 1
+    with opened(data) as source, pytest.raises(Rejected) as rejected:
+        read(source)
+    assert [problem.code for problem in rejected.value.problems] == ["too-many-members"]
+
+
 def test_child_that_is_killed_is_reported(read: Read) -> None:
     with pytest.raises(ChildDied, match="reading the file ended with signal 9"):
         read_slowly(read, FAULTY, lambda pid: os.kill(pid, signal.SIGKILL))
