@@ -213,7 +213,8 @@ CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.
 CHILD_MEMORY_BYTES = env.int("TSTTC_CHILD_MEMORY_BYTES", default=1_500_000_000)
-CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=60)
+# Seconds; and one more for every 25,000 sequences of the manifest.
+CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=4)
 
 # --- Celery: a broker message is only a nudge, the database is the queue ------------------------------------
 

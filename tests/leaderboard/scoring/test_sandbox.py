@@ -25,7 +25,7 @@ from evaluator import Manifest, Rejected, read_predictions, read_truth, write_pr
 from evaluator.limits import READY
 from evaluator.predictions.predictions import Predictions
 from leaderboard.scoring import sandbox
-from leaderboard.scoring.sandbox import ChildDied, ChildNotReady, LeaseLost
+from leaderboard.scoring.sandbox import ChildDied, ChildNotReady, ChildOutOfTime, LeaseLost
 from tests import builders
 from tests.chaos.processes import REPOSITORY
 from tests.chaos.uploads import bomb_file, reader_memory_bytes
@@ -148,6 +148,12 @@ def test_archives_and_tables_of_too_many_parts_are_refused_within_a_second_of_pr
     with opened(data) as source, pytest.raises(Rejected) as rejected:
         read(source)
     assert [problem.code for problem in rejected.value.problems] == ["too-many-members"]
+
+
+def test_file_that_takes_too_much_processor_time_ends_the_child_and_is_told_from_a_crash(read: Read) -> None:
+    with pytest.raises(ChildOutOfTime, match="reading the file took more than 4 s of processor time"):
+        read_slowly(read, FAULTY, lambda pid: os.kill(pid, signal.SIGXCPU))
+    assert not children()
 
 
 def test_child_that_is_killed_is_reported(read: Read) -> None:
