@@ -123,8 +123,8 @@ SABOTAGES = (
     Sabotage(
         "claim what somebody else has",
         "leaderboard/models/submissions.py",
-        "waiting = self.filter(status=Status.QUEUED, due_at__lte=Now())",
-        "waiting = self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
+        "return self.filter(status=Status.QUEUED, due_at__lte=Now())",
+        "return self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
         f"{STEPS}::test_what_is_claimed_is_not_claimed_again",
     ),
     Sabotage(
