@@ -24,7 +24,9 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "too-large": "The file is larger than the limit.",
     "not-utf8": "The file is not UTF-8 text.",
     "too-deep": "Objects and lists are nested deeper than any prediction file needs.",
-    "too-many-members": "The file has far more members than the manifest has sequences.",
+    "too-many-members": (
+        "The file has far more values, rows, columns or gzip members than one for the manifest needs."
+    ),
     "not-json": "The text is not JSON.",
     "wrong-top-level": "The outermost value, or `predictions`, is not an object.",
     "unknown-field": "The envelope has a field that the format does not know.",
