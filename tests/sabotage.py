@@ -265,7 +265,7 @@ SABOTAGES = (
     Sabotage(
         "the child may open files and sockets",
         "evaluator/limits.py",
-        "    resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))\n",
+        "    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))\n",
         "    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))\n",
         f"{CHILD}::test_child_may_open_nothing_write_nothing_and_start_nothing",
     ),

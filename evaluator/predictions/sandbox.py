@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, limit, obey_the_parent_alone
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, forbid_calls, limit, obey_the_parent_alone
 from evaluator.predictions.predictions import read_sent
 from evaluator.problems import Rejected
 from evaluator.truth.truth import Manifest
@@ -66,6 +66,7 @@ def main() -> None:
     manifest = Manifest.load(Path(sys.argv[1]))
     warm_up(manifest)
     limit(memory_bytes=int(sys.argv[2]), cpu_s=int(sys.argv[3]))
+    forbid_calls()
     out = sys.stdout.buffer
     out.write(READY)
     out.flush()
