@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Final
 
-from evaluator.problems import Problem, Rejected, reject
+from evaluator.problems import Rejected, reject
 
 EXIT_OUT_OF_MEMORY: Final = 77
 N_MAGIC_BYTES: Final = 4
@@ -73,8 +73,7 @@ def _answer(exit_code: int, answer: bytes, complaints: bytes) -> bytes:
     if exit_code == 0 and verdict == b"good":
         return content
     if exit_code == 0 and verdict == b"rejected":
-        found = json.loads(content)
-        raise Rejected([Problem(**one) for one in found["problems"]], n_problems=found["n_problems"])
+        raise Rejected.from_dict(json.loads(content))
     expected = "expected an intact Parquet table of predictions"
     if exit_code == EXIT_OUT_OF_MEMORY:
         raise reject("too-large", f"Reading the table takes too much memory; {expected}.")
