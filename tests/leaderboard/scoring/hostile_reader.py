@@ -30,14 +30,33 @@ def read_sent(data, *, manifest):
 predictions.read_sent = read_sent
 {more}
 """
+ANNOTATIONS = f"""
+import itertools
+from evaluator.truth import annotations
+honest_files = annotations.read_files
+
+def read_files(files, **options):
+    files = iter(files)
+    name, data = first = next(files)
+    if data.startswith({MARK!r}):
+        exec(data.decode(), globals())
+    return honest_files(itertools.chain([first], files), **options)
+
+annotations.read_files = read_files
+"""
 WITHOUT_A_FILTER = "system_calls.why_unavailable = lambda: 'none here'"
+
+
+def write_site(directory: Path, *, more: str = "") -> None:
+    """What a Python that has this directory on its path runs first."""
+    site = _SITE.format(repository=str(REPOSITORY), mark=MARK, more=more)
+    (directory / "sitecustomize.py").write_text(site)
 
 
 @contextmanager
 def obeying_its_file(directory: Path, settings: Settings, *, more: str = "") -> Iterator[None]:
     """Readers of this thread execute a file that begins with `MARK`, once they have given up their rights."""
-    site = _SITE.format(repository=str(REPOSITORY), mark=MARK, more=more)
-    (directory / "sitecustomize.py").write_text(site)
+    write_site(directory, more=more)
     settings.BASE_DIR = directory
     fork_server.server_of_this_thread(python_path=REPOSITORY).close()
     try:

@@ -15,19 +15,22 @@ import pytest
 import structlog
 from pytest_django import Settings
 
-from evaluator import Manifest, Predictions, Rejected, read_truth, system_calls
+from evaluator import Manifest, Predictions, Rejected, read_manifest, read_truth, system_calls
 from evaluator.predictions.predictions import sha256_digest
+from evaluator.truth import annotation_folders
 from leaderboard.models import Edition, Evaluation, User
 from leaderboard.scoring import sandbox, worker
 from leaderboard.scoring.sandbox import ChildDied
 from leaderboard.storage import files
 from tests import builders
 from tests.leaderboard.scoring.hostile_reader import (
+    ANNOTATIONS,
     MARK,
     WITHOUT_A_FILTER,
     attempts,
     obeying_its_file,
     says,
+    write_site,
 )
 
 pytestmark = pytest.mark.slow
@@ -254,3 +257,65 @@ def test_values_of_another_file_are_not_replaced(
     after = files.load_aligned(theirs.sent_file, n_sequences=builders.N_SEQUENCES)
     assert after is not None
     assert after.tolist() == kept.tolist()
+
+
+# --- the reader of annotation files -----------------------------------------------------------------------
+
+
+@pytest.fixture
+def read_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[[bytes], Manifest]:
+    """Read a folder with this one file, which its reader executes."""
+    site, folder = tmp_path / "site", tmp_path / "folder"
+    site.mkdir()
+    folder.mkdir()
+    write_site(site, more=ANNOTATIONS)
+    monkeypatch.syspath_prepend(site)
+
+    def read_one(data: bytes) -> Manifest:
+        (folder / "a.pkl").write_bytes(data)
+        return read_manifest(folder)
+
+    return read_one
+
+
+@needs_a_filter
+def test_reader_of_annotations_that_is_taken_over_reaches_nothing(
+    read_folder: Callable[[bytes], Manifest], places: dict[str, str | int]
+) -> None:
+    place = {"port": 5432, "address": 4096}
+    with pytest.raises(Rejected) as told:
+        read_folder(attempts(worker=os.getpid(), places=places | place))
+    table = {problem.where: problem.message for problem in told.value.problems}
+    assert len(table) == 27
+    # Its own limits it may lower, file by file; not raise, but for root.
+    assert table.pop("raise its own limits") in {"EPERM", "reached"}
+    assert table.pop("take more memory") == "ENOMEM"
+    assert set(table.values()) == {"EPERM"}, table
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        b"[]\n",
+        b"{}\n",
+        b"[" * 100_000 + b"\n",
+        b'{"problems": [], "n_problems": 0}\n',
+        b'{"table": {"anno_id": ["x"]}, "n_sequences": [1], "boxes": [], "frames": []}\n',
+        b'{"table": {"anno_id": [1], "ttc_s": [1.0, 2.0]}, "n_sequences": [1], "boxes": [], "frames": []}\n',
+        b'{"table": {"anno_id": [1]}, "n_sequences": [2], "boxes": [], "frames": []}\n',
+        b'{"table": {"secret": [1]}, "n_sequences": [1], "boxes": [], "frames": []}\n',
+    ],
+)
+def test_a_lie_about_annotations_is_refused_in_words(
+    read_folder: Callable[[bytes], Manifest], answer: bytes
+) -> None:
+    with pytest.raises(Rejected, match="gave an answer of another form; expected annotations of the toolkit"):
+        read_folder(says(answer))
+
+
+def test_reader_that_complains_without_end_is_ended(
+    read_folder: Callable[[bytes], Manifest], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(annotation_folders, "_PATIENCE_S", 0.1)
+    with pytest.raises(Rejected, match="Reading the file"):
+        read_folder(MARK + b"os.close(1)\nwhile True: os.write(2, bytes(1 << 16))")
