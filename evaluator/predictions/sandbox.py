@@ -3,7 +3,8 @@
 It writes `READY` to its standard output, reads a prediction file from its standard input, and writes one line
 of JSON, followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the
 first untrusted byte is read it gives up memory, processor time, new processes and the right to open anything,
-sockets included. A child that ends before `READY` has seen nothing of the file.
+sockets included, and where the kernel can do that all system calls but those that reading needs. A child that
+ends before `READY` has seen nothing of the file.
 """
 
 import json
