@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Final
+
+from evaluator.units import RECORDING, in_words
 
 SIGNIFICANT: Final = 0.05
 P_CLASSES: Final = (0.001, 0.01, SIGNIFICANT)
 """Below which of these a p lies is told where the p itself is not."""
 
 MIN_DEGREES: Final = 8.0
-"""With fewer degrees of freedom nothing is said of a mean: too few recordings to know how much they vary."""
+"""With fewer degrees of freedom nothing is said of a mean: too few units to know how much they vary."""
 
 # Of the normal distribution's 97.5 % point: what a difference must be to be found with a power of 80 %.
 _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
@@ -31,9 +33,9 @@ class Difference:
     """First minus second in one column: below 0 the first is better. Computed here or told by a server.
 
     `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
-    are too few recordings. `p_below` is the smallest of `P_CLASSES` that p is below, else 1: it is what
-    judges, alone where p is not told, and follows from p where it is not given. `n_effective` is the
-    effective number of recordings.
+    are too few units. `p_below` is the smallest of `P_CLASSES` that p is below, else 1: it is what judges,
+    alone where p is not told, and follows from p where it is not given. `n_effective` is the effective number
+    of units, and `unit` what these are: recording, day or given.
     """
 
     difference: float
@@ -42,6 +44,7 @@ class Difference:
     p: float | None = None
     p_below: float | None = None
     n_effective: float | None = None
+    unit: str = field(default=RECORDING, repr=False)
 
     def __post_init__(self) -> None:
         """Give `p_below` where p says it."""
@@ -68,24 +71,23 @@ class Difference:
         """The same seen from the other side: second minus first."""
         low = None if self.high is None else 0.0 - self.high
         high = None if self.low is None else 0.0 - self.low
-        return Difference(0.0 - self.difference, low, high, self.p, self.p_below, self.n_effective)
+        return replace(self, difference=0.0 - self.difference, low=low, high=high)
 
 
-def too_few_recordings(n_effective: float | None) -> str:
+def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:
     """Why there is no interval and no p.
 
-    >>> too_few_recordings(5.34)
+    >>> too_few_units(5.34)
     'too few recordings (effective number 5.3; at least 8 needed)'
-    >>> too_few_recordings(7.99)
-    'too few recordings (effective number 7.9; at least 8 needed)'
-    >>> too_few_recordings(None)
+    >>> too_few_units(7.99, unit="day")
+    'too few days (effective number 7.9; at least 8 needed)'
+    >>> too_few_units(None)
     'too few recordings'
     """
+    few = f"too few {in_words(unit)}"
     if n_effective is None:
-        return "too few recordings"
-    return (
-        f"too few recordings (effective number {cut_off(n_effective):.1f}; at least {MIN_DEGREES:g} needed)"
-    )
+        return few
+    return f"{few} (effective number {cut_off(n_effective):.1f}; at least {MIN_DEGREES:g} needed)"
 
 
 def cut_off(n_effective: float) -> float:

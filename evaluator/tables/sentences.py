@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Final
 
 from evaluator.metrics.protocol import PRIMARY, column_words, metric_of
-from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_recordings
+from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_units
 
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
@@ -44,7 +44,7 @@ def sentence(
 ) -> str:
     """What a difference in one column means, in words; `decimals` are those in which values are published.
 
-    `withheld` says why there is no interval, in a sentence, where it is not for too few recordings.
+    `withheld` says why there is no interval, in a sentence, where it is not for too few units.
 
     >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
     "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
@@ -66,7 +66,8 @@ The difference is not significant. The test detects a difference above 2.0 with 
     if withheld:
         return f"{gap}. {withheld}"
     if found.low is None or found.high is None or found.p_below is None:
-        return f"{gap}; there are {too_few_recordings(found.n_effective)} to say whether that is significant."
+        few = too_few_units(found.n_effective, unit=found.unit)
+        return f"{gap}; there are {few} to say whether that is significant."
     ends = _ends(found.difference, found.low, found.high, digits)
     told = f"{gap} (95 % confidence interval: {ends}; {p_text(found.p, found.p_below)})."
     detectable = found.detectable_difference

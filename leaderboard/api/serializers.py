@@ -33,6 +33,11 @@ DECIMALS: Final = "Decimals that the edition publishes of scores, confidence int
 GROUND_TRUTH: Final = "Digest of the ground truth."
 N_SEQUENCES: Final = "Number of sequences in the ground truth."
 N_RECORDINGS: Final = "Number of recordings that the sequences come from."
+UNIT: Final = (
+    "What confidence intervals, p-values and rank ranges take as independent: `recording`, `day`, or `given` "
+    "by the ground truth."
+)
+N_UNITS: Final = "Number of such units."
 OPENS_AT: Final = "When submissions open; null: as soon as there is ground truth."
 CLOSES_AT: Final = "When submissions close; null: never."
 METHOD_ID: Final = "Id of the method; null for a result quoted from a paper."
@@ -378,6 +383,8 @@ class BoardSerializer(serializers.Serializer[Board]):
     n_recordings = serializers.IntegerField(
         source="edition.ground_truth.n_recordings", help_text=N_RECORDINGS, **NULLABLE
     )
+    unit = serializers.CharField(source="edition.unit", help_text=UNIT, **NULLABLE)
+    n_units = serializers.IntegerField(source="edition.unit_count", help_text=N_UNITS, **NULLABLE)
     floor = ScoresSerializer(
         source="edition.floor",
         help_text="Scores of the ground truth itself, submitted as predictions: no file scores lower, "

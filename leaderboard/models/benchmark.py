@@ -9,6 +9,7 @@ from django.db.models import Q
 from django.utils import timezone
 
 from evaluator.metrics.protocol import Protocol, get_protocol
+from evaluator.units import DAY, GIVEN, KINDS, RECORDING, in_words, noun_of
 from leaderboard.models.people import User
 from leaderboard.models.quotas import QuotaRules
 
@@ -241,6 +242,15 @@ class Edition(models.Model):
         default=1,
         help_text="With how many decimals everything of it is published; the split's when it was opened.",
     )
+    unit = models.CharField(
+        max_length=12,
+        choices=[(kind, kind) for kind in KINDS],
+        default=RECORDING,
+        help_text="What its intervals, tests and rank ranges take as independent; set when it was opened.",
+    )
+    n_units = models.PositiveIntegerField(
+        null=True, blank=True, help_text="How many; null: as many as its ground truth has recordings."
+    )
     opened_at = models.DateTimeField(default=timezone.now)
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
     published_at = models.DateTimeField(null=True, blank=True, help_text="When it first was the board.")
@@ -256,7 +266,7 @@ class Edition(models.Model):
     n_effective = models.JSONField(
         default=dict,
         blank=True,
-        help_text="Effective number of recordings by score name: the degrees of freedom of its interval.",
+        help_text="Effective number of units by score name: the degrees of freedom of its interval.",
     )
 
     class Meta:
@@ -264,11 +274,16 @@ class Edition(models.Model):
         constraints = [
             models.UniqueConstraint(fields=["split", "number"], name="edition_number_once_per_split"),
             models.UniqueConstraint(
-                fields=["split", "ground_truth", "protocol", "decimals"],
+                fields=["split", "ground_truth", "protocol", "decimals", "unit"],
                 condition=models.Q(discarded_at=None),
                 name="one_edition_per_ground_truth_and_protocol",
             ),
             models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="decimals_one_or_two"),
+            models.CheckConstraint(
+                condition=models.Q(unit=RECORDING, n_units=None)
+                | models.Q(unit__in=[DAY, GIVEN], n_units__isnull=False),
+                name="edition_unit_is_known",
+            ),
             models.CheckConstraint(
                 condition=models.Q(published_at=None) | models.Q(discarded_at=None),
                 name="published_editions_stay",
@@ -282,6 +297,21 @@ class Edition(models.Model):
     def rules(self) -> Protocol:
         """Its protocol, which says what metrics and TTC ranges there are."""
         return get_protocol(self.protocol)
+
+    @property
+    def unit_count(self) -> int:
+        """How many units it has."""
+        return self.ground_truth.n_recordings if self.n_units is None else self.n_units
+
+    @property
+    def unit_noun(self) -> str:
+        """What one of them is called."""
+        return noun_of(self.unit)
+
+    @property
+    def units(self) -> str:
+        """Its units in words, as "42 days"."""
+        return in_words(self.unit, self.unit_count)
 
     @property
     def is_in_preparation(self) -> bool:

@@ -245,20 +245,21 @@ def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
 
 
 def compute(row: Comparison, *, now: datetime) -> None:
-    """Compare the two entries of a row, recording by recording, and write what came of it, once.
+    """Compare the two entries of a row, unit by unit, and write what came of it, once.
 
     Raises what `bags.sums_of` raises; the row waits on then.
     """
     questions.begin(row, now=now)
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
-    first, second = (recording_sums.sums_of(edition, file=file) for file in sent)
+    first, second = (recording_sums.unit_sums_of(edition, file=file) for file in sent)
     found = differences.difference(
         first,
         second,
-        recording_sums.counts_of(edition),
+        recording_sums.unit_counts_of(edition),
         names=edition.rules.score_names,
         signs=confidence.generator_of(edition, purpose="signs"),
+        unit=edition.unit,
     )
     values = [rows.flat_scores(each) for each in (row.first, row.second)]
     shown = {

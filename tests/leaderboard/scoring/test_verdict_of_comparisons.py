@@ -20,7 +20,7 @@ def compared(p_of_b: float, p_of_c: float, *, reason: str = "") -> Compared:
         return Pair(first, second, {"mid": Difference(-2.0, -3.0, -1.0, p)})
 
     pairs = (pair(A, B, p_of_b), pair(A, C, p_of_c), pair(B, C, 0.5))
-    nothing = cast("Any", SimpleNamespace())
+    nothing = cast("Any", SimpleNamespace(unit="recording"))
     return Compared(nothing, nothing, (A, B, C), pairs, is_complete=True, reason=reason)
 
 
