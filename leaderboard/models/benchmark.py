@@ -9,9 +9,9 @@ from django.db.models import Q
 from django.utils import timezone
 
 from evaluator.metrics.protocol import Protocol, get_protocol
-from evaluator.units import DAY, GIVEN, KINDS, RECORDING, in_words, noun_of
 from leaderboard.models.people import User
 from leaderboard.models.quotas import QuotaRules
+from leaderboard.models.units import UnitOfInference
 
 # Of quoted rows that stand since their split exists: before any time that a board can sensibly be asked for.
 SINCE_EVER = datetime(1970, 1, 1, tzinfo=UTC)
@@ -231,7 +231,7 @@ class TruthComparison(models.Model):
         return f"{self.old_id} to {self.new_id}"
 
 
-class Edition(models.Model):
+class Edition(UnitOfInference):
     """Ground truth, protocol and decimals of a split: the frame in which a ranking lives."""
 
     split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="editions")
@@ -241,15 +241,6 @@ class Edition(models.Model):
     decimals = models.PositiveSmallIntegerField(
         default=1,
         help_text="With how many decimals everything of it is published; the split's when it was opened.",
-    )
-    unit = models.CharField(
-        max_length=12,
-        choices=[(kind, kind) for kind in KINDS],
-        default=RECORDING,
-        help_text="What its intervals, tests and rank ranges take as independent; set when it was opened.",
-    )
-    n_units = models.PositiveIntegerField(
-        null=True, blank=True, help_text="How many; null: as many as its ground truth has recordings."
     )
     opened_at = models.DateTimeField(default=timezone.now)
     opened_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
@@ -279,11 +270,7 @@ class Edition(models.Model):
                 name="one_edition_per_ground_truth_and_protocol",
             ),
             models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="decimals_one_or_two"),
-            models.CheckConstraint(
-                condition=models.Q(unit=RECORDING, n_units=None)
-                | models.Q(unit__in=[DAY, GIVEN], n_units__isnull=False),
-                name="edition_unit_is_known",
-            ),
+            *UnitOfInference.Meta.constraints,
             models.CheckConstraint(
                 condition=models.Q(published_at=None) | models.Q(discarded_at=None),
                 name="published_editions_stay",
@@ -297,21 +284,6 @@ class Edition(models.Model):
     def rules(self) -> Protocol:
         """Its protocol, which says what metrics and TTC ranges there are."""
         return get_protocol(self.protocol)
-
-    @property
-    def unit_count(self) -> int:
-        """How many units it has."""
-        return self.ground_truth.n_recordings if self.n_units is None else self.n_units
-
-    @property
-    def unit_noun(self) -> str:
-        """What one of them is called."""
-        return noun_of(self.unit)
-
-    @property
-    def units(self) -> str:
-        """Its units in words, as "42 days"."""
-        return in_words(self.unit, self.unit_count)
 
     @property
     def is_in_preparation(self) -> bool:
