@@ -1,13 +1,13 @@
 # One image for web, worker and the maintainers' commands; docker-compose.yml says which does what.
 
-FROM python:3.11.14-slim-bookworm AS environment
+FROM python:3.11.15-slim-bookworm AS environment
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/tsttc
 WORKDIR /build
 COPY requirements.lock ./
 RUN /opt/tsttc/bin/pip install --quiet --require-hashes -r requirements.lock
 
-FROM python:3.11.14-slim-bookworm
+FROM python:3.11.15-slim-bookworm
 ENV PATH=/opt/tsttc/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \

@@ -24,7 +24,7 @@ from evaluator.scoring.scoring import Scorer
 from evaluator.truth.csv_tables import Table
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import corrections, ground_truth
-from leaderboard.models import Analysis, Edition, Evaluation, Score, Status, Submission, SweepBeat
+from leaderboard.models import Analysis, Edition, Evaluation, Score, Status, Submission
 from leaderboard.scoring import lifecycle, worker
 from leaderboard.storage import files, truth_values
 from tests import crowd
@@ -76,11 +76,10 @@ def perturbed(truth: evaluator.GroundTruth, *, seed: int) -> evaluator.GroundTru
 def leave_what_waits_behind() -> None:
     """Keep the workers from what they do behind submissions, which are other benchmarks: to them it was done.
 
-    Intervals, the cards of a crowd that has just joined, and the analyses of an open split.
+    Intervals, and the analyses of an open split.
     """
     tomorrow = timezone.now() + timedelta(days=1)
     Edition.objects.update(inferred_at=tomorrow)
-    SweepBeat.objects.update_or_create(defaults={"cards_begun_at": tomorrow})
     scored = Evaluation.objects.filter(
         status=Status.SCORED, analysis=None, edition__published_at__isnull=False
     )

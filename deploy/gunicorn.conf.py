@@ -19,6 +19,10 @@ threads = int(os.environ.get("TSTTC_WEB_THREADS", "8")) + int(os.environ.get("TS
 # Each process has its own listening socket. With a shared one, kept-alive connections pile up on one process.
 reuse_port = True
 keepalive = 30
+# No request says where the site is. From a proxy on this machine gunicorn would take SCRIPT_NAME, which a
+# visitor may have sent. The application reads X-Forwarded-Proto itself.
+forwarded_allow_ips = ""
+forwarder_headers = ""
 timeout = 60
 graceful_timeout = 30
 # The application writes a line for each request, with its id and without what people type; gunicorn's own

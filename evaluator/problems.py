@@ -24,7 +24,9 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "too-large": "The file is larger than the limit.",
     "not-utf8": "The file is not UTF-8 text.",
     "too-deep": "Objects and lists are nested deeper than any prediction file needs.",
-    "too-many-members": "The file has far more members than the manifest has sequences.",
+    "too-many-members": (
+        "The file has far more values, rows, columns or gzip members than one for the manifest needs."
+    ),
     "not-json": "The text is not JSON.",
     "wrong-top-level": "The outermost value, or `predictions`, is not an object.",
     "unknown-field": "The envelope has a field that the format does not know.",
@@ -52,7 +54,8 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "duplicate-ids": "An anno_id appears more than once.",
     "duplicate-natural-keys": "A natural key appears more than once.",
     "truth-not-finite": "A true time to contact is NaN or infinite.",
-    "truth-near-zero": "A true time to contact lies where the errors are undefined (−0.1 ≤ τ ≤ 0).",
+    "truth-near-zero": "A true time to contact lies where the errors are undefined (−0.1 ≤ τ ≤ 0, or "
+    "|τ| < 1e-200).",
     "no-overlap": "A correction has no sequence of the ground truth that it is to correct.",
     "bad-digest": "The content of a saved file does not match the digest stored in it.",
     "forbidden-pickle": "A pickle asks for something other than plain containers, numbers and arrays.",

@@ -17,6 +17,7 @@ from django.core.management.utils import get_random_secret_key
 from leaderboard.api import settings
 from leaderboard.ops import environment, logs
 from leaderboard.ops.environment import key_of_checkout, required
+from leaderboard.web.account import allauth_settings
 from leaderboard.web.middleware import frame
 
 BASE_DIR = Path(__file__).resolve().parent.parent
@@ -81,6 +82,9 @@ INSTALLED_APPS = [
 ]
 MIDDLEWARE = frame.MIDDLEWARE
 ROOT_URLCONF = "leaderboard.urls"
+# The site is at the root of its name. What a request says of another place would be in every link, and in the
+# pages that others are shown from memory.
+FORCE_SCRIPT_NAME = ""
 WSGI_APPLICATION = "leaderboard.wsgi.application"
 TEMPLATES = [
     {
@@ -188,6 +192,9 @@ RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
+# Files of a team in 24 hours, on all splits together, that are rejected, are cancelled, or stop the process
+# that reads them; 0: any number.
+MAX_TEAM_REJECTED_PER_DAY = env.int("TSTTC_MAX_TEAM_REJECTED_PER_DAY", default=30)
 
 # --- rank ranges --------------------------------------------------------------------------------------------
 
@@ -213,7 +220,8 @@ CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.
 CHILD_MEMORY_BYTES = env.int("TSTTC_CHILD_MEMORY_BYTES", default=1_500_000_000)
-CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=60)
+# Seconds; and one more for every 25,000 sequences of the manifest.
+CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=4)
 
 # --- Celery: a broker message is only a nudge, the database is the queue ------------------------------------
 
@@ -224,9 +232,9 @@ CELERY_BROKER_URL = required(
     elsewhere="memory://",
 )
 CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any] = {
-    "visibility_timeout": 900,
-    "unacked_restore_interval": 10,
-    "unacked_restore_throttle": 1,
+    # A message that a dying worker held is worth nothing, since workers look by themselves. To restore it,
+    # kombu would run a program in Redis, which deploy/redis.acl does not allow.
+    "ack_emulation": False,
     "socket_timeout": 5,
     "socket_connect_timeout": 2,
     "socket_keepalive": True,
@@ -237,6 +245,8 @@ CELERY_BROKER_TRANSPORT_OPTIONS: dict[str, Any] = {
     "interval_step": 0.1,
     "interval_max": 0.2,
 }
+# Queues of questions to workers end with their connection; to let them expire as well takes a program too.
+CELERY_CONTROL_QUEUE_EXPIRES = None
 CELERY_BROKER_CONNECTION_RETRY_ON_STARTUP = True
 CELERY_BROKER_CONNECTION_MAX_RETRIES = None
 CELERY_TASK_PUBLISH_RETRY = False
@@ -271,12 +281,8 @@ AUTH_PASSWORD_VALIDATORS = [
 LOGIN_URL = "account_login"
 LOGIN_REDIRECT_URL = "/submit/"
 LOGOUT_REDIRECT_URL = "/"
-ACCOUNT_USER_MODEL_USERNAME_FIELD = None
-ACCOUNT_LOGIN_METHODS = {"email"}
-ACCOUNT_SIGNUP_FIELDS = ["email*", "password1*", "password2*"]
-ACCOUNT_SIGNUP_FORM_CLASS = "leaderboard.web.account.team_views.SignupNameForm"
 ACCOUNT_EMAIL_SUBJECT_PREFIX = f"[{SITE_NAME}] "
-ACCOUNT_SESSION_REMEMBER = True
+vars().update(allauth_settings.SETTINGS)
 EMAIL_CONFIG = environment.mail_server(env.str("TSTTC_EMAIL_URL", default="consolemail://"))
 vars().update(EMAIL_CONFIG)
 # Somebody waits on a page meanwhile; what is not sent within it is sent later.
@@ -286,21 +292,16 @@ SENDS_MAIL = bool(env.str("TSTTC_EMAIL_URL", default=""))
 DEFAULT_FROM_EMAIL = env.str("TSTTC_FROM_EMAIL", default="leaderboard@localhost")
 # Who the pages say answers questions; the pages are edited at /maintain/pages/.
 CONTACT_EMAIL = env.str("TSTTC_CONTACT_EMAIL", default="") or DEFAULT_FROM_EMAIL
-# Without a mail server nobody could follow the link; with one, an address counts once it is proved.
+# Without a mail server nobody would get the code; with one, an address counts once it is proved.
 ACCOUNT_EMAIL_VERIFICATION = "mandatory" if SENDS_MAIL else "none"
+# With a code, which counts only where it was asked for: nobody proves an address for the account of somebody
+# else by following a link, and none is kept before it is proved (see leaderboard/people/addresses.py).
+ACCOUNT_EMAIL_VERIFICATION_BY_CODE_ENABLED = SENDS_MAIL
 # Proxies of ours in front: of X-Forwarded-For, what the last so many wrote is believed, and nothing else.
 TRUSTED_PROXIES = env.int("TSTTC_TRUSTED_PROXIES", default=0)
 ALLAUTH_TRUSTED_PROXY_COUNT = TRUSTED_PROXIES
-ACCOUNT_ADAPTER = "leaderboard.web.account.accounts.AccountAdapter"
-ACCOUNT_FORMS = {"signup": "leaderboard.web.account.accounts.SignupForm"}
-# Wrong passwords; the keys are an account at an address, and an account (see web/account/accounts.py).
-ACCOUNT_RATE_LIMITS = {"login_failed": "10/m/ip,5/5m/key", "login_failed_anywhere": "30/h/key"}
-
-# Whoever changes how one signs in, its owner is told by mail.
-ACCOUNT_EMAIL_NOTIFICATIONS = True
 # Whether maintainers need a second factor for their pages (see web/account/accounts.py).
 REQUIRE_SECOND_FACTOR = env.bool("TSTTC_REQUIRE_SECOND_FACTOR", default=False)
-MFA_ADAPTER = "leaderboard.web.account.accounts.SecondFactorAdapter"
 # Without a mail server nobody could verify an address.
 MFA_ALLOW_UNVERIFIED_EMAIL = not SENDS_MAIL
 # Accounts elsewhere that people may sign in with (see web/account/providers.py); without a client, none.
@@ -308,16 +309,6 @@ SOCIALACCOUNT_PROVIDERS = environment.providers(
     orcid=("ORCID", "TSTTC_ORCID_CLIENT_ID", "TSTTC_ORCID_CLIENT_SECRET"),
     github=("GitHub", "TSTTC_GITHUB_CLIENT_ID", "TSTTC_GITHUB_CLIENT_SECRET"),
 )
-SOCIALACCOUNT_ADAPTER = "leaderboard.web.account.providers.ProviderAdapter"
-SOCIALACCOUNT_FORMS = {
-    "signup": "leaderboard.web.account.providers.ProviderSignupForm",
-    "disconnect": "leaderboard.web.account.providers.ConnectedForm",
-}
-# Who signs up reads of the rules first, and chooses a name.
-SOCIALACCOUNT_AUTO_SIGNUP = False
-# Another way into the account: whoever finds an open session does not add one.
-SOCIALACCOUNT_REAUTHENTICATION_REQUIRED = True
-SOCIALACCOUNT_REQUESTS_TIMEOUT = 5
 
 # --- API -------------------------------------------------------------------------------------------------
 

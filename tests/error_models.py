@@ -150,6 +150,28 @@ def exponential_sums(counts: Floats, rng: Random) -> Floats:
     return counts * levels + rng.gamma(counts, (1 - _SHARE) ** 0.5)
 
 
+def odd_field(
+    name: str, n_methods: int, n_recordings: int, n: int, rng: Random
+) -> tuple[NDArray[np.float64], Floats]:
+    """Sums of methods of one true mean, (methods, G, n), and the counts: all like the first, the last odd.
+
+    It comes to its mean as the second method of `informative` or `one fails` does.
+    """
+    counts = _lengths(n_recordings, n, rng)
+    shape = n_methods, n_recordings, n
+    sigma = 0.2**0.5 if name == "informative" else 0.2
+    shared, own = rng.standard_normal((n_recordings, n)), rng.standard_normal(shape)
+    levels = np.exp(sigma * (shared + own) / 2**0.5 - sigma**2 / 2)
+    sums = levels * rng.gamma(np.broadcast_to(counts, shape))
+    if name == "informative":
+        tilt = 0.3 * (1 - counts / _BALANCE)
+        sums[:-1] *= 1 + tilt
+        sums[-1] *= 1 - tilt
+    else:
+        sums[-1] = 0.9 * sums[-1] + 2.5 * (rng.random((n_recordings, n)) < 0.04) * counts
+    return sums, counts
+
+
 @lru_cache(maxsize=1)
 def _tracks() -> Drawn:
     """MiD of two estimators on tracks of real driving, the second scaled to the first one's mean."""

@@ -123,8 +123,8 @@ SABOTAGES = (
     Sabotage(
         "claim what somebody else has",
         "leaderboard/models/submissions.py",
-        "waiting = self.filter(status=Status.QUEUED, due_at__lte=Now())",
-        "waiting = self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
+        "return self.filter(status=Status.QUEUED, due_at__lte=Now())",
+        "return self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
         f"{STEPS}::test_what_is_claimed_is_not_claimed_again",
     ),
     Sabotage(
@@ -253,7 +253,7 @@ SABOTAGES = (
         "evaluator/limits.py",
         "    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))\n",
         "",
-        f"{RUNS}::test_file_that_kills_its_reader_is_given_up_after_three_runs_and_the_next_is_scored",
+        f"{RUNS}::test_file_that_kills_its_reader_is_tried_again_behind_the_next_and_given_up_after_three_runs",
     ),
     Sabotage(
         "no processor limit for the child",

@@ -20,7 +20,7 @@ from evaluator.cli.reading import TABLE, naming, predictions_of
 from evaluator.cli.tokens import has_token
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.significance import Difference
-from evaluator.tables.sentences import others, p_cell, sentence
+from evaluator.tables.sentences import influence, others, p_cell, sentence
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Compared
@@ -135,6 +135,8 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
     names = str(first), str(second)
     if PRIMARY in found:
         click.echo(printable(sentence(*names, name=PRIMARY, found=found[PRIMARY])))
+        if rests_on := influence(*names, found=found[PRIMARY]):
+            click.echo(printable(rests_on))
     if lead := others(found):
         click.echo(lead)
 

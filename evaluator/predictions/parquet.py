@@ -6,20 +6,17 @@ For files of one's own, on one's own machine: the leaderboard reads no Parquet (
 
 from __future__ import annotations
 
-import json
-import os
-import subprocess
-import sys
+import io
+from collections.abc import Iterator, Sequence
 from importlib.util import find_spec
-from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
-from evaluator.problems import Problem, Rejected, reject
+from evaluator.problems import quoted, reject
 
-EXIT_OUT_OF_MEMORY: Final = 77
 N_MAGIC_BYTES: Final = 4
 _MAGIC: Final = b"PAR1"
-_CHILD: Final = "evaluator.predictions.parquet_child"
+MAX_ROWS: Final = 1_000_000
+"""Rows of a table, far above what the largest split needs."""
 
 
 def is_parquet(data: bytes) -> bool:
@@ -39,46 +36,85 @@ def as_sent(data: bytes) -> bytes:
         raise ModuleNotFoundError(
             "Parquet tables need pyarrow, which is not installed: pip install pyarrow", name="pyarrow"
         )
-    return _answer(*_asked(data))
+    import pyarrow as pa  # noqa: PLC0415 -- of an extra
+    from pyarrow import parquet  # noqa: PLC0415 -- the same
 
+    from evaluator.predictions.predictions import document_of  # noqa: PLC0415 -- which asks this module
 
-def _asked(data: bytes) -> tuple[int, bytes, bytes]:
-    """Exit code, answer and complaints of the process that reads the table; pyarrow can end its process."""
-    environment = {
-        "PATH": os.defpath,
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).resolve().parents[2]), *filter(None, sys.path)]),
-        "PYTHONDONTWRITEBYTECODE": "1",
-        "OPENBLAS_NUM_THREADS": "1",
-        "OMP_NUM_THREADS": "1",
-        "ARROW_IO_THREADS": "1",
-    }
-    if "SYSTEMROOT" in os.environ:  # without it Python does not start on Windows
-        environment["SYSTEMROOT"] = os.environ["SYSTEMROOT"]
     try:
-        child = subprocess.run(  # noqa: S603 - our own interpreter and module, nothing of the file
-            [sys.executable, "-P", "-m", _CHILD],
-            input=data,
-            capture_output=True,
-            env=environment,
-            check=False,
-        )
-    except OSError as error:
-        message = f"The process that reads the table did not start: {error.strerror}."
-        raise reject("unreadable", message) from None
-    return child.returncode, child.stdout, child.stderr
+        table = parquet.ParquetFile(io.BytesIO(data))
+        keys, values = _columns(table.schema_arrow)
+        _require_size(table.metadata, keys + values)
+        return document_of(keys + values, _rows(table, keys, values))
+    except (pa.ArrowException, OSError, ValueError, OverflowError, KeyError) as error:
+        reason = (str(error).splitlines() or ["it ends early"])[0].removesuffix(".")
+        raise reject("unreadable", f"The file is not an intact Parquet table: {quoted(reason)}.") from None
 
 
-def _answer(exit_code: int, answer: bytes, complaints: bytes) -> bytes:
-    verdict, _, content = answer.partition(b"\n")
-    if exit_code == 0 and verdict == b"good":
-        return content
-    if exit_code == 0 and verdict == b"rejected":
-        found = json.loads(content)
-        raise Rejected([Problem(**one) for one in found["problems"]], n_problems=found["n_problems"])
-    expected = "expected an intact Parquet table of predictions"
-    if exit_code == EXIT_OUT_OF_MEMORY:
-        raise reject("too-large", f"Reading the table takes too much memory; {expected}.")
-    words = complaints[-2000:].decode(errors="replace").strip().rpartition("\n")[2][:200]
-    how = f"signal {-exit_code}" if exit_code < 0 else f"exit code {exit_code}"
-    said = f": {words}" if words else ""
-    raise reject("unreadable", f"Reading the table ended its process ({how}{said}); {expected}.")
+def _columns(schema: Any) -> tuple[list[str], list[str]]:
+    """The columns of the key and those of the numbers, each of a type that can be what its name says."""
+    from evaluator.predictions.predictions import columns_of  # noqa: PLC0415 -- which asks this module
+
+    keys, value, rate = columns_of(schema.names)
+    values = [value] if rate is None else [value, rate]
+    for name in (*keys, *values):
+        n_columns = schema.names.count(name)
+        if n_columns > 1:
+            message = f"The table has {n_columns} columns {quoted(name)}; expected one."
+            raise reject("bad-field", message, f"column {name}")
+        column_type = schema.field(name).type
+        if not _is_fitting(column_type, is_key=name in keys):
+            expected = "integers or text" if name in keys else "integers or floats"
+            message = (
+                f"The column {quoted(name)} has the type {quoted(str(column_type))}; expected {expected}."
+            )
+            raise reject("bad-field", message, f"column {name}")
+    return list(keys), values
+
+
+def _is_fitting(column_type: Any, *, is_key: bool) -> bool:
+    from pyarrow import types  # noqa: PLC0415 -- of an extra
+
+    if types.is_dictionary(column_type):
+        column_type = column_type.value_type
+    is_text = (
+        types.is_string(column_type)
+        or types.is_large_string(column_type)
+        or types.is_string_view(column_type)
+    )
+    if is_text or types.is_floating(column_type):
+        return bool(is_text == is_key)
+    return bool(types.is_integer(column_type) or types.is_null(column_type))
+
+
+def _require_size(metadata: Any, names: Sequence[str]) -> None:
+    """Raise `Rejected` for a table whose own account is too large, before anything is unpacked."""
+    from evaluator.predictions.predictions import MAX_UNPACKED_BYTES  # noqa: PLC0415 -- which asks this module
+
+    if metadata.num_rows > MAX_ROWS:
+        message = f"The table has {metadata.num_rows:,} rows; expected at most {MAX_ROWS:,}."
+        raise reject("too-many-members", message)
+    groups = map(metadata.row_group, range(metadata.num_row_groups))
+    columns = (group.column(i) for group in groups for i in range(group.num_columns))
+    n_bytes = sum(one.total_uncompressed_size for one in columns if one.path_in_schema in names)
+    if n_bytes > MAX_UNPACKED_BYTES:
+        message = f"The table unpacks to {n_bytes:,} bytes; expected at most {MAX_UNPACKED_BYTES:,}."
+        raise reject("too-large", message)
+
+
+def _rows(table: Any, keys: list[str], values: list[str]) -> Iterator[Sequence[str | None]]:
+    """The fields as text, of numbers the shortest that means the same; None where a value is missing."""
+    number = 0
+    for batch in table.iter_batches(columns=keys + values, use_threads=False):
+        columns = [map(_text, batch.column(name).to_pylist()) for name in keys + values]
+        for row in zip(*columns, strict=True):
+            number += 1
+            # A missing value is left to the reader of the JSON.
+            if None in row[: len(keys)]:
+                message = f"The row has no {keys[row.index(None)]}; expected one in every row."
+                raise reject("bad-field", message, f"row {number}")
+            yield row
+
+
+def _text(value: object) -> str | None:
+    return value if value is None or isinstance(value, str) else repr(value)

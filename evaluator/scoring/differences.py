@@ -7,18 +7,18 @@ entry better, whatever stands in one half could as well stand in the other.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
+from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.predictions import Predictions
 from evaluator.scoring.report import published
 from evaluator.scoring.scoring import Scorer
-from evaluator.scoring.significance import SIGNIFICANT, Difference, cut_off, p_below
+from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
 from evaluator.scoring.uncertainty import degrees_of, generator_of, usable_columns
 from evaluator.truth.truth import GroundTruth
 
@@ -30,6 +30,7 @@ PUBLISHED_DECIMALS: Final = get_protocol(DEFAULT_PROTOCOL).decimals
 _BLOCK: Final = 1_000
 # Beside the sum of the differences' sizes, what is below this is left of rounding.
 _NO_SUM: Final = 1e-12
+_SEEDS: Final = 2**63 - 1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,6 +145,73 @@ def difference(
     }
 
 
+def influence(
+    differences: Floats, counts: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS
+) -> Influence:
+    """Leave recordings out until a difference is not significant, and until it has the other sign.
+
+    `differences` and `counts` are those of one column, (G,) each. First left out are the recordings that
+    favour the better entry most. For the sign no other choice needs fewer; for the p of the rest another
+    one might (Broderick, Giordano and Meager, arXiv 2011.14999), so that number is an upper bound.
+    """
+    total = float(differences.sum())
+    favours = differences * np.sign(total)
+    order = np.argsort(-favours, kind="stable")
+    n_favouring = int((favours > 0).sum())
+    left = favours.sum() - np.cumsum(favours[order[:n_favouring]])
+    # What is left of rounding is no other sign.
+    turned = np.flatnonzero(left < -_NO_SUM * np.abs(favours).sum())
+    n_to_turn = int(turned[0]) + 1 if turned.size else None
+    seed = int(rng.integers(_SEEDS))
+
+    def is_significant(n_left_out: int) -> bool:
+        kept = np.ones(len(order), dtype=np.float64)
+        kept[order[:n_left_out]] = 0.0
+        signs = np.random.default_rng(seed)
+        rest = sign_flips((differences * kept)[:, None], (counts * kept)[:, None], rng=signs, n_flips=n_flips)
+        return bool(rest.p[0] < SIGNIFICANT)
+
+    return Influence(
+        n_recordings=int((counts > 0).sum()),
+        n_to_undecided=_first_false(is_significant, n_to_turn or n_favouring) if is_significant(0) else None,
+        n_to_turn=n_to_turn,
+    )
+
+
+def with_influence(
+    found: Mapping[str, Difference],
+    *,
+    differences: Floats,
+    counts: Floats,
+    names: Sequence[str],
+    rng: np.random.Generator,
+) -> dict[str, Difference]:
+    """Add to `found` on how few recordings the difference in overall MiD rests.
+
+    `differences` and `counts` are (G, columns), `names` those of the columns. Where there are too few
+    recordings for a p, nothing is added.
+    """
+    overall = found.get(PRIMARY)
+    if overall is None or overall.p_below is None:
+        return dict(found)
+    column = list(names).index(PRIMARY)
+    rests_on = influence(differences[:, column], counts[:, column], rng=rng)
+    return {**found, PRIMARY: replace(overall, influence=rests_on)}
+
+
+def _first_false(holds: Callable[[int], bool], last: int) -> int:
+    """The first number up to `last` for which it does not hold, if it holds for all before and none after.
+
+    >>> _first_false(lambda n: n < 5, 9)
+    5
+    """
+    holding, failing = 0, last
+    while failing - holding > 1:
+        middle = (holding + failing) // 2
+        holding, failing = (middle, failing) if holds(middle) else (holding, middle)
+    return failing
+
+
 def rounded_difference(
     found: Difference, *, first: float | None, second: float | None, decimals: int
 ) -> Difference:
@@ -215,6 +283,13 @@ def compare_predictions(
         names=rules.score_names,
         signs=generator_of(truth.digest, purpose="signs"),
         n_flips=n_flips,
+    )
+    found = with_influence(
+        found,
+        differences=one.bags.sums - other.bags.sums,
+        counts=one.bags.counts,
+        names=rules.score_names,
+        rng=generator_of(truth.digest, purpose="influence"),
     )
     if decimals is None:
         return found

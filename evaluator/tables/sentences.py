@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from statistics import median
 from typing import Final
 
+from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY, column_words, metric_of
-from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_recordings
+from evaluator.scoring.significance import SIGNIFICANT, Difference, best_of, too_few_recordings
 
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
@@ -52,7 +54,7 @@ def sentence(
     "A's RTE is 0.70 percentage points higher than B's (95 % confidence interval: 0.20 to 1.20 higher; ...
     >>> print(sentence("Two frames", "B", name="mid", found=Difference(-2.0, -2.5, 0.3, 0.0812)))
     Two frames' MiD is 2.0 lower than B's (95 % confidence interval: 0.3 higher to 2.5 lower; p = 0.0812). \
-The difference is not significant. The test detects a difference above 2.0 with 80 % power.
+The difference is not significant. The test detects a difference above 2.0 with about 80 % power.
     """
     column, unit = column_words(name), metric_of(name).unit_of_difference
     if round(found.difference, decimals) == 0:
@@ -77,7 +79,7 @@ The difference is not significant. The test detects a difference above 2.0 with 
         return told
     return (
         f"{told} The difference is not significant. The test detects a difference above "
-        f"{_amount(detectable, digits)}{unit} with 80 % power."
+        f"{_amount(detectable, digits)}{unit} with about 80 % power."
     )
 
 
@@ -116,6 +118,85 @@ def _digits(found: Difference, decimals: int) -> int:
     fewest = 0 if half >= 10 else 1 if half >= 0.995 else 2
     smallest = min(abs(value) for value in (found.difference, found.low, found.high) if value)
     return min(decimals, max(fewest, next((n for n in (0, 1) if round(smallest, n)), 2)))
+
+
+def influence(first: str, second: str, *, found: Difference) -> str:
+    """On how few recordings a difference rests; empty where that is not known.
+
+    >>> from evaluator.scoring.significance import Influence
+    >>> found = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
+    >>> print(influence("A", "B", found=found))
+    Without the 39 of 700 recordings that favour A most, the difference would not be significant; without \
+59, it would have the other sign.
+    >>> influence("A", "B", found=Difference(0.1, -0.2, 0.4, 0.4, influence=Influence(700, None, 2)))
+    'Without the 2 of 700 recordings that favour B most, the difference would have the other sign.'
+    """
+    known = found.influence
+    if known is None or not found.difference:
+        return ""
+    better = first if found.difference < 0 else second
+    becomes = {"would not be significant": known.n_to_undecided, "would have the other sign": known.n_to_turn}
+    parts = [(n, words) for words, n in becomes.items() if n is not None]
+    if not parts:
+        return ""
+    (n, words), *rest = parts
+    head = f"Without the {n:,} of {known.n_recordings:,} recordings that favour {better} most, the difference"
+    return "; ".join([f"{head} {words}", *(f"without {n:,}, it {words}" for n, words in rest)]) + "."
+
+
+def selection(n_tried: Mapping[str, int]) -> str:
+    """What it is worth to be the best of several, for methods and their numbers of scored submissions.
+
+    Empty where nothing was chosen.
+
+    >>> print(selection({"A": 3}))
+    A is the best of 3 scored submissions: the best of 3 equally good variants looks better than it is by \
+about 0.60 standard errors of the difference of two of them.
+    >>> print(selection({"A": 3, "B": 1, "C": 10}))
+    A is the best of 3 scored submissions, C of 10: the best of so many equally good variants looks better \
+than it is by about 0.60 and 1.09 standard errors of the difference of two of them.
+    >>> selection({"A": 1})
+    ''
+    """
+    chosen = {name: n for name, n in n_tried.items() if n > 1}
+    if not chosen:
+        return ""
+    numbers = list(chosen.values())
+    (name, n), *rest = chosen.items()
+    who = ", ".join(
+        [f"{name} is the best of {n:,} scored submissions", *(f"{each} of {m:,}" for each, m in rest)]
+    )
+    many = "so many" if rest else f"{n:,}"
+    amounts = [f"{best_of(each):.2f}" for each in numbers]
+    listed = amounts[0] if not rest else f"{', '.join(amounts[:-1])} and {amounts[-1]}"
+    return (
+        f"{who}: the best of {many} equally good variants looks better than it is by about {listed} "
+        "standard errors of the difference of two of them."
+    )
+
+
+def resolution(found: Sequence[Mapping[str, Difference]], *, decimals: int = 2) -> str:
+    """The resolution of each column, from the differences of neighbours on a board; empty without any.
+
+    >>> some = [{"mid": Difference(-1, -2, 0, 0.1), "rte": Difference(-1, -1.5, -0.5, 0.01)}]
+    >>> print(resolution(some))
+    Resolution: neighbouring methods are told apart, with about 80 % power, if they differ by MiD 1.43, RTE \
+0.71 percentage points (medians of 1 pair).
+    """
+    names = dict.fromkeys(name for pair in found for name in pair)
+    known = {name: [r for pair in found if name in pair and (r := pair[name].resolution)] for name in names}
+    parts = [
+        f"{column_words(name)} {median(values):.{decimals}f}{metric_of(name).unit_of_difference}"
+        for name, values in known.items()
+        if values
+    ]
+    if not parts:
+        return ""
+    n = max(map(len, known.values()))
+    return (
+        f"Resolution: neighbouring methods are told apart, with about 80 % power, if they differ by "
+        f"{', '.join(parts)} (medians of {counted(n, 'pair')})."
+    )
 
 
 def others(found: Mapping[str, Difference]) -> str:

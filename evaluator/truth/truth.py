@@ -321,7 +321,9 @@ def _check_values(ttc_s: Floats, table: Table) -> None:
     # The last two conditions only keep the arithmetic finite; no real value comes near them.
     undefined = _inside(ttc_s, -0.1, 0.0) | ~(np.isfinite(alpha) & (alpha > 0)) | (np.abs(ttc_s) < 1e-200)
     for row in np.flatnonzero(finite & undefined).tolist():
-        message = f"ttc is {ttc_s[row]!s}, where the errors are undefined; expected ttc > 0 or ttc < -0.1."
+        message = (
+            f"ttc is {ttc_s[row]!s}, where the errors are undefined; expected ttc >= 1e-200 or ttc < -0.1."
+        )
         findings.add("truth-near-zero", message, table.where(row))
     findings.raise_if_any()
 

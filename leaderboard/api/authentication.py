@@ -7,11 +7,11 @@ from django.utils import timezone
 from drf_spectacular.extensions import OpenApiAuthenticationExtension
 from knox.auth import TokenAuthentication
 from rest_framework import exceptions
-from rest_framework.permissions import SAFE_METHODS
+from rest_framework.permissions import SAFE_METHODS, BasePermission
 from rest_framework.request import Request
 
 from leaderboard.models import ApiToken, Scope, User
-from leaderboard.people import tokens
+from leaderboard.people import second_factor, tokens
 
 
 class BearerAuthentication(TokenAuthentication):
@@ -38,7 +38,16 @@ class BearerAuthentication(TokenAuthentication):
             row = tokens.use(secret=token.decode("latin-1"), now=timezone.now())
         except tokens.UnusableToken as fault:
             raise exceptions.AuthenticationFailed(str(fault), code=fault.code) from None
+        row.user.owes_a_code = second_factor.is_required(row.user)
         return row.user, row
+
+
+class IsMaintainer(BasePermission):
+    """Lets maintainers in, where they must give a code with a session that has given one."""
+
+    def has_permission(self, request: Request, view: Any) -> bool:
+        """Whether it may be answered."""
+        return isinstance(request.user, User) and request.user.acts_as_maintainer
 
 
 def _require_scope(token: ApiToken, wanted: Collection[Scope]) -> None:

@@ -57,8 +57,8 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
         "positives. Where the ground truth is hidden, the interval does not say this: 0 may be an end."
     )
     detectable_difference = serializers.SerializerMethodField(
-        help_text="The smallest difference that the test detects with 80 % power; null: this one is "
-        "significant, or there are too few recordings."
+        help_text="The smallest difference that the test detects with about 80 % power, an estimate; null: "
+        "this one is significant, or there are too few recordings."
     )
     sentence = serializers.SerializerMethodField(
         help_text="The result as a sentence. Its p is uncorrected, for this column and pair alone."

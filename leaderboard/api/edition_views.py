@@ -5,12 +5,13 @@ from typing import Any
 from django.shortcuts import get_object_or_404
 from drf_spectacular.utils import extend_schema
 from rest_framework import serializers
-from rest_framework.permissions import AllowAny, IsAdminUser
+from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
 from leaderboard.api import pagination
+from leaderboard.api.authentication import IsMaintainer
 from leaderboard.api.schema import errors
 from leaderboard.api.serializers import (
     DECIMALS,
@@ -165,7 +166,7 @@ class ChangelogView(APIView):
 class ProgressView(APIView):
     """Progress of the re-scoring of an edition; for maintainers."""
 
-    permission_classes = [IsAdminUser]
+    permission_classes = [IsMaintainer]
 
     @extend_schema(operation_id="edition_progress", responses={200: RescoringSerializer, **errors(404)})
     def get(self, request: Request, split: str, number: int) -> Response:
@@ -177,7 +178,7 @@ class ProgressView(APIView):
 class PreviewView(APIView):
     """What publishing an edition would change; for maintainers."""
 
-    permission_classes = [IsAdminUser]
+    permission_classes = [IsMaintainer]
 
     @extend_schema(operation_id="edition_preview", responses={200: PreviewSerializer, **errors(404)})
     def get(self, request: Request, split: str, number: int) -> Response:

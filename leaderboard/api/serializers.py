@@ -390,8 +390,8 @@ class BoardSerializer(serializers.Serializer[Board]):
     )
     floor = ScoresSerializer(
         source="edition.floor",
-        help_text="Scores of the ground truth itself, submitted as predictions: no file scores lower, "
-        "because the protocol truncates predictions and not the ground truth. Null: not computed yet.",
+        help_text="Scores of the ground truth itself, submitted as predictions: hardly any file scores "
+        "lower, because the protocol truncates predictions and not the ground truth. Null: not computed yet.",
         **NULLABLE,
     )
     at = serializers.DateTimeField(allow_null=True, help_text="Time requested by `at`; null: now.")

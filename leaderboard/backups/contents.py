@@ -74,13 +74,36 @@ class Contents:
             document = json.loads(path.read_text(encoding="utf-8"))
             if document["format"] != FORMAT:
                 raise NoBackup(f"{path} has the format {document['format']!r}; expected {FORMAT}.")
-            return cls(**{**document, "parts": [RowFile(**part) for part in document["parts"]]})
+            found = cls(**{**document, "parts": [RowFile(**part) for part in document["parts"]]})
+            found.require_names_of_ours(path)
+            return found
         except OSError as fault:
             raise NoBackup(
                 f"{path} cannot be read ({fault.strerror}); expected the folder of a backup."
             ) from fault
         except (ValueError, KeyError, TypeError) as fault:
             raise NoBackup(f"{path} is damaged; expected the list that `manage.py backup` wrote.") from fault
+
+    def require_names_of_ours(self, path: Path) -> None:
+        """Refuse a name that leads out of its directory: whoever changed it could write anywhere.
+
+        Raises `NoBackup`.
+        """
+        one_name = "expected a name without a slash"
+        of_the_store = "expected the name of a prediction file, a manifest or aligned values"
+        for entry, names, is_sound, expected in (
+            ("database", [self.database], _is_one_name, one_name),
+            ("parts", [part.name for part in self.parts], _is_one_name, one_name),
+            (GROUND_TRUTH, self.ground_truth, _is_one_name, one_name),
+            (FILES, self.files, files.is_name, of_the_store),
+        ):
+            for name in names:
+                if not is_sound(name):
+                    raise NoBackup(f"{path} names {name!r} in {entry}; {expected}. Nothing was changed.")
+
+
+def _is_one_name(text: str) -> bool:
+    return text not in {"", ".", ".."} and not {"/", "\0"} & set(text)
 
 
 def require_variables() -> None:

@@ -38,14 +38,3 @@ class Snapshot(models.Model):
 
     def __str__(self) -> str:
         return str(self.edition)
-
-
-class CardPicture(models.Model):
-    """The picture of a card (see `exports/cards.py`), under the digest of what is on it."""
-
-    digest = models.CharField(max_length=64, primary_key=True)
-    png = models.BinaryField(help_text="Empty where the card cannot be drawn.")
-    made_at = models.DateTimeField(default=timezone.now)
-
-    def __str__(self) -> str:
-        return self.digest[:8]

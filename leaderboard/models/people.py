@@ -65,7 +65,8 @@ class User(AbstractBaseUser, PermissionsMixin):  # type: ignore[django-manager-m
     def __str__(self) -> str:
         return self.email
 
-    # Of a session, not of the account: whether it still owes the code that maintainers must give here.
+    # Of a session or a token, not of the account: whether maintainers must give a code here and this one has
+    # given none. A token never gives one.
     owes_a_code = False
 
     @property

@@ -63,7 +63,7 @@ def _addresses() -> Iterator[str]:
     if environment.PROCESS in {"web", "worker", "maintainer"} and not settings.CELERY_BROKER_URL.startswith(
         _BROKERS
     ):
-        yield "TSTTC_BROKER_URL is not understood; expected redis://:password@host:6379/0."
+        yield "TSTTC_BROKER_URL is not understood; expected redis://user:password@host:6379/0."
 
 
 def _can_be_written(folder: str) -> bool:

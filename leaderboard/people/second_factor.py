@@ -1,15 +1,20 @@
 """The second factor of an account: codes of an app, and recovery codes for the day when the app is lost.
 
-allauth keeps both and asks for them at sign-in; here is what the site itself asks and does. API tokens have
-nothing to do with it.
+allauth keeps both and asks for them at sign-in; here is what the site itself asks and does.
 """
 
 from allauth.mfa.models import Authenticator
+from django.conf import settings
 from django.db import transaction
 
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, clean_text
 from leaderboard.models import AuditEvent, User
+
+
+def is_required(user: User) -> bool:
+    """Whether this person acts as a maintainer only with a second factor."""
+    return bool(settings.REQUIRE_SECOND_FACTOR) and user.is_maintainer
 
 
 def is_set_up(user: User) -> bool:

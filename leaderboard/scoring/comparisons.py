@@ -9,6 +9,7 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import datetime
+from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
@@ -17,6 +18,7 @@ from django.db import transaction
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring import differences
+from evaluator.scoring.significance import Influence
 from evaluator.tables import sentences
 from leaderboard.boards import boards, rows, snapshots
 from leaderboard.boards.rows import Entry
@@ -86,6 +88,11 @@ class Pair:
             decimals=self.first.decimals,
             withheld=self.withheld,
         )
+
+    def influence(self) -> str:
+        """On how few recordings the difference in MiD rests; empty where that is not told."""
+        found = (self.differences or {}).get(PRIMARY)
+        return sentences.influence(self.first.method, self.second.method, found=found) if found else ""
 
     def others(self) -> str:
         """How many columns besides overall MiD differ significantly."""
@@ -178,6 +185,13 @@ def of_first(*, board: boards.Board, now: datetime) -> tuple[Pair, ...]:
     )
 
 
+def neighbours(pairs: Sequence[Pair]) -> list[Pair]:
+    """Of all pairs of some rows, those of two rows that follow each other."""
+    firsts = list(dict.fromkeys(pair.first.evaluation_id for pair in pairs))
+    is_first = dict.fromkeys(firsts, True)
+    return [pair for pair in pairs if is_first.pop(pair.first.evaluation_id, False)]
+
+
 def _chosen(board: boards.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
     """The methods' rows, in the order that was asked for."""
     if not MIN_METHODS <= len(methods) <= MAX_METHODS:
@@ -244,9 +258,15 @@ def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
         name: found.turned() if is_turned else found
         for name in first.scores
         if name in row.differences
-        for found in [Difference(**row.differences[name])]
+        for found in [_told(row.differences[name])]
     }
     return Pair(first, second, shown, withheld=row.differences.get(WITHHELD, ""))
+
+
+def _told(kept: Mapping[str, Any]) -> Difference:
+    """A difference as it was kept; one from before it was known on how few recordings it rests has none."""
+    known = kept.get("influence")
+    return Difference(**{**kept, "influence": Influence(**known) if known else None})
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
@@ -285,6 +305,15 @@ def _differences(
         names=edition.rules.score_names,
         signs=confidence.generator_of(edition, purpose="signs"),
     )
+    if not disclosure.is_hidden(edition):
+        # Each count would tell more of hidden labels, and of the recordings that a file was made to favour.
+        found = differences.with_influence(
+            found,
+            differences=first - second,
+            counts=recording_sums.counts_of(edition),
+            names=edition.rules.score_names,
+            rng=confidence.generator_of(edition, purpose="influence"),
+        )
     return {
         name: disclosure.published_difference(
             gap,

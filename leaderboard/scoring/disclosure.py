@@ -58,14 +58,14 @@ def coarse_ends(low: float, high: float, *, decimals: int) -> tuple[float, float
     return round(ends[0], decimals) + 0.0, round(ends[1], decimals) + 0.0
 
 
-def _is_hidden(edition: Edition) -> bool:
+def is_hidden(edition: Edition) -> bool:
     """Whether the ground truth is hidden, for workers: the database cannot call open what is marked."""
     return edition.split.is_hidden or hidden_marks.is_marked(edition.ground_truth_id)
 
 
 def published_ends(low: Floats, high: Floats, *, edition: Edition) -> tuple[Floats, Floats]:
     """The ends of the intervals of means as an edition publishes them; NaN where there is none."""
-    if not _is_hidden(edition):
+    if not is_hidden(edition):
         return np.round(low, edition.decimals), np.round(high, edition.decimals)
     shown = np.array(
         [
@@ -83,7 +83,7 @@ def published_difference(found: Difference, shown: Difference, *, edition: Editi
     so that the interval holds what the computed one holds. So 0 may be an end although p is below 0.05, and
     `p_below` alone says what is significant.
     """
-    if found.low is None or found.high is None or not _is_hidden(edition):
+    if found.low is None or found.high is None or not is_hidden(edition):
         return shown
     low, high = coarse_ends(found.low, found.high, decimals=edition.decimals)
     low, high = min(low, shown.difference), max(high, shown.difference)

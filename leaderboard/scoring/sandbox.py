@@ -10,6 +10,7 @@ changes nothing, one that removes some leaves the others, and only one that adds
 """
 
 import json
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -32,9 +33,17 @@ from leaderboard.storage import files, manifests, truth_values
 
 log = structlog.get_logger(__name__)
 
+# Besides TSTTC_CHILD_CPU_S a reader has a second for so many sequences: three times what the slowest legal
+# file takes, a table of 1,000,000 scale ratios by natural keys, 14 s on a busy machine.
+SEQUENCES_PER_CPU_S = 25_000
+
 
 class ChildDied(Exception):
     """The child ended without an answer while it read the file: out of memory or time, or a crash."""
+
+
+class ChildOutOfTime(ChildDied):
+    """The child used up its processor time, as it would in any other run."""
 
 
 class ChildNotReady(Exception):
@@ -62,12 +71,14 @@ def read_predictions(
     request = {
         "manifest": str(manifest_path),
         "memory_bytes": settings.CHILD_MEMORY_BYTES,
-        "cpu_s": settings.CHILD_CPU_S,
+        "cpu_s": (cpu_s := settings.CHILD_CPU_S + manifest.n_sequences // SEQUENCES_PER_CPU_S),
     }
     read = _forked if fork_server.AVAILABLE else _spawned
     found = read(source, request, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
     if not found.output.startswith(READY):
         raise ChildNotReady(f"the reading process did not start: {_cause(found.returncode, found.complaint)}")
+    if found.returncode == -signal.SIGXCPU:
+        raise ChildOutOfTime(f"reading the file took more than {cpu_s} s of processor time")
     if found.returncode != 0:
         raise ChildDied(f"reading the file {_cause(found.returncode, found.complaint)}")
     return _decoded(found.output[len(READY) :], manifest=manifest)

@@ -19,19 +19,30 @@ def sentence_of(evaluation: Evaluation) -> str:
             n = evaluation.n_problems
             return f"The file is at fault: it has {counted(n, 'problem')}, so it was not scored."
         case Status.SYSTEM_ERROR:
-            tries = f"{n_failed} times" if n_failed != 1 else "once"
-            is_poison = evaluation.n_poison_strikes >= lifecycle.MAX_POISON_STRIKES
-            counts = " Until then it counts as a rejected file for 24 hours." if is_poison else ""
-            return (
-                f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
-                f"the file, and a maintainer can retry it.{counts}"
-            )
+            return _of_system_error(evaluation, n_failed=n_failed)
         case Status.CANCELLED:
             return "The team cancelled the submission before it was scored."
         case Status.QUEUED | Status.RUNNING if n_failed:
             tries = f"{n_failed} tries" if n_failed != 1 else "One try"
             return f"{tries} ended without a result; the file may be fine. We retry automatically."
     return ""
+
+
+def _of_system_error(evaluation: Evaluation, *, n_failed: int) -> str:
+    """Why scoring was given up."""
+    counts = " Until then it counts as a rejected file for 24 hours." if evaluation.is_file_suspect else ""
+    if evaluation.is_file_suspect and evaluation.n_poison_strikes < lifecycle.MAX_POISON_STRIKES:
+        # Given up before its strikes were exhausted.
+        return (
+            "Reading the file took more processor time than a file for this split may take, so it was not "
+            "scored; `tsttc check` reads it on your machine without this limit. We keep the file, and a "
+            f"maintainer can have it read again.{counts}"
+        )
+    tries = f"{n_failed} times" if n_failed != 1 else "once"
+    return (
+        f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
+        f"the file, and a maintainer can retry it.{counts}"
+    )
 
 
 def why_no_interval(edition: Edition) -> str:

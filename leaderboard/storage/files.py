@@ -5,6 +5,7 @@ It goes through Django's storages, so that workers and web on several machines c
 
 import hashlib
 import os
+import re
 import tempfile
 import time
 from collections.abc import Iterator
@@ -24,6 +25,11 @@ from leaderboard.models import SentFile
 
 CHUNK_BYTES = 1 << 20
 _DIGEST_BYTES = 32
+_NAMES = re.compile(
+    r"predictions/[0-9a-f]{2}/[0-9a-f]{64}\.json|manifests/[0-9a-f]{64}\.csv|aligned/[0-9a-f]{16}/[0-9a-f]{64}\.f8"
+)
+# Web and workers may be two accounts, which share the group of the directory.
+_FILE_MODE = 0o640
 INCOMING = ".incoming"
 LEFTOVER_S = 3600.0
 FRESH = timedelta(hours=12)
@@ -72,6 +78,7 @@ class DurableFileSystemStorage(FileSystemStorage):
                 for chunk in content.chunks(CHUNK_BYTES):
                     out.write(chunk)
                 out.flush()
+                os.fchmod(out.fileno(), _FILE_MODE)
                 if not isinstance(content, Rebuildable):
                     os.fsync(out.fileno())
             Path(temporary).replace(target)
@@ -147,6 +154,11 @@ def replacing(target: Path) -> Iterator[Path]:
 def store() -> Storage:
     """The configured file store."""
     return storages["files"]
+
+
+def is_name(text: str) -> bool:
+    """Whether the store keeps a file under this name: it leads nowhere else."""
+    return _NAMES.fullmatch(text) is not None
 
 
 def predictions_name(digest: str) -> str:

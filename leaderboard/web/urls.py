@@ -43,7 +43,6 @@ urlpatterns = [
     path("", cacheable(landing_views.home, board_query.PARAMETERS), name="home"),
     path("board/", takes(landing_views.main_board, board_query.PARAMETERS), name="main_board"),
     path("board/<slug:split>/", cacheable(board_views.board, board_query.PARAMETERS), name="board"),
-    path("board/<slug:split>/card.png", takes(shared_views.board_card), name="board_card"),
     path("board/<slug:split>/charts/", takes(chart_views.board_charts), name="charts"),
     path(
         "board/<slug:split>/charts/progress.json",
@@ -73,7 +72,6 @@ urlpatterns = [
         cacheable(shared_views.badge, shared_views.PARAMETERS),
         name="badge",
     ),
-    path("methods/<uuid:method_id>/card.png", takes(shared_views.method_card), name="method_card"),
     path("robots.txt", crawler_views.robots, name="robots"),
     path("sitemap.xml", cacheable(crawler_views.sitemap), name="sitemap"),
     path("favicon.ico", crawler_views.favicon, name="favicon"),

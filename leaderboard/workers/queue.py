@@ -64,12 +64,6 @@ def clean_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
         upkeep.clean(now=clock.database_now())
 
 
-def draw_cards_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Draw the cards that are missing, unless somebody has begun to within `SWEEP_S`."""
-    if _begun("cards_begun_at", every_s=settings.SWEEP_S):
-        upkeep.draw(now=clock.database_now(), is_stopping=stopping.is_set)
-
-
 def send_mails_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
     """Queue notices and send what waits, unless somebody has begun to within `SWEEP_S`.
 
@@ -150,7 +144,7 @@ class Poller(threading.Thread):
 
 
 def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
-    """Let this process look for work, sweep, clean, draw cards and send mails by itself.
+    """Let this process look for work, sweep, clean and send mails by itself.
 
     One for each, so that neither a long run nor a slow store keeps the queue from being swept.
     """
@@ -158,7 +152,6 @@ def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
         Poller(poll, every_s=settings.POLL_S, rng=rng),
         Poller(sweep_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
         Poller(clean_if_due, every_s=min(settings.CLEAN_S, 60.0), rng=rng),
-        Poller(draw_cards_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
         Poller(send_mails_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
     )
     for poller in pollers:

@@ -1,17 +1,16 @@
-"""Upkeep: remove files that no submission names and rows that have expired, and draw the cards."""
+"""Upkeep: remove files that no submission names and rows that have expired."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from datetime import datetime
 
 import structlog
 from django.db.models import F
 
-from leaderboard.exports import card_drawing, cards
 from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
+from leaderboard.people import addresses
 from leaderboard.quotas import mailboxes
-from leaderboard.scoring import questions, worker
+from leaderboard.scoring import questions
 from leaderboard.storage import orphans
 from leaderboard.submissions import forgetting, idempotency
 
@@ -39,6 +38,7 @@ def clean(*, now: datetime) -> Cleaned:
     outbox.purge(now=now)
     mailboxes.delete_expired(now=now)
     forgetting.delete_late_rows()
+    addresses.delete_unproved(now=now)
     n_files = n_bytes = n_leftovers = 0
     for orphan in orphans.orphans(now=now):
         if orphans.remove(orphan, now=now):
@@ -54,25 +54,3 @@ def clean(*, now: datetime) -> Cleaned:
     cleaned = Cleaned(n_files, n_bytes, n_leftovers, n_keys, n_questions)
     log.info("cleaned", **vars(cleaned))
     return cleaned
-
-
-PATIENCE_S = 0.1
-
-
-def draw(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
-    """Draw the cards that are missing, and remove those that no longer hold. Returns how many were drawn.
-
-    One more method changes the cards of all: it is told among how many each stands. So they wait while
-    another thread of this process decides a submission.
-    """
-    present = cards.present()
-    cards.remove_others(present)
-    n_drawn = 0
-    for card in cards.missing(present.values()):
-        while not is_stopping() and worker.others_decide(timeout_s=PATIENCE_S):
-            pass
-        if is_stopping():
-            break
-        cards.keep(card, card_drawing.png(card), now=now)
-        n_drawn += 1
-    return n_drawn

@@ -58,9 +58,41 @@ def test_units_start_programs_that_there_are_without_privileges(path: Path) -> N
         assert (REPOSITORY / f"leaderboard/management/commands/{arguments[1]}.py").exists()
     if "--config" in arguments:
         assert (REPOSITORY / arguments[arguments.index("--config") + 1]).exists()
-    assert service["NoNewPrivileges"] == "yes"
     assert service["ProtectSystem"] == "strict"
-    assert service["User"] == "tsttc"
+    assert service["SupplementaryGroups"] == "tsttc-files"
+    assert (service["User"] == service["Group"] == "tsttc-web") == (path.stem == "tsttc-web")
+
+
+HARDENED = {
+    "NoNewPrivileges": "yes",
+    "CapabilityBoundingSet": "",
+    "PrivateUsers": "yes",
+    "PrivateDevices": "yes",
+    "ProtectProc": "invisible",
+    "ProcSubset": "pid",
+    "ProtectKernelTunables": "yes",
+    "RestrictNamespaces": "yes",
+    "RestrictSUIDSGID": "yes",
+    "RestrictAddressFamilies": "AF_INET AF_INET6 AF_UNIX",
+    "SystemCallFilter": "@system-service",
+}
+
+
+@pytest.mark.parametrize("path", UNITS, ids=lambda path: path.stem)
+def test_a_unit_that_is_taken_over_sees_no_other_process_and_asks_little_of_the_kernel(path: Path) -> None:
+    lines = path.read_text().splitlines()
+    assert [f"{name}={value}" for name, value in HARDENED.items() if f"{name}={value}" not in lines] == []
+
+
+def test_web_and_workers_are_two_accounts_and_both_keep_the_group_of_files() -> None:
+    users, masks = {}, {}
+    for path in UNITS:
+        text = path.read_text()
+        users[path.stem] = re.findall(r"^User=(.*)$", text, re.MULTILINE)
+        masks[path.stem] = re.findall(r"^UMask=(.*)$", text, re.MULTILINE)
+    assert users == {"tsttc-web": ["tsttc-web"], "tsttc-worker": ["tsttc"], "tsttc-backup": ["tsttc"]}
+    # What is in the folder of both is writable by both; a backup is its owner's alone.
+    assert masks == {"tsttc-web": ["0007"], "tsttc-worker": ["0007"], "tsttc-backup": ["0077"]}
 
 
 def test_only_the_worker_can_read_the_ground_truth() -> None:
@@ -73,17 +105,40 @@ def test_only_the_worker_can_read_the_ground_truth() -> None:
     assert "ReadOnlyPaths=/var/lib/tsttc/ground-truth" in worker
 
 
-@pytest.mark.parametrize(
-    ("name", "header"),
-    [
-        ("nginx.conf", "proxy_set_header X-Forwarded-Proto https;"),
-        ("Caddyfile.host", "request_buffers 64KB"),
-    ],
-)
-def test_proxies_take_uploads_and_hide_the_figures(name: str, header: str) -> None:
+@pytest.mark.parametrize("name", ["nginx.conf", "Caddyfile", "Caddyfile.host"])
+def test_proxies_take_uploads_and_hide_the_figures(name: str) -> None:
     text = (DEPLOY / name).read_text()
     assert text.count("{") == text.count("}")
-    assert header in text
     assert "/submit/" in text
     assert "/api/v1/submissions" in text
     assert re.search(r"/metrics \{\s+(return|respond) 404", text)
+
+
+@pytest.mark.parametrize("name", ["Caddyfile", "Caddyfile.host"])
+def test_caddy_keeps_every_request_back_until_it_is_whole(name: str) -> None:
+    text = (DEPLOY / name).read_text()
+    # What compose sets where nobody says otherwise.
+    text = text.replace("{$TSTTC_MAX_REQUEST_SIZE}", "21MB")
+    passed_on = re.findall(r"max_size (\S+)\s+\}\s+reverse_proxy \S+ \{\s+request_buffers (\S+)\s+\}", text)
+    assert len(passed_on) == text.count("reverse_proxy") == 2
+    assert [buffer for size, buffer in passed_on if n_bytes(buffer) <= n_bytes(size)] == []
+    assert re.search(r"timeouts \{[^}]*read_body \dm", text)
+
+
+def n_bytes(text: str) -> int:
+    """What Caddy understands by a size: "21MB"."""
+    number, unit = re.fullmatch(r"(\d+)([KMG])B", text).groups()  # type: ignore[union-attr]  # else it fails
+    return int(number) * {"K": 10**3, "M": 10**6, "G": 10**9}[unit]
+
+
+def test_nginx_keeps_every_request_back_until_it_is_whole() -> None:
+    text = (DEPLOY / "nginx.conf").read_text()
+    assert re.findall(r"proxy_request_buffering (\w+);", text) == ["on"]
+    assert "proxy_set_header X-Forwarded-Proto https;" in text
+
+
+def test_no_proxy_passes_on_what_would_move_the_site() -> None:
+    assert "underscores_in_headers off;" in (DEPLOY / "nginx.conf").read_text()
+    for name in ("Caddyfile", "Caddyfile.host"):
+        before, _, _ = (DEPLOY / name).read_text().partition("reverse_proxy")
+        assert "\trequest_header -*_*\n" in before, name

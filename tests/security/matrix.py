@@ -82,9 +82,7 @@ LINES: dict[str, Line] = {
     "feed_of_all": line(GET=OPEN),
     # What stands in a README is what everybody sees, whoever looks: the owner's method is private.
     "badge": line(GET=all_of("404")),
-    "method_card": line(GET=all_of("404")),
     # No worker has drawn it: the picture of every page.
-    "board_card": line(GET=all_of("302")),
     "docs": line(GET=OPEN),
     "docs_search": line(GET=OPEN),
     "guide": line(GET=OPEN, at={"guide_name": "researchers"}),

@@ -125,6 +125,24 @@ def test_pages_and_uploads_need_no_ground_truth(alone: Alone) -> None:
     assert not (alone.site.directory / "not-there").exists()
 
 
+PLACES = ("/x", "/board", "//evil.example", "/does-not-fit")
+
+
+@pytest.mark.parametrize("name", ["SCRIPT_NAME", "Script-Name", "PATH_INFO", "X-Forwarded-Prefix"])
+def test_no_header_moves_the_site(alone: Alone, name: str) -> None:
+    # Without cookies and tokens: what is answered is kept for others. We ask from loopback, as a proxy may.
+    with httpx.Client(base_url=alone.site.url, timeout=PATIENCE_S, trust_env=False) as client:
+        for path in ("/", "/board/test/", "/board/test/?sort=-mid", "/docs/", "/api/v1/splits"):
+            for place in PLACES:
+                moved = client.get(path, headers={name: place})
+                plain = client.get(path)
+                assert (moved.status_code, moved.content) == (200, plain.content), (path, place)
+                assert place.encode() + b"/board" not in plain.content
+                # Where the header was believed, the page was one below it.
+                below = client.get(f"/x{path}", headers={name: place})
+                assert below.status_code == 404, (path, place)
+
+
 def test_hostile_files_and_names_are_answered_and_leave_no_memory_behind(alone: Alone) -> None:
     found: dict[int, int] = {}
     with alone.client() as client:

@@ -1,6 +1,7 @@
 """`manage.py createsuperuser`, as Django's, and the address counts as proved.
 
-Whoever may run it needs no mail to be believed, and must be able to sign in while no mail goes out.
+Whoever may run it needs no mail to be believed, and must be able to sign in while no mail goes out. Where a
+second factor is required, the first sign-in asks for a mailed code all the same.
 """
 
 from typing import Any

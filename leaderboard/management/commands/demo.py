@@ -19,6 +19,10 @@ from leaderboard.management.commands.build_wheel import build, is_built
 
 # What a multipart body has beside the file.
 FORM_BYTES = 1_000_000
+# Connections at once, half-open ones among them: fewer than the files that a process may open.
+MAX_CONNECTIONS = 900
+SILENT_S = 20
+ANYWHERE = frozenset({"", "0.0.0.0", "::"})  # noqa: S104 - nothing is bound here
 
 
 class Command(BaseCommand):
@@ -61,8 +65,8 @@ class Command(BaseCommand):
             f"Logs and mail are in {settings.DATA_DIR / 'logs'}\n"
         )
         try:
-            processes = _processes(host, port, address=address)
-            asyncio.run(supervise(processes, host=host, port=port, ready=lambda: self._say(banner)))
+            running = processes(host, port, address=address)
+            asyncio.run(supervise(running, host=host, port=port, ready=lambda: self._say(banner)))
         except StartFailed as fault:
             raise CommandError(str(fault)) from fault
 
@@ -92,13 +96,30 @@ def static_files_changed(root: Path) -> bool:
     )
 
 
-def _processes(host: str, port: int, *, address: str) -> list[Process]:
+def names_of(host: str) -> list[str]:
+    """The names by which browsers may ask: a page elsewhere that leads its own name here is refused.
+
+    Whoever listens at every address is asked by names that only they know.
+    """
+    if host in ANYWHERE:
+        return ["*"]
+    return ["localhost", "127.0.0.1", "[::1]", f"[{host}]" if ":" in host else host]
+
+
+def processes(host: str, port: int, *, address: str) -> list[Process]:
+    """The web server and the worker of the demo."""
     logs = settings.DATA_DIR / "logs"
     logs.mkdir(parents=True, exist_ok=True)
-    environment = {"TSTTC_SITE_URL": address, "OPENBLAS_NUM_THREADS": "1", **os.environ}
+    environment = {
+        "TSTTC_SITE_URL": address,
+        "TSTTC_ALLOWED_HOSTS": ",".join(names_of(host)),
+        "OPENBLAS_NUM_THREADS": "1",
+        **os.environ,
+    }
     web = [
         *(sys.executable, "-m", "waitress", f"--host={host}", f"--port={port}", "--threads=8"),
         f"--max-request-body-size={settings.MAX_PREDICTIONS_BYTES + FORM_BYTES}",
+        *(f"--connection-limit={MAX_CONNECTIONS}", f"--channel-timeout={SILENT_S}", "--asyncore-use-poll"),
         "leaderboard.wsgi:application",
     ]
     worker = [

@@ -11,8 +11,8 @@ from leaderboard.models import MailKind
 from leaderboard.people import second_factor
 
 _TOLD = (
-    "A maintainer removed the second factor and the recovery codes of your account: you sign in without a "
-    "code again. If you did not ask for this, tell us at once: {contact}\n\n"
+    "A maintainer removed the second factor and the recovery codes of your account: you sign in without "
+    "it again. If you did not ask for this, tell us at once: {contact}\n\n"
     "Set up a new second factor here: {site}/accounts/2fa/\n\n--\n{name}\n{site}"
 )
 

@@ -12,7 +12,8 @@ from typing import Any
 from urllib.parse import urlsplit, urlunsplit
 
 from allauth.account import forms
-from allauth.account.adapter import DefaultAccountAdapter
+from allauth.account.adapter import DefaultAccountAdapter, get_adapter
+from allauth.account.models import EmailAddress, Login
 from allauth.core import context as allauth_context
 from allauth.core.internal import ratelimit
 from allauth.mfa.adapter import DefaultMFAAdapter
@@ -22,12 +23,14 @@ from django.contrib.auth.hashers import make_password
 from django.contrib.auth.models import AnonymousUser
 from django.contrib.sites.requests import RequestSite
 from django.core.cache import cache
+from django.db import transaction
 from django.http import HttpRequest
 from django.urls import reverse
 from django.utils import timezone
 
 from leaderboard.mails import outbox
 from leaderboard.models import User
+from leaderboard.people import addresses, second_factor
 
 KNOWN_ADDRESS_S = 90 * 24 * 3600
 
@@ -43,6 +46,11 @@ class ConfiguredSite(RequestSite):
 
 class AccountAdapter(DefaultAccountAdapter):
     """Sends mails, and decides whether somebody may try a password."""
+
+    error_messages = {
+        **DefaultAccountAdapter.error_messages,
+        "incorrect_code": "The code is wrong; expected the code of the last mail that we sent for this.",
+    }
 
     def send_mail(self, template_prefix: str, email: str, context: dict[str, Any]) -> None:
         """Send a mail whose links lead to the configured site, now or, if no server takes it, later."""
@@ -64,7 +72,7 @@ class AccountAdapter(DefaultAccountAdapter):
         """Count one try. Raises allauth's validation error once there were too many wrong ones."""
         super().pre_authenticate(request, **credentials)
         login = _login_of(credentials)
-        if cache.get(_known_address_key(login, ratelimit.get_ip(request))):
+        if cache.get(known_address_key(login, ratelimit.get_ip(request))):
             return
         usage = ratelimit.consume(request, app="allauth.account", action="login_failed_anywhere", key=login)
         if not usage:
@@ -78,10 +86,24 @@ class AccountAdapter(DefaultAccountAdapter):
         user = super().authenticate(request, **credentials)
         if user:
             address = ratelimit.get_ip(request)
-            cache.set(
-                _known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S
-            )
+            cache.set(known_address_key(_login_of(credentials), address), value=True, timeout=KNOWN_ADDRESS_S)
         return user
+
+    def is_login_by_code_required(self, login: Login) -> bool:
+        """Whether the sign-in also asks for a mailed code: of a maintainer who has to set up an app first.
+
+        Otherwise somebody who knows only the password would set up an app of their own.
+        """
+        user = login.user
+        if not isinstance(user, User) or not second_factor.is_required(user):
+            return False
+        return not second_factor.is_set_up(user)
+
+    def confirm_email(self, request: HttpRequest, email_address: EmailAddress) -> bool:
+        """Whether the address is proved now. Its account may have given way meanwhile."""
+        with transaction.atomic():
+            is_there = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id)
+            return is_there.exists() and bool(super().confirm_email(request, email_address))
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
         """How somebody confirms that it is them: with a code if they have a second factor, else by password.
@@ -102,7 +124,24 @@ class AccountAdapter(DefaultAccountAdapter):
         )
 
 
-class SignupForm(forms.SignupForm):
+class OwnersAddress(forms.BaseSignupForm):
+    """Of a form that signs up: an address that somebody else has not proved is free."""
+
+    def validate_unique_email(self, value: str) -> str:
+        """The address. Only an account that it belongs to counts as there."""
+        if addresses.accounts_of(value).exists():
+            return str(super().validate_unique_email(value))
+        return value
+
+    def save(self, request: HttpRequest) -> User:
+        """Make the account; what had the address unproved gives way."""
+        with transaction.atomic():
+            addresses.release(address=self.cleaned_data["email"])
+            user: User = super().save(request)
+        return user
+
+
+class SignupForm(OwnersAddress, forms.SignupForm):
     """Signs up; an address that has an account already gets a mail, and the same answer."""
 
     def clean(self) -> dict[str, Any]:
@@ -123,11 +162,35 @@ class SignupForm(forms.SignupForm):
         return super().try_save(request)
 
 
+class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
+    """The mailed code that proves an address."""
+
+    def clean_code(self) -> Any:
+        """The code. With the right one, nobody who has not proved the address keeps the owner from it."""
+        forms.BaseConfirmCodeForm.clean_code(self)
+        if self.user is None:  # the account gave way, or there is none
+            raise get_adapter().validation_error("incorrect_code")
+        addresses.release(address=self.email, to=self.user)
+        return super().clean_code()
+
+
+class ResetPasswordForm(forms.ResetPasswordForm):
+    """Mails a link to an address that belongs to an account."""
+
+    def clean_email(self) -> Any:
+        """The address. An account that nobody confirmed is none: whoever made it may have another way in."""
+        address = super().clean_email()
+        theirs = set(addresses.accounts_of(address))
+        self.users = [user for user in self.users if user in theirs]  # type: ignore[has-type]  # allauth sets it here alone
+        return address
+
+
 def _login_of(credentials: dict[str, Any]) -> str:
     return str(credentials.get("email") or credentials.get("username") or "").lower()
 
 
-def _known_address_key(login: str, address: str) -> str:
+def known_address_key(login: str, address: str) -> str:
+    """Where the cache says that this address has signed in here before."""
     # A hash: who signs in from where is nobody's business in a table of the database.
     return "known-address:" + hashlib.sha256(f"{login}\n{address}".encode()).hexdigest()
 

@@ -2,6 +2,7 @@
 
 from typing import Final, cast
 
+from allauth.account.decorators import reauthentication_required
 from django import forms
 from django.contrib import messages
 from django.contrib.auth import logout
@@ -45,13 +46,20 @@ def data(request: HttpRequest) -> HttpResponse:
     if form.is_valid():
         with form.refusals():
             form.require(user)
-            forgetting.forget(user=user, reason="on their own page", actor=user, now=timezone.now())
-            logout(request)
-            messages.success(request, "Your account is deleted.")
-            return redirect("home")
+            return _forget(request)
     stays = quotas.span(mailboxes.longest_window()) if mailboxes.are_proved() else ""
     context = {"form": form, "quota_stays": stays}
     return render(request, "account/data.html", context, status=422 if form.errors else 200)
+
+
+@reauthentication_required
+def _forget(request: HttpRequest) -> HttpResponse:
+    """Delete the account once the person has confirmed who they are; an open session is not enough."""
+    user = cast("User", request.user)
+    forgetting.forget(user=user, reason="on their own page", actor=user, now=timezone.now())
+    logout(request)
+    messages.success(request, "Your account is deleted.")
+    return redirect("home")
 
 
 @own_page

@@ -33,6 +33,8 @@ from django.shortcuts import render
 from django.urls import URLPattern, URLResolver, include, path
 
 from leaderboard.models import User
+from leaderboard.people import addresses
+from leaderboard.web.account.accounts import OwnersAddress
 
 log = structlog.get_logger(__name__)
 
@@ -148,7 +150,9 @@ class ProviderAdapter(DefaultSocialAccountAdapter):
         sociallogin.token = None
         is_sign_in = sociallogin.state.get("process", AuthProcess.LOGIN) == AuthProcess.LOGIN
         address = sociallogin.user.email if sociallogin.user else ""
-        if sociallogin.is_existing or not is_sign_in or not address or not _has_account(address):
+        if sociallogin.is_existing or not is_sign_in or not address:
+            return
+        if not addresses.accounts_of(address).exists():
             return
         context = {"provider": sociallogin.provider, "address": address}
         raise ImmediateHttpResponse(render(request, "socialaccount/known_address.html", context, status=409))
@@ -169,11 +173,6 @@ class ProviderAdapter(DefaultSocialAccountAdapter):
             extra_context["sentence"] = _sentence(provider.app.name, exception, request)
 
 
-def _has_account(address: str) -> bool:
-    taken = EmailAddress.objects.filter(email__iexact=address)
-    return taken.exists() or User.objects.filter(email__iexact=address).exists()
-
-
 def _sentence(name: str, exception: Exception | None, request: HttpRequest) -> str:
     if isinstance(exception, requests.Timeout):
         return f"{name} did not answer in time. The fault is not yours: try again later."
@@ -189,7 +188,7 @@ def _sentence(name: str, exception: Exception | None, request: HttpRequest) -> s
     )
 
 
-class ProviderSignupForm(SignupForm):
+class ProviderSignupForm(OwnersAddress, SignupForm):
     """Address and name. The address is taken as verified where it is the one that the provider verified."""
 
     def save(self, request: HttpRequest) -> User:

@@ -5,6 +5,7 @@ from django.shortcuts import render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
+from evaluator.tables import sentences
 from leaderboard.boards import snapshots
 from leaderboard.boards.boards import Board
 from leaderboard.http import cacheable
@@ -37,6 +38,10 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
         "n_profiles": N_PROFILES,
         "significance": significance_chart.significance(pairs, split=board.split.pk),
         "n_first": comparisons.N_FIRST,
+        "resolution": sentences.resolution(
+            [pair.differences or {} for pair in comparisons.neighbours(pairs)],
+            decimals=board.edition.decimals if board.edition else 2,
+        ),
     }
     return render(request, "boards/charts.html", context)
 

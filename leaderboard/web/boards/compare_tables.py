@@ -1,16 +1,19 @@
 """Tables of comparisons: the verdict in words, the values, the differences of each pair."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any, Final
+from uuid import UUID
 
 from django.utils.html import format_html
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
 from evaluator.scoring.report import format_published
-from evaluator.scoring.significance import too_few_recordings
+from evaluator.scoring.significance import told_apart, too_few_recordings
+from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
-from leaderboard.boards.rows import Entry
+from leaderboard.boards.rows import Entry, Interval
 from leaderboard.scoring.comparisons import Compared, Pair
 from leaderboard.web.boards import profile_chart, svg
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
@@ -20,13 +23,16 @@ _DIFFERENCE_PX: Final = 150.0
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
-def comparison(compared: Compared) -> dict[str, Any]:
-    """What was compared, as the compare page places it."""
+def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
+    """What was compared, as the compare page places it; `n_tried` are scored submissions by method."""
     return {
         "compared": compared,
         "verdict": verdict(compared),
         "pairs": [_pair_table(pair) for pair in compared.pairs],
         "profile": profile_chart.profile(compared.entries),
+        "selection": sentences.selection(
+            {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
+        ),
     }
 
 
@@ -40,7 +46,8 @@ def verdict(compared: Compared) -> str:
     if len(compared.entries) == len(("first", "second")):
         return compared.pairs[0].sentence()
     best = min(compared.entries, key=lambda entry: entry.scores[PRIMARY] or 0.0)
-    worse, alike = _told_apart(best, compared.pairs)
+    tested = [pair for pair in compared.pairs if not pair.withheld and PRIMARY in (pair.differences or {})]
+    worse, alike = _told_apart(best, tested)
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
         f"{format_published(best.scores[PRIMARY], decimals=best.decimals)}."
@@ -49,19 +56,29 @@ def verdict(compared: Compared) -> str:
         return f"{head} There are too few recordings for confidence intervals and p-values."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
     parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
-    said = [head, f"On these recordings it is {', and '.join(parts)}."] if parts else [head]
+    together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
+    said = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
     return " ".join([*said, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
 
 
-def _told_apart(best: Entry, pairs: Sequence[Pair]) -> tuple[list[str], list[str]]:
-    """The methods that the best is significantly better than in MiD, and the others."""
+def _told_apart(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
+    """The methods that the best is significantly better than in MiD, and the others.
+
+    The best was chosen by looking, so all pairs are tested together. What the board says of the same methods
+    holds first: nothing is worse that it marks as possibly the best, and ranks whose ranges do not meet are
+    told apart.
+    """
+    apart = told_apart([(pair.differences or {})[PRIMARY] for pair in tested])
     worse: list[str] = []
     alike: list[str] = []
-    for pair in pairs:
-        if best in (pair.first, pair.second) and pair.differences and not pair.withheld:
-            other = pair.second if pair.first == best else pair.first
-            found = pair.differences.get(PRIMARY)
-            (worse if found and found.is_significant else alike).append(other.method)
+    for pair, is_apart in zip(tested, apart, strict=True):
+        if best not in (pair.first, pair.second):
+            continue
+        other = pair.second if pair.first == best else pair.first
+        on_board, of_best = (each.intervals.get(PRIMARY, Interval()) for each in (other, best))
+        is_worse = is_apart and not on_board.is_with_best
+        is_worse |= (of_best.rank_high or math.inf) < (on_board.rank_low or 0)
+        (worse if is_worse else alike).append(other.method)
     return worse, alike
 
 
@@ -82,6 +99,7 @@ def _pair_table(pair: Pair) -> dict[str, Any]:
         "pair": pair,
         "sentence": pair.sentence(),
         "others": pair.others(),
+        "influence": pair.influence(),
         "groups": [
             _difference_group(group, [name for name in names if name in differences], pair, differences)
             for group, names in zip(score_groups(columns), grouped_names(columns).values(), strict=True)

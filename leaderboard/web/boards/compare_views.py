@@ -1,5 +1,6 @@
 """The page that sets two to five methods side by side."""
 
+from collections import Counter
 from typing import Final
 
 from django.http import HttpRequest, HttpResponse
@@ -64,7 +65,11 @@ def _choose(request: HttpRequest, split: Split) -> HttpResponse:
 
 
 def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse:
-    context = {"page": compare_tables.comparison(compared), "board_split": compared.split.pk}
+    # As many as everybody sees on the methods' pages.
+    attempts = snapshots.shown(split=compared.split, edition=compared.edition).attempts
+    n_tried = Counter(attempt.method_id for attempt in attempts)
+    page = compare_tables.comparison(compared, n_tried=n_tried)
+    context = {"page": page, "board_split": compared.split.pk}
     return render(request, "boards/compare/compare.html", context)
 
 

@@ -11,6 +11,7 @@ from django.urls import reverse
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY
 from evaluator.scoring.report import format_published
+from evaluator.tables import sentences
 from leaderboard.boards.results import Result
 from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
@@ -86,6 +87,7 @@ def method_result(result: Result) -> dict[str, Any]:
             )
             for attempt in result.attempts
         ],
+        "selection": sentences.selection({entry.method: len(result.attempts)}) if rank_range(entry) else "",
         "profile": profile_chart.profile((entry, *result.neighbours)),
         "compare_href": _compare_href(result),
         "can_compare": entry.scores[PRIMARY] is not None,

@@ -33,6 +33,7 @@ from urllib.parse import urlencode
 
 from django.conf import settings
 from django.contrib.messages.storage.cookie import CookieStorage
+from django.core.exceptions import DisallowedHost
 from django.http import (
     HttpRequest,
     HttpResponse,
@@ -95,7 +96,17 @@ def is_anybodys(request: HttpRequest) -> bool:
         and "HTTP_HX_REQUEST" not in request.META
         and settings.SESSION_COOKIE_NAME not in request.COOKIES
         and CookieStorage.cookie_name not in request.COOKIES
+        and _is_ours(request)
     )
+
+
+def _is_ours(request: HttpRequest) -> bool:
+    """Whether the site answers to the name that is asked; for another one, the layers refuse."""
+    try:
+        request.get_host()
+    except DisallowedHost:
+        return False
+    return True
 
 
 class Form(NamedTuple):

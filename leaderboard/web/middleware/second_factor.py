@@ -1,11 +1,12 @@
 """Where `TSTTC_REQUIRE_SECOND_FACTOR` is on, only a second factor makes a session that of a maintainer."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Final
 
 from allauth.account.authentication import get_authentication_records
 from django.conf import settings
 from django.contrib import messages
+from django.contrib.auth import logout
 from django.contrib.auth.models import AnonymousUser
 from django.http import HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import redirect, resolve_url
@@ -16,9 +17,18 @@ from django_htmx.http import HttpResponseClientRefresh
 from leaderboard.models import User
 from leaderboard.people import second_factor
 
+_SIGN_IN: Final = "account_login"
+_SET_UP: Final = "mfa_activate_totp"
+_SIGN_IN_AGAIN: Final = (
+    "Maintainers of this site need a second factor. To set it up, sign in again: this time the site also "
+    "asks for a code that we mail to you."
+)
+
 
 class SecondFactorMiddleware:
     """Leads from `/maintain/` and `/admin/` to the page that sets up the second factor, or asks for it.
+
+    Who has none yet signs in with a mailed code first (`AccountAdapter.is_login_by_code_required`).
 
     On all other pages and in the API, a session without a code sees and does no more than other people.
     """
@@ -37,27 +47,44 @@ class SecondFactorMiddleware:
         self, request: HttpRequest, view: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> HttpResponseBase | None:
         """Redirect, or let the view answer."""
-        if not _is_for_maintainers(request) or not request.user.is_authenticated:
+        if not request.user.is_authenticated or not _is_guarded(request):
             return None
         step = _missing_step(request, request.user)
         if not step:
             return None
         if getattr(request, "htmx", None):
             return HttpResponseClientRefresh()  # a part of an open page: the whole page leads on
-        if request.method not in {"GET", "HEAD"}:
-            return redirect(step)
-        if step == "mfa_activate_totp":
-            messages.warning(request, "Maintainers of this site need a second factor. Set it up first.")
-            return redirect(step)
-        return redirect(f"{resolve_url(step)}?{urlencode({'next': request.get_full_path()})}")
+        return _lead(request, step)
 
 
-def _is_for_maintainers(request: HttpRequest) -> bool:
+def _lead(request: HttpRequest, step: str) -> HttpResponseBase | None:
+    """Redirect to the missing step; None on its own page."""
+    if step == _name(request):
+        return None
+    back = {"next": request.get_full_path()}
+    if step == _SIGN_IN:
+        logout(request)
+        messages.warning(request, _SIGN_IN_AGAIN)
+        back = {"next": resolve_url(_SET_UP)}
+    elif step == _SET_UP:
+        messages.warning(request, "Maintainers of this site need a second factor. Set it up first.")
+        return redirect(step)
+    elif request.method not in {"GET", "HEAD"}:
+        return redirect(step)
+    return redirect(f"{resolve_url(step)}?{urlencode(back)}")
+
+
+def _name(request: HttpRequest) -> str:
     match = request.resolver_match
-    if match is None:
-        return False
-    name = match.url_name or ""
-    return name != "logout" if match.namespace == "admin" else name.startswith("maintain")
+    return (match.url_name or "") if match else ""
+
+
+def _is_guarded(request: HttpRequest) -> bool:
+    """Whether it is a page of maintainers, or the one that sets up the app."""
+    name = _name(request)
+    if request.resolver_match and request.resolver_match.namespace == "admin":
+        return name != "logout"
+    return name.startswith("maintain") or name == _SET_UP
 
 
 def _marked(request: HttpRequest, user: User | AnonymousUser) -> User | AnonymousUser:
@@ -70,11 +97,12 @@ def _missing_step(request: HttpRequest, user: User) -> str:
     """The name of the page that a maintainer has to pass first; empty where nothing is missing.
 
     It is the session that has to be opened with a code: one that was opened by a password alone, before the
-    app was set up, is no better for it.
+    app was set up, is no better for it. Only a session that was opened with a mailed code sets up the app:
+    somebody who knows the password alone would set up their own.
     """
-    if not settings.REQUIRE_SECOND_FACTOR or not user.is_maintainer:
+    if not second_factor.is_required(user):
         return ""
-    if not second_factor.is_set_up(user):
-        return "mfa_activate_totp"
-    has_given_a_code = any(each.get("method") == "mfa" for each in get_authentication_records(request, user))
-    return "" if has_given_a_code else "mfa_reauthenticate"
+    given = {each.get("method") for each in get_authentication_records(request, user)}
+    if second_factor.is_set_up(user):
+        return "" if "mfa" in given else "mfa_reauthenticate"
+    return _SET_UP if "code" in given else _SIGN_IN

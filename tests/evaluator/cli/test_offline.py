@@ -299,3 +299,22 @@ def test_public_names_are_there_although_they_load_late() -> None:
     assert [name for name in evaluator.__all__ if getattr(evaluator, name, None) is None] == []
     with pytest.raises(AttributeError, match="no attribute 'absent'"):
         _ = evaluator.absent  # type: ignore[attr-defined]  # the point of the test
+
+
+def test_two_files_are_compared_with_what_their_difference_rests_on(tsttc: Tsttc, tmp_path: Path) -> None:
+    taus = {str(i): (i % 9) + 1.5 for i in range(120)}
+    rows = [f"{key},bag{i % 20},1,{100 + i},{i},{tau}" for i, (key, tau) in enumerate(taus.items())]
+    truth = tmp_path / "truth.csv"
+    truth.write_text("\n".join(["anno_id,bag_stamp,cam_id,ts,track_id,ttc", *rows]) + "\n")
+    near, far = tmp_path / "near.json", tmp_path / "far.json"
+    for path, factor in ((near, 1.05), (far, 1.3)):
+        path.write_text(json.dumps({key: tau * factor for key, tau in taus.items()}))
+    said = tsttc("compare", near, far, "--truth", truth)
+    assert said.exit_code == 0, said.stderr
+    words = (
+        f"Without the 15 of 20 recordings that favour {near} most, the difference would not be significant."
+    )
+    assert words in said.stdout.splitlines(), "of five recordings no p is below 0.05"
+    told = json.loads(tsttc("compare", near, far, "--truth", truth, "--json").stdout)["differences"]
+    assert told["mid"]["influence"] == {"n_recordings": 20, "n_to_undecided": 15, "n_to_turn": None}
+    assert told["rte"]["influence"] is None

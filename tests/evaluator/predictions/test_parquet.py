@@ -8,6 +8,7 @@ import pytest
 
 from evaluator import Rejected, convert, read_manifest, read_predictions
 from evaluator.predictions import parquet as asking
+from evaluator.predictions import predictions
 from evaluator.predictions.predictions import json_of, read_sent, sha256_digest
 from evaluator.predictions.sandbox import answer
 from evaluator.tables.formats import parquet_of
@@ -15,7 +16,6 @@ from tests.evaluator.worlds import EXAMPLES, Tsttc, flat
 
 pa: Any = pytest.importorskip("pyarrow", reason="pyarrow is not installed: pip install '.[parquet]'")
 pq: Any = pytest.importorskip("pyarrow.parquet")
-child: Any = pytest.importorskip("evaluator.predictions.parquet_child")
 
 MANIFEST = read_manifest(EXAMPLES / "manifest.csv")
 VALUES = [1.5 + row for row in range(MANIFEST.n_sequences)]
@@ -56,13 +56,13 @@ def test_a_table_is_what_its_json_is() -> None:
     ids=["natural keys", "dictionary", "small types"],
 )
 def test_tables_of_other_types_say_the_same(columns: dict[str, Any]) -> None:
-    assert read_sent(child.json_of(table(**columns)), manifest=MANIFEST).ttc_s.tolist() == VALUES
+    assert read_sent(asking.as_sent(table(**columns)), manifest=MANIFEST).ttc_s.tolist() == VALUES
 
 
 def test_ratios_have_the_rate_of_their_row() -> None:
     data = table(anno_id=[0, 1], scale_ratio=[0.9, 1.1], frame_gap=[5, 1])
     expected = '{"unit":"scale_ratio","frame_gap":{"0":5.0,"1":1.0},"predictions":{"0":0.9,"1":1.1}}'
-    assert child.json_of(data).decode() == expected
+    assert asking.as_sent(data).decode() == expected
 
 
 FAULTS: dict[str, tuple[bytes, str, str, str]] = {
@@ -96,7 +96,7 @@ FAULTS: dict[str, tuple[bytes, str, str, str]] = {
 def test_what_cannot_be_read_is_said_in_words(name: str) -> None:
     data, code, words, where = FAULTS[name]
     with pytest.raises(Rejected) as caught:
-        child.json_of(data)
+        asking.as_sent(data)
     [problem] = caught.value.problems
     assert (problem.code, problem.where) == (code, where)
     assert words in problem.message
@@ -106,42 +106,24 @@ def test_two_columns_of_one_name_are_refused() -> None:
     out = io.BytesIO()
     pq.write_table(pa.Table.from_arrays([[0], [1.5], [2.5]], names=["anno_id", "ttc", "ttc"]), out)
     with pytest.raises(Rejected, match='2 columns "ttc"; expected one'):
-        child.json_of(out.getvalue())
+        asking.as_sent(out.getvalue())
 
 
 def test_values_that_are_missing_are_the_problems_of_json() -> None:
     data = table(anno_id=IDS, ttc=[None, float("nan"), 0.0, *VALUES[3:]])
     with pytest.raises(Rejected) as caught:
-        read_sent(child.json_of(data), manifest=MANIFEST)
+        read_sent(asking.as_sent(data), manifest=MANIFEST)
     found = {problem.where: problem.code for problem in caught.value.problems}
     assert found == {"/0": "not-a-number", "/1": "nan", "/2": "zero"}
 
 
 def test_a_bomb_is_refused_by_what_it_says_of_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(child, "MAX_UNPACKED_BYTES", 100)
+    monkeypatch.setattr(predictions, "MAX_UNPACKED_BYTES", 100)
     with pytest.raises(Rejected, match=r"unpacks to [\d,]+ bytes; expected at most 100"):
-        child.json_of(table(anno_id=IDS, ttc=VALUES))
-    monkeypatch.setattr(child, "MAX_ROWS", 59)
+        asking.as_sent(table(anno_id=IDS, ttc=VALUES))
+    monkeypatch.setattr(asking, "MAX_ROWS", 59)
     with pytest.raises(Rejected, match="has 60 rows; expected at most 59"):
-        child.json_of(GOOD)
-
-
-@pytest.mark.parametrize(
-    ("exit_code", "complaints", "code", "words"),
-    [
-        (77, b"", "too-large", "takes too much memory"),
-        (-6, b"terminate called\n  what():  size mismatch\n", "unreadable", "(signal 6:   what():  size mis"),
-        (1, b"", "unreadable", "(exit code 1); expected an intact Parquet table"),
-    ],
-)
-def test_a_table_that_ends_its_reader_is_told_and_ends_nothing_else(
-    exit_code: int, complaints: bytes, code: str, words: str
-) -> None:
-    with pytest.raises(Rejected) as caught:
-        asking._answer(exit_code, b"", complaints)
-    [problem] = caught.value.problems
-    assert problem.code == code
-    assert words in problem.message
+        asking.as_sent(GOOD)
 
 
 def test_the_server_reads_no_parquet_and_says_what_to_do() -> None:

@@ -3,22 +3,31 @@
 Here few repetitions, with room for their own chance; the command makes thousands.
 """
 
+import itertools
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from tests import error_models, validity
-from tests.error_models import Model
+from tests import error_models
+from tests.error_models import Drawn, Model
 from tests.evaluator.recordings import sign_flip_p
+from tests.validity import __main__ as tables
+from tests.validity import coverage, fields, margin, worlds
+from tests.validity.coverage import Coverage
 
 pytestmark = pytest.mark.slow
+
+DOCUMENTATION = Path(__file__).resolve().parents[3] / "docs" / "uncertainty.md"
 
 # Cells in which no interval of this kind holds 95 %: docs/uncertainty.md gives their coverage.
 SKEWED = {"Pareto", "unequal"}
 
 
-def _found(model: Model, n_recordings: int) -> validity.Coverage:
+def _found(model: Model, n_recordings: int) -> Coverage:
     rng = np.random.default_rng([n_recordings, *model.name.encode()])
-    return validity.coverage(model, n_recordings=n_recordings, n=200, n_resamples=1_000, n_flips=999, rng=rng)
+    return coverage.coverage(model, n_recordings=n_recordings, n=200, n_resamples=1_000, n_flips=999, rng=rng)
 
 
 @pytest.mark.parametrize("n_recordings", [20, 100])
@@ -28,10 +37,11 @@ def test_intervals_hold_the_truth_and_agree_with_p(model: Model, n_recordings: i
         pytest.skip("KITTI: no shared/data/kitti-dev beside this checkout")
     found = _found(model, n_recordings)
     assert found.n_contradictions == 0
-    assert found.of_mean >= (0.86 if model.name in SKEWED else 0.90)
+    worse = 0.81 if model.name == "informative" else 0.86 if model.name in SKEWED else 0.89
+    assert min(found.all.of_means) >= worse
     if model.name != "informative":
-        assert found.of_difference >= 0.91
-        assert 0.02 <= found.false_positives <= 0.09
+        assert found.all.of_difference >= 0.91
+        assert 0.02 <= found.all.below_5_percent <= 0.09
 
 
 @pytest.mark.parametrize(
@@ -40,13 +50,22 @@ def test_intervals_hold_the_truth_and_agree_with_p(model: Model, n_recordings: i
 def test_asymmetric_differences_are_called_significant_too_often(model: Model) -> None:
     """The limit that docs/uncertainty.md states: equal means by different routes break the symmetry."""
     few, many = _found(model, 50), _found(model, 700)
-    assert few.false_positives > 0.08
-    assert many.false_positives < few.false_positives
+    assert few.all.below_5_percent > 0.08
+    assert many.all.below_5_percent < few.all.below_5_percent
+
+
+@pytest.mark.parametrize("model", [error_models.ONE_FAILS], ids=str)
+def test_the_interval_of_the_method_that_fails_is_the_worse_one(model: Model) -> None:
+    """Whoever looks at the other method alone sees nothing of it."""
+    found = _found(model, 50)
+    assert found.all.of_means[1] < 0.92 < found.all.of_means[0]
+    assert 0.3 < found.share_shown < 0.6
+    assert found.shown.n == round(200 * found.share_shown)
 
 
 def test_a_test_of_single_sequences_is_wrong_most_of_the_time() -> None:
     rng = np.random.default_rng(1)
-    assert validity.by_sequences(0.2, n_recordings=100, n=100, rng=rng) > 0.4
+    assert coverage.by_sequences(0.2, n_recordings=100, n=100, rng=rng) > 0.4
 
 
 def test_a_test_of_recordings_is_right_where_that_of_sequences_is_not() -> None:
@@ -56,12 +75,12 @@ def test_a_test_of_recordings_is_right_where_that_of_sequences_is_not() -> None:
     assert 0.02 <= (p < 0.05).mean() <= 0.09
 
 
-@pytest.mark.parametrize("field", validity.LEVELS)
+@pytest.mark.parametrize("field", fields.LEVELS)
 @pytest.mark.parametrize("n_recordings", [100, 700])
 def test_rank_ranges_hold_the_true_ranks(n_recordings: int, field: str) -> None:
     rng = np.random.default_rng([3, n_recordings])
-    ranks = validity.ranks(
-        validity.LEVELS[field],
+    ranks = fields.ranks(
+        fields.LEVELS[field],
         n_recordings=n_recordings,
         correlation=0.0,
         with_quoted_row=False,
@@ -76,7 +95,7 @@ def test_rank_ranges_hold_the_true_ranks(n_recordings: int, field: str) -> None:
 @pytest.mark.parametrize("correlation", [0.0, 0.9])
 def test_all_rank_ranges_hold_at_once_beside_a_quoted_row(n_methods: int, correlation: float) -> None:
     rng = np.random.default_rng([4, n_methods, int(10 * correlation)])
-    ranks = validity.ranks(
+    ranks = fields.ranks(
         (0.0,) * n_methods,
         n_recordings=100,
         correlation=correlation,
@@ -84,4 +103,60 @@ def test_all_rank_ranges_hold_at_once_beside_a_quoted_row(n_methods: int, correl
         n=100,
         rng=rng,
     )
-    assert ranks.all_at_once >= 0.88 - validity.margin(0.88, 100)
+    assert ranks.all_at_once >= 0.88 - margin(0.88, 100)
+
+
+def test_recordings_of_alike_days_need_days_as_units() -> None:
+    """35 recordings a day whose levels correlate by 0.2: by recordings, intervals are too narrow."""
+    model = worlds.day_model(35, 0.2)
+
+    def found(units: Callable[[Drawn], Drawn]) -> Coverage:
+        rng = np.random.default_rng(5)
+        return coverage.coverage(
+            model, n_recordings=700, n=100, n_resamples=500, n_flips=499, rng=rng, units=units
+        )
+
+    recordings, days = found(coverage.as_drawn), found(coverage.days_of(35))
+    assert recordings.all.of_difference < 0.8 < days.all.of_difference
+    assert min(recordings.all.of_means) < 0.8 < min(days.all.of_means)
+
+
+def test_one_odd_method_among_ten_costs_more_than_a_quoted_row() -> None:
+    draw = worlds.one_odd("informative", n_methods=10)
+    rng = np.random.default_rng(6)
+    found = fields.ranks_of(draw, means=np.ones(10), n_recordings=50, n=100, rng=rng)
+    assert found.all_at_once < 0.92
+
+
+# --- the tables of the documentation ---------------------------------------------------------------------
+
+
+def documented(head: Sequence[object]) -> list[list[str]]:
+    """The rows of the documentation's table with this head."""
+    lines = DOCUMENTATION.read_text(encoding="utf-8").splitlines()
+    (start,) = [i for i, text in enumerate(lines) if text == tables.line(head)]
+    rows = itertools.takewhile(lambda text: text.startswith("|"), lines[start + 2 :])
+    return [text.strip("| ").split(" | ") for text in rows]
+
+
+def test_the_documented_tables_have_the_rows_of_the_command() -> None:
+    names = [*map(str, error_models.MODELS), str(error_models.ONE_FAILS)]
+    found = documented(tables.COVERAGE_HEAD)
+    assert [row[:2] for row in found] == [[name, str(g)] for name in names for g in tables.N_RECORDINGS]
+    of_days = [row[:4] for row in documented(tables.DAYS_HEAD)]
+    units = "recording", "day"
+    assert of_days == [[*map(str, setting), unit] for setting in tables.DAYS for unit in units]
+    odd = [row[0] for row in documented(tables.RANKS_HEAD) if "one odd" in row[0]]
+    assert odd == [f"10, one odd: {name}" for name in ("informative", "one fails") for _ in range(3)]
+
+
+@pytest.mark.parametrize("name", ["exponential", "one fails"])
+def test_a_documented_row_is_what_the_command_finds(name: str) -> None:
+    model = next(model for model in (*error_models.MODELS, error_models.ONE_FAILS) if model.name == name)
+    n = 500
+    again = tables.coverage_row(model, 50, tables.coverage_of(model, 50, n=n))
+    (told,) = [row for row in documented(tables.COVERAGE_HEAD) if row[:2] == [name, "50"]]
+    for cell, other in zip(told[3:], again[3:], strict=True):
+        (value, half), (found, its_half) = (map(float, str(each).split(" ± ")) for each in (cell, other))
+        # Seven cells, each at 95 %: half as much again.
+        assert abs(value - found) <= 1.5 * (half + its_half) + 0.1, (cell, other)

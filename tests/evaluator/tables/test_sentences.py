@@ -73,7 +73,7 @@ def test_an_undecided_difference_says_what_would_have_been_found(
     text = said(found)
     assert f"(95 % confidence interval: {ends}; p = {found.p:.4f})." in text
     assert "The difference is not significant." in text
-    assert text.endswith(f" The test detects a difference above {detectable} with 80 % power.")
+    assert text.endswith(f" The test detects a difference above {detectable} with about 80 % power.")
 
 
 def test_the_detectable_difference_is_that_of_80_percent_power() -> None:

@@ -125,7 +125,7 @@ FAULTS = {
     "zero": (
         "5,a,1,5,3,0",
         "truth-near-zero",
-        "ttc is 0.0, where the errors are undefined; expected ttc > 0 or ttc < -0.1.",
+        "ttc is 0.0, where the errors are undefined; expected ttc >= 1e-200 or ttc < -0.1.",
     ),
     "no time": ("5,a,1,5,3,", "bad-field", 'ttc is ""; expected a number of seconds.'),
     "underscores": (

@@ -40,7 +40,7 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
         assert found["low"] <= found["difference"] <= found["high"]
         assert "MiD is" in pair["sentence"]
         is_undecided = found["detectable_difference"] is not None
-        assert is_undecided == ("with 80 % power" in pair["sentence"]) == (not found["is_significant"])
+        assert is_undecided == ("with about 80 % power" in pair["sentence"]) == (not found["is_significant"])
         names = {entry["method_id"]: entry["method"] for entry in body["entries"]}
         for name, found in pair["differences"].items():
             if found is not None:

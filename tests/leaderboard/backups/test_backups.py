@@ -1,20 +1,25 @@
 """A backup says what it is, refuses what would do harm, and comes back whole or not at all."""
 
+import hashlib
+import re
 from pathlib import Path
 
 import pytest
 from django.conf import settings as configured
 from django.core.files.base import ContentFile
 from django.core.management import CommandError, call_command
+from django.db import connection
 
 from leaderboard.backups import backup, contents, restore
 from leaderboard.backups.contents import Contents, NoBackup
 from leaderboard.storage import files
 
+FILE = f"predictions/ab/{'ab' * 32}.json"
+
 
 def listed(folder: Path, **changed: object) -> Contents:
     """A backup of one file, without rows."""
-    kept = folder / contents.FILES / "predictions" / "ab.json"
+    kept = folder / contents.FILES / FILE
     kept.parent.mkdir(parents=True)
     kept.write_bytes(b"{}")
     made = Contents(
@@ -25,7 +30,7 @@ def listed(folder: Path, **changed: object) -> Contents:
             "migrations": [],
             "database": "database-1",
             "parts": [],
-            "files": {"predictions/ab.json": contents.digest_at(kept)},
+            "files": {FILE: contents.digest_at(kept)},
             "ground_truth": {},
             "missing": [],
             "keys": {"keys": []},
@@ -71,10 +76,51 @@ def test_a_folder_with_other_things_is_left_alone(tmp_path: Path) -> None:
 def test_a_damaged_backup_is_not_restored(tmp_path: Path) -> None:
     folder = tmp_path / "backup"
     listed(folder)
-    (folder / contents.FILES / "predictions" / "ab.json").write_bytes(b"[]")
+    (folder / contents.FILES / FILE).write_bytes(b"[]")
     with pytest.raises(CommandError, match=r"damaged; nothing was changed. 1 of 1 files[^$]*predictions/ab"):
         call_command("restore", str(folder))
     assert not configured.FILES_DIR.exists()
+
+
+EVIL = "import os"
+OUTSIDE = ("../evil.py", "/tmp/evil.py", "sub/evil.py", "..", ".", "", "a\0b")
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize("name", OUTSIDE)
+@pytest.mark.parametrize("entry", ["database", "parts", "ground_truth", "files"])
+def test_a_name_that_leads_out_of_its_directory_is_refused_before_anything_is_written(
+    entry: str, name: str, tmp_path: Path
+) -> None:
+    folder = tmp_path / "backup"
+    digest = hashlib.sha256(EVIL.encode()).hexdigest()
+    row_file = {"name": name, "columns": [], "sha256": digest}
+    changed = {"database": name, "parts": [row_file], "ground_truth": {name: digest}, "files": {name: digest}}
+    listed(folder, **{entry: changed[entry]}, vendor=connection.vendor)
+    # It is there, with the digest that the list has: the backup is whole.
+    for base in ("ground-truth", "files", "database-1"):
+        (folder / base / "sub").mkdir(parents=True, exist_ok=True)
+        (folder / base / "sub" / "evil.py").write_text(EVIL)
+    (folder / "evil.py").write_text(EVIL)
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(
+        CommandError, match=re.escape(f"names {name!r} in {entry.replace('_', '-')}; expected")
+    ):
+        call_command("restore", str(folder))
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+@pytest.mark.django_db
+@pytest.mark.parametrize(
+    "name", ["ground-truth/seed.key", f"predictions/../{'ab' * 32}.json", f"predictions/ab/{'AB' * 32}.json"]
+)
+def test_the_store_takes_back_what_it_has_names_for(name: str, tmp_path: Path) -> None:
+    listed(tmp_path / "backup", files={name: "0" * 64})
+    with pytest.raises(CommandError, match="in files; expected the name of a prediction file"):
+        call_command("restore", str(tmp_path / "backup"))
+    for own in (files.predictions_name("ab" * 32), files.manifest_name("ab" * 32), FILE):
+        assert files.is_name(own)
+    assert files.is_name(files.aligned_name(manifest_digest="ab" * 32, digest="cd" * 32))
 
 
 @pytest.mark.parametrize(

@@ -327,7 +327,6 @@ def test_a_split_that_is_switched_off_is_on_no_page_form_list_or_sitemap(
             assert '"val"' not in answer.text, address
     for address in (
         "/board/val/editions/1/",
-        "/board/val/card.png",
         "/api/v1/splits/val/changelog",
         "/api/v1/splits/val/manifest",
         "/compare/?split=val",

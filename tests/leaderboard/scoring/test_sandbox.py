@@ -25,7 +25,7 @@ from evaluator import Manifest, Rejected, read_predictions, read_truth, write_pr
 from evaluator.limits import READY
 from evaluator.predictions.predictions import Predictions
 from leaderboard.scoring import sandbox
-from leaderboard.scoring.sandbox import ChildDied, ChildNotReady, LeaseLost
+from leaderboard.scoring.sandbox import ChildDied, ChildNotReady, ChildOutOfTime, LeaseLost
 from tests import builders
 from tests.chaos.processes import REPOSITORY
 from tests.chaos.uploads import bomb_file, reader_memory_bytes
@@ -129,6 +129,30 @@ def test_file_that_needs_too_much_memory_ends_the_child_alone(
         pytest.raises(ChildDied, match=r"needed more than \d+ MB of memory|ended with signal"),
     ):
         read(source)
+    assert not children()
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        gzip.compress(b"", mtime=0) * 900_000,
+        b"anno_id,ttc" + b"".join(b",c%d" % i for i in range(300_000)) + b"\n",
+        gzip.compress(b"anno_id,ttc\n" + b"\n" * 60_000_000),
+    ],
+    ids=["members", "columns", "lines"],
+)
+def test_archives_and_tables_of_too_many_parts_are_refused_within_a_second_of_processor_time(
+    read: Read, settings: Settings, data: bytes
+) -> None:
+    settings.CHILD_CPU_S = 1
+    with opened(data) as source, pytest.raises(Rejected) as rejected:
+        read(source)
+    assert [problem.code for problem in rejected.value.problems] == ["too-many-members"]
+
+
+def test_file_that_takes_too_much_processor_time_ends_the_child_and_is_told_from_a_crash(read: Read) -> None:
+    with pytest.raises(ChildOutOfTime, match="reading the file took more than 4 s of processor time"):
+        read_slowly(read, FAULTY, lambda pid: os.kill(pid, signal.SIGXCPU))
     assert not children()
 
 

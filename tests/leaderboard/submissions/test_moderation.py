@@ -203,8 +203,17 @@ def test_the_account_page_exports_and_deletes(signed_in: Client, edition: Editio
     assert_sound(signed_in.get("/account/data/"))
     wrong = signed_in.post("/account/data/", {"email": "other@example.org"})
     assert "another address" in assert_sound(wrong).one("div", class_="wrong").text
-    assert signed_in.post("/account/data/", {"email": "Owner@example.org"}).status_code == 302
+    # Whoever finds an open session reads the address on the page, but does not know the password.
+    asked = signed_in.post("/account/data/", {"email": "Owner@example.org"})
+    assert asked.headers["Location"] == "/accounts/reauthenticate/?next=%2Faccount%2Fdata%2F"
+    assert "deletes the account" in assert_sound(signed_in.get(asked.headers["Location"])).text
+    signed_in.post("/accounts/reauthenticate/", {"password": "wrong", "next": "/account/data/"})
+    assert User.objects.filter(email="owner@example.org").exists()
+    # The password sends the form that was filled in.
+    form = {"password": "correct horse", "next": "/account/data/"}
+    assert signed_in.post("/accounts/reauthenticate/", form).headers["Location"] == "/"
     assert not User.objects.filter(email="owner@example.org").exists()
+    assert "Your account is deleted." in signed_in.get("/").text
     assert signed_in.get("/account/data.json").status_code == 302
 
 

@@ -125,7 +125,7 @@ def test_times_that_could_not_tell_a_dead_worker_from_a_long_run_are_refused(tim
 
 
 def test_a_worker_that_lacks_a_library_does_not_start() -> None:
-    start = "import sys; sys.modules['PIL'] = None; import leaderboard.celery as worker; "
+    start = "import sys; sys.modules['numpy'] = None; import leaderboard.celery as worker; "
     done = subprocess.run(
         [sys.executable, "-c", start + "worker.app.loader.import_default_modules()"],
         env=os.environ,
@@ -134,7 +134,7 @@ def test_a_worker_that_lacks_a_library_does_not_start() -> None:
         check=False,
     )
     assert done.returncode == 1
-    assert "import of PIL halted" in done.stderr
+    assert "import of numpy halted" in done.stderr
 
 
 def test_a_look_decides_everything_that_waits(edition: Edition, owner: User) -> None:

@@ -27,6 +27,7 @@ from leaderboard.submissions import forgetting
 from leaderboard.web.account import providers
 from leaderboard.web.middleware import frame
 from tests.leaderboard.web.account.oauth_server import CODE, HANGS, IID, TOKEN, Provider, lead_to, running
+from tests.leaderboard.web.account.proving import proving
 from tests.leaderboard.web.test_every_page import assert_sound
 
 PASSWORD = "correct horse"
@@ -52,7 +53,7 @@ def provider(server: Provider, db: None, settings: Settings, monkeypatch: pytest
         github=("GitHub", "TSTTC_GITHUB_CLIENT_ID", "TSTTC_GITHUB_CLIENT_SECRET"),
     )
     settings.CONTENT_SECURITY_POLICY = frame.content_security_policy(settings.SOCIALACCOUNT_PROVIDERS)
-    settings.ACCOUNT_EMAIL_VERIFICATION = "mandatory"
+    proving(settings)
     addresses = ModuleType("urls_with_providers")
     addresses.urlpatterns = [*urls.urlpatterns, path("accounts/", include(providers.patterns()))]  # type: ignore[attr-defined]
     addresses.handler400, addresses.handler500 = urls.handler400, urls.handler500  # type: ignore[attr-defined]
@@ -201,6 +202,8 @@ def test_an_address_that_has_an_account_opens_nothing(
     provider: Provider, owner: User, is_verified_here: bool
 ) -> None:
     EmailAddress.objects.create(user=owner, email=owner.email, verified=is_verified_here, primary=True)
+    # The owner has been in it.
+    User.objects.filter(pk=owner.pk).update(last_login=timezone.now())
     provider.github(emails=[(owner.email.upper(), True, True)])
     client = Client()
     told = arrive(client)
@@ -210,6 +213,25 @@ def test_an_address_that_has_an_account_opens_nothing(
     assert not SocialAccount.objects.exists()
     owner.refresh_from_db()
     assert owner.check_password(PASSWORD)
+
+
+@pytest.mark.parametrize("squat", ["added", "signed up"])
+def test_an_address_that_nobody_proved_here_is_its_owners(
+    provider: Provider, client: Client, owner: User, squat: str
+) -> None:
+    if squat == "added":
+        EmailAddress.objects.create(user=owner, email=NEW, verified=False)
+    else:
+        squatter = User.objects.create_user(NEW, PASSWORD)
+        EmailAddress.objects.create(user=squatter, email=NEW, verified=False, primary=True)
+    arrive(client)
+    made = client.post("/accounts/3rdparty/signup/", {"email": NEW, "name": "Owls"})
+    assert made.status_code == 302
+    assert is_in(client)
+    row = EmailAddress.objects.get(email=NEW)
+    assert (row.verified, row.user.name) == (True, "Owls")
+    assert SocialAccount.objects.get().user == row.user
+    assert User.objects.filter(email=NEW).count() == 1
 
 
 @pytest.mark.parametrize("verified", [False, None, "true", 1])

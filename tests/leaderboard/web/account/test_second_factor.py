@@ -19,6 +19,7 @@ from tests import builders
 from tests.leaderboard.web.test_every_page import assert_sound
 
 PASSWORD = "correct horse"
+SET_UP = "/accounts/2fa/totp/activate/"
 
 
 class Phone:
@@ -62,7 +63,7 @@ def signed_in(user: User) -> Client:
 
 def set_up(client: Client, phone: Phone) -> list[str]:
     """Confirm the password, read the key, send a code; returns the recovery codes."""
-    path = "/accounts/2fa/totp/activate/"
+    path = SET_UP
     asked = client.get(path)
     assert asked.headers["Location"] == f"/accounts/reauthenticate/?next={path.replace('/', '%2F')}"
     assert_sound(client.get(asked.headers["Location"]))
@@ -107,14 +108,60 @@ def test_who_has_an_app_needs_its_code_and_a_recovery_code_works_once(owner: Use
         assert lost.post("/accounts/2fa/authenticate/", {"code": sent}).status_code == expected
 
 
+def test_the_code_that_set_up_the_app_signs_nobody_in(owner: User, phone: Phone) -> None:
+    client = signed_in(owner)
+    set_up(client, phone)
+    phone.now_s -= 30
+    used = phone.code()
+    replayed = Client()
+    sign_in(replayed, owner)
+    assert "already used" in replayed.post("/accounts/2fa/authenticate/", {"code": used}).text
+    assert replayed.get("/submissions/").status_code == 302
+
+
+# --- who guesses codes -----------------------------------------------------------------------------------
+
+HOME, ATTACKER = "198.51.100.7", "203.0.113.9"
+
+
+def tries(user: User, code: str, *, address: str) -> bool:
+    """Whether this code, sent from this address by somebody who knows the password, opens the account."""
+    client = Client(REMOTE_ADDR=address)
+    sign_in(client, user)
+    return client.post("/accounts/2fa/authenticate/", {"code": code}).status_code == 302
+
+
 def test_who_guesses_codes_is_stopped(owner: User, phone: Phone) -> None:
     set_up(signed_in(owner), phone)
-    client = Client()
+    client = Client(REMOTE_ADDR=ATTACKER)
     sign_in(client, owner)
     for _ in range(5):
         client.post("/accounts/2fa/authenticate/", {"code": "1"})
     assert client.post("/accounts/2fa/authenticate/", {"code": phone.code()}).status_code == 200
     assert client.get("/submissions/").status_code == 302
+
+
+def test_wrong_codes_from_one_address_lock_out_that_address_and_not_the_owner(
+    owner: User, phone: Phone
+) -> None:
+    set_up(signed_in(owner), phone)
+    assert not any(tries(owner, "1", address=ATTACKER) for _ in range(12))
+    assert not tries(owner, phone.code(), address=ATTACKER)
+    assert tries(owner, phone.code(), address=HOME)
+
+
+@pytest.mark.slow
+def test_guesses_of_codes_from_many_addresses_meet_the_limit_of_the_account(
+    owner: User, phone: Phone
+) -> None:
+    set_up(signed_in(owner), phone)
+    assert tries(owner, phone.code(), address=HOME)
+    assert not any(tries(owner, "1", address=f"203.0.113.{n % 10}") for n in range(50))
+    # Also the right code, from an address where nobody has ever given one: that the attacker knows the
+    # password, and so signs in as far as this, makes no address known.
+    assert not tries(owner, phone.code(), address="192.0.2.3")
+    assert not tries(owner, phone.code(), address="203.0.113.10")
+    assert tries(owner, phone.code(), address=HOME)
 
 
 def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
@@ -151,10 +198,19 @@ def test_codes_can_be_made_anew_and_the_app_removed_after_the_password(
 # --- maintainers -----------------------------------------------------------------------------------------
 
 
+TO_SIGN_IN = "/accounts/login/?next=%2Faccounts%2F2fa%2Ftotp%2Factivate%2F"
+
+
+def mailed_code() -> str:
+    """The code of the last mail."""
+    [code] = re.findall(r"^[A-Z]{4}-[A-Z]{4}$", str(mail.outbox[-1].body), re.MULTILINE)
+    return str(code)
+
+
 def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before(
     keeper: User, owner: User, edition: Edition, phone: Phone, settings: Settings
 ) -> None:
-    early = signed_in(keeper)
+    early, later = signed_in(keeper), signed_in(keeper)
     assert early.get("/maintain/").status_code == 200
     sent = builders.send(owner, builders.predictions(edition)).submission  # private
     of_another = (
@@ -163,19 +219,21 @@ def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before
         f"/methods/{sent.method_id}/",
         f"/api/v1/methods/{sent.method_id}",
     )
-    assert {early.get(path).status_code for path in of_another} == {200}
+    of_maintainers = [f"/api/v1/splits/test/editions/1/{name}" for name in ("preview", "progress")]
+    assert {early.get(path).status_code for path in (*of_another, *of_maintainers)} == {200}
     settings.REQUIRE_SECOND_FACTOR = True
     assert {early.get(path).status_code for path in of_another} == {404}
-    for path in ("/maintain/", "/maintain/audit/", "/admin/", "/admin/leaderboard/user/"):
-        assert early.get(path).headers["Location"] == "/accounts/2fa/totp/activate/"
-    assert early.post("/maintain/queue/retry/").headers["Location"] == "/accounts/2fa/totp/activate/"
-    assert "need a second factor" in early.get("/accounts/reauthenticate/").text
+    assert {early.get(path).status_code for path in of_maintainers} == {403}
     assert early.get("/submissions/").status_code == 200
 
-    client = signed_in(keeper)
+    client = Client()
+    assert sign_in(client, keeper) == "/accounts/login/code/confirm/"
+    client.post("/accounts/login/code/confirm/", {"code": mailed_code()})
+    assert client.get("/maintain/").headers["Location"] == SET_UP
+    assert "need a second factor" in client.get("/accounts/reauthenticate/").text
     set_up(client, phone)
     # Sessions from before are no better for it: neither shows its pages without a code.
-    for session in (early, client):
+    for session in (later, client):
         asked = session.get("/maintain/?x=1").headers["Location"]
         assert asked == "/accounts/2fa/reauthenticate/?next=%2Fmaintain%2F%3Fx%3D1"
         page = assert_sound(session.get(asked))
@@ -183,16 +241,73 @@ def test_maintainers_who_must_have_one_are_led_to_it_and_see_nothing_more_before
         code = {"code": phone.code(), "next": "/maintain/?x=1"}
         assert session.post("/accounts/2fa/reauthenticate/", code).headers["Location"] == "/maintain/?x=1"
         assert session.get("/maintain/").status_code == session.get("/admin/").status_code == 200
-        assert {session.get(path).status_code for path in of_another} == {200}
+        assert {session.get(path).status_code for path in (*of_another, *of_maintainers)} == {200}
 
     refused = client.post("/accounts/2fa/totp/deactivate/")
     assert "Maintainers of this site must have a second factor." in refused.text
     assert Authenticator.objects.filter(user=keeper, type="totp").exists()
 
 
-def test_api_tokens_and_other_people_need_no_code(
-    keeper: User, owner: User, phone: Phone, settings: Settings
+def test_the_password_of_a_maintainer_alone_sets_up_no_app(keeper: User, settings: Settings) -> None:
+    settings.REQUIRE_SECOND_FACTOR = True
+    client = Client()
+    assert sign_in(client, keeper) == "/accounts/login/code/confirm/"
+    assert [message.to for message in mail.outbox] == [[keeper.email]]
+    assert mail.outbox[0].subject.endswith("Your code to sign in")
+    assert_sound(client.get("/accounts/login/code/confirm/"))
+    for path in ("/submissions/", "/maintain/", SET_UP):
+        assert client.get(path).headers["Location"].startswith(("/accounts/login/", "/accounts/reauth")), path
+    for _ in range(2):
+        wrong = client.post("/accounts/login/code/confirm/", {"code": "BBBB-BBBB"})
+        assert "The code is wrong" in assert_sound(wrong).text
+    client.post("/accounts/login/code/confirm/", {"code": "BBBB-BBBB"})
+    client.post("/accounts/login/code/confirm/", {"code": mailed_code()})
+    assert client.get("/submissions/").status_code == 302, "three wrong codes end it"
+
+
+@pytest.mark.parametrize("path", ["/maintain/", "/maintain/audit/", "/admin/leaderboard/user/", SET_UP])
+def test_a_session_that_the_password_alone_opened_before_signs_in_again(
+    keeper: User, settings: Settings, path: str
 ) -> None:
+    client = signed_in(keeper)
+    client.post("/accounts/reauthenticate/", {"password": PASSWORD})
+    settings.REQUIRE_SECOND_FACTOR = True
+    answer = client.get(path)
+    assert answer.headers["Location"] == TO_SIGN_IN
+    assert "a code that we mail to you" in assert_sound(client.get(TO_SIGN_IN)).text
+    form = {"login": keeper.email, "password": PASSWORD, "next": SET_UP}
+    assert client.post("/accounts/login/", form).headers["Location"] == "/accounts/login/code/confirm/"
+    answer = client.post("/accounts/login/code/confirm/", {"code": mailed_code()})
+    assert answer.headers["Location"] == SET_UP
+
+
+def test_forms_of_maintainers_and_of_the_set_up_do_nothing_in_such_a_session(
+    keeper: User, settings: Settings
+) -> None:
+    settings.REQUIRE_SECOND_FACTOR = True
+    for path in ("/maintain/queue/retry/", SET_UP):
+        client = Client()
+        client.force_login(keeper)
+        assert client.post(path, {"code": "123456"}).headers["Location"] == TO_SIGN_IN
+    assert not Authenticator.objects.exists()
+
+
+def test_a_token_has_no_more_rights_than_a_session_without_a_code(
+    keeper: User, owner: User, edition: Edition, settings: Settings
+) -> None:
+    sent = builders.send(owner, builders.predictions(edition)).submission  # private
+    client = Client(headers={"Authorization": f"Bearer {builders.token(keeper)}"})
+    of_another = [f"/api/v1/submissions/{sent.pk}", f"/api/v1/methods/{sent.method_id}"]
+    of_maintainers = [f"/api/v1/splits/test/editions/1/{name}" for name in ("preview", "progress")]
+    assert {client.get(path).status_code for path in (*of_another, *of_maintainers)} == {200}
+    settings.REQUIRE_SECOND_FACTOR = True
+    assert {client.get(path).status_code for path in of_another} == {404}
+    assert {client.get(path).status_code for path in of_maintainers} == {403}
+    assert client.get("/api/v1/submissions").json() == []
+    assert client.post(f"/api/v1/submissions/{sent.pk}/withdraw").status_code == 404
+
+
+def test_other_people_need_no_code(owner: User, phone: Phone, settings: Settings) -> None:
     settings.REQUIRE_SECOND_FACTOR = True
     assert signed_in(owner).get("/maintain/").status_code == 404
     set_up(signed_in(owner), phone)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import statistics
 from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
@@ -179,6 +180,29 @@ def test_first_rows_are_compared_once_somebody_looks(client: Client, compared: l
     assert all(float(row[2].replace("−", "-")) <= 0 for row in found)
     client.get("/board/test/charts/")
     assert Comparison.objects.count() == n_pairs
+
+
+def test_resolution_of_each_column_stands_once_below_the_pairs(
+    client: Client, compared: list[Submission]
+) -> None:
+    def said() -> list[str]:
+        return [part.text for part in pages.page(client.get("/board/test/charts/")).all("p", id="resolution")]
+
+    assert said() == [], "nothing is known yet"
+    builders.infer_all()
+    (text,) = said()
+    pairs = Comparison.objects.filter(edition=compared[0].evaluations.get().edition)
+    ranked = [sent.evaluations.get().pk for sent in compared]
+    widths = [
+        pair.differences["mid"]["high"] - pair.differences["mid"]["low"]
+        for pair in pairs
+        if pair.differences and abs(ranked.index(pair.first_id) - ranked.index(pair.second_id)) == 1
+    ]
+    assert f"MiD {statistics.median(1.4294 * width / 2 for width in widths):.1f}, " in text
+    assert "(medians of 3 pairs)" in text
+    assert "about MiD 4" in text
+    board = pages.page(client.get("/board/test/"))
+    assert [a for a in board.all("a") if a.attributes.get("href") == "/board/test/charts/#significance"]
 
 
 def test_page_of_unfinished_comparisons_is_not_kept(client: Client, compared: list[Submission]) -> None:

@@ -7,7 +7,7 @@ from uuid import uuid4
 import pytest
 from django.test import Client
 
-from leaderboard.models import Edition, Method, Submission, User
+from leaderboard.models import Comparison, Edition, Method, Split, Submission, User
 from tests import builders, pages
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
@@ -155,3 +155,64 @@ def test_names_in_a_comparison_are_text_never_markup(client: Client, edition: Ed
     assert [script.attributes.get("type") for script in scripts] == ["application/json"]
     assert "<" not in scripts[0].raw_text
     assert "alert(2)" in scripts[0].raw_text
+
+
+def test_the_page_says_on_how_few_recordings_the_difference_rests(
+    client: Client, entries: list[Submission]
+) -> None:
+    ids = [entries[0].method_id, entries[1].method_id]
+    get(client, *ids)
+    builders.infer_all()
+    said = get(client, *ids).one("p", class_="influence").text
+    assert re.fullmatch(
+        r"Without the \d+ of \d+ recordings that favour M1.05 most, the difference would not be significant"
+        r"(; without \d+, it would have the other sign)?\.",
+        said,
+    ), said
+
+
+def test_of_a_hidden_split_nobody_learns_on_how_few_recordings_a_difference_rests(
+    client: Client, entries: list[Submission], edition: Edition, stranger: User
+) -> None:
+    Split.objects.filter(pk="test").update(is_hidden=True)
+    rival = builders.submit(stranger, builders.predictions(edition, factor=1.3), method="Rival")
+    builders.score_all()
+    ids = [entries[0].method_id, rival.method_id]
+    get(client, *ids)
+    builders.infer_all()
+    root = get(client, *ids)
+    assert "(95 % confidence interval: " in root.one("p", class_="verdict").text
+    assert root.all("p", class_="influence") == []
+    (kept,) = Comparison.objects.values_list("differences", flat=True)
+    assert {found["influence"] for found in kept.values()} == {None}
+
+
+def test_what_was_chosen_of_several_submissions_is_said_and_what_that_is_worth(
+    client: Client, entries: list[Submission], edition: Edition, owner: User
+) -> None:
+    ids = [entries[0].method_id, entries[1].method_id]
+    get(client, *ids)
+    builders.infer_all()
+    assert get(client, *ids).all("p", class_="selection") == [], "one submission each: nothing was chosen"
+    name = entries[0].method.name
+    for factor in (1.8, 1.9):
+        builders.submit(owner, builders.predictions(edition, factor=factor), method=name)
+    builders.score_all()
+    builders.infer_all()
+    said = (
+        f"{name} is the best of 3 scored submissions: the best of 3 equally good variants looks better than "
+        "it is by about 0.60 standard errors of the difference of two of them."
+    )
+    assert get(client, *ids).one("p", class_="selection").text == said
+    method_page = pages.page(client.get(f"/methods/{ids[0]}/"))
+    assert method_page.one("p", class_="selection").text == said
+    other = pages.page(client.get(f"/methods/{ids[1]}/"))
+    assert other.all("p", class_="selection") == []
+
+
+def test_uncorrected_p_values_are_said_to_be_those_of_equal_methods(
+    client: Client, entries: list[Submission]
+) -> None:
+    note = get(client, *[entry.method_id for entry in entries[:3]]).one("p", class_="note").text
+    assert "expect 1 false positive in 20 tests of equal methods." in note
+    assert "The sentence at the top tests all pairs together (Holm's correction)" in note

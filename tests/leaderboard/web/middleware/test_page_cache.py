@@ -61,6 +61,32 @@ def test_order_duplicates_and_empty_parameters_are_one_address(filled: list[Meth
     assert n_remembered() == n_before == 1
 
 
+def test_what_is_kept_is_answered_under_our_names_alone(
+    filled: list[Method], client: Client, settings: Any
+) -> None:
+    settings.ALLOWED_HOSTS = ["board.example.org"]
+    for page in PAGES:
+        for _ in range(3):
+            assert client.get(page, headers={"Host": "board.example.org"}).status_code == 200
+        assert client.get(page, headers={"Host": "rebound.example.org"}).status_code == 400
+
+
+@pytest.mark.parametrize("place", ["/x", "//evil.example"])
+def test_what_says_that_the_site_is_elsewhere_changes_no_answer(
+    place: str, filled: list[Method], client: Client
+) -> None:
+    queries = ("", "?sort=-mid&nerf=no", "?frames=6")
+    for address in (*PAGES, *(f"/board/test/{query}" for query in queries)):
+        # As a server hands it on that believes such a header of its proxy.
+        first = client.get(address, SCRIPT_NAME=place)
+        assert first.status_code == 200
+        kept = client.get(address).content
+        assert first.content == kept, address
+        memory.clear()
+        assert client.get(address).content == kept, address
+        memory.clear()
+
+
 @pytest.mark.parametrize(
     ("query", "status"),
     [

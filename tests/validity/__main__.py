@@ -1,0 +1,211 @@
+"""Print the tables of `docs/uncertainty.md`, or some by name: `python -m tests.validity coverage days`."""
+
+import argparse
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from typing import Final
+
+import numpy as np
+
+from tests import error_models
+from tests.validity import coverage, fields, percent, worlds
+from tests.validity.coverage import Coverage, Held
+
+N_RECORDINGS: Final = (20, 50, 100, 700)
+# Fewer than the board takes, 10,000 and 9,999, and many more repetitions.
+N_RESAMPLES: Final = 2_000
+N_SIGN_FLIPS: Final = 1_999
+N_METHODS: Final = 8
+# Of fewer repetitions nothing is said.
+MIN_SHOWN: Final = 200
+# Recordings, how many of them make a day, and the correlation between two of a day.
+DAYS: Final = (
+    (150, 5, 0.0),
+    (150, 5, 0.05),
+    (150, 5, 0.2),
+    (700, 10, 0.05),
+    (700, 10, 0.2),
+    (700, 35, 0.05),
+    (700, 35, 0.2),
+)
+
+COVERAGE_HEAD: Final = (
+    "errors",
+    "recordings",
+    "shown",
+    "worse mean",
+    "other mean",
+    "worse mean, shown",
+    "difference",
+    "difference, shown",
+    "p ≤ 0.001",
+    "p ≤ 0.001, shown",
+)
+RANKS_HEAD: Final = (
+    "methods",
+    "quoted row",
+    "recordings",
+    "correlation of methods",
+    "all ranges hold",
+    "one range holds",
+    "mean width",
+)
+DAYS_HEAD: Final = (
+    "recordings",
+    "of a day",
+    "correlation",
+    "units",
+    "worse mean",
+    "difference",
+    "p ≤ 0.001",
+    "all ranges hold",
+)
+Row = tuple[object, ...]
+
+
+def models() -> tuple[error_models.Model, ...]:
+    """Those of the coverage table, the models that break the test's assumption at the end."""
+    return (*error_models.available(), error_models.ONE_FAILS)
+
+
+def coverage_of(
+    model: error_models.Model, n_recordings: int, *, n: int, by_day: int | None = None
+) -> Coverage:
+    """One cell of the tables."""
+    units = coverage.as_drawn if by_day is None else coverage.days_of(by_day)
+    return coverage.coverage(
+        model,
+        n_recordings=n_recordings,
+        n=n,
+        n_resamples=N_RESAMPLES,
+        n_flips=N_SIGN_FLIPS,
+        rng=np.random.default_rng([n_recordings, *model.name.encode()]),
+        units=units,
+    )
+
+
+def coverage_rows(n: int) -> Iterator[Row]:
+    """How often intervals hold the truth, in all repetitions and where the board shows them."""
+    for model in models():
+        for n_recordings in N_RECORDINGS:
+            # As costly as all the others together: a third of the repetitions.
+            n_here = n // 3 if n_recordings == max(N_RECORDINGS) else n
+            yield coverage_row(model, n_recordings, coverage_of(model, n_recordings, n=n_here))
+
+
+def coverage_row(model: error_models.Model, n_recordings: int, found: Coverage) -> Row:
+    """One row of the table; of the means the worse one first, as it is in all repetitions."""
+    if found.n_contradictions:
+        raise AssertionError(f"{model}, {n_recordings} recordings: intervals and p contradict each other")
+    worse = int(np.argmin(found.all.of_means))
+
+    def cell(share: Callable[[Held], float], held: Held, *, decimals: int = 1) -> str:
+        return percent(share(held), held.n, decimals=decimals) if held.n >= MIN_SHOWN else "–"
+
+    return (
+        model,
+        n_recordings,
+        f"{100 * found.share_shown:.0f} %",
+        cell(lambda held: held.of_means[worse], found.all),
+        cell(lambda held: held.of_means[1 - worse], found.all),
+        cell(lambda held: held.of_means[worse], found.shown),
+        cell(lambda held: held.of_difference, found.all),
+        cell(lambda held: held.of_difference, found.shown),
+        cell(lambda held: held.up_to_1_permille, found.all, decimals=2),
+        cell(lambda held: held.up_to_1_permille, found.shown, decimals=2),
+    )
+
+
+def sequences_rows(n: int) -> Iterator[Row]:
+    """How often a test of single sequences is wrong."""
+    for n_recordings in (100, 300, 700):
+        for rho in (0.05, 0.2):
+            rng = np.random.default_rng([n_recordings, int(100 * rho)])
+            found = coverage.by_sequences(rho, n_recordings=n_recordings, n=n // 3, rng=rng)
+            yield n_recordings, rho, percent(found, n // 3)
+
+
+def ranks_rows(n: int) -> Iterator[Row]:
+    """How often all rank ranges of a column hold at once, in half as many repetitions."""
+    rows: list[tuple[tuple[float, ...], float, bool, int]] = [
+        (levels, 0.0, False, g) for levels in fields.LEVELS.values() for g in (100, 300, 700)
+    ]
+    rows += [((0.0,) * n_methods, rho, True, 100) for n_methods in (5, 10, 50) for rho in fields.SHARED]
+    for levels, rho, with_quoted_row, n_recordings in rows:
+        rng = np.random.default_rng([n_recordings, len(levels), int(10 * rho), with_quoted_row])
+        found = fields.ranks(
+            levels,
+            n_recordings=n_recordings,
+            correlation=rho,
+            with_quoted_row=with_quoted_row,
+            n=n // 2,
+            rng=rng,
+        )
+        name = f"{len(levels)}, {'alike' if not any(levels) else 'spread'}"
+        yield name, "yes" if with_quoted_row else "no", n_recordings, rho, *_held(found)
+
+
+def odd_rows(n: int) -> Iterator[Row]:
+    """The same of ten equally good methods of which one comes to its mean by another route."""
+    for name in ("informative", "one fails"):
+        for n_recordings in (50, 100, 700):
+            rng = np.random.default_rng([n_recordings, *name.encode()])
+            draw = worlds.one_odd(name, n_methods=10)
+            means = np.ones(10)
+            found = fields.ranks_of(draw, means=means, n_recordings=n_recordings, n=n // 2, rng=rng)
+            yield f"10, one odd: {name}", "no", n_recordings, "–", *_held(found)
+
+
+def _held(found: fields.Ranks) -> Row:
+    return percent(found.all_at_once, found.n), percent(found.each, found.n), f"{found.mean_width:.1f}"
+
+
+def days_rows(n: int) -> Iterator[Row]:
+    """What becomes of all this where recordings of one day are alike, with recordings and days as units."""
+    for n_recordings, per_day, rho in DAYS:
+        model = worlds.day_model(per_day, rho)
+        for unit in ("recording", "day"):
+            found = coverage_of(model, n_recordings, n=n // 4, by_day=per_day if unit == "day" else None)
+            draw = worlds.in_days(per_day, rho, n_methods=N_METHODS)
+            if unit == "day":
+                draw = worlds.by_day(draw, per_day=per_day)
+            rng = np.random.default_rng([n_recordings, per_day, int(100 * rho)])
+            ranks = fields.ranks_of(
+                draw, means=np.ones(N_METHODS), n_recordings=n_recordings, n=n // 20, rng=rng
+            )
+            held = found.all
+            cells = [percent(share, held.n) for share in (min(held.of_means), held.of_difference)]
+            small = percent(held.up_to_1_permille, held.n, decimals=2)
+            yield n_recordings, per_day, rho, unit, *cells, small, percent(ranks.all_at_once, ranks.n)
+
+
+TABLES: Final[dict[str, tuple[Row, Callable[[int], Iterator[Row]]]]] = {
+    "coverage": (COVERAGE_HEAD, coverage_rows),
+    "sequences": (("recordings", "ρ", "z-test by sequences"), sequences_rows),
+    "ranks": (RANKS_HEAD, ranks_rows),
+    "odd": (RANKS_HEAD, odd_rows),
+    "days": (DAYS_HEAD, days_rows),
+}
+
+
+def main() -> None:
+    """Print tables, row by row."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("tables", nargs="*", default=list(TABLES), help=", ".join(TABLES))
+    parser.add_argument("--repetitions", type=int, default=6_000)
+    options = parser.parse_args()
+    for name in options.tables:
+        head, rows = TABLES[name]
+        sys.stdout.write(f"\n{line(head)}\n{line(['---'] * len(head))}\n")
+        for row in rows(options.repetitions):
+            sys.stdout.write(f"{line(row)}\n")
+            sys.stdout.flush()
+
+
+def line(cells: Sequence[object]) -> str:
+    """A row of a table."""
+    return f"| {' | '.join(map(str, cells))} |"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,71 @@
+"""Fields of equally good methods of which one is odd, and recordings that come in days."""
+
+from statistics import NormalDist
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tests.error_models import Drawn, Model, odd_field
+from tests.validity.fields import Draw
+
+Floats = NDArray[np.float64]
+# As unequal as the real test set's recordings, about: log-normal, σ = 0.4.
+_LENGTHS: Final = np.round(
+    [40 * np.exp(0.4 * NormalDist().inv_cdf((i + 0.5) / 10_000)) for i in range(10_000)]
+)
+# Of the logarithm of a recording's level.
+_SIGMA: Final = 0.4
+
+
+def one_odd(name: str, *, n_methods: int) -> Draw:
+    """All methods alike but for the last, which comes to the same mean as the second of `name`'s model."""
+
+    def draw(n_recordings: int, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        return odd_field(name, n_methods, n_recordings, n, rng)
+
+    return draw
+
+
+def in_days(per_day: int, rho: float, *, n_methods: int) -> Draw:
+    """Recordings in days, `per_day` of them one after the other; every method has levels of its own.
+
+    `rho` is the correlation of the logarithms of two levels of one day.
+    """
+
+    def draw(n_recordings: int, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        counts = _LENGTHS[rng.integers(0, len(_LENGTHS), size=(n_recordings, n))]
+        n_days = -(-n_recordings // per_day)
+        of_day = rng.standard_normal((n_methods, n_days, n)).repeat(per_day, axis=1)[:, :n_recordings]
+        own = rng.standard_normal((n_methods, n_recordings, n))
+        levels = np.exp(_SIGMA * (rho**0.5 * of_day + (1 - rho) ** 0.5 * own) - _SIGMA**2 / 2)
+        return levels * rng.gamma(np.broadcast_to(counts, levels.shape)), counts
+
+    return draw
+
+
+def day_model(per_day: int, rho: float) -> Model:
+    """Two methods on recordings that come in days."""
+    draw = in_days(per_day, rho, n_methods=2)
+
+    def both(n_recordings: int, n: int, rng: np.random.Generator) -> Drawn:
+        (first, second), counts = draw(n_recordings, n, rng)
+        return Drawn(counts, first, second)
+
+    return Model(f"days of {per_day}", "recordings of one day are alike", lambda: 1.0, both)
+
+
+def summed(values: Floats, *, per_day: int) -> Floats:
+    """Sums of each day, for values (…, recordings, n)."""
+    starts = np.arange(0, values.shape[-2], per_day)
+    return np.asarray(np.add.reduceat(values, starts, axis=-2))
+
+
+def by_day(draw: Draw, *, per_day: int) -> Draw:
+    """The same field with days as units."""
+
+    def drawn(n_recordings: int, n: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+        sums, counts = draw(n_recordings, n, rng)
+        return summed(sums, per_day=per_day), summed(counts, per_day=per_day)
+
+    return drawn
