@@ -69,7 +69,7 @@ def _snippet(text: str, asked: list[re.Pattern[str]]) -> SafeString:
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0
     end = len(text) if len(text) <= begin + _SNIPPET else text.rfind(" ", 0, begin + _SNIPPET)
-    pieces = enumerate(marked.split(text[begin:end]))
+    pieces = enumerate(marked.split(text[begin:end].strip(" ·")))
     drawn = format_html_join(
         "", "{}", ([format_html("<mark>{}</mark>", p) if n % 2 else p] for n, p in pieces)
     )
