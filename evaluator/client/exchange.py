@@ -55,7 +55,7 @@ class RetryPolicy:
 
 
 def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """The response, if it is one of success; raises Unreachable, Redirected or Refused."""
+    """The response, if it is one of success or 304; raises Unreachable, Redirected or Refused."""
     try:
         response = send()
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
@@ -66,7 +66,7 @@ def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
         ) from error
     except (httpx.TransportError, httpx.DecodingError) as error:
         raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
-    if response.is_success:
+    if response.is_success or response.status_code == httpx.codes.NOT_MODIFIED:
         return response
     if response.is_redirect:
         raise Redirected(url=url, location=response.headers["location"])

@@ -58,7 +58,7 @@ def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
     if not is_known(request, response["ETag"]):
         return response
     known = HttpResponseNotModified()
-    for name in ("ETag", "Vary", "Cache-Control"):
+    for name in ("ETag", "Vary", "Cache-Control", "Retry-After"):
         if response.has_header(name):
             known[name] = response[name]
     return known

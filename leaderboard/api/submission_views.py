@@ -1,9 +1,5 @@
 """Submitting and following submissions."""
 
-import random
-import select
-import socket
-from collections.abc import Mapping
 from datetime import datetime
 from functools import partial
 from typing import Any, cast
@@ -18,12 +14,10 @@ from drf_spectacular.utils import OpenApiParameter, OpenApiResponse, extend_sche
 from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
-from rest_framework.utils.serializer_helpers import ReturnDict
 from rest_framework.views import APIView
 
 from leaderboard.api import pagination
 from leaderboard.api.authentication import require_split, split_of
-from leaderboard.api.exceptions import whole_number
 from leaderboard.api.schema import errors, response_header
 from leaderboard.api.serializers import absolute
 from leaderboard.api.submission_serializers import (
@@ -37,10 +31,11 @@ from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Submission, User
 from leaderboard.quotas import quotas
 from leaderboard.storage import files
-from leaderboard.submissions import idempotency, long_poll, outcomes, submissions
+from leaderboard.submissions import idempotency, outcomes, submissions
 
 TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
-
+# While a submission waits or runs; a file is scored within a second.
+ASK_AGAIN_S = 1
 
 EVALUATIONS = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
 
@@ -116,37 +111,22 @@ class SubmissionView(APIView):
     @extend_schema(
         operation_id="submission",
         parameters=[
-            OpenApiParameter(
-                "wait",
-                int,
-                description="Hold the response until the submission is final, for at most this many seconds "
-                "(0 to 60). With too many clients waiting it comes at once, with Retry-After.",
-            ),
             response_header(
                 "Retry-After",
                 int,
-                "Seconds after which to repeat the request, if too many clients were waiting.",
+                "Seconds after which to repeat the request; absent once the submission is final.",
                 statuses=[200],
             ),
         ],
-        responses={200: SubmissionSerializer, **errors(400, 404)},
+        responses={200: SubmissionSerializer, **errors(404)},
     )
     def get(self, request: Request, submission_id: UUID) -> Response:
         """State, then scores or problems. The submission of another team gives 404."""
-        wait_s = _wait_s(request)
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         found = get_object_or_404(rows, pk=submission_id)
-        if not wait_s or submissions.evaluation_of(found).is_final:
-            return Response(_data(found))
-        if long_poll.wait(found.pk, wait_s=wait_s, is_gone=partial(_is_gone, request.META)):
-            return Response(_data(get_object_or_404(rows.all(), pk=submission_id)))
-        retry_after_s = long_poll.THE_WATCHER.retry_after_s(rng=random.Random())  # noqa: S311 - to spread clients
-        return Response(_data(found), headers={"Retry-After": str(retry_after_s)})
-
-
-def _data(submission: Submission) -> ReturnDict[str, Any]:
-    (outcome,) = outcomes.of([submission], now=timezone.now())
-    return SubmissionSerializer(outcome).data
+        (outcome,) = outcomes.of([found], now=timezone.now())
+        again = {} if outcome.progress.is_final else {"Retry-After": str(ASK_AGAIN_S)}
+        return Response(SubmissionSerializer(outcome).data, headers=again)
 
 
 def _submit(request: Request, form: QueryDict) -> submissions.Submitted:
@@ -189,27 +169,3 @@ def _take(
         measured=measured,
         **texts,
     )
-
-
-def _wait_s(request: Request) -> int:
-    """The parameter `wait`. Raises `BadValue`."""
-    return whole_number(
-        request.query_params.get("wait", "0"),
-        name="wait",
-        code="bad-wait",
-        limits=range(long_poll.MAX_WAIT_S + 1),
-        expected=f"whole seconds, from 0 to {long_poll.MAX_WAIT_S}",
-    )
-
-
-def _is_gone(environ: Mapping[str, Any]) -> bool:
-    """Whether the client has closed the connection, as far as the web server lets us know."""
-    connected = environ.get("gunicorn.socket")
-    if not isinstance(connected, socket.socket):
-        return False
-    try:
-        asked = select.poll()
-        asked.register(connected, select.POLLIN)
-        return bool(asked.poll(0)) and not connected.recv(1, socket.MSG_PEEK)
-    except OSError:
-        return True

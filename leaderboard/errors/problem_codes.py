@@ -20,7 +20,6 @@ API_CODES: Final[dict[str, str]] = {
     "invalid": "A field of the request has an invalid value.",
     "bad-idempotency-key": "The Idempotency-Key header is malformed or too long.",
     "idempotency-key-reused": "The Idempotency-Key was used before with another file or other fields.",
-    "bad-wait": "`wait` is not a whole number of seconds from 0 to 60.",
     "bad-limit": "`limit` is not a number of rows that a page may have.",
     "bad-cursor": "`after` names no row of this list.",
     "bad-edition": "`edition` is not the number of an edition.",
