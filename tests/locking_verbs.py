@@ -33,7 +33,7 @@ from leaderboard.people import invitations, teams, tokens
 from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import comparisons, confidence, lifecycle, questions, recording_sums
 from leaderboard.storage import files, orphans, truth_values
-from leaderboard.submissions import empty_methods, idempotency, submissions
+from leaderboard.submissions import empty_methods, submissions
 from tests import builders, moderation_verbs
 from tests.leaderboard.web.maintain import queue_rows
 from tests.locking_scene import DAY, Scene
@@ -57,14 +57,7 @@ def _submission(scene: Scene, user: User) -> Callable[[], submissions.Submitted]
 
 def _first_submission(scene: Scene) -> Deed:
     """Of somebody whose team is founded with it."""
-    return partial(
-        idempotency.once,
-        user=scene.newcomer,
-        key=uuid.uuid4().hex,
-        digest="sha256:0",
-        submit=_submission(scene, scene.newcomer),
-        now=timezone.now(),
-    )
+    return _submission(scene, scene.newcomer)
 
 
 def _leases(n: int) -> list[lifecycle.Lease]:

@@ -6,13 +6,11 @@
             print(submission.state)
 
 Every failure is an `answers.ClientError` that states facts (address, status, code, problems); the command
-line words them. Sending is safe to repeat: a key that is made once per call tells the server that a request
-is the same one again, and bytes that it holds get their first submission as answer.
+line words them. Sending is safe to repeat: bytes that the server has get their first submission as answer.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import BinaryIO
 from urllib.parse import quote, urlencode
@@ -37,7 +35,6 @@ from evaluator.client.answers import (
 from evaluator.client.connection import Connection
 from evaluator.client.exchange import (
     PASSING_STATUSES,
-    fresh_key,
     one,
     retry_after_s,
     rows,
@@ -79,30 +76,28 @@ class Client(Connection):
         split: str,
         method: str,
         details: Mapping[str, str] | None = None,
-        idempotency_key: str | None = None,
     ) -> Submission:
         """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
 
         `file` must be seekable; it is streamed, never read whole. `details` are the form's optional fields
-        (description, paper_url, code_url, note, commit). Requests under one `idempotency_key` are one
-        request, however often they are made; without one each call has its own. Raises ClientError.
+        (description, paper_url, code_url, note, commit). Raises ClientError.
         """
         fields = {"split": split, "method": method, **(details or {})}
-        key = idempotency_key or fresh_key(file, fields)
+        n_sent = 0
 
         def send() -> httpx.Response:
+            nonlocal n_sent
+            n_sent += 1
             file.seek(0)
             return self._http.post(
                 self._address("submissions"),
                 data=fields,
                 files={"file": (filename, file, "application/json")},
-                headers={"Idempotency-Key": json.dumps(key)},
             )
 
         response = self._retry(send)
-        # A request of this very call may have made it, of which only the answer was lost.
-        is_ours = idempotency_key is None and "Idempotent-Replayed" in response.headers
-        is_new = is_ours or response.status_code == httpx.codes.CREATED
+        # An earlier try of this very call may have made it, of which only the answer was lost.
+        is_new = n_sent > 1 or response.status_code == httpx.codes.CREATED
         return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:

@@ -19,7 +19,7 @@ from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
 from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import comparisons, questions
-from leaderboard.submissions import idempotency, receipts, submissions
+from leaderboard.submissions import receipts, submissions
 
 # Codes of authentication that follow a query for the token.
 LOOKED_UP = {
@@ -91,8 +91,6 @@ DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
     boards.UnknownColumn: (400, "unknown-column", "sort"),
     boards.BadTime: (400, "bad-moment", "at"),
     NotMaintainer: (403, "not-maintainer", ""),
-    idempotency.BadKey: (400, "bad-idempotency-key", "Idempotency-Key"),
-    idempotency.KeyReused: (409, "idempotency-key-reused", "Idempotency-Key"),
     comparisons.BadComparison: (400, comparisons.BadComparison.code, "m"),
     comparisons.UnknownMethod: (404, comparisons.UnknownMethod.code, "m"),
     comparisons.NotOnTheBoard: (404, comparisons.NotOnTheBoard.code, "m"),

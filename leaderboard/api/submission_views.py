@@ -1,16 +1,14 @@
 """Submitting and following submissions."""
 
 from datetime import datetime
-from functools import partial
 from typing import Any, cast
 from uuid import UUID
 
-from django.core.files.uploadedfile import UploadedFile
 from django.db.models import Prefetch
 from django.http import QueryDict
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
-from drf_spectacular.utils import OpenApiParameter, OpenApiResponse, extend_schema
+from drf_spectacular.utils import OpenApiResponse, extend_schema
 from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
@@ -30,8 +28,7 @@ from leaderboard.api.views import visible
 from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Submission, User
 from leaderboard.quotas import quotas
-from leaderboard.storage import files
-from leaderboard.submissions import idempotency, outcomes, submissions
+from leaderboard.submissions import outcomes, submissions
 
 TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
 # While a submission waits or runs; a file is scored within a second.
@@ -49,28 +46,12 @@ class SubmissionsView(APIView):
     @extend_schema(
         operation_id="submit",
         parameters=[
-            OpenApiParameter(
-                "Idempotency-Key",
-                str,
-                OpenApiParameter.HEADER,
-                description="Your own key for this request: repeating the request with it returns the same "
-                "submission. Valid for at least 7 days.",
-            ),
             response_header("Location", str, "URL of the submission.", statuses=[200, 201]),
-            response_header(
-                "Idempotent-Replayed",
-                str,
-                "`true` if this repeats the response to an earlier request.",
-                statuses=[200],
-            ),
         ],
         request={"multipart/form-data": NewSubmissionSerializer},
         responses={
             201: SubmittedSerializer,
-            200: OpenApiResponse(
-                SubmittedSerializer,
-                "The submission made before with the same bytes or the same Idempotency-Key.",
-            ),
+            200: OpenApiResponse(SubmittedSerializer, "The submission made before with the same bytes."),
             **errors(400, 409, 413, 422, 429),
         },
     )
@@ -78,17 +59,17 @@ class SubmissionsView(APIView):
         """Submit one file to one split. The response comes once it is safely stored; the scores follow."""
         form = cast("QueryDict", request.data)  # the only parser here is that of multipart bodies
         require_split(request.auth, str(form.get("split", "")))
-        answer, now = _submit(request, form), timezone.now()
+        now = timezone.now()
+        answer = _submit(request, form, now=now)
         made = answer.submission
         quota = quotas.state(
             team=made.method.team, user=cast("User", request.user), split=made.split, now=now
         )
         (outcome,) = outcomes.of([made], now=now)
-        replayed = {"Idempotent-Replayed": "true"} if answer.is_replayed else {}
         return Response(
             SubmittedSerializer(outcome, context={"quota": quota}).data,
             status=201 if answer.is_new else 200,
-            headers={"Location": absolute("api-submission", made.pk), **replayed},
+            headers={"Location": absolute("api-submission", made.pk)},
         )
 
     @extend_schema(
@@ -129,33 +110,9 @@ class SubmissionView(APIView):
         return Response(SubmissionSerializer(outcome).data, headers=again)
 
 
-def _submit(request: Request, form: QueryDict) -> submissions.Submitted:
-    """The submission of this request, new or repeated."""
-    user, now = cast("User", request.user), timezone.now()
-    upload = request.FILES.get("file")
-    header = request.headers.get("Idempotency-Key")
-    may_edit = split_of(request.auth) is None
-    submit = partial(_take, user=user, form=form, upload=upload, now=now, may_edit=may_edit)
-    if header is None:
-        return submit()
-    key = idempotency.parse(header)
-    fields = {name: values for name, values in form.lists() if name not in request.FILES}
-    measured = files.measure(upload) if upload is not None else None
-    digest = idempotency.request_digest(fields=fields, file_digest=measured.digest if measured else "")
-    return idempotency.once(
-        user=user, key=key, digest=digest, submit=partial(submit, measured=measured), now=now
-    )
-
-
-def _take(
-    *,
-    user: User,
-    form: QueryDict,
-    upload: UploadedFile | None,
-    now: datetime,
-    may_edit: bool,
-    measured: files.StoredFile | None = None,
-) -> submissions.Submitted:
+def _submit(request: Request, form: QueryDict, *, now: datetime) -> submissions.Submitted:
+    """The submission of this request, or the one that had the same bytes before."""
+    user, upload = cast("User", request.user), request.FILES.get("file")
     texts: dict[str, Any] = {name: str(form.get(name, "")) for name in TEXT_FIELDS}
     return submissions.submit(
         user=user,
@@ -165,7 +122,6 @@ def _take(
         via=Submission.Via.API,
         now=now,
         filename=getattr(upload, "name", "") or "",
-        may_edit=may_edit,
-        measured=measured,
+        may_edit=split_of(request.auth) is None,
         **texts,
     )

@@ -18,8 +18,6 @@ API_CODES: Final[dict[str, str]] = {
     "bad-request": "The request is malformed or incomplete.",
     "parse-error": "The body is not what its Content-Type says.",
     "invalid": "A field of the request has an invalid value.",
-    "bad-idempotency-key": "The Idempotency-Key header is malformed or too long.",
-    "idempotency-key-reused": "The Idempotency-Key was used before with another file or other fields.",
     "bad-limit": "`limit` is not a number of rows that a page may have.",
     "bad-cursor": "`after` names no row of this list.",
     "bad-edition": "`edition` is not the number of an edition.",

@@ -19,7 +19,6 @@ from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, T
 from leaderboard.models.quotas import Admission, QuotaOverride, SpentMailbox
 from leaderboard.models.submissions import (
     Evaluation,
-    IdempotencyKey,
     Score,
     SentFile,
     Status,

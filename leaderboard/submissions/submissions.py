@@ -40,14 +40,10 @@ class TokenSplit(Refused):
 
 @dataclass(frozen=True)
 class Submitted:
-    """The answer to a submission; `is_new` is False when the same bytes had come before.
-
-    `is_replayed`: it answers an earlier request of the same key; see `idempotency`.
-    """
+    """The answer to a submission; `is_new` is False when the same bytes had come before."""
 
     submission: Submission
     is_new: bool
-    is_replayed: bool = False
 
 
 def submit(
@@ -66,7 +62,6 @@ def submit(
     note: str = "",
     commit: str = "",
     may_edit: bool = True,
-    measured: files.StoredFile | None = None,
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
@@ -74,8 +69,7 @@ def submit(
     cost nothing and change nothing. Once a correction has another manifest, the same bytes are another
     submission: their keys may mean other sequences. With a new file, details that differ from the method's
     own replace them, through `methods.edit`; without `may_edit` they are refused. `method_details` are those
-    of the registry. `measured` is for who has hashed the file already. Raises `Refused` or
-    `quotas.QuotaExceeded` (nothing is kept then).
+    of the registry. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
     asked = _Asked(
@@ -100,7 +94,7 @@ def submit(
         now=now,
         may_edit=may_edit,
     )
-    file = measured or files.measure(asked.upload)
+    file = files.measure(asked.upload)
     first = _admit(asked, file)
     if first is not None:
         return Submitted(submission=first, is_new=False)
