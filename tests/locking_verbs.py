@@ -107,9 +107,15 @@ def _ask(scene: Scene, *, who: str) -> Deed:
     # Of the team: what the loner has is deleted for another verb.
     theirs = Evaluation.objects.filter(edition=scene.world.edition, submission__method__team=scene.team)
     ids = theirs.order_by("pk").values_list("pk", flat=True)
-    asker = questions.asker_of(user=AnonymousUser(), address=who)
     pairs = list(combinations(ids, 2))
-    return partial(questions.ask, edition=scene.world.edition, pairs=pairs, asker=asker, now=timezone.now())
+    return partial(
+        questions.ask,
+        edition=scene.world.edition,
+        pairs=pairs,
+        user=AnonymousUser(),
+        address=who,
+        now=timezone.now(),
+    )
 
 
 def _compare(scene: Scene) -> Deed:

@@ -108,7 +108,7 @@ def _domain_error(exc: Exception) -> Response | None:
             if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):
                 status = 403
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case quotas.QuotaExceeded() | questions.TooManyWaiting():
+        case quotas.QuotaExceeded() | questions.AskedTooOften():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
@@ -121,7 +121,7 @@ def _domain_error(exc: Exception) -> Response | None:
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
-def _not_yet(exc: quotas.QuotaExceeded | questions.TooManyWaiting) -> Response:
+def _not_yet(exc: quotas.QuotaExceeded | questions.AskedTooOften) -> Response:
     """A request that will be accepted later."""
     if isinstance(exc, quotas.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())

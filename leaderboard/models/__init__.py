@@ -10,7 +10,7 @@ from leaderboard.models.benchmark import (
     TruthComparison,
 )
 from leaderboard.models.boards import BoardVersion, Snapshot
-from leaderboard.models.inference import Analysis, Comparison, EditionRanges, Question
+from leaderboard.models.inference import Analysis, Comparison, EditionRanges
 from leaderboard.models.limits import Allowance, CachedValue
 from leaderboard.models.mails import Mail, MailKind, MutedKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
