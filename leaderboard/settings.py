@@ -318,7 +318,7 @@ REST_KNOX = {
     "TOKEN_MODEL": KNOX_TOKEN_MODEL,
 }
 REST_FRAMEWORK = {**settings.REST_FRAMEWORK, "NUM_PROXIES": TRUSTED_PROXIES}
-# How often one account or one address may ask; counted by all web processes together.
+# How often one account or one address may ask (leaderboard/ops/rate_limits.py).
 API_RATES: dict[str, str | None] = {
     "signed_in": "600/min",
     "visitor": "240/min",

@@ -12,7 +12,7 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
-from leaderboard.api.throttling import MalformedTokenThrottle, UnauthorizedThrottle
+from leaderboard.api.throttling import UnauthorizedThrottle
 from leaderboard.boards import boards, filters
 from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
@@ -21,15 +21,6 @@ from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import comparisons, questions
 from leaderboard.submissions import receipts, submissions
 
-# Codes of authentication that follow a query for the token.
-LOOKED_UP = {
-    "token-unknown",
-    "token-expired",
-    "token-revoked",
-    "token-scope",
-    "token-split",
-    "account-closed",
-}
 UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
 
 
@@ -72,8 +63,7 @@ def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | Non
     """The problem document of an exception; one failed authentication too many from an address is a 429."""
     if isinstance(exc, UNAUTHORIZED):
         # Such a request ends before the throttles of its view are asked.
-        is_known = exc.get_codes() in LOOKED_UP
-        throttle = UnauthorizedThrottle() if is_known else MalformedTokenThrottle()
+        throttle = UnauthorizedThrottle()
         if not throttle.allow_request(context["request"], context["view"]):
             exc = exceptions.Throttled(throttle.wait())
     return _outage(exc) or _domain_error(exc) or _bad_request(exc) or _framework_error(exc, context)

@@ -36,12 +36,11 @@ class ApiHeadersMiddleware:
 
 
 def _policy(throttle: Throttle) -> str:
-    return f'"{throttle.scope}";q={throttle.rate.n};w={throttle.rate.period_s:g}'
+    return f'"{throttle.scope}";q={throttle.num_requests};w={throttle.duration}'
 
 
 def _remaining(throttle: Throttle) -> str:
-    n_left = throttle.answer.n_left if throttle.answer else 0
-    return f'"{throttle.scope}";r={n_left};t={math.ceil(throttle.wait() or 0)}'
+    return f'"{throttle.scope}";r={throttle.n_left};t={math.ceil(throttle.wait_s)}'
 
 
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:

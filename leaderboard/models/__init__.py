@@ -11,7 +11,7 @@ from leaderboard.models.benchmark import (
 )
 from leaderboard.models.boards import BoardVersion, Snapshot
 from leaderboard.models.inference import Analysis, Comparison, EditionRanges
-from leaderboard.models.limits import Allowance, CachedValue
+from leaderboard.models.limits import CachedValue
 from leaderboard.models.mails import Mail, MailKind, MutedKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.pages import PageVersion, SiteAnnouncement

@@ -3,9 +3,9 @@
 import math
 from collections.abc import Collection, Sequence
 from datetime import datetime
+from typing import Any
 from uuid import UUID
 
-from django.conf import settings
 from django.contrib.auth.models import AnonymousUser
 from django.db import transaction
 from django.db.models import F, QuerySet
@@ -30,6 +30,16 @@ class AskedTooOften(Exception):
         )
 
 
+class NewComparisons(rate_limits.Throttle):
+    """Comparisons that nobody has asked for before, of one account or address."""
+
+    rates, scope = "PAGE_RATES", "compare"
+
+    def identity(self, request: Any) -> object | None:
+        """Who asks: there is no request here."""
+        return request
+
+
 def ask(
     *, edition: Edition, pairs: Sequence[Key], user: User | AnonymousUser, address: str, now: datetime
 ) -> None:
@@ -37,12 +47,10 @@ def ask(
 
     Raises `AskedTooOften`; nothing is written then.
     """
-    rate = settings.PAGE_RATES["compare"]
-    if pairs and rate is not None:
-        who = f"account:{user.pk}" if user.is_authenticated else address
-        answer = rate_limits.take(who=f"compare:{who}", rate=rate_limits.rate_of(rate), now_s=now.timestamp())
-        if not answer.is_allowed:
-            raise AskedTooOften(wait_s=answer.wait_s)
+    throttle = NewComparisons()
+    who = f"account:{user.pk}" if user.is_authenticated else address
+    if pairs and not throttle.allow_request(who):
+        raise AskedTooOften(wait_s=throttle.wait_s)
     _write(edition=edition, pairs=pairs, asked_at=now)
 
 

@@ -11,6 +11,7 @@ from django.utils import timezone
 from pytest_django import Settings
 
 from leaderboard.models import Comparison, Edition, Evaluation, Submission, User
+from leaderboard.ops import rate_limits
 from leaderboard.scoring import comparisons, questions
 from leaderboard.scoring.questions import AskedTooOften
 from leaderboard.storage import truth_values
@@ -20,6 +21,11 @@ from tests.leaderboard.web.maintain import queue_rows
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
 Pairs = list[tuple[Any, Any]]
 ANYBODY = AnonymousUser()
+
+
+@pytest.fixture(autouse=True)
+def nobody_has_asked() -> None:
+    rate_limits.IN_PROCESS.clear()
 
 
 @pytest.fixture
