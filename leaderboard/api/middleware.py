@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
-from leaderboard.api.throttling import Throttle, counted
+from leaderboard.api.throttling import ApiThrottle, counted
 from leaderboard.http import is_known
 
 Next = Callable[[HttpRequest], HttpResponse]
@@ -35,11 +35,11 @@ class ApiHeadersMiddleware:
         return response
 
 
-def _policy(throttle: Throttle) -> str:
+def _policy(throttle: ApiThrottle) -> str:
     return f'"{throttle.scope}";q={throttle.num_requests};w={throttle.duration}'
 
 
-def _remaining(throttle: Throttle) -> str:
+def _remaining(throttle: ApiThrottle) -> str:
     return f'"{throttle.scope}";r={throttle.n_left};t={math.ceil(throttle.wait_s)}'
 
 

@@ -16,13 +16,13 @@ if TYPE_CHECKING:  # views make their classes with these
     from rest_framework.views import APIView
 
 
-def counted(request: HttpRequest) -> list["Throttle"]:
+def counted(request: HttpRequest) -> list["ApiThrottle"]:
     """The throttles that counted this request, for the headers of its response; a list to append to."""
-    found: list[Throttle] = request.__dict__.setdefault("_counted", [])
+    found: list[ApiThrottle] = request.__dict__.setdefault("_counted", [])
     return found
 
 
-class Throttle(rate_limits.Throttle):
+class ApiThrottle(rate_limits.Throttle):
     """A rate of `settings.API_RATES`, told in the headers of the response."""
 
     def allow_request(self, request: Request, view: "APIView | None" = None) -> bool:
@@ -33,7 +33,7 @@ class Throttle(rate_limits.Throttle):
         return is_allowed
 
 
-class SignedInThrottle(Throttle):
+class SignedInThrottle(ApiThrottle):
     """Requests of one account, whatever token it uses."""
 
     scope = "signed_in"
@@ -43,7 +43,7 @@ class SignedInThrottle(Throttle):
         return request.user.pk if request.user.is_authenticated else None
 
 
-class VisitorThrottle(Throttle):
+class VisitorThrottle(ApiThrottle):
     """Requests without an account from one address."""
 
     scope = "visitor"
@@ -64,7 +64,7 @@ class SubmitThrottle(SignedInThrottle):
         return super().identity(request) if request.method == "POST" else None
 
 
-class AsOfThrottle(Throttle):
+class AsOfThrottle(ApiThrottle):
     """Boards as of a time, which take long to read, of one account or one address."""
 
     scope = "as_of"
@@ -74,14 +74,14 @@ class AsOfThrottle(Throttle):
         return rate_limits.account_or_address(request) if request.query_params.get("at") else None
 
 
-class RevokeThrottle(Throttle):
+class RevokeThrottle(ApiThrottle):
     """Reports of leaked tokens from one address, signed in or not."""
 
     scope = "revoke"
     cache = cache
 
 
-class UnauthorizedThrottle(Throttle):
+class UnauthorizedThrottle(ApiThrottle):
     """Requests from one address that fail authentication, before the throttles above are asked."""
 
     scope = "refused"
