@@ -28,7 +28,6 @@ LIMITS_S = {
     "board_large": 70,
     "whole_path": 60,
     "scale_out": 120,
-    "waiting": 100,
     "inference": 60,
     "rescoring": 90,
     "evaluator": 65,

@@ -5,7 +5,6 @@ It stands behind a proxy that buffers requests, so a slow upload never occupies 
 
 import os
 import shutil
-import signal
 import tempfile
 from typing import Any
 
@@ -14,8 +13,7 @@ from leaderboard.ops.logs import logging_settings
 bind = os.environ.get("TSTTC_WEB_BIND", "0.0.0.0:8000")
 # The number of processes is gunicorn's own variable, WEB_CONCURRENCY.
 worker_class = "gthread"
-# Those who wait for a submission have threads beside the ones that serve everybody else.
-threads = int(os.environ.get("TSTTC_WEB_THREADS", "8")) + int(os.environ.get("TSTTC_WAITERS", "16"))
+threads = int(os.environ.get("TSTTC_WEB_THREADS", "8"))
 # Each process has its own listening socket. With a shared one, kept-alive connections pile up on one process.
 reuse_port = True
 keepalive = 30
@@ -46,17 +44,3 @@ def when_ready(server: Any) -> None:
 def on_exit(server: Any) -> None:
     """The figures end with the processes."""
     shutil.rmtree(os.environ["PROMETHEUS_MULTIPROC_DIR"], ignore_errors=True)
-
-
-def post_worker_init(worker: Any) -> None:
-    """Asked to end, a process first lets its waiters go, with the state as it is; they ask the next one."""
-    from leaderboard.submissions import long_poll  # noqa: PLC0415 - needs the application, which is loaded only now
-
-    end = signal.getsignal(signal.SIGTERM)
-
-    def let_go(number: int, frame: Any) -> None:
-        long_poll.THE_WATCHER.close()
-        if callable(end):
-            end(number, frame)
-
-    signal.signal(signal.SIGTERM, let_go)

@@ -322,7 +322,7 @@ REST_KNOX = {
     "TOKEN_MODEL": KNOX_TOKEN_MODEL,
 }
 REST_FRAMEWORK = {**settings.REST_FRAMEWORK, "NUM_PROXIES": TRUSTED_PROXIES}
-# How often one account or one address may ask; counted by all web processes together.
+# How often one account or one address may ask (leaderboard/ops/rate_limits.py).
 API_RATES: dict[str, str | None] = {
     "signed_in": "600/min",
     "visitor": "240/min",
@@ -331,13 +331,17 @@ API_RATES: dict[str, str | None] = {
     "revoke": "10/min",
     "refused": "60/min",
 }
-# What somebody sends on pages, and pages that a process draws anew for one address, as of a time apart.
-PAGE_RATES: dict[str, str | None] = {"send": "60/min", "draw": "300/min", "as_of": "30/min"}
+# What somebody sends on pages, pages that a process draws anew for one address, as of a time apart, and
+# comparisons (up to ten pairs each) that nobody has asked for before, on pages or in the API.
+PAGE_RATES: dict[str, str | None] = {
+    "send": "60/min",
+    "draw": "300/min",
+    "as_of": "30/min",
+    "compare": "12/min",
+}
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
     API_RATES, PAGE_RATES = dict.fromkeys(API_RATES), dict.fromkeys(PAGE_RATES)
 SPECTACULAR_SETTINGS = settings.SPECTACULAR_SETTINGS
-# Waiters that a web process holds at once; gunicorn has as many threads for them (deploy/gunicorn.conf.py).
-WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)
 # So long after an addition, anybody may be shown the former board while a worker draws the new one.
 BOARD_LAG = timedelta(seconds=env.float("TSTTC_BOARD_LAG_S", default=3 if PRODUCTION else 0))
 

@@ -29,7 +29,7 @@ from leaderboard.people.names import skeleton
 DAY = timedelta(days=1)
 # What a scene adds to the world.
 _SWEPT = (
-    *("score", "analysis", "question", "comparison", "truthcomparison", "evaluation", "idempotencykey"),
+    *("score", "analysis", "comparison", "truthcomparison", "evaluation"),
     *("submission", "publication", "apitoken", "invitation", "quotaoverride", "method", "membership"),
     *("admission", "team", "boardversion", "snapshot", "mail"),
 )

@@ -33,7 +33,7 @@ from leaderboard.people import invitations, teams, tokens
 from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import comparisons, confidence, lifecycle, questions, recording_sums
 from leaderboard.storage import files, orphans, truth_values
-from leaderboard.submissions import empty_methods, idempotency, submissions
+from leaderboard.submissions import empty_methods, submissions
 from tests import builders, moderation_verbs
 from tests.leaderboard.web.maintain import queue_rows
 from tests.locking_scene import DAY, Scene
@@ -57,14 +57,7 @@ def _submission(scene: Scene, user: User) -> Callable[[], submissions.Submitted]
 
 def _first_submission(scene: Scene) -> Deed:
     """Of somebody whose team is founded with it."""
-    return partial(
-        idempotency.once,
-        user=scene.newcomer,
-        key=uuid.uuid4().hex,
-        digest="sha256:0",
-        submit=_submission(scene, scene.newcomer),
-        now=timezone.now(),
-    )
+    return _submission(scene, scene.newcomer)
 
 
 def _leases(n: int) -> list[lifecycle.Lease]:
@@ -114,9 +107,15 @@ def _ask(scene: Scene, *, who: str) -> Deed:
     # Of the team: what the loner has is deleted for another verb.
     theirs = Evaluation.objects.filter(edition=scene.world.edition, submission__method__team=scene.team)
     ids = theirs.order_by("pk").values_list("pk", flat=True)
-    asker = questions.asker_of(user=AnonymousUser(), address=who)
     pairs = list(combinations(ids, 2))
-    return partial(questions.ask, edition=scene.world.edition, pairs=pairs, asker=asker, now=timezone.now())
+    return partial(
+        questions.ask,
+        edition=scene.world.edition,
+        pairs=pairs,
+        user=AnonymousUser(),
+        address=who,
+        now=timezone.now(),
+    )
 
 
 def _compare(scene: Scene) -> Deed:

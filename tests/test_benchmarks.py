@@ -21,10 +21,10 @@ def test_every_figure_in_the_documents_stands_in_the_report() -> None:
 
 def test_a_report_is_read_as_it_was_written() -> None:
     measured = bench.Measured("board", datetime(2026, 11, 22, tzinfo=UTC), 0.5, took_s=3)
-    for line in ("board_json = 838 requests/s", "waiting.500.page_p99 = 12.5 ms", "wrk is not installed", ""):
+    for line in ("board_json = 838 requests/s", "board.200.page_p99 = 12.5 ms", "wrk is not installed", ""):
         measured.hear(line)
     text = _report.text([measured.text()])
-    assert _report.figures_in(text) == {"board_json": "838 requests/s", "waiting.500.page_p99": "12.5 ms"}
+    assert _report.figures_in(text) == {"board_json": "838 requests/s", "board.200.page_p99": "12.5 ms"}
     assert "- wrk is not installed" in text
     head = "| | figure | measured |\n|---|---|---|\n"
     row = "| answers | `board_json` | 1 request/s |\n| gone | `board_xml` | 2 |\n"

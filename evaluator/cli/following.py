@@ -62,14 +62,12 @@ def _states(
 
 
 def state_in_words(submission: Submission) -> str:
-    """One line: the state, and for a waiting one how many are ahead and about how long that takes."""
+    """One line: the state, and for a waiting one how many are ahead."""
     words = printable(submission.state)
     if submission.withdrawn_at:
         words += ", withdrawn"
     if submission.queue is not None and submission.state == "QUEUED":
         words += f", {submission.queue.ahead:,} ahead"
-        if submission.queue.estimate_s is not None:
-            words += f", about {submission.queue.estimate_s:.0f} s"
     return words
 
 

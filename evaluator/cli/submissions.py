@@ -36,19 +36,6 @@ if TYPE_CHECKING:
     from evaluator.client.answers import Submission
     from evaluator.client.client import Client
 
-MAX_KEY_CHARACTERS = 255
-
-
-def _key(_context: click.Context, _parameter: click.Parameter, value: str | None) -> str | None:
-    """A key as the API takes it."""
-    if not value:  # an empty variable is none
-        return None
-    if len(value) > MAX_KEY_CHARACTERS or not value.isascii() or not value.isprintable():
-        raise click.BadParameter(
-            f"found {value[:60]!r}, expected at most {MAX_KEY_CHARACTERS} printable ASCII characters."
-        )
-    return value
-
 
 @click.command(short_help="Submit a prediction file to the leaderboard.")
 @predictions_argument
@@ -75,13 +62,6 @@ def _key(_context: click.Context, _parameter: click.Parameter, value: str | None
 @timeout_option
 @gates.fail_if_option
 @gates.worse_than_options
-@click.option(
-    "--idempotency-key",
-    callback=_key,
-    envvar="TSTTC_IDEMPOTENCY_KEY",
-    metavar="TEXT",
-    help="Requests with the same key count as one request, also across runs of a job.",
-)
 @click.option("--yes", is_flag=True, help="Do not ask before the results of a public method go public.")
 @click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
 @url_option
@@ -96,7 +76,6 @@ def submit(
     fail_if: list[gates.Condition],
     worse_than: str | None,
     significant: bool,
-    idempotency_key: str | None,
     yes: bool,
     no_check: bool,
     url: str,
@@ -139,7 +118,6 @@ def submit(
                     split=split,
                     method=method,
                     details={field: value for field, value in details.items() if value},
-                    idempotency_key=idempotency_key,
                 )
         is_waiting = wait or bool(fail_if) or bool(worse_than)
         if is_waiting or not as_json:

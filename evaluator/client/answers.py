@@ -20,10 +20,9 @@ JSON = dict[str, Any]
 
 
 class Queue(msgspec.Struct, frozen=True):
-    """Place in the queue: evaluations ahead of this one, and an estimate in seconds where there is one."""
+    """Place in the queue: how many evaluations are ahead of this one."""
 
     ahead: int
-    estimate_s: float | None = None
 
 
 class Submission(msgspec.Struct, frozen=True, kw_only=True):

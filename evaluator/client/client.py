@@ -6,13 +6,11 @@
             print(submission.state)
 
 Every failure is an `answers.ClientError` that states facts (address, status, code, problems); the command
-line words them. Sending is safe to repeat: a key that is made once per call tells the server that a request
-is the same one again, and bytes that it holds get their first submission as answer.
+line words them. Sending is safe to repeat: bytes that the server has get their first submission as answer.
 """
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Mapping, Sequence
 from typing import BinaryIO
 from urllib.parse import quote, urlencode
@@ -37,14 +35,11 @@ from evaluator.client.answers import (
 from evaluator.client.connection import Connection
 from evaluator.client.exchange import (
     PASSING_STATUSES,
-    fresh_key,
     one,
     retry_after_s,
     rows,
 )
 
-# For one answer to "is it final?"; what stands in between cuts silence after 30 s or more.
-LONGEST_WAIT_S = 20
 # Where nothing else is to do, intervals follow the scores within some tenths of a second: asked for soon.
 N_EAGER, EAGERNESS = 3, 0.4
 
@@ -81,30 +76,28 @@ class Client(Connection):
         split: str,
         method: str,
         details: Mapping[str, str] | None = None,
-        idempotency_key: str | None = None,
     ) -> Submission:
         """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
 
         `file` must be seekable; it is streamed, never read whole. `details` are the form's optional fields
-        (description, paper_url, code_url, note, commit). Requests under one `idempotency_key` are one
-        request, however often they are made; without one each call has its own. Raises ClientError.
+        (description, paper_url, code_url, note, commit). Raises ClientError.
         """
         fields = {"split": split, "method": method, **(details or {})}
-        key = idempotency_key or fresh_key(file, fields)
+        n_sent = 0
 
         def send() -> httpx.Response:
+            nonlocal n_sent
+            n_sent += 1
             file.seek(0)
             return self._http.post(
                 self._address("submissions"),
                 data=fields,
                 files={"file": (filename, file, "application/json")},
-                headers={"Idempotency-Key": json.dumps(key)},
             )
 
         response = self._retry(send)
-        # A request of this very call may have made it, of which only the answer was lost.
-        is_ours = idempotency_key is None and "Idempotent-Replayed" in response.headers
-        is_new = is_ours or response.status_code == httpx.codes.CREATED
+        # An earlier try of this very call may have made it, of which only the answer was lost.
+        is_new = n_sent > 1 or response.status_code == httpx.codes.CREATED
         return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
@@ -239,35 +232,28 @@ class Client(Connection):
 
         `seen` is the answer of a moment ago, such as that to the file; else the present state is asked for.
 
-        The server is asked to answer when there is something to tell; one that answers sooner, is away or
-        busy is asked again less and less often. Raises TimedOut after `timeout_s` seconds; of the other
-        errors only those that waiting cannot cure.
+        The server says when to ask again; one that is away or busy is asked less and less often. Raises
+        TimedOut after `timeout_s` seconds; of the other errors only those that waiting cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
-        last = seen
-        state, n_same = "", 0
+        last, tag, n_same = seen, "", 0
+        again_s: float | None = None
         if last is not None:
             yield last
-            if last.is_final:
-                return
-        while True:
-            asked_s = self.monotonic_s()
-            is_first = last is None
-            found, again_s = self._look(submission_id, wait_s=0 if is_first else until_s - asked_s)
-            if found is not None:
-                last = found
+            n_same = 1
+        while last is None or not last.is_final:
+            if n_same:
+                delay_s = again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
+                if self.monotonic_s() + delay_s >= until_s:
+                    raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
+                self.sleep(delay_s)
+            before = last
+            response, again_s = self._look(submission_id, known=tag)
+            if response is not None and response.status_code != httpx.codes.NOT_MODIFIED:
+                last, tag = one(response, Submission), response.headers.get("ETag", "")
                 yield last
-                if last.is_final:
-                    return
-                if is_first and again_s is None:
-                    continue  # the next answer is one that the server holds: nothing is gained by a pause
-            present = last.state if last else ""
-            state, n_same = present, (n_same + 1 if present == state else 1)  # a change: ask often again
-            delay_s = self.patience.delay_s(n_failed=n_same, retry_after_s=again_s, rng=self.rng)
-            delay_s = max(delay_s - (self.monotonic_s() - asked_s), again_s or 0.0)
-            if self.monotonic_s() + delay_s >= until_s:
-                raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
-            self.sleep(delay_s)
+            is_same = (before and before.state) == (last and last.state)
+            n_same = n_same + 1 if is_same else 1  # a change: ask often again
 
     def settled(self, submission: Submission, *, timeout_s: float) -> Submission:
         """A scored submission with its intervals, once they are computed; after `timeout_s` as it is then.
@@ -284,24 +270,24 @@ class Client(Connection):
             if self.monotonic_s() + delay_s >= until_s:
                 break
             self.sleep(delay_s)
-            submission = self._look(submission.id, wait_s=0)[0] or submission
+            response, _ = self._look(submission.id)
+            submission = one(response, Submission) if response is not None else submission
         return submission
 
-    def _look(self, submission_id: str, *, wait_s: float) -> tuple[Submission | None, float | None]:
-        """The answer to one question about a submission, and when to ask again where the server said it.
+    def _look(self, submission_id: str, *, known: str = "") -> tuple[httpx.Response | None, float | None]:
+        """One answer about a submission, and after how many seconds to ask again where the server said it.
 
-        A fault that passes by itself is no answer, not an error.
+        It is 304 where nothing has changed since the ETag `known`. A fault that passes by itself is no
+        answer, not an error.
         """
         address = self._address("submissions", submission_id)
-        # The first answer comes at once, so that whoever waits sees the place in the queue.
-        wait = {"wait": str(int(min(wait_s, LONGEST_WAIT_S)))} if wait_s >= 1 else None
-        timeout_s = self.timeout_s + LONGEST_WAIT_S
+        headers = {"If-None-Match": known} if known else {}
         try:
-            response = self._checked(lambda: self._http.get(address, params=wait, timeout=timeout_s))
+            response = self._checked(lambda: self._http.get(address, headers=headers))
         except Unreachable:
             return None, None
         except Refused as refused:
             if refused.status not in PASSING_STATUSES:
                 raise
             return None, refused.retry_after_s
-        return one(response, Submission), retry_after_s(response.headers)
+        return response, retry_after_s(response.headers)

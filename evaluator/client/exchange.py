@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import email.utils
-import hashlib
-import json
 import random
-import uuid
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import BinaryIO, TypeVar
+from typing import TypeVar
 
 import httpx
 import msgspec
@@ -55,7 +52,7 @@ class RetryPolicy:
 
 
 def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """The response, if it is one of success; raises Unreachable, Redirected or Refused."""
+    """The response, if it is one of success or 304; raises Unreachable, Redirected or Refused."""
     try:
         response = send()
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
@@ -66,7 +63,7 @@ def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
         ) from error
     except (httpx.TransportError, httpx.DecodingError) as error:
         raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
-    if response.is_success:
+    if response.is_success or response.status_code == httpx.codes.NOT_MODIFIED:
         return response
     if response.is_redirect:
         raise Redirected(url=url, location=response.headers["location"])
@@ -177,13 +174,3 @@ def _converted(document: object, kind: type[T], *, url: str, **more: object) -> 
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
         raise BadAnswer(url=url, found=str(error)) from None
-
-
-def fresh_key(file: BinaryIO, fields: Mapping[str, str]) -> str:
-    """A key for one call: of the file's bytes, the fields, and an id that no other call has."""
-    file.seek(0)
-    digest = hashlib.sha256()
-    while block := file.read(1 << 20):
-        digest.update(block)
-    what = json.dumps([digest.hexdigest(), sorted(fields.items()), uuid.uuid4().hex])
-    return hashlib.sha256(what.encode()).hexdigest()

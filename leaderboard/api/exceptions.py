@@ -12,24 +12,15 @@ from rest_framework.response import Response
 from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
-from leaderboard.api.throttling import MalformedTokenThrottle, UnauthorizedThrottle
+from leaderboard.api.throttling import UnauthorizedThrottle
 from leaderboard.boards import boards, filters
 from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
 from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import comparisons, questions
-from leaderboard.submissions import idempotency, receipts, submissions
+from leaderboard.submissions import receipts, submissions
 
-# Codes of authentication that follow a query for the token.
-LOOKED_UP = {
-    "token-unknown",
-    "token-expired",
-    "token-revoked",
-    "token-scope",
-    "token-split",
-    "account-closed",
-}
 UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
 
 
@@ -72,8 +63,7 @@ def exception_handler(exc: Exception, context: dict[str, Any]) -> Response | Non
     """The problem document of an exception; one failed authentication too many from an address is a 429."""
     if isinstance(exc, UNAUTHORIZED):
         # Such a request ends before the throttles of its view are asked.
-        is_known = exc.get_codes() in LOOKED_UP
-        throttle = UnauthorizedThrottle() if is_known else MalformedTokenThrottle()
+        throttle = UnauthorizedThrottle()
         if not throttle.allow_request(context["request"], context["view"]):
             exc = exceptions.Throttled(throttle.wait())
     return _outage(exc) or _domain_error(exc) or _bad_request(exc) or _framework_error(exc, context)
@@ -91,8 +81,6 @@ DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
     boards.UnknownColumn: (400, "unknown-column", "sort"),
     boards.BadTime: (400, "bad-moment", "at"),
     NotMaintainer: (403, "not-maintainer", ""),
-    idempotency.BadKey: (400, "bad-idempotency-key", "Idempotency-Key"),
-    idempotency.KeyReused: (409, "idempotency-key-reused", "Idempotency-Key"),
     comparisons.BadComparison: (400, comparisons.BadComparison.code, "m"),
     comparisons.UnknownMethod: (404, comparisons.UnknownMethod.code, "m"),
     comparisons.NotOnTheBoard: (404, comparisons.NotOnTheBoard.code, "m"),
@@ -110,7 +98,7 @@ def _domain_error(exc: Exception) -> Response | None:
             if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):
                 status = 403
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case quotas.QuotaExceeded() | questions.TooManyWaiting():
+        case quotas.QuotaExceeded() | questions.AskedTooOften():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
@@ -123,7 +111,7 @@ def _domain_error(exc: Exception) -> Response | None:
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
-def _not_yet(exc: quotas.QuotaExceeded | questions.TooManyWaiting) -> Response:
+def _not_yet(exc: quotas.QuotaExceeded | questions.AskedTooOften) -> Response:
     """A request that will be accepted later."""
     if isinstance(exc, quotas.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
-from leaderboard.api.throttling import Throttle, counted
+from leaderboard.api.throttling import ApiThrottle, counted
 from leaderboard.http import is_known
 
 Next = Callable[[HttpRequest], HttpResponse]
@@ -35,13 +35,12 @@ class ApiHeadersMiddleware:
         return response
 
 
-def _policy(throttle: Throttle) -> str:
-    return f'"{throttle.scope}";q={throttle.rate.n};w={throttle.rate.period_s:g}'
+def _policy(throttle: ApiThrottle) -> str:
+    return f'"{throttle.scope}";q={throttle.num_requests};w={throttle.duration}'
 
 
-def _remaining(throttle: Throttle) -> str:
-    n_left = throttle.answer.n_left if throttle.answer else 0
-    return f'"{throttle.scope}";r={n_left};t={math.ceil(throttle.wait() or 0)}'
+def _remaining(throttle: ApiThrottle) -> str:
+    return f'"{throttle.scope}";r={throttle.n_left};t={math.ceil(throttle.wait_s)}'
 
 
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
@@ -58,7 +57,7 @@ def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
     if not is_known(request, response["ETag"]):
         return response
     known = HttpResponseNotModified()
-    for name in ("ETag", "Vary", "Cache-Control"):
+    for name in ("ETag", "Vary", "Cache-Control", "Retry-After"):
         if response.has_header(name):
             known[name] = response[name]
     return known

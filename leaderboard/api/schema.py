@@ -87,7 +87,6 @@ EXAMPLES: Mapping[str, Mapping[str, Any]] = {
     },
     "number": {
         **dict.fromkeys(known_names(), 15.03),
-        "estimate_s": 12.5,
         "rate_per_s": 3.6,
     },
     "object": {"truncated": {"20": 3}},

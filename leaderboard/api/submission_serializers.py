@@ -22,12 +22,9 @@ from leaderboard.submissions.outcomes import SubmissionResult
 
 
 class QueueSerializer(serializers.Serializer[Any]):
-    """Position in the queue, and an estimate from recent runs."""
+    """Position in the queue."""
 
     ahead = serializers.IntegerField(help_text="Submissions to be scored before this one.")
-    estimate_s = serializers.FloatField(
-        allow_null=True, help_text="Estimated seconds until it is scored; null: unknown."
-    )
 
 
 class NewSubmissionSerializer(serializers.Serializer[Any]):
@@ -137,7 +134,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
             "size_bytes": submission.size_bytes,
             "note": submission.note,
             "commit": submission.commit,
-            "queue": {"ahead": progress.n_ahead, "estimate_s": progress.estimate_s} if is_waiting else None,
+            "queue": {"ahead": progress.n_ahead} if is_waiting else None,
             "scores": progress.scores,
             "decimals": progress.decimals,
             "intervals": {

@@ -1,29 +1,21 @@
 """Submitting and following submissions."""
 
-import random
-import select
-import socket
-from collections.abc import Mapping
 from datetime import datetime
-from functools import partial
 from typing import Any, cast
 from uuid import UUID
 
-from django.core.files.uploadedfile import UploadedFile
 from django.db.models import Prefetch
 from django.http import QueryDict
 from django.shortcuts import get_object_or_404
 from django.utils import timezone
-from drf_spectacular.utils import OpenApiParameter, OpenApiResponse, extend_schema
+from drf_spectacular.utils import OpenApiResponse, extend_schema
 from rest_framework.parsers import MultiPartParser
 from rest_framework.request import Request
 from rest_framework.response import Response
-from rest_framework.utils.serializer_helpers import ReturnDict
 from rest_framework.views import APIView
 
 from leaderboard.api import pagination
 from leaderboard.api.authentication import require_split, split_of
-from leaderboard.api.exceptions import whole_number
 from leaderboard.api.schema import errors, response_header
 from leaderboard.api.serializers import absolute
 from leaderboard.api.submission_serializers import (
@@ -36,11 +28,11 @@ from leaderboard.api.views import visible
 from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Submission, User
 from leaderboard.quotas import quotas
-from leaderboard.storage import files
-from leaderboard.submissions import idempotency, long_poll, outcomes, submissions
+from leaderboard.submissions import outcomes, submissions
 
 TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
-
+# While a submission waits or runs; a file is scored within a second.
+ASK_AGAIN_S = 1
 
 EVALUATIONS = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
 
@@ -54,28 +46,12 @@ class SubmissionsView(APIView):
     @extend_schema(
         operation_id="submit",
         parameters=[
-            OpenApiParameter(
-                "Idempotency-Key",
-                str,
-                OpenApiParameter.HEADER,
-                description="Your own key for this request: repeating the request with it returns the same "
-                "submission. Valid for at least 7 days.",
-            ),
             response_header("Location", str, "URL of the submission.", statuses=[200, 201]),
-            response_header(
-                "Idempotent-Replayed",
-                str,
-                "`true` if this repeats the response to an earlier request.",
-                statuses=[200],
-            ),
         ],
         request={"multipart/form-data": NewSubmissionSerializer},
         responses={
             201: SubmittedSerializer,
-            200: OpenApiResponse(
-                SubmittedSerializer,
-                "The submission made before with the same bytes or the same Idempotency-Key.",
-            ),
+            200: OpenApiResponse(SubmittedSerializer, "The submission made before with the same bytes."),
             **errors(400, 409, 413, 422, 429),
         },
     )
@@ -83,17 +59,17 @@ class SubmissionsView(APIView):
         """Submit one file to one split. The response comes once it is safely stored; the scores follow."""
         form = cast("QueryDict", request.data)  # the only parser here is that of multipart bodies
         require_split(request.auth, str(form.get("split", "")))
-        answer, now = _submit(request, form), timezone.now()
+        now = timezone.now()
+        answer = _submit(request, form, now=now)
         made = answer.submission
         quota = quotas.state(
             team=made.method.team, user=cast("User", request.user), split=made.split, now=now
         )
         (outcome,) = outcomes.of([made], now=now)
-        replayed = {"Idempotent-Replayed": "true"} if answer.is_replayed else {}
         return Response(
             SubmittedSerializer(outcome, context={"quota": quota}).data,
             status=201 if answer.is_new else 200,
-            headers={"Location": absolute("api-submission", made.pk), **replayed},
+            headers={"Location": absolute("api-submission", made.pk)},
         )
 
     @extend_schema(
@@ -116,66 +92,27 @@ class SubmissionView(APIView):
     @extend_schema(
         operation_id="submission",
         parameters=[
-            OpenApiParameter(
-                "wait",
-                int,
-                description="Hold the response until the submission is final, for at most this many seconds "
-                "(0 to 60). With too many clients waiting it comes at once, with Retry-After.",
-            ),
             response_header(
                 "Retry-After",
                 int,
-                "Seconds after which to repeat the request, if too many clients were waiting.",
+                "Seconds after which to repeat the request; absent once the submission is final.",
                 statuses=[200],
             ),
         ],
-        responses={200: SubmissionSerializer, **errors(400, 404)},
+        responses={200: SubmissionSerializer, **errors(404)},
     )
     def get(self, request: Request, submission_id: UUID) -> Response:
         """State, then scores or problems. The submission of another team gives 404."""
-        wait_s = _wait_s(request)
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         found = get_object_or_404(rows, pk=submission_id)
-        if not wait_s or submissions.evaluation_of(found).is_final:
-            return Response(_data(found))
-        if long_poll.wait(found.pk, wait_s=wait_s, is_gone=partial(_is_gone, request.META)):
-            return Response(_data(get_object_or_404(rows.all(), pk=submission_id)))
-        retry_after_s = long_poll.THE_WATCHER.retry_after_s(rng=random.Random())  # noqa: S311 - to spread clients
-        return Response(_data(found), headers={"Retry-After": str(retry_after_s)})
+        (outcome,) = outcomes.of([found], now=timezone.now())
+        again = {} if outcome.progress.is_final else {"Retry-After": str(ASK_AGAIN_S)}
+        return Response(SubmissionSerializer(outcome).data, headers=again)
 
 
-def _data(submission: Submission) -> ReturnDict[str, Any]:
-    (outcome,) = outcomes.of([submission], now=timezone.now())
-    return SubmissionSerializer(outcome).data
-
-
-def _submit(request: Request, form: QueryDict) -> submissions.Submitted:
-    """The submission of this request, new or repeated."""
-    user, now = cast("User", request.user), timezone.now()
-    upload = request.FILES.get("file")
-    header = request.headers.get("Idempotency-Key")
-    may_edit = split_of(request.auth) is None
-    submit = partial(_take, user=user, form=form, upload=upload, now=now, may_edit=may_edit)
-    if header is None:
-        return submit()
-    key = idempotency.parse(header)
-    fields = {name: values for name, values in form.lists() if name not in request.FILES}
-    measured = files.measure(upload) if upload is not None else None
-    digest = idempotency.request_digest(fields=fields, file_digest=measured.digest if measured else "")
-    return idempotency.once(
-        user=user, key=key, digest=digest, submit=partial(submit, measured=measured), now=now
-    )
-
-
-def _take(
-    *,
-    user: User,
-    form: QueryDict,
-    upload: UploadedFile | None,
-    now: datetime,
-    may_edit: bool,
-    measured: files.StoredFile | None = None,
-) -> submissions.Submitted:
+def _submit(request: Request, form: QueryDict, *, now: datetime) -> submissions.Submitted:
+    """The submission of this request, or the one that had the same bytes before."""
+    user, upload = cast("User", request.user), request.FILES.get("file")
     texts: dict[str, Any] = {name: str(form.get(name, "")) for name in TEXT_FIELDS}
     return submissions.submit(
         user=user,
@@ -185,31 +122,6 @@ def _take(
         via=Submission.Via.API,
         now=now,
         filename=getattr(upload, "name", "") or "",
-        may_edit=may_edit,
-        measured=measured,
+        may_edit=split_of(request.auth) is None,
         **texts,
     )
-
-
-def _wait_s(request: Request) -> int:
-    """The parameter `wait`. Raises `BadValue`."""
-    return whole_number(
-        request.query_params.get("wait", "0"),
-        name="wait",
-        code="bad-wait",
-        limits=range(long_poll.MAX_WAIT_S + 1),
-        expected=f"whole seconds, from 0 to {long_poll.MAX_WAIT_S}",
-    )
-
-
-def _is_gone(environ: Mapping[str, Any]) -> bool:
-    """Whether the client has closed the connection, as far as the web server lets us know."""
-    connected = environ.get("gunicorn.socket")
-    if not isinstance(connected, socket.socket):
-        return False
-    try:
-        asked = select.poll()
-        asked.register(connected, select.POLLIN)
-        return bool(asked.poll(0)) and not connected.recv(1, socket.MSG_PEEK)
-    except OSError:
-        return True

@@ -1,16 +1,14 @@
-"""Throttles: requests per account, else per address, counted for all web processes together.
+"""Throttles: requests per account, else per address; see leaderboard/ops/rate_limits.py.
 
 The address is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one that our own proxy wrote down;
-whatever a client puts into X-Forwarded-For is ignored. See leaderboard/ops/rate_limits.py.
+whatever a client puts into X-Forwarded-For is ignored.
 """
 
-import time
 from typing import TYPE_CHECKING
 
-from django.conf import settings
+from django.core.cache import cache
 from django.http import HttpRequest
 from rest_framework.request import Request
-from rest_framework.throttling import BaseThrottle
 
 from leaderboard.ops import rate_limits
 
@@ -18,44 +16,24 @@ if TYPE_CHECKING:  # views make their classes with these
     from rest_framework.views import APIView
 
 
-def counted(request: HttpRequest) -> list["Throttle"]:
+def counted(request: HttpRequest) -> list["ApiThrottle"]:
     """The throttles that counted this request, for the headers of its response; a list to append to."""
-    found: list[Throttle] = request.__dict__.setdefault("_counted", [])
+    found: list[ApiThrottle] = request.__dict__.setdefault("_counted", [])
     return found
 
 
-class Throttle(BaseThrottle):
-    """A rate of `settings.API_RATES`, which may be None; `rate` and `answer` are set once it has counted."""
+class ApiThrottle(rate_limits.Throttle):
+    """A rate of `settings.API_RATES`, told in the headers of the response."""
 
-    scope = ""
-    rate: rate_limits.Rate
-    answer: rate_limits.Decision | None = None
-
-    def allow_request(self, request: Request, view: "APIView") -> bool:
+    def allow_request(self, request: Request, view: "APIView | None" = None) -> bool:
         """Count this request."""
-        text: str | None = settings.API_RATES[self.scope]
-        identity = self.identity(request) if text else None
-        if not text or identity is None:
-            return True
-        self.rate = rate_limits.rate_of(text)
-        self.answer = self.take(f"{self.scope}:{identity}")
-        counted(request._request).append(self)
-        return self.answer.is_allowed
-
-    def take(self, who: str) -> rate_limits.Decision:
-        """Count the request in the database, where all processes see it."""
-        return rate_limits.take(who=who, rate=self.rate, now_s=time.time())
-
-    def wait(self) -> float | None:
-        """Seconds until the next request is allowed."""
-        return self.answer.wait_s if self.answer else None
-
-    def identity(self, request: Request) -> object | None:
-        """Who is counted: the address. None: this throttle does not apply."""
-        return rate_limits.address_of(request)
+        is_allowed = super().allow_request(request, view)
+        if self.key is not None:
+            counted(request._request).append(self)
+        return is_allowed
 
 
-class SignedInThrottle(Throttle):
+class SignedInThrottle(ApiThrottle):
     """Requests of one account, whatever token it uses."""
 
     scope = "signed_in"
@@ -65,7 +43,7 @@ class SignedInThrottle(Throttle):
         return request.user.pk if request.user.is_authenticated else None
 
 
-class VisitorThrottle(Throttle):
+class VisitorThrottle(ApiThrottle):
     """Requests without an account from one address."""
 
     scope = "visitor"
@@ -79,41 +57,31 @@ class SubmitThrottle(SignedInThrottle):
     """Files sent by one account: also those that cost no quota are read and written."""
 
     scope = "submit"
+    cache = cache
 
     def identity(self, request: Request) -> object | None:
         """The account, if it sends something."""
         return super().identity(request) if request.method == "POST" else None
 
 
-class AsOfThrottle(Throttle):
+class AsOfThrottle(ApiThrottle):
     """Boards as of a time, which take long to read, of one account or one address."""
 
     scope = "as_of"
 
     def identity(self, request: Request) -> object | None:
         """The account, else the address, if it asks for a time."""
-        if not request.query_params.get("at"):
-            return None
-        return request.user.pk if request.user.is_authenticated else super().identity(request)
+        return rate_limits.account_or_address(request) if request.query_params.get("at") else None
 
 
-class RevokeThrottle(Throttle):
+class RevokeThrottle(ApiThrottle):
     """Reports of leaked tokens from one address, signed in or not."""
 
     scope = "revoke"
+    cache = cache
 
 
-class UnauthorizedThrottle(Throttle):
+class UnauthorizedThrottle(ApiThrottle):
     """Requests from one address that fail authentication, before the throttles above are asked."""
 
     scope = "refused"
-
-
-class MalformedTokenThrottle(UnauthorizedThrottle):
-    """The same in memory: a malformed token never reaches the database."""
-
-    memory = rate_limits.InMemory()
-
-    def take(self, who: str) -> rate_limits.Decision:
-        """Count the request in this process."""
-        return self.memory.take(who=who, rate=self.rate, now_s=time.time())

@@ -10,8 +10,8 @@ from leaderboard.models.benchmark import (
     TruthComparison,
 )
 from leaderboard.models.boards import BoardVersion, Snapshot
-from leaderboard.models.inference import Analysis, Comparison, EditionRanges, Question
-from leaderboard.models.limits import Allowance, CachedValue
+from leaderboard.models.inference import Analysis, Comparison, EditionRanges
+from leaderboard.models.limits import CachedValue
 from leaderboard.models.mails import Mail, MailKind, MutedKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
 from leaderboard.models.pages import PageVersion, SiteAnnouncement
@@ -19,7 +19,6 @@ from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, T
 from leaderboard.models.quotas import Admission, QuotaOverride, SpentMailbox
 from leaderboard.models.submissions import (
     Evaluation,
-    IdempotencyKey,
     Score,
     SentFile,
     Status,

@@ -31,7 +31,9 @@ class Comparison(models.Model):
     edition = models.ForeignKey(Edition, on_delete=models.CASCADE, related_name="comparisons")
     first = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="+")
     second = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="+")
-    asked_at = models.DateTimeField(default=timezone.now)
+    asked_at = models.DateTimeField(
+        null=True, blank=True, help_text="Empty: nobody waits for it; workers compute it last."
+    )
     computed_at = models.DateTimeField(null=True, blank=True)
     differences = models.JSONField(
         null=True,
@@ -51,27 +53,6 @@ class Comparison(models.Model):
 
     def __str__(self) -> str:
         return f"{self.first_id} against {self.second_id}"
-
-
-class Question(models.Model):
-    """That somebody waits for a comparison. Deleted once it is computed; see `scoring.questions`.
-
-    The asker is named by a keyed hash: of their account, or of the address that they come from.
-    """
-
-    comparison = models.ForeignKey(Comparison, on_delete=models.CASCADE, related_name="questions")
-    asker = models.CharField(max_length=64)
-    is_signed_in = models.BooleanField()
-    asked_at = models.DateTimeField(default=timezone.now)
-    turn_at = models.DateTimeField(help_text="Of all of an asker's questions; the earliest is next.")
-
-    class Meta:
-        constraints = [
-            models.UniqueConstraint(fields=["asker", "comparison"], name="one_question_per_asker"),
-        ]
-
-    def __str__(self) -> str:
-        return f"question about {self.comparison_id}"
 
 
 class Analysis(models.Model):

@@ -101,24 +101,6 @@ class Submission(models.Model):
         return SentFile(self.digest, self.manifest_digest)
 
 
-class IdempotencyKey(models.Model):
-    """A client's own name for one request, so that the same request sent twice is one submission."""
-
-    user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="+")
-    key = models.CharField(max_length=255)
-    request_digest = models.CharField(max_length=80)
-    submission = models.ForeignKey(Submission, on_delete=models.CASCADE, related_name="+")
-    created_at = models.DateTimeField(default=timezone.now, db_index=True)
-
-    class Meta:
-        constraints = [
-            models.UniqueConstraint(fields=["user", "key"], name="idempotency_key_once_per_person"),
-        ]
-
-    def __str__(self) -> str:
-        return f"{self.key} of {self.user}"
-
-
 class Status(models.TextChoices):
     """The states of an evaluation; only `leaderboard.scoring.lifecycle` writes them."""
 

@@ -1,61 +1,27 @@
-"""Rate limits: counted for all web processes together, in one statement of the database.
+"""Rate limits: throttles of Django REST framework, for the API, for pages and for comparisons.
 
-A rate of `n` in a period lets `n` requests through at once, and after that one for each `period / n` seconds
-(the generic cell rate algorithm). What is kept is a single time, at which the one who asked is as good as
-new; moving it on and refusing are one conditional INSERT, so that no two processes take the last place.
+A rate of 60 a minute lets 60 requests of the last minute through. Reading is counted by each process in its
+memory, which asks the database nothing; what is sent is counted in Django's cache, by all processes together.
 """
 
 import hashlib
 import math
-import re
-import threading
-from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from ipaddress import IPv6Address, ip_address, ip_network
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
-from django.db import connection
-from rest_framework.throttling import BaseThrottle
+from django.conf import settings
+from django.core.cache.backends.base import BaseCache
+from django.core.cache.backends.locmem import LocMemCache
+from rest_framework.throttling import BaseThrottle, SimpleRateThrottle
 
-from leaderboard.models import Allowance, CachedValue
+from leaderboard.models import CachedValue
 
-_MOVE_ON = """
-INSERT INTO leaderboard_allowance (key, free_at_s) VALUES (%(key)s, %(now)s + %(step)s)
-ON CONFLICT (key) DO UPDATE SET free_at_s = %(step)s + CASE
-    WHEN leaderboard_allowance.free_at_s > %(now)s THEN leaderboard_allowance.free_at_s ELSE %(now)s END
-WHERE leaderboard_allowance.free_at_s <= %(now)s + %(period)s - %(step)s
-RETURNING free_at_s
-"""
-# Rounding of a float of today's seconds, which must not cost anybody a request.
-_TOLERANCE_S = 1e-5
-_MOST_IN_MEMORY = 10_000
-_PERIODS_S: Final = {"s": 1, "m": 60, "h": 3600, "d": 86400}
-_RATE: Final = re.compile(r"(?P<n>\d+)/(?P<period>[smhd])[a-z]*")
+if TYPE_CHECKING:  # views make their classes with these
+    from rest_framework.views import APIView
 
-
-@dataclass(frozen=True)
-class Rate:
-    """`n` requests in `period_s` seconds."""
-
-    n: int
-    period_s: float
-
-    @property
-    def step_s(self) -> float:
-        """What one request costs, in seconds."""
-        return self.period_s / self.n
-
-
-def rate_of(text: str) -> Rate:
-    """A rate as the settings have it.
-
-    >>> rate_of("600/min")
-    Rate(n=600, period_s=60)
-    """
-    found = _RATE.fullmatch(text)
-    if found is None:
-        raise ValueError(f"{text!r} is not a rate; expected one such as '600/min'")
-    return Rate(n=int(found["n"]), period_s=_PERIODS_S[found["period"]])
+# From more addresses at once it is an attack, which no counting of addresses ends.
+IN_PROCESS: Final = LocMemCache("rate_limits", {"OPTIONS": {"MAX_ENTRIES": 10_000}})
 
 
 def address_of(request: Any) -> str:
@@ -70,73 +36,57 @@ def address_of(request: Any) -> str:
     return str(ip_network((found, 64), strict=False) if isinstance(found, IPv6Address) else found)
 
 
+def account_or_address(request: Any) -> str:
+    """The account that asks, wherever it comes from; else the address."""
+    return f"account:{request.user.pk}" if request.user.is_authenticated else address_of(request)
+
+
 def refusal(wait_s: float) -> str:
     """What is said to who asked too often, on pages and in the API."""
     return f"Too many requests in a short time; the next one is answered in {math.ceil(wait_s)} s."
 
 
-@dataclass(frozen=True)
-class Decision:
-    """Whether a request is let through, how many more would be at once, and when the next one is if none."""
+class Throttle(SimpleRateThrottle):
+    """A rate of the settings, which may be None; `n_left` and `wait_s` are known once it has counted."""
 
-    is_allowed: bool
-    n_left: int
-    wait_s: float
+    cache: BaseCache = IN_PROCESS
+    rates = "API_RATES"
+    key: str | None = None
+    history: list[float]
+    num_requests: int
+    duration: int  # in seconds
+
+    def get_rate(self) -> str | None:
+        """The rate as the settings have it now."""
+        rate: str | None = getattr(settings, self.rates)[self.scope]
+        return rate
+
+    def allow_request(self, request: Any, view: "APIView | None" = None) -> bool:
+        """Count this request."""
+        return bool(super().allow_request(request, view))  # type: ignore[arg-type]  # pages have no view
+
+    def identity(self, request: Any) -> object | None:
+        """Who is counted: the address. None: this throttle does not apply."""
+        return address_of(request)
+
+    def get_cache_key(self, request: Any, view: "APIView | None") -> str | None:
+        """A hash: addresses and accounts are nobody's business in a cache."""
+        who = self.identity(request)
+        text = f"{self.rates}:{self.scope}:{who}"
+        return None if who is None else f"rate:{hashlib.sha256(text.encode()).hexdigest()}"
+
+    @property
+    def n_left(self) -> int:
+        """How many more are let through now."""
+        return max(0, self.num_requests - len(self.history))
+
+    @property
+    def wait_s(self) -> float:
+        """Seconds until the next is let through."""
+        return 0.0 if self.n_left else self.wait() or 0.0
 
 
-def _answer(rate: Rate, *, free_at_s: float, now_s: float, is_allowed: bool) -> Decision:
-    ahead_s = max(0.0, free_at_s - now_s)
-    n_left = int((rate.period_s - ahead_s + _TOLERANCE_S) / rate.step_s)
-    wait_s = max(0.0, ahead_s + rate.step_s - rate.period_s)
-    return Decision(is_allowed=is_allowed, n_left=max(0, n_left), wait_s=wait_s)
-
-
-def take(*, who: str, rate: Rate, now_s: float) -> Decision:
-    """Count one request of `who`, a name with the rate's in it, for every process on this database."""
-    key = hashlib.sha256(who.encode()).hexdigest()
-    values: dict[str, str | float] = {
-        "key": key,
-        "now": now_s,
-        "step": rate.step_s,
-        "period": rate.period_s + _TOLERANCE_S,
-    }
-    with connection.cursor() as cursor:
-        cursor.execute(_MOVE_ON, values)
-        rows = cursor.fetchall()
-    if rows:
-        return _answer(rate, free_at_s=rows[0][0], now_s=now_s, is_allowed=True)
-    free_at_s = Allowance.objects.filter(pk=key).values_list("free_at_s", flat=True).first() or now_s
-    return _answer(rate, free_at_s=free_at_s, now_s=now_s, is_allowed=False)
-
-
-def purge_expired(*, now_s: float) -> int:
-    """Remove what counts for nothing any more, of allowances and of the cache. Returns how many rows."""
-    n_allowances, _ = Allowance.objects.filter(free_at_s__lt=now_s).delete()
-    n_values, _ = CachedValue.objects.filter(expires__lt=datetime.fromtimestamp(now_s, tz=UTC)).delete()
-    return n_allowances + n_values
-
-
-class InMemory:
-    """The same for this process alone: for requests that are not worth asking the database for."""
-
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._free_at_s: dict[str, float] = {}
-
-    def take(self, *, who: str, rate: Rate, now_s: float) -> Decision:
-        """Count one request."""
-        with self._lock:
-            free_at_s = max(self._free_at_s.get(who, now_s), now_s)
-            is_allowed = free_at_s <= now_s + rate.period_s - rate.step_s + _TOLERANCE_S
-            if is_allowed:
-                free_at_s += rate.step_s
-                self._free_at_s[who] = free_at_s
-            if len(self._free_at_s) > _MOST_IN_MEMORY:
-                # From that many addresses at once it is an attack, which no counting of addresses ends.
-                self._free_at_s.clear()
-        return _answer(rate, free_at_s=free_at_s, now_s=now_s, is_allowed=is_allowed)
-
-    def forget(self) -> None:
-        """Begin anew."""
-        with self._lock:
-            self._free_at_s.clear()
+def purge_expired(*, now: datetime) -> int:
+    """Remove what has expired in the table of Django's cache. Returns how many rows."""
+    n_values, _ = CachedValue.objects.filter(expires__lt=now).delete()
+    return n_values

@@ -13,7 +13,6 @@ from typing import Any
 from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
-from django.db import transaction
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY
@@ -128,9 +127,9 @@ def of(
 
     Pairs that no worker has compared yet have `differences` None; they are asked for, and the workers told.
     Of pairs that `disclosure.why_withheld` names, there is the difference of the published values alone.
-    A visitor's places are counted by the `address` that they ask from. Raises `BadComparison` for another
+    What a visitor asks for is counted by the `address` that they ask from. Raises `BadComparison` for another
     number of methods or the same one twice, `UnknownMethod` for one that the viewer may not see,
-    `NotOnTheBoard` for one without a value there, `questions.TooManyWaiting` if there is no place.
+    `NotOnTheBoard` for one without a value there, `questions.AskedTooOften`.
     """
     board = snapshots.board(split=split, edition=edition, viewer=viewer)
     if board.edition is None:
@@ -141,13 +140,8 @@ def of(
     asked = list(itertools.combinations(chosen, 2))
     withheld = _withheld(board.edition, asked)
     known = _known(board.edition, chosen)
-    told = [key for key in map(_key, asked) if key not in withheld]
-    questions.ask(
-        edition=board.edition,
-        pairs=[key for key in told if key not in known or known[key].differences is None],
-        asker=questions.asker_of(user=viewer, address=address),
-        now=now,
-    )
+    new = [key for key in map(_key, asked) if key not in withheld and not _is_asked_for(known.get(key))]
+    questions.ask(edition=board.edition, pairs=new, user=viewer, address=address, now=now)
     pairs = tuple(
         _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
         for pair in asked
@@ -162,7 +156,7 @@ def of(
     )
 
 
-def of_first(*, board: boards.Board, now: datetime) -> tuple[Pair, ...]:
+def of_first(*, board: boards.Board) -> tuple[Pair, ...]:
     """All pairs of the first rows of a board that everybody sees, each with the better rank first.
 
     What is not known yet is noted, for workers to compute after all that somebody waits for. Empty for a
@@ -178,7 +172,7 @@ def of_first(*, board: boards.Board, now: datetime) -> tuple[Pair, ...]:
     pairs = list(itertools.combinations(first, 2))
     withheld, known = _withheld(board.edition, pairs), _known(board.edition, first)
     new = [key for key in map(_key, pairs) if key not in withheld and key not in known]
-    questions.note(edition=board.edition, pairs=new, now=now)
+    questions.note(edition=board.edition, pairs=new)
     return tuple(
         _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
         for pair in pairs
@@ -250,6 +244,10 @@ def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[tuple[UUID, UUID],
     return {(row.first_id, row.second_id): row for row in asked}
 
 
+def _is_asked_for(row: Comparison | None) -> bool:
+    return row is not None and (row.computed_at is not None or row.asked_at is not None)
+
+
 def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
     if row is None or row.differences is None:
         return Pair(first, second, None)
@@ -286,9 +284,7 @@ def compute(row: Comparison, *, now: datetime) -> None:
     else:
         shown = _differences(row, one, other)
     told = {name: asdict(gap) for name, gap in shown.items()} | ({WITHHELD: withheld} if withheld else {})
-    with transaction.atomic():
-        Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=told, computed_at=now)
-        questions.end(row)
+    Comparison.objects.filter(pk=row.pk, computed_at=None).update(differences=told, computed_at=now)
 
 
 def _differences(

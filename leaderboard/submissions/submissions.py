@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Any
 
 import structlog
@@ -14,6 +14,7 @@ from django.db.models import Q
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, versions
 from leaderboard.boards.rows import Interval, scored_of
+from leaderboard.db import clock
 from leaderboard.errors.refusals import Refused, clean_text
 from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
@@ -22,9 +23,11 @@ from leaderboard.people.names import clean_name
 from leaderboard.quotas import admissions, quotas
 from leaderboard.scoring import lifecycle, verdicts
 from leaderboard.storage import files, orphans
-from leaderboard.submissions import estimates
 
 log = structlog.get_logger(__name__)
+
+# A file is scored within a second; one that has waited for longer than this has met a fault.
+LATE_AFTER = timedelta(minutes=1)
 
 
 class TooLarge(Refused):
@@ -37,14 +40,10 @@ class TokenSplit(Refused):
 
 @dataclass(frozen=True)
 class Submitted:
-    """The answer to a submission; `is_new` is False when the same bytes had come before.
-
-    `is_replayed`: it answers an earlier request of the same key; see `idempotency`.
-    """
+    """The answer to a submission; `is_new` is False when the same bytes had come before."""
 
     submission: Submission
     is_new: bool
-    is_replayed: bool = False
 
 
 def submit(
@@ -63,7 +62,6 @@ def submit(
     note: str = "",
     commit: str = "",
     may_edit: bool = True,
-    measured: files.StoredFile | None = None,
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
@@ -71,8 +69,7 @@ def submit(
     cost nothing and change nothing. Once a correction has another manifest, the same bytes are another
     submission: their keys may mean other sequences. With a new file, details that differ from the method's
     own replace them, through `methods.edit`; without `may_edit` they are refused. `method_details` are those
-    of the registry. `measured` is for who has hashed the file already. Raises `Refused` or
-    `quotas.QuotaExceeded` (nothing is kept then).
+    of the registry. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
     asked = _Asked(
@@ -97,7 +94,7 @@ def submit(
         now=now,
         may_edit=may_edit,
     )
-    file = measured or files.measure(asked.upload)
+    file = files.measure(asked.upload)
     first = _admit(asked, file)
     if first is not None:
         return Submitted(submission=first, is_new=False)
@@ -324,8 +321,7 @@ class Progress:
     started_at: datetime | None = None
     finished_at: datetime | None = None
     n_ahead: int | None = None
-    estimate_s: float | None = None
-    is_late: bool = False  # it takes much longer than was to be expected
+    is_late: bool = False  # it takes longer than `LATE_AFTER`
     first_run: Evaluation | None = None  # in the first edition, where another edition's speaks for it
     scores: Mapping[str, float | None] | None = None
     intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
@@ -369,7 +365,6 @@ def progress(submission: Submission) -> Progress:
     evaluation = evaluation_of(submission)
     report = evaluation.report or {}
     counts = report.get("counts", {})
-    place = estimates.place_of(evaluation)
     scored = scored_of(evaluation) if evaluation.status == Status.SCORED else None
     return Progress(
         state=evaluation.status,
@@ -377,9 +372,8 @@ def progress(submission: Submission) -> Progress:
         queued_at=evaluation.queued_at,
         started_at=evaluation.started_at,
         finished_at=evaluation.finished_at,
-        n_ahead=place.n_ahead if place else None,
-        estimate_s=place.estimate_s if place else None,
-        is_late=place is not None and place.is_late,
+        n_ahead=None if evaluation.is_final else _n_ahead(evaluation),
+        is_late=not evaluation.is_final and _is_late(evaluation),
         first_run=_first_run(submission, evaluation),
         scores=scored.values if scored else None,
         intervals=scored.intervals if scored else {},
@@ -398,3 +392,21 @@ def progress(submission: Submission) -> Progress:
         protocol=evaluation.edition.protocol,
         kept_in=evaluation.kept_in,
     )
+
+
+def _n_ahead(evaluation: Evaluation) -> int:
+    """How many are claimed before this one; those that wait for another try are not in its way."""
+    if evaluation.status != Status.QUEUED:
+        return 0
+    earlier = Q(priority__lt=evaluation.priority) | Q(
+        priority=evaluation.priority, queued_at__lt=evaluation.queued_at
+    )
+    # What has stopped its reader waits behind all others.
+    waiting = Evaluation.objects.due().filter(earlier, n_poison_strikes__lte=evaluation.n_poison_strikes)
+    return waiting.exclude(pk=evaluation.pk).count()
+
+
+def _is_late(evaluation: Evaluation) -> bool:
+    # Re-scoring goes in batches behind everything else: it may take its time.
+    is_live = evaluation.priority == Evaluation.PRIORITY_LIVE
+    return is_live and clock.database_now() - evaluation.queued_at > LATE_AFTER

@@ -62,7 +62,7 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
         "edition__ground_truth", "edition__split", "first__submission__method", "second__submission__method"
     )
     begun: list[int] = []
-    # Asked anew each time: somebody else may have come, whose turn it is.
+    # Asked anew each time: somebody may have come who waits for a pair, while others were only noted.
     while len(begun) < MAX_AT_ONCE and (row := asked.exclude(pk__in=begun).first()) is not None:
         begun.append(row.pk)
         yield partial(comparisons.compute, row, now=now)

@@ -95,7 +95,7 @@ def sweep(*, rng: random.Random) -> None:
     versions.times_passed(now=clock.database_now())
     snapshots.check(now=clock.database_now())
     analyses.delete_hidden()
-    rate_limits.purge_expired(now_s=time.time())
+    rate_limits.purge_expired(now=clock.database_now())
     due = Evaluation.objects.due()
     n_out_of_reach = due.count() - due.scorable(truth_values.readable_digests()).count()
     if n_out_of_reach:

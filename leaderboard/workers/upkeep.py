@@ -10,9 +10,8 @@ from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
 from leaderboard.people import addresses
 from leaderboard.quotas import mailboxes
-from leaderboard.scoring import questions
 from leaderboard.storage import orphans
-from leaderboard.submissions import forgetting, idempotency
+from leaderboard.submissions import forgetting
 
 log = structlog.get_logger(__name__)
 
@@ -24,8 +23,6 @@ class Cleaned:
     n_files: int
     n_bytes: int
     n_leftovers: int  # half-written files of processes that were killed
-    n_keys: int  # idempotency keys
-    n_questions: int  # about comparisons that no worker could compute
 
 
 def clean(*, now: datetime) -> Cleaned:
@@ -33,8 +30,6 @@ def clean(*, now: datetime) -> Cleaned:
 
     Raises `OSError` if the store does not answer; what was removed until then stays removed.
     """
-    n_keys = idempotency.purge(now=now)
-    n_questions = questions.delete_expired(now=now)
     outbox.purge(now=now)
     mailboxes.delete_expired(now=now)
     forgetting.delete_late_rows()
@@ -51,6 +46,6 @@ def clean(*, now: datetime) -> Cleaned:
         n_files_removed=F("n_files_removed") + n_files,
         n_bytes_removed=F("n_bytes_removed") + n_bytes,
     )
-    cleaned = Cleaned(n_files, n_bytes, n_leftovers, n_keys, n_questions)
+    cleaned = Cleaned(n_files, n_bytes, n_leftovers)
     log.info("cleaned", **vars(cleaned))
     return cleaned

@@ -43,7 +43,6 @@ def operations() -> Iterator[Any]:
 @pytest.fixture(autouse=True)
 def no_quotas(settings: Settings) -> None:
     settings.QUOTAS = False
-    settings.WAITERS = 0  # nobody waits a minute for made-up things
 
 
 def headers_of(world: World, role: str, method: str) -> dict[str, str]:

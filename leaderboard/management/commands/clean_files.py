@@ -8,11 +8,10 @@ from django.utils import timezone
 
 from evaluator.counting import counted
 from leaderboard.storage import orphans
-from leaderboard.submissions import idempotency
 
 
 class Command(BaseCommand):
-    """Lists or removes files that no submission names; with them go old idempotency keys."""
+    """Lists or removes files that no submission names."""
 
     help = "List stored files without a submission that are older than a day; --remove deletes them."
 
@@ -32,10 +31,6 @@ class Command(BaseCommand):
             self.stdout.write(f"half-written: {path.name}")
             if options["remove"]:
                 path.unlink(missing_ok=True)
-        n_keys = idempotency.purge(now=timezone.now()) if options["remove"] else 0
-        if n_keys:
-            keys = counted(n_keys, "idempotency key")
-            self.stdout.write(f"{keys} of more than {idempotency.KEPT.days} days ago removed.")
 
     def _files(self, *, remove: bool) -> None:
         now = timezone.now()

@@ -2,7 +2,6 @@
 
 from django.http import HttpRequest, HttpResponse, JsonResponse
 from django.shortcuts import render
-from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from evaluator.tables import sentences
@@ -22,7 +21,7 @@ N_PROFILES = 5
 def board_charts(request: HttpRequest, split: str) -> HttpResponse:
     """Progress over time, accuracy against latency, errors by TTC range, significance of the first rows."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
-    pairs = comparisons.of_first(board=board, now=timezone.now())
+    pairs = comparisons.of_first(board=board)
     # What is being computed changes by itself.
     draw = cacheable(_drawn) if all(pair.differences is not None for pair in pairs) else _drawn
     return draw(request, board, pairs)

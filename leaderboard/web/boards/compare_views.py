@@ -53,7 +53,7 @@ def compare(request: HttpRequest) -> HttpResponse:
             now=timezone.now(),
             address=rate_limits.address_of(request),
         )
-    except (comparisons.BadComparison, questions.TooManyWaiting) as refusal:
+    except (comparisons.BadComparison, questions.AskedTooOften) as refusal:
         return _refused(request, split, refusal)
     draw = cacheable(_drawn) if compared.is_complete else _drawn  # what is being computed changes by itself
     return draw(request, compared)
@@ -93,13 +93,13 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
 
 
 def _refused(
-    request: HttpRequest, split: Split | None, refusal: comparisons.BadComparison | questions.TooManyWaiting
+    request: HttpRequest, split: Split | None, refusal: comparisons.BadComparison | questions.AskedTooOften
 ) -> HttpResponse:
     """What is wrong with the choice, and the choice again."""
     status = NOT_FOUND if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else UNPROCESSABLE
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
     response = render(request, "boards/compare/choose.html", context, status=status)
-    if isinstance(refusal, questions.TooManyWaiting):
+    if isinstance(refusal, questions.AskedTooOften):
         response.status_code = TOO_MANY
         response["Retry-After"] = str(refusal.retry_after_s)
     return response

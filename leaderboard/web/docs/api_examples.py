@@ -146,8 +146,8 @@ EXAMPLES: Final[Mapping[str, Example]] = {
         "list(client.submissions())",
     ),
     "submission": Example(
-        _own(f"submissions/{SUBMISSION}", ("wait", "60")),
-        _own(f"submissions/{SUBMISSION}", ("wait", "100")),
+        _own(f"submissions/{SUBMISSION}"),
+        _own(f"submissions/{NOBODYS}"),
         f"tsttc status {SUBMISSION} --watch",
         f'client.submission("{SUBMISSION}")',
     ),

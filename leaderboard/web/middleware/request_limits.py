@@ -1,14 +1,14 @@
 """Limits of requests, judged before any of the body is read: size and rate.
 
-The API has its own throttles (`leaderboard/api/throttling.py`), whose rates, counts and words these share.
+The API has its own throttles (`leaderboard/api/throttling.py`), of the same kind and with the same words.
 """
 
 import math
-import time
 from collections.abc import Callable
 from typing import Final
 
 from django.conf import settings
+from django.core.cache import cache
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
 
@@ -38,16 +38,37 @@ class UploadLimitMiddleware:
         return render(request, "413.html", {"sentence": sentence}, status=413)
 
 
-class RateLimitMiddleware:
-    """Answers 429 to who does or draws too much on pages. What is answered from memory never comes here.
+class SendThrottle(rate_limits.Throttle):
+    """What somebody sends, of one account, else of one address."""
 
-    What somebody sends is counted per account, else per address, for all web processes together; what is
-    drawn is counted per address by this process alone, which costs the database nothing.
-    """
+    rates, scope, cache = "PAGE_RATES", "send", cache
+
+    def identity(self, request: HttpRequest) -> object | None:
+        """The account, else the address."""
+        return rate_limits.account_or_address(request)
+
+
+class DrawThrottle(rate_limits.Throttle):
+    """Pages drawn for one address."""
+
+    rates, scope = "PAGE_RATES", "draw"
+
+
+class DrawAsOfThrottle(rate_limits.Throttle):
+    """Of these, boards as of a time."""
+
+    rates, scope = "PAGE_RATES", "as_of"
+
+    def identity(self, request: HttpRequest) -> object | None:
+        """The address, if it asks for a time."""
+        return super().identity(request) if "at" in request.GET else None
+
+
+class RateLimitMiddleware:
+    """Answers 429 to who does or draws too much on pages. What is answered from memory never comes here."""
 
     # The API counts by itself, and monitoring is not limited.
     ELSEWHERE: Final = ("/api/", "/healthz", "/readyz", "/healthy", "/metrics")
-    drawn = rate_limits.InMemory()
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
         self.get_response = get_response
@@ -55,29 +76,11 @@ class RateLimitMiddleware:
     def __call__(self, request: HttpRequest) -> HttpResponse:
         """Let those pass who come now and then."""
         if not request.path.startswith(self.ELSEWHERE):
-            answer = self._drawn(request) if request.method in {"GET", "HEAD"} else self._sent(request)
-            if answer is not None and not answer.is_allowed:
-                return _too_many(request, wait_s=answer.wait_s)
+            is_reading = request.method in {"GET", "HEAD"}
+            for throttle in (DrawAsOfThrottle(), DrawThrottle()) if is_reading else (SendThrottle(),):
+                if not throttle.allow_request(request):
+                    return _too_many(request, wait_s=throttle.wait_s)
         return self.get_response(request)
-
-    def _sent(self, request: HttpRequest) -> rate_limits.Decision | None:
-        rate = settings.PAGE_RATES["send"]
-        if rate is None:
-            return None
-        who = (
-            f"account:{request.user.pk}" if request.user.is_authenticated else rate_limits.address_of(request)
-        )
-        return rate_limits.take(who=f"page_send:{who}", rate=rate_limits.rate_of(rate), now_s=time.time())
-
-    def _drawn(self, request: HttpRequest) -> rate_limits.Decision | None:
-        address, answer = rate_limits.address_of(request), None
-        for name in ("as_of", "draw") if "at" in request.GET else ("draw",):
-            rate = settings.PAGE_RATES[name]
-            if rate is not None and (answer is None or answer.is_allowed):
-                answer = self.drawn.take(
-                    who=f"{name}:{address}", rate=rate_limits.rate_of(rate), now_s=time.monotonic()
-                )
-        return answer
 
 
 def _too_many(request: HttpRequest, *, wait_s: float) -> HttpResponse:

@@ -7,7 +7,7 @@ from typing import Final
 
 from leaderboard.models import Evaluation, Status
 from leaderboard.submissions.submissions import Progress
-from leaderboard.templatetags.board import duration, grouped
+from leaderboard.templatetags.board import grouped
 
 MAX_POINTS: Final = 20
 INTERVALS_FOLLOW: Final = "confidence intervals follow"
@@ -96,13 +96,12 @@ def _again(progress: Progress, first: Evaluation, *, awaits_intervals: bool) -> 
 
 
 def waiting(progress: Progress) -> str:
-    """How many go first, and about how long that takes."""
+    """How many go first."""
     if progress.is_late:
         return LATE
     if progress.n_ahead is None:
         return ""
-    place = f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
-    return f"{place}, about {duration(progress.estimate_s)}" if progress.estimate_s is not None else place
+    return f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
 
 
 def truncation(truncated: Mapping[str, int]) -> str:

@@ -133,7 +133,7 @@ def put_documented_answers(site: RecordedSite) -> None:
         "method": "Foo++",
         "method_id": METHOD_ID,
         "url": f"https://leaderboard.example.org/submissions/{ID}/",
-        "queue": {"ahead": 2, "estimate_s": 4.0},
+        "queue": {"ahead": 2},
         "scores": None,
         "counts": None,
         "n_out_of_range": None,

@@ -31,7 +31,7 @@ QUEUED: dict[str, Any] = {
     "split": "val",
     "method": "Foo++",
     "url": f"/submissions/{ID}/",
-    "queue": {"ahead": 2, "estimate_s": 4.2},
+    "queue": {"ahead": 2},
     "scores": None,
     "counts": None,
     "problems": [],
@@ -73,7 +73,7 @@ def test_submit_sends_what_was_said_and_names_the_submission(tsttc: Tsttc, site:
     assert (result.exit_code, result.stderr) == (0, "")
     assert result.stdout.splitlines() == [
         f"Submission {ID}  {site.url}/submissions/{ID}/",
-        "QUEUED, 2 ahead, about 4 s: Foo++ on val",
+        "QUEUED, 2 ahead: Foo++ on val",
     ]
     sent = site.posts[0].parts()
     assert sent.pop("file") == ("predictions.json", PREDICTIONS.read_bytes())
@@ -135,7 +135,7 @@ def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(GET, Reply(QUEUED | {"state": "RUNNING", "queue": None}), Reply(SCORED))
     result = submit(tsttc, "--wait")
     assert result.exit_code == 0
-    assert result.stderr == "QUEUED, 2 ahead, about 4 s\nRUNNING\n"
+    assert result.stderr == "QUEUED, 2 ahead\nRUNNING\n"
     lines = result.stdout.splitlines()
     assert lines[1:3] == ["SCORED: Foo++ on val", ""]
     assert lines[3].split() == COLUMNS
@@ -155,7 +155,7 @@ def test_json_is_the_server_s_document_alone(tsttc: Tsttc, site: RecordedSite) -
 def test_status_asks_once_and_watch_asks_until_the_end(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(GET, Reply(QUEUED), Reply(QUEUED), Reply(SCORED))
     once = tsttc("status", ID)
-    assert (once.exit_code, once.stdout) == (0, "QUEUED, 2 ahead, about 4 s: Foo++ on val\n")
+    assert (once.exit_code, once.stdout) == (0, "QUEUED, 2 ahead: Foo++ on val\n")
     watched = tsttc("status", ID, "--watch")
     assert watched.exit_code == 0
     assert watched.stdout.startswith("SCORED: Foo++ on val\n")
@@ -209,7 +209,7 @@ def test_waiting_job_knows_its_submission_from_the_start(tsttc: Tsttc, site: Rec
     site.put(POST, Reply(QUEUED, status=201))
     site.put(GET, Reply(SCORED))
     result = submit(tsttc, "--wait", "--json")
-    assert result.stderr == f"Submission {ID}  {site.url}/submissions/{ID}/\nQUEUED, 2 ahead, about 4 s\n"
+    assert result.stderr == f"Submission {ID}  {site.url}/submissions/{ID}/\nQUEUED, 2 ahead\n"
     assert json.loads(result.stdout) == SCORED
 
 
@@ -307,7 +307,7 @@ def test_ctrl_c_while_waiting_ends_quietly_with_130(site: RecordedSite) -> None:
         )
     try:
         assert waiting.stderr is not None
-        assert waiting.stderr.readline() == "QUEUED, 2 ahead, about 4 s\n"
+        assert waiting.stderr.readline() == "QUEUED, 2 ahead\n"
         waiting.send_signal(signal.SIGINT)
         stdout, stderr = waiting.communicate(timeout=120)
     finally:
@@ -320,6 +320,6 @@ def test_terminal_shows_the_state_live_and_cannot_be_steered_by_it(site: Recorde
     site.put(GET, Reply(QUEUED), Reply(hostile), Reply(SCORED))
     done, shown = on_terminal("status", ID, "--watch", "--json")
     assert (done.returncode, json.loads(done.stdout)) == (0, SCORED)
-    assert "QUEUED, 2 ahead, about 4 s" in shown
+    assert "QUEUED, 2 ahead" in shown
     assert r"[red]\x1b[2JNEW" in shown
     assert "\x1b[2JNEW" not in shown

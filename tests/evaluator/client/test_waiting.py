@@ -19,12 +19,12 @@ pytestmark = pytest.mark.slow
 
 
 def test_watch_gives_every_state_until_the_final_one(client: Client, site: RecordedSite) -> None:
-    queued = QUEUED | {"queue": {"ahead": 2, "estimate_s": 4.5}}
+    queued = QUEUED | {"queue": {"ahead": 2}}
     site.put(ONE, Reply(queued), Reply(QUEUED | {"state": "RUNNING"}), Reply(SCORED))
     seen = list(client.watch("abc", timeout_s=60))
     assert [submission.state for submission in seen] == ["QUEUED", "RUNNING", "SCORED"]
     assert seen[0].queue is not None
-    assert (seen[0].queue.ahead, seen[0].queue.estimate_s) == (2, 4.5)
+    assert seen[0].queue.ahead == 2
 
 
 def test_watch_asks_less_and_less_often(client: Client, site: RecordedSite, clock: FakeTime) -> None:
@@ -82,22 +82,25 @@ def test_state_of_a_newer_server_is_not_taken_for_a_final_one(client: Client, si
     assert [submission.state for submission in client.watch("abc", timeout_s=60)] == ["PAUSED", "SCORED"]
 
 
-def test_watch_asks_the_server_to_hold_its_answer_after_a_first_look(
+def test_watch_looks_soon_after_the_answer_to_the_file_and_then_as_the_server_says(
     client: Client, site: RecordedSite, clock: FakeTime
 ) -> None:
-    site.put(ONE, Reply(QUEUED), Reply(QUEUED), Reply(SCORED))
-    list(client.watch("abc", timeout_s=60))
-    assert [request.path.partition("?")[2] for request in site.requests] == ["", "wait=20", "wait=20"]
-    assert len(clock.slept_s) == 1, "at once after the first answer, which was not held"
+    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
+    sent = send(client)
+    site.put(ONE, *[Reply(QUEUED, headers={"Retry-After": "1"})] * 2, Reply(SCORED))
+    assert [each.state for each in client.watch("abc", timeout_s=60, seen=sent)][-1] == "SCORED"
+    assert clock.slept_s[0] <= 0.25
+    assert clock.slept_s[1:] == [1.0, 1.0]
 
 
-def test_held_answer_is_not_asked_for_longer_than_one_waits(client: Client, site: RecordedSite) -> None:
-    site.put(ONE, Reply(QUEUED))
-    with pytest.raises(TimedOut):
-        list(client.watch("abc", timeout_s=6))
-    waits = [int(request.path.partition("wait=")[2] or 0) for request in site.requests]
-    assert waits == sorted(waits[:1]) + sorted(waits[1:], reverse=True)
-    assert max(waits) <= 6
+def test_watch_says_nothing_again_that_has_not_changed(
+    client: Client, site: RecordedSite, clock: FakeTime
+) -> None:
+    again = {"ETag": '"q"', "Retry-After": "1"}
+    site.put(ONE, Reply(QUEUED, headers=again), Reply(status=304, headers=again), Reply(SCORED))
+    assert [each.state for each in client.watch("abc", timeout_s=60)] == ["QUEUED", "SCORED"]
+    assert [request.headers.get("If-None-Match") for request in site.requests] == [None, '"q"', '"q"']
+    assert clock.slept_s == [1.0, 1.0]
 
 
 def test_server_that_has_answered_is_waited_for_when_it_goes_away(clock: FakeTime) -> None:

@@ -7,7 +7,7 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from rest_framework.test import APIClient
 
 from evaluator.metrics.protocol import SCORE_NAMES
-from leaderboard.models import ApiToken, Edition, Submission, User
+from leaderboard.models import ApiToken, Edition, Method, Split, Submission, User
 from tests import builders
 
 
@@ -156,3 +156,30 @@ def test_announced_excess_is_refused_before_the_body_is_read(edition: Edition, o
     assert response.status_code == 413
     assert response.json()["code"] == "too-large"
     assert not Submission.objects.exists()
+
+
+def test_method_is_named_by_name_or_by_id(edition: Edition, owner: User, stranger: User) -> None:
+    client = client_of(owner)
+    first = post(client, builders.predictions(edition)).json()
+    again = post(client, builders.predictions(edition, factor=1.2), method=first["method_id"])
+    assert (again.status_code, again.json()["method"]) == (201, "Foo")
+    others = post(client_of(stranger), builders.predictions(edition), method=first["method_id"])
+    assert (others.status_code, others.json()["code"]) == (422, "unknown-method")
+    assert Method.objects.count() == 1
+
+
+def test_the_same_bytes_are_one_submission_and_cost_nothing_again(edition: Edition, owner: User) -> None:
+    Split.objects.filter(pk="test").update(quota_limit=1)
+    client, data = client_of(owner), builders.predictions(edition)
+    first, again = post(client, data), post(client, data, note="sent again")
+    assert (first.status_code, again.status_code) == (201, 200)
+    assert (first.json()["id"], first.headers["Location"]) == (again.json()["id"], again.headers["Location"])
+    assert again.json()["quota"]
+
+
+@pytest.mark.parametrize("key", ["k", '"', ""])
+def test_the_idempotency_key_of_an_older_client_is_ignored(edition: Edition, owner: User, key: str) -> None:
+    client = client_of(owner)
+    client.defaults["HTTP_IDEMPOTENCY_KEY"] = key
+    sent = [post(client, builders.predictions(edition, factor=factor)) for factor in (1.1, 1.2, 1.1)]
+    assert [response.status_code for response in sent] == [201, 201, 200]

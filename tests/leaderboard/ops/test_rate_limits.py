@@ -1,93 +1,103 @@
-"""Rates that all web processes count together."""
+"""Rates: what is let through of one account or address, and what is told of it."""
 
 from datetime import UTC, datetime, timedelta
 
 import pytest
-from django.core.cache import caches
-from django.db import connection
+from django.core.cache import cache, caches
 from django.test import Client
 from pytest_django import DjangoAssertNumQueries, Settings
 
-from leaderboard.models import Allowance, CachedValue, User
+from leaderboard.models import CachedValue, User
 from leaderboard.ops import rate_limits
-from leaderboard.ops.rate_limits import InMemory, Rate
-from tests.leaderboard.db.test_races import at_once
 
 NOW_S = 1_800_000_000.0
-THREE = Rate(n=3, period_s=60)
 
 
-def taken(*, at_s: float, who: str = "somebody", rate: Rate = THREE) -> bool:
-    return rate_limits.take(who=who, rate=rate, now_s=NOW_S + at_s).is_allowed
+class Sent(rate_limits.Throttle):
+    """Three a minute, of whom it is given."""
+
+    scope = "sent"
+    clock_s = NOW_S
+
+    def timer(self) -> float:
+        return self.clock_s
+
+    def identity(self, request: object) -> object | None:
+        return request
 
 
-def test_so_many_at_once_and_then_one_at_a_time(db: None) -> None:
-    assert [taken(at_s=0) for _ in range(4)] == [True, True, True, False]
-    assert [taken(at_s=19.9), taken(at_s=20.1), taken(at_s=20.2)] == [False, True, False]
-    assert [taken(at_s=200) for _ in range(4)] == [True, True, True, False]
+class Together(Sent):
+    """The same, counted by all processes."""
+
+    cache = cache
 
 
-def test_a_refusal_says_when_the_next_is_let_through_and_moves_nothing(db: None) -> None:
+@pytest.fixture(autouse=True)
+def rates(settings: Settings) -> None:
+    settings.API_RATES = {**settings.API_RATES, "sent": "3/min"}
+    rate_limits.IN_PROCESS.clear()
+    cache.clear()
+
+
+def taken(*, at_s: float, who: str = "somebody", kind: type[Sent] = Sent) -> Sent | None:
+    """The throttle, if it lets somebody through."""
+    throttle = kind()
+    throttle.clock_s = NOW_S + at_s
+    return throttle if throttle.allow_request(who) else None
+
+
+@pytest.mark.parametrize("kind", [Sent, Together])
+def test_so_many_in_any_minute(kind: type[Sent]) -> None:
+    moments = (0, 0, 20, 59, 61, 62, 79, 81)
+    assert [taken(at_s=at_s, kind=kind) is not None for at_s in moments] == [
+        *(True, True, True, False),
+        *(True, True, False, True),
+    ]
+
+
+def test_a_refusal_says_when_the_next_is_let_through_and_counts_nothing() -> None:
     for _ in range(3):
         taken(at_s=0)
-    answers = [rate_limits.take(who="somebody", rate=THREE, now_s=NOW_S + at_s) for at_s in (1, 5)]
-    assert [round(answer.wait_s, 3) for answer in answers] == [19, 15]
-    assert [answer.n_left for answer in answers] == [0, 0]
-    assert taken(at_s=20.1)
+    refused = Sent()
+    for at_s in (1, 41):
+        refused.clock_s = NOW_S + at_s
+        assert not refused.allow_request("somebody")
+        assert (refused.wait_s, refused.n_left) == (60 - at_s, 0)
+    assert taken(at_s=60)
 
 
-def test_what_is_left_is_told(db: None) -> None:
-    left = [rate_limits.take(who="somebody", rate=THREE, now_s=NOW_S).n_left for _ in range(3)]
-    assert left == [2, 1, 0]
+def test_what_is_left_is_told() -> None:
+    some = [taken(at_s=0) for _ in range(3)]
+    assert [(each.n_left, each.wait_s) for each in some if each] == [(2, 0), (1, 0), (0, 60)]
 
 
-def test_people_and_rates_are_counted_apart(db: None) -> None:
-    assert [taken(at_s=0, who=f"{n}") for n in range(5)] == [True] * 5
+def test_people_and_rates_are_counted_apart() -> None:
+    assert all(taken(at_s=0, who=f"{n}") for n in range(5))
+    assert all(taken(at_s=0, kind=kind) for kind in (Sent, Together) for _ in range(3))
 
 
-def test_one_statement_counts_a_request(db: None, django_assert_num_queries: DjangoAssertNumQueries) -> None:
-    with django_assert_num_queries(1):
-        assert taken(at_s=0)
+def test_reading_asks_the_database_nothing(
+    db: None, shared_cache: None, django_assert_num_queries: DjangoAssertNumQueries
+) -> None:
+    with django_assert_num_queries(0):
+        taken(at_s=0)
 
 
-def test_nobody_reads_addresses_out_of_the_table(db: None) -> None:
-    taken(at_s=0, who="visitor:203.0.113.9")
-    assert "203.0.113.9" not in str(list(Allowance.objects.values()))
+def test_what_is_sent_is_counted_by_all_processes(db: None, shared_cache: None) -> None:
+    assert taken(at_s=0, kind=Together)
+    assert CachedValue.objects.count() == 1
+
+
+def test_nobody_reads_addresses_out_of_the_table(db: None, shared_cache: None) -> None:
+    taken(at_s=0, who="203.0.113.9", kind=Together)
+    assert "203.0.113.9" not in str(list(CachedValue.objects.values()))
 
 
 def test_what_is_over_is_forgotten(db: None) -> None:
-    taken(at_s=0)
-    CachedValue.objects.create(
-        cache_key="x", value="", expires=datetime.fromtimestamp(NOW_S, tz=UTC) + timedelta(seconds=5)
-    )
-    assert rate_limits.purge_expired(now_s=NOW_S + 1) == 0
-    assert rate_limits.purge_expired(now_s=NOW_S + 30) == 2
-    assert not Allowance.objects.exists()
-
-
-def test_memory_counts_like_the_database(db: None) -> None:
-    memory = InMemory()
-    for at_s in (0, 0, 0, 0, 19, 21, 22, 45, 300):
-        answer = memory.take(who="somebody", rate=THREE, now_s=NOW_S + at_s)
-        assert answer == rate_limits.take(who="somebody", rate=THREE, now_s=NOW_S + at_s)
-    memory.forget()
-    assert memory.take(who="somebody", rate=THREE, now_s=NOW_S).n_left == 2
-
-
-@pytest.mark.services
-@pytest.mark.django_db(transaction=True)
-@pytest.mark.skipif("connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql")
-def test_two_processes_cannot_both_take_the_last_place() -> None:
-    rate = Rate(n=20, period_s=60)
-    found = at_once(100, lambda _: taken(at_s=0, rate=rate))
-    assert (found.count(True), len(found)) == (20, 100)
-
-
-@pytest.mark.skipif("connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql")
-def test_counts_cost_no_write_ahead_log(db: None) -> None:
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT relpersistence FROM pg_class WHERE relname = 'leaderboard_allowance'")
-        assert cursor.fetchone() == ("u",)
+    now = datetime.fromtimestamp(NOW_S, tz=UTC)
+    CachedValue.objects.create(cache_key="x", value="", expires=now + timedelta(seconds=5))
+    assert rate_limits.purge_expired(now=now + timedelta(seconds=1)) == 0
+    assert rate_limits.purge_expired(now=now + timedelta(seconds=30)) == 1
 
 
 # --- signing in ------------------------------------------------------------------------------------------

@@ -15,10 +15,10 @@ from django.utils import timezone
 from pytest_django import Settings
 from structlog.testing import capture_logs
 
-from leaderboard.models import AuditEvent, Edition, IdempotencyKey, Submission, User
+from leaderboard.models import AuditEvent, Edition, Submission, User
 from leaderboard.ops import prometheus
 from leaderboard.storage import files, orphans
-from leaderboard.workers import queue, upkeep
+from leaderboard.workers import queue
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -184,7 +184,7 @@ def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path,
     with capture_logs() as lines:
         queue.clean_if_due(rng=random.Random(0), stopping=threading.Event())
     [line] = [line for line in lines if line["event"] == "cleaned"]
-    assert (line["n_files"], line["n_bytes"], line["n_leftovers"], line["n_keys"]) == (1, 10, 1, 0)
+    assert (line["n_files"], line["n_bytes"], line["n_leftovers"]) == (1, 10, 1)
     assert not orphan.exists()
     assert not half.exists()
     assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1
@@ -199,18 +199,3 @@ def test_two_that_clean_at_once_remove_a_file_once(orphan: Path) -> None:
     found = [list(orphans.orphans(now=now)) for _ in range(2)]
     assert [[orphans.remove(row, now=now) for row in rows] for rows in found] == [[True], [False]]
     assert AuditEvent.objects.filter(verb="removed", noun="File").count() == 1
-
-
-def test_old_idempotency_keys_go_with_them(edition: Edition, owner: User) -> None:
-    sent = builders.submit(owner, builders.predictions(edition))
-    now = timezone.now()
-    for days in (1, 8):
-        IdempotencyKey.objects.create(
-            user=owner,
-            key=f"{days} days",
-            request_digest="sha256:0",
-            submission=sent,
-            created_at=now - timedelta(days=days),
-        )
-    assert upkeep.clean(now=now).n_keys == 1
-    assert IdempotencyKey.objects.get().key == "1 days"

@@ -100,7 +100,7 @@ def test_links_between_objects_lead_somewhere(client: Client, benchmark: None) -
 def test_submitting_says_what_to_send_and_that_it_needs_an_account(client: Client, benchmark: None) -> None:
     root = operation_page(client, "submit")
     assert "It needs an API token." in root.text
-    fields = [row.all("td")[0].text for row in root.all("tbody")[1].all("tr")]
+    fields = [row.all("td")[0].text for row in root.all("tbody")[0].all("tr")]
     assert fields[:3] == ["split", "method", "file"]
     answers = [dt.text for dt in root.all("dl")[0].all("dt")]
     assert answers == ["200", "201", "400", "409", "413", "422", "429"]

@@ -16,8 +16,7 @@ from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.storage import files, manifests
 from leaderboard.web.submissions import forms
 from tests import builders, pages
-from tests.leaderboard.api.test_idempotency import keyed
-from tests.leaderboard.api.test_submissions import client_of
+from tests.leaderboard.api.test_submissions import client_of, post
 
 FIELDS = {"split": "test", "method": "Foo", "description": "", "paper_url": "", "code_url": ""}
 
@@ -57,7 +56,7 @@ def test_a_file_is_hashed_once_by_whatever_way_it_comes(edition: Edition, owner:
     with patch.object(files, "measure", wraps=files.measure) as measured:
         send(client, builders.predictions(edition))
         builders.submit(owner, builders.predictions(edition, factor=1.2))
-        keyed(client_of(owner), "key", builders.predictions(edition, factor=1.3))
+        post(client_of(owner), builders.predictions(edition, factor=1.3))
     assert (measured.call_count, Submission.objects.count()) == (3, 3)
 
 
