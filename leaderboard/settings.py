@@ -130,8 +130,6 @@ else:
     DATABASES["default"]["CONN_MAX_AGE"] = env.int("TSTTC_DATABASE_CONN_MAX_AGE", default=60)
     DATABASES["default"]["CONN_HEALTH_CHECKS"] = True
     DATABASES["default"].setdefault("OPTIONS", {})["connect_timeout"] = 5
-    # Only those of `leaderboard/db/prepared.py` are kept: in others the values stand already.
-    DATABASES["default"]["OPTIONS"]["prepare_threshold"] = 0
 
 # The role of web, workers and maintainers on PostgreSQL, which owns nothing (see the command `grant`).
 APPLICATION_ROLE = env.str("TSTTC_APPLICATION_ROLE", default="")

@@ -15,10 +15,9 @@ from weakref import WeakSet
 
 import psycopg
 from django.db import connection, transaction
-from django.db.models import Case, Exists, F, OuterRef, QuerySet, Subquery, When
+from django.db.models import Case, Exists, F, OuterRef, Subquery, When
 from django.db.models.functions import Now
 
-from leaderboard.db import repeated
 from leaderboard.models import (
     BoardVersion,
     Evaluation,
@@ -200,12 +199,7 @@ def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
     hold()
-    ids = list(evaluation_ids)
-    shown = repeated.rows(_splits_showing, of=ids[0]) if len(ids) == 1 else _splits_showing(*ids)
-    _count(sorted({split_id for (split_id,) in shown}), is_exact=False)
-
-
-def _splits_showing(*evaluation_ids: uuid.UUID) -> "QuerySet[Evaluation, tuple[Any, ...]]":
-    shown = Evaluation.objects.filter(pk__in=evaluation_ids, edition__published_at__isnull=False)
+    shown = Evaluation.objects.filter(pk__in=list(evaluation_ids), edition__published_at__isnull=False)
     public = shown.exclude(submission__method__visibility=Visibility.PRIVATE)
-    return public.order_by().values_list("edition__split").distinct()
+    split_ids = public.order_by().values_list("edition__split", flat=True).distinct()
+    _count(sorted(split_ids), is_exact=False)
