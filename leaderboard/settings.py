@@ -332,8 +332,6 @@ if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
 SPECTACULAR_SETTINGS = settings.SPECTACULAR_SETTINGS
 # Waiters that a web process holds at once; gunicorn has as many threads for them (deploy/gunicorn.conf.py).
 WAITERS = env.int("TSTTC_WAITERS", default=16 if PRODUCTION else 4)
-# So long after an addition, anybody may be shown the former board while a worker draws the new one.
-BOARD_LAG = timedelta(seconds=env.float("TSTTC_BOARD_LAG_S", default=3 if PRODUCTION else 0))
 
 # --- what is written down, and who may look --------------------------------------------------------------
 

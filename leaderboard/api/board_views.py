@@ -16,7 +16,7 @@ from rest_framework.request import Request
 from rest_framework.views import APIView
 
 from leaderboard.api.parsers import UniformJSONRenderer
-from leaderboard.api.schema import errors, response_header
+from leaderboard.api.schema import errors
 from leaderboard.api.serializers import BoardSerializer, EntrySerializer
 from leaderboard.api.throttling import AsOfThrottle
 from leaderboard.api.views import current_split, published_edition
@@ -51,13 +51,6 @@ PARAMETERS = {
     "mine": tables.YES_OR_NO,
     **filters.PARAMETERS,
 }
-BEHIND = response_header(
-    "Board-Behind",
-    str,
-    "`true` if something was added a moment ago and is not in this response yet; repeat the request in a few "
-    "seconds, or with a token.",
-    statuses=[200],
-)
 FILTERS = [
     OpenApiParameter(name, str, description=f"{each.label}: {each.kind.takes}.")
     for name, each in filters.FILTERS.items()
@@ -94,7 +87,7 @@ class BoardView(APIView):
 
     @extend_schema(
         operation_id="board",
-        parameters=[SORT, AT, INTERVALS, MINE, *FILTERS, BEHIND],
+        parameters=[SORT, AT, INTERVALS, MINE, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
     def get(self, request: Request, split: str) -> HttpResponseBase:
@@ -111,7 +104,7 @@ class EditionBoardView(APIView):
 
     @extend_schema(
         operation_id="edition_board",
-        parameters=[SORT, INTERVALS, MINE, *FILTERS, BEHIND],
+        parameters=[SORT, INTERVALS, MINE, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
     def get(self, request: Request, split: str, number: int) -> HttpResponseBase:

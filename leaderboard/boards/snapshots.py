@@ -2,7 +2,7 @@
 
 A snapshot is stamped with the version of its split (`leaderboard/versions.py`) as of which it was drawn; with
 another version it is drawn again: by a worker that was told of the change, or by the first reader to find it.
-Only the page cache answers from an old one, and says so (ADR 76). Every snapshot is read from the database as
+Every snapshot is read from the database as
 of one moment, so none mixes two; its `etag` is the digest of what it says, so that a change which nobody can
 see changes nothing.
 
@@ -102,11 +102,6 @@ def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
 def state_of(request: HttpRequest) -> int:
     """The sum of the versions of all boards as this request found them; see `versions.state`."""
     return versions.state_of(_all_splits_of(request))
-
-
-def numbers_of(request: HttpRequest) -> dict[str, int]:
-    """The version of each of them, by split."""
-    return versions.numbers_of(_all_splits_of(request))
 
 
 def _all_splits() -> list[Split]:

@@ -16,12 +16,6 @@ class BoardVersion(models.Model):
     n_times_passed = models.PositiveSmallIntegerField(
         default=0, help_text="Of its split's opening and closing, how many its boards know to be over."
     )
-    exact_number = models.PositiveBigIntegerField(
-        default=0, help_text="The number of the last change that no reader may be late for."
-    )
-    behind_since = models.DateTimeField(
-        null=True, help_text="When a change last made the board that had been drawn an old one."
-    )
 
     def __str__(self) -> str:
         return f"{self.split_id} {self.number}"

@@ -2,7 +2,7 @@
 
 Whoever brings neither a session nor a token is anybody. What such a reader is shown changes only with the
 version of some split's boards (`leaderboard/versions.py`) and with the day, so one statement tells whether an
-answer still holds: none is old but a late one, which says so (ADR 76). A view says with `http.cacheable` that
+answer still holds: none is old. A view says with `http.cacheable` that
 this is so of its answer. The middleware stands before sessions and accounts, so that anybody's question costs
 neither.
 
@@ -24,7 +24,7 @@ import io
 import re
 import sys
 import zlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from datetime import date
 from functools import lru_cache
@@ -47,7 +47,7 @@ from django.utils import timezone
 
 from leaderboard import versions
 from leaderboard.boards.snapshot_store import BoundedCache
-from leaderboard.boards.snapshots import numbers_of, state_of
+from leaderboard.boards.snapshots import state_of
 from leaderboard.http import Parameters, is_cacheable, is_known, parameters_of
 
 Next = Callable[[HttpRequest], HttpResponseBase]
@@ -76,16 +76,6 @@ SHARED_HEADERS: Final = (
 )
 # A browser lets these of a 304 replace what it has kept: left out, a badge would be forbidden elsewhere.
 HEADERS_OF_304: Final = frozenset({"Cross-Origin-Resource-Policy"})
-
-
-# A late answer has this header, and a page this line in place of the mark that `base.html` leaves.
-BEHIND: Final = "Board-Behind"
-MARK: Final = b"<!--behind-->"
-BEHIND_LINE: Final = (
-    b'<p class="notice" role="status">A score was added a moment ago, and is not on this page yet. '
-    b'<a href="">Load the page again</a> in a few seconds.</p>'
-)
-MAX_LATE_BYTES: Final = 4_000_000
 
 
 def is_anybodys(request: HttpRequest) -> bool:
@@ -122,8 +112,7 @@ class CachedResponse:
     """An answer's bytes, as they are and compressed, with the headers that its view gave it.
 
     A long one is kept compressed alone, and `body` is None: who does not take gzip gets it unpacked piece by
-    piece. `ready` has the headers of each form as it left the outermost layer, once it has. `numbers` are the
-    versions of the boards that it is at least of, by split.
+    piece. `ready` has the headers of each form as it left the outermost layer, once it has.
     """
 
     body: bytes | None
@@ -131,7 +120,6 @@ class CachedResponse:
     compressed: bytes
     etag: str
     headers: tuple[tuple[str, str], ...]
-    numbers: Mapping[str, int] = field(default_factory=dict, compare=False)
     ready: dict[Form, dict[str, str]] = field(default_factory=dict, compare=False)
 
     @property
@@ -140,7 +128,7 @@ class CachedResponse:
         return OVERHEAD_BYTES + len(self.body or b"") + len(self.compressed)
 
     @classmethod
-    def of(cls, response: HttpResponseBase, *, numbers: Mapping[str, int] | None = None) -> "CachedResponse":
+    def of(cls, response: HttpResponseBase) -> "CachedResponse":
         """The answer that a view made, or makes while it is read here."""
         # The same bytes compress to the same: a moment within would give each process its own ETag.
         digest, packer, n_body = hashlib.sha256(), zlib.compressobj(6, wbits=_AS_GZIP), 0
@@ -161,7 +149,6 @@ class CachedResponse:
             compressed=b"".join(packed) if n_body >= MIN_COMPRESSED_BYTES else b"",
             etag=digest.hexdigest()[:32],
             headers=tuple((name, response[name]) for name in SHARED_HEADERS if response.has_header(name)),
-            numbers=numbers or {},
         )
 
     def form_for(self, request: HttpRequest) -> Form:
@@ -188,16 +175,6 @@ class CachedResponse:
         response["Cache-Control"] = ANYBODYS
         response["Vary"] = VARY
         return response
-
-    def late(self) -> "CachedResponse":
-        """The same with the line that says so, where it has a place for it."""
-        if self.body is None or MARK not in self.body:
-            return self
-        found = late_pages.get(self.etag)
-        if found is None:
-            page = HttpResponse(self.body.replace(MARK, BEHIND_LINE, 1), headers=dict(self.headers))
-            found = late_pages.put(self.etag, CachedResponse.of(page))
-        return found
 
     def ready_for(self, form: Form) -> HttpResponseBase | None:
         """The response with the headers of every layer; None if this form never went through them."""
@@ -276,7 +253,6 @@ class ResponseCache:
         self.queries.clear()
 
 
-late_pages = BoundedCache[CachedResponse](MAX_LATE_BYTES, cost=lambda _, page: page.n_bytes)
 memory = ResponseCache(plain_bytes=MAX_PLAIN_BYTES, queries_bytes=MAX_QUERIES_BYTES)
 
 
@@ -365,7 +341,7 @@ class PageCacheMiddleware:
         if found is None:
             return self._made(request, address)
         if found[0] != _state(request):
-            return _late(request, *found) or self._made(request, address)
+            return self._made(request, address)
         response = found[1].to(request)
         setattr(response, _REPEATS, found[1])
         return response
@@ -373,25 +349,13 @@ class PageCacheMiddleware:
     def _made(self, request: HttpRequest, address: str) -> HttpResponseBase:
         """Ask the view, and remember what it answers if it says so."""
         # Before the view looks: what it finds may be newer than this state, and is never older.
-        state, numbers = _today(state_of(request)), numbers_of(request)
+        state = _today(state_of(request))
         response: HttpResponseBase = self._get_response(request)
         if not _is_cacheable(response) or request.method == "HEAD":
             return response
-        answer = CachedResponse.of(response, numbers=numbers)
+        answer = CachedResponse.of(response)
         memory.shelf_of(address).put(address, (state, answer))
         return answer.to(request)
-
-
-def _late(request: HttpRequest, state: State, answer: CachedResponse) -> HttpResponseBase | None:
-    """The answer of before, with its own ETag and the word that it is late; None if it may not be."""
-    is_todays = state[1] == _state(request)[1]
-    if not (settings.BOARD_LAG and is_todays):
-        return None
-    if not versions.may_be_late(answer.numbers, lag=settings.BOARD_LAG):
-        return None
-    response = answer.late().to(request)
-    response[BEHIND] = "true"
-    return response
 
 
 def _is_cacheable(response: HttpResponseBase) -> bool:
