@@ -141,14 +141,30 @@ FILES_URL = env.str("TSTTC_FILES_URL", default="")
 if FILES_URL and not FILES_URL.startswith("s3://"):
     environment.FAULTS.append("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
 
+CACHES: dict[str, dict[str, Any]] = {
+    "default": {"BACKEND": "django.core.cache.backends.locmem.LocMemCache"},
+    # What is the same for all readers, by the boards' numbers: each process has its own, so that whoever
+    # restores a database of before has only to start the processes anew.
+    "boards": {
+        "BACKEND": "django.core.cache.backends.locmem.LocMemCache",
+        "LOCATION": "boards",
+        "TIMEOUT": 300,
+        "OPTIONS": {"MAX_ENTRIES": 1000},
+    },
+    # Answers to addresses with a query, of which anybody can make up any number: they push out nothing else.
+    "views": {
+        "BACKEND": "django.core.cache.backends.locmem.LocMemCache",
+        "LOCATION": "views",
+        "TIMEOUT": 300,
+        "OPTIONS": {"MAX_ENTRIES": 300},
+    },
+}
 # Signing in is limited by what is counted here (allauth), so that all web processes count together.
 if PRODUCTION:
-    CACHES = {
-        "default": {
-            "BACKEND": "django.core.cache.backends.db.DatabaseCache",
-            "LOCATION": "leaderboard_cache",
-            "OPTIONS": {"MAX_ENTRIES": 100_000},
-        }
+    CACHES["default"] = {
+        "BACKEND": "django.core.cache.backends.db.DatabaseCache",
+        "LOCATION": "leaderboard_cache",
+        "OPTIONS": {"MAX_ENTRIES": 100_000},
     }
 
 STORAGES: dict[str, dict[str, Any]] = {

@@ -7,10 +7,9 @@ It is raised inside the transaction that makes the change, so nobody ever sees t
 import uuid
 from collections.abc import Iterable
 from datetime import datetime
-from typing import Any
 
 from django.db import connection, transaction
-from django.db.models import F, Sum
+from django.db.models import F
 
 from leaderboard.models import (
     BoardVersion,
@@ -64,13 +63,10 @@ def number(split_id: str) -> int:
 
 def state() -> int:
     """The sum of all versions: the key of everything cached that any board appears in."""
-    total: int | None = BoardVersion.objects.aggregate(total=Sum("number"))["total"]
-    return total or 0
-
-
-def state_of(splits: Iterable[Any]) -> int:
-    """The same of all splits that were read with `board_number`, as `snapshots.splits()` does."""
-    return sum(split.board_number or 0 for split in splits)
+    # Asked for each public answer, and a third of what the ORM takes to make the same.
+    with connection.cursor() as cursor:
+        cursor.execute("SELECT coalesce(sum(number), 0) FROM leaderboard_boardversion")
+        return int(cursor.fetchone()[0])
 
 
 def changed_everywhere() -> None:

@@ -99,11 +99,6 @@ def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
     return ""
 
 
-def state_of(request: HttpRequest) -> int:
-    """The sum of the versions of all boards as this request found them; see `versions.state`."""
-    return versions.state_of(_all_splits_of(request))
-
-
 def _all_splits() -> list[Split]:
     rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
     rows = rows.annotate(**SiteAnnouncement.of_every_row())

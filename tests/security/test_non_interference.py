@@ -15,7 +15,7 @@ from django.test import Client
 from leaderboard.boards import filters
 from leaderboard.models import Method, Snapshot, Submission, User
 from leaderboard.web.boards.board_query import BoardQuery
-from leaderboard.web.middleware import page_cache
+from tests.caching import forget_boards
 from tests.security.addresses import FILTERS, QUERIES, TOGETHER, addresses
 from tests.security.people import ADDRESS
 from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, START, build
@@ -175,7 +175,7 @@ def test_what_is_hidden_is_there_and_would_be_noticed(db: None, tmp_path: Path) 
     paths = ["/", f"/methods/{HIDDEN_METHODS[0]}/", "/board/test/?sort=team"]
 
     def look() -> list[Seen]:
-        page_cache.memory.clear()
+        forget_boards()
         return [seen(Client(REMOTE_ADDR=ADDRESS).get(path)) for path in paths]
 
     before = look()

@@ -36,8 +36,8 @@ from leaderboard.models import (
 from leaderboard.people import teams, tokens
 from leaderboard.storage import seeds, truth_values
 from leaderboard.submissions import submissions
-from leaderboard.web.middleware import page_cache
 from tests import builders
+from tests.caching import forget_boards
 
 START = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 WITH_IDS = (Team, Method, Submission, Evaluation)
@@ -259,4 +259,4 @@ def _settle(scene: Scene, edition: Edition) -> None:
     User.objects.filter(membership__team__in=scene.teams).update(date_joined=START)
     Edition.objects.update(inferred_at=START + timedelta(days=12))
     Snapshot.objects.all().delete()
-    page_cache.memory.clear()
+    forget_boards()
