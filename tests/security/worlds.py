@@ -50,7 +50,7 @@ PUBLIC = (
     # team, method, factor, visibility
     ("Owls", "Foo++", 1.05, "PUBLIC"),
     ("Owls", "Foo", 1.20, "PUBLIC"),
-    ("Crows", "Deep Scale", 1.10, "PUBLIC"),
+    ("Crows", "Deep Range", 1.10, "PUBLIC"),
     ("Jays", "Wide", 1.30, "PUBLIC"),
     ("Strangers", "Their own", 1.25, "PUBLIC"),
     ("Strangers", "Their secret", 1.15, "PRIVATE"),
