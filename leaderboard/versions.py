@@ -35,8 +35,7 @@ def changed(*split_ids: str) -> None:
     for split_id in split_ids:
         if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
             BoardVersion.objects.create(split_id=split_id, number=1)
-    # Workers hear of it, once for each event, to draw boards and to compute intervals. Robust: the rows are
-    # committed by then, and a reader draws what no worker has drawn.
+    # Workers hear of it, once for each event, to compute intervals. Robust: the rows are committed by then.
     transaction.on_commit(broker.work_off, robust=True)
 
 

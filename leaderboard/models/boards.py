@@ -1,9 +1,8 @@
-"""What readers are answered from: a board as it was drawn last, and the number that says if it holds."""
+"""The number that says whether what is kept of a split's boards holds."""
 
 from django.db import models
-from django.utils import timezone
 
-from leaderboard.models.benchmark import Edition, Split
+from leaderboard.models.benchmark import Split
 
 
 class BoardVersion(models.Model):
@@ -19,16 +18,3 @@ class BoardVersion(models.Model):
 
     def __str__(self) -> str:
         return f"{self.split_id} {self.number}"
-
-
-class Snapshot(models.Model):
-    """What everybody sees of an edition, as of one version of its split's boards."""
-
-    edition = models.OneToOneField(Edition, on_delete=models.CASCADE, related_name="snapshot")
-    version = models.PositiveBigIntegerField()
-    body = models.BinaryField()
-    etag = models.CharField(max_length=80)
-    made_at = models.DateTimeField(default=timezone.now)
-
-    def __str__(self) -> str:
-        return str(self.edition)

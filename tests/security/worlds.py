@@ -27,7 +27,6 @@ from leaderboard.models import (
     Evaluation,
     Membership,
     Method,
-    Snapshot,
     Split,
     Submission,
     Team,
@@ -258,5 +257,4 @@ def _settle(scene: Scene, edition: Edition) -> None:
     Membership.objects.filter(team__in=scene.teams).update(joined_at=START)
     User.objects.filter(membership__team__in=scene.teams).update(date_joined=START)
     Edition.objects.update(inferred_at=START + timedelta(days=12))
-    Snapshot.objects.all().delete()
     forget_boards()
