@@ -19,16 +19,7 @@ def main() -> None:
 
 
 def change() -> None:
-    """Change one value that everybody sees, and tell the workers: the next reader has to see it."""
-    _change(is_addition=False)
-
-
-def add() -> None:
-    """The same as when a score was decided: readers may be late."""
-    _change(is_addition=True)
-
-
-def _change(*, is_addition: bool) -> None:
+    """Change one value that everybody sees: the next reader has to see it."""
     from django.db import transaction  # noqa: PLC0415 - needs Django, which is configured only now
     from django.db.models import F  # noqa: PLC0415
 
@@ -38,4 +29,4 @@ def _change(*, is_addition: bool) -> None:
     with transaction.atomic():
         first = Score.objects.order_by("pk").values("pk")[:1]
         Score.objects.filter(pk__in=first).update(value=F("value") + 0.01)
-        (versions.added_to if is_addition else versions.changed)("test")
+        versions.changed("test")

@@ -21,7 +21,6 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
-import psycopg
 
 from tests.journeys.production import REPOSITORY, await_that, free_port, settings_for
 from tests.services import throwaway_database, throwaway_redis
@@ -74,35 +73,14 @@ def run(environment: dict[str, str], *arguments: str) -> None:
 
 
 def print_first_readers(environment: dict[str, str], url: str) -> None:
-    """How long a first reader waits: without workers, at once after a score, and once it is drawn."""
+    """How long the first reader after a change waits."""
     with httpx.Client(base_url=url, trust_env=False, timeout=60) as http:
         http.get(API)
-        alone_ms = []
+        first_ms = []
         for _ in range(N_CHANGES):
             run(environment, "-c", _ROWS.format("change"))
-            alone_ms.append(asked_ms(http))
-        print(f"board_first_reader_without_workers = {statistics.median(alone_ms):.0f} ms", flush=True)
-        command = [sys.executable, "-m", "celery", "--app=leaderboard", "worker", "--concurrency=1"]
-        worker = subprocess.Popen(
-            command, cwd=REPOSITORY, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-        )
-        try:
-            await_that(lambda: is_drawn(environment), what="the worker has drawn the board")
-            drawn_ms, after_ms, late_ms = [], [], []
-            http.get(API, headers=GZIP)
-            for _ in range(N_CHANGES):
-                run(environment, "-c", _ROWS.format("add"))
-                late_ms.append(asked_ms(http))
-                began_s = time.perf_counter()
-                await_that(lambda: is_drawn(environment), what="the worker has drawn the board")
-                drawn_ms.append(1e3 * (time.perf_counter() - began_s))
-                after_ms.append(asked_ms(http))
-        finally:
-            worker.terminate()
-            worker.wait()
-    print(f"board_first_reader_at_once = {statistics.median(late_ms):.0f} ms")
-    print(f"board_drawn_by_a_worker_after = {statistics.median(drawn_ms):.0f} ms")
-    print(f"board_first_reader_after_a_change = {statistics.median(after_ms):.0f} ms")
+            first_ms.append(asked_ms(http))
+    print(f"board_first_reader_after_a_change = {statistics.median(first_ms):.0f} ms", flush=True)
 
 
 def asked_ms(http: httpx.Client) -> float:
@@ -110,16 +88,6 @@ def asked_ms(http: httpx.Client) -> float:
     began_s = time.perf_counter()
     http.get(API, headers=GZIP).raise_for_status()
     return 1e3 * (time.perf_counter() - began_s)
-
-
-def is_drawn(environment: dict[str, str]) -> bool:
-    """Whether what is kept of the board is of its last version."""
-    with psycopg.connect(environment["TSTTC_DATABASE_URL"]) as database:
-        row = database.execute(
-            "SELECT s.version = v.number FROM leaderboard_snapshot s JOIN leaderboard_edition e"
-            " ON e.id = s.edition_id JOIN leaderboard_boardversion v ON v.split_id = e.split_id"
-        ).fetchone()
-    return bool(row and row[0])
 
 
 def print_memory(url: str, master: int, *, name: str) -> None:

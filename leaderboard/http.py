@@ -1,17 +1,14 @@
 """Who gets the response of a view, and who may keep it; answers to conditional requests.
 
-`leaderboard/web/middleware/page_cache.py` reads the mark of what a cache may keep for anonymous readers.
+`leaderboard/web/middleware/public_answers.py` reads the mark of what a cache may keep for anonymous readers.
 """
 
-import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import wraps
 from typing import Any, Final, ParamSpec, TypeVar
 
 from django.contrib.auth.decorators import login_required
-from django.http import HttpRequest, HttpResponseBase
-from django.utils import timezone
+from django.http import HttpRequest, HttpResponseBase, QueryDict
 from django.utils.http import parse_etags
 from django.views.decorators.cache import never_cache
 from django.views.decorators.http import require_http_methods, require_POST, require_safe
@@ -20,7 +17,6 @@ P = ParamSpec("P")
 R = TypeVar("R")
 View = TypeVar("View", bound=Callable[..., HttpResponseBase])
 _MARK: Final = "is_kept"
-_PARAMETERS: Final = "query_parameters"
 
 asks_first = require_http_methods(["GET", "HEAD", "POST"])
 """Of a view that shows a form and takes it."""
@@ -41,66 +37,24 @@ def own_deed(view: View) -> View:
     return login_required(never_cache(require_POST(view)))
 
 
-@dataclass(frozen=True)
-class Parameter:
-    """A query parameter that a view reads, and which texts of it are worth remembering an answer for.
+def cacheable(view: Callable[P, R]) -> Callable[P, R]:
+    """What this view answers anybody depends on the known part of its address and on the boards' numbers.
 
-    To be worth it an empty text has to mean the same as none at all.
+    Of an address that anybody asks for, the view sees what is known alone.
     """
-
-    is_worth_it: Callable[[str], bool]
-    is_list: bool = False  # the view reads every one of that name, in their order; else the last one
-
-
-Parameters = Mapping[str, Parameter]
-NOTHING: Final[Parameters] = {}
-
-
-def one_of(*texts: str) -> Parameter:
-    """Worth remembering: these texts, exactly."""
-    return Parameter(frozenset(texts).__contains__)
-
-
-def matching(pattern: str, *, is_list: bool = False) -> Parameter:
-    """Worth remembering: texts like this, of which the view answers few with 200."""
-    wanted = re.compile(pattern)
-    return Parameter(lambda text: wanted.fullmatch(text) is not None, is_list=is_list)
-
-
-ANYTHING: Final = matching("")
-"""A parameter of which anybody can think of any number of texts: remembered is only where it is empty."""
-
-NEVER: Final = one_of()
-"""The same, where an empty text is not the same as none."""
-
-_DAY: Final = re.compile("[0-9]{4}-[0-9]{2}-[0-9]{2}")
-A_PAST_DAY: Final = Parameter(
-    lambda text: _DAY.fullmatch(text) is not None and text < f"{timezone.now():%Y-%m-%d}"
-)
-"""Worth remembering: days in UTC that are over. Of one that is not, the answer changes when it ends."""
-
-
-def takes(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
-    """A view that reads these query parameters and no others: what else an address names is dropped."""
-    setattr(view, _PARAMETERS, parameters)
-    return view
-
-
-def parameters_of(view: object) -> Parameters | None:
-    """The query parameters that it reads; None for a view that does not say."""
-    return getattr(view, _PARAMETERS, None)
-
-
-def cacheable(view: Callable[P, R], parameters: Parameters = NOTHING) -> Callable[P, R]:
-    """What this view answers anybody depends on its path, on these parameters and on the boards' numbers."""
 
     @wraps(view)
     def marked(*args: P.args, **kwargs: P.kwargs) -> R:
+        request: Any = args[0]
+        query: str | None = getattr(request, "known_query", None)
+        if query is not None:
+            request.GET = QueryDict(query)
+            request.META["QUERY_STRING"] = query
         response = view(*args, **kwargs)
         setattr(response, _MARK, True)
         return response
 
-    return takes(marked, parameters)
+    return marked
 
 
 def is_cacheable(response: Any) -> bool:

@@ -130,8 +130,6 @@ else:
     DATABASES["default"]["CONN_MAX_AGE"] = env.int("TSTTC_DATABASE_CONN_MAX_AGE", default=60)
     DATABASES["default"]["CONN_HEALTH_CHECKS"] = True
     DATABASES["default"].setdefault("OPTIONS", {})["connect_timeout"] = 5
-    # Only those of `leaderboard/db/prepared.py` are kept: in others the values stand already.
-    DATABASES["default"]["OPTIONS"]["prepare_threshold"] = 0
 
 # The role of web, workers and maintainers on PostgreSQL, which owns nothing (see the command `grant`).
 APPLICATION_ROLE = env.str("TSTTC_APPLICATION_ROLE", default="")
@@ -143,14 +141,30 @@ FILES_URL = env.str("TSTTC_FILES_URL", default="")
 if FILES_URL and not FILES_URL.startswith("s3://"):
     environment.FAULTS.append("TSTTC_FILES_URL is not understood; expected s3://bucket/folder, or nothing.")
 
+CACHES: dict[str, dict[str, Any]] = {
+    "default": {"BACKEND": "django.core.cache.backends.locmem.LocMemCache"},
+    # What is the same for all readers, by the boards' numbers: each process has its own, so that whoever
+    # restores a database of before has only to start the processes anew.
+    "boards": {
+        "BACKEND": "django.core.cache.backends.locmem.LocMemCache",
+        "LOCATION": "boards",
+        "TIMEOUT": 300,
+        "OPTIONS": {"MAX_ENTRIES": 1000},
+    },
+    # Answers to addresses with a query, of which anybody can make up any number: they push out nothing else.
+    "views": {
+        "BACKEND": "django.core.cache.backends.locmem.LocMemCache",
+        "LOCATION": "views",
+        "TIMEOUT": 300,
+        "OPTIONS": {"MAX_ENTRIES": 300},
+    },
+}
 # Signing in is limited by what is counted here (allauth), so that all web processes count together.
 if PRODUCTION:
-    CACHES = {
-        "default": {
-            "BACKEND": "django.core.cache.backends.db.DatabaseCache",
-            "LOCATION": "leaderboard_cache",
-            "OPTIONS": {"MAX_ENTRIES": 100_000},
-        }
+    CACHES["default"] = {
+        "BACKEND": "django.core.cache.backends.db.DatabaseCache",
+        "LOCATION": "leaderboard_cache",
+        "OPTIONS": {"MAX_ENTRIES": 100_000},
     }
 
 STORAGES: dict[str, dict[str, Any]] = {
@@ -342,8 +356,6 @@ PAGE_RATES: dict[str, str | None] = {
 if TESTING or not env.bool("TSTTC_THROTTLES", default=True):
     API_RATES, PAGE_RATES = dict.fromkeys(API_RATES), dict.fromkeys(PAGE_RATES)
 SPECTACULAR_SETTINGS = settings.SPECTACULAR_SETTINGS
-# So long after an addition, anybody may be shown the former board while a worker draws the new one.
-BOARD_LAG = timedelta(seconds=env.float("TSTTC_BOARD_LAG_S", default=3 if PRODUCTION else 0))
 
 # --- what is written down, and who may look --------------------------------------------------------------
 

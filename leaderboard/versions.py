@@ -2,28 +2,19 @@
 
 Whoever keeps a copy of a board (see `boards.snapshots`) knows by this number whether it still holds.
 It is raised inside the transaction that makes the change, so nobody ever sees the one without the other.
-
-After a change that only adds something, a reader may for a moment be given the board of before, while a
-worker draws the new one (see `may_be_late`); after any other change nobody is.
 """
 
 import uuid
-from collections.abc import Iterable, Mapping
-from datetime import datetime, timedelta
-from typing import Any
-from weakref import WeakSet
+from collections.abc import Iterable
+from datetime import datetime
 
-import psycopg
 from django.db import connection, transaction
-from django.db.models import Case, Exists, F, OuterRef, QuerySet, Subquery, When
-from django.db.models.functions import Now
+from django.db.models import F
 
-from leaderboard.db import repeated
 from leaderboard.models import (
     BoardVersion,
     Evaluation,
     SiteAnnouncement,
-    Snapshot,
     Split,
     Submission,
     Visibility,
@@ -41,28 +32,10 @@ def changed(*split_ids: str) -> None:
     Call it last of all that a verb writes: see `hold`.
     """
     hold()
-    _count(split_ids, is_exact=True)
-
-
-def added_to(*split_ids: str) -> None:
-    """The same, where something came to what everybody sees and nothing had to go: readers may be late."""
-    hold()
-    _count(split_ids, is_exact=False)
-
-
-def _count(split_ids: Iterable[str], *, is_exact: bool) -> None:
     for split_id in split_ids:
-        shown = Split.objects.filter(pk=OuterRef(OuterRef("split"))).values("published_edition")
-        drawn = Snapshot.objects.filter(edition__in=shown, version=OuterRef("number"))
-        changes = {
-            "number": F("number") + 1,
-            "behind_since": Case(When(Exists(drawn), then=Now()), default=F("behind_since")),
-            **({"exact_number": F("number") + 1} if is_exact else {}),
-        }
-        if not BoardVersion.objects.filter(split=split_id).update(**changes):
-            BoardVersion.objects.create(split_id=split_id, number=1, exact_number=1)
-    # Workers hear of it, once for each event, to draw boards and to compute intervals. Robust: the rows are
-    # committed by then, and a reader draws what no worker has drawn.
+        if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
+            BoardVersion.objects.create(split_id=split_id, number=1)
+    # Workers hear of it, once for each event, to compute intervals. Robust: the rows are committed by then.
     transaction.on_commit(broker.work_off, robust=True)
 
 
@@ -87,73 +60,12 @@ def number(split_id: str) -> int:
     return found or 0
 
 
-_STATE = "SELECT coalesce(sum(number), 0) FROM leaderboard_boardversion"
-_STATE_NAME = b"tsttc_state"
-_prepared = WeakSet[psycopg.Connection[Any]]()
-
-
 def state() -> int:
     """The sum of all versions: the key of everything cached that any board appears in."""
-    # This is asked before every answer, and is all that most of them ask. So PostgreSQL's library is asked
-    # where it can be had, with a prepared statement: it takes a third of what the driver takes.
-    driver = connection.connection
-    if connection.vendor == "postgresql" and driver is not None and not _is_watched():
-        found = _state_of_driver(driver)
-        if found is not None:
-            return found
-        # The connection broke meanwhile: below it is found out, and made anew.
+    # Asked for each public answer, and a third of what the ORM takes to make the same.
     with connection.cursor() as cursor:
-        cursor.execute(_STATE)
+        cursor.execute("SELECT coalesce(sum(number), 0) FROM leaderboard_boardversion")
         return int(cursor.fetchone()[0])
-
-
-def _state_of_driver(driver: "psycopg.Connection[Any]") -> int | None:
-    try:
-        if driver not in _prepared:
-            driver.pgconn.prepare(_STATE_NAME, _STATE.encode())
-            _prepared.add(driver)
-        result = driver.pgconn.exec_prepared(_STATE_NAME, None)
-    except psycopg.Error:
-        return None
-    if result.status != psycopg.pq.ExecStatus.TUPLES_OK:
-        _prepared.discard(driver)
-        return None
-    return int(result.get_value(0, 0) or 0)
-
-
-def state_of(splits: Iterable[Any]) -> int:
-    """The same of all splits that were read with `board_number`, as `snapshots.splits()` does."""
-    return sum(split.board_number or 0 for split in splits)
-
-
-def numbers_of(splits: Iterable[Any]) -> dict[str, int]:
-    """The number of each of these splits, read in the same way."""
-    return {split.pk: split.board_number or 0 for split in splits}
-
-
-def may_be_late(known: Mapping[str, int], *, lag: timedelta) -> bool:
-    """Whether an answer of when boards had these numbers may still be given: one statement.
-
-    It may where only additions came, the first not longer ago than `lag`, and nobody has drawn the board
-    since: so no reader gets a board that is older than one that they may have seen.
-    """
-    drawn = Snapshot.objects.filter(edition=OuterRef("split__published_edition")).values("version")
-    rows = BoardVersion.objects.values_list(
-        "split", "number", "exact_number", "behind_since", Subquery(drawn), Now()
-    )
-    for split_id, number, exact, behind_since, version, now in rows:
-        then = known.get(split_id, 0)
-        if number == then:
-            continue
-        is_drawn_since = version is None or version > then
-        if exact > then or is_drawn_since or behind_since is None or now - behind_since > lag:
-            return False
-    return True
-
-
-def _is_watched() -> bool:
-    """Whether somebody counts or hinders statements, which they could not do to the driver's."""
-    return connection.queries_logged or bool(connection.execute_wrappers) or connection.in_atomic_block
 
 
 def changed_everywhere() -> None:
@@ -180,8 +92,8 @@ def times_passed(*, now: datetime) -> int:
     return n_told
 
 
-def changed_by_methods(method_ids: Iterable[uuid.UUID], *, is_addition: bool = False) -> None:
-    """The same for the splits that these methods have submissions to; as `added_to` for an addition."""
+def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
+    """The same for the splits that these methods have submissions to."""
     methods = list(method_ids)
     submissions = Submission.objects.filter(method__in=methods)
     split_ids = sorted(set(submissions.order_by().values_list("split", flat=True).distinct()))
@@ -189,7 +101,7 @@ def changed_by_methods(method_ids: Iterable[uuid.UUID], *, is_addition: bool = F
         # On no board, and yet with a page of its own: any of the numbers will do.
         split_ids = list(Split.objects.order_by("name").values_list("name", flat=True)[:1])
     if split_ids:
-        (added_to if is_addition else changed)(*split_ids)
+        changed(*split_ids)
 
 
 def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
@@ -200,12 +112,7 @@ def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
     hold()
-    ids = list(evaluation_ids)
-    shown = repeated.rows(_splits_showing, of=ids[0]) if len(ids) == 1 else _splits_showing(*ids)
-    _count(sorted({split_id for (split_id,) in shown}), is_exact=False)
-
-
-def _splits_showing(*evaluation_ids: uuid.UUID) -> "QuerySet[Evaluation, tuple[Any, ...]]":
-    shown = Evaluation.objects.filter(pk__in=evaluation_ids, edition__published_at__isnull=False)
+    shown = Evaluation.objects.filter(pk__in=list(evaluation_ids), edition__published_at__isnull=False)
     public = shown.exclude(submission__method__visibility=Visibility.PRIVATE)
-    return public.order_by().values_list("edition__split").distinct()
+    split_ids = public.order_by().values_list("edition__split", flat=True).distinct()
+    changed(*sorted(split_ids))

@@ -15,9 +15,9 @@ from pytest_django import DjangoDbBlocker
 from pytest_django.fixtures import Settings
 
 from leaderboard.benchmark import splits
-from leaderboard.web.middleware.page_cache import memory
 from leaderboard.web.monitoring import healthiness, readiness
 from tests import emptying, kept, prepared, services, spread
+from tests.caching import forget_boards
 
 # How long an example takes says more about the machine than about the code, and what is found by chance is
 # not found in the change that fails: `--hypothesis-profile=default` looks further.
@@ -155,7 +155,7 @@ def nothing_remembered() -> None:
 
     Nor does what the test before has found out about this machine, or done too often within a minute.
     """
-    memory.clear()
+    forget_boards()
     readiness.forget()
     healthiness.forget()
     cache.clear()

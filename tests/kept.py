@@ -19,8 +19,8 @@ from django.db import connection, transaction
 from django.test import override_settings
 from pytest_django import DjangoDbBlocker
 
-from leaderboard.web.middleware.page_cache import memory
 from tests import spread
+from tests.caching import forget_boards
 
 # Who makes a world in a folder, by the name of the fixture that stands for all of it. One is held at a time.
 MAKERS: dict[str, Callable[[Path], object]] = {}
@@ -96,7 +96,7 @@ def prepare(item: pytest.Item, *, blocker: DjangoDbBlocker) -> None:
             let_go()
             raise
     connection.run_on_commit = []
-    memory.clear()
+    forget_boards()
     cache.clear()
 
 

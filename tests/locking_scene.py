@@ -31,7 +31,7 @@ DAY = timedelta(days=1)
 _SWEPT = (
     *("score", "analysis", "comparison", "truthcomparison", "evaluation"),
     *("submission", "publication", "apitoken", "invitation", "quotaoverride", "method", "membership"),
-    *("admission", "team", "boardversion", "snapshot", "mail"),
+    *("admission", "team", "boardversion", "mail"),
 )
 
 

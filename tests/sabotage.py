@@ -75,15 +75,15 @@ SABOTAGES = (
     Sabotage(
         "finalise without the attempt",
         LIFECYCLE,
-        "{row[0]: row[3] for row in rows if row[:3] in valid}",
+        "{row[0]: row[3] for row in claimable.running(ids) if row[:3] in valid}",
         "{row[0]: row[3] for row in rows if (row[0], row[2]) in {(v[0], v[2]) for v in valid}}",
         f"{STEPS}::test_result_of_a_stale_lease_is_discarded[attempt]",
     ),
     Sabotage(
         "finalise without the token",
         LIFECYCLE,
-        "{row[0]: row[3] for row in rows if row[:3] in valid}",
-        "{row[0]: row[3] for row in rows if row[:2] in {v[:2] for v in valid}}",
+        "{row[0]: row[3] for row in claimable.running(ids) if row[:3] in valid}",
+        "{row[0]: row[3] for row in claimable.running(ids) if row[:2] in {v[:2] for v in valid}}",
         f"{STEPS}::test_result_of_a_stale_lease_is_discarded[token]",
     ),
     Sabotage(

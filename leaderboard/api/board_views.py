@@ -1,35 +1,22 @@
-"""Boards: the current one of each split, and that of every published edition.
+"""Boards: the current one of each split, and that of every published edition."""
 
-Their JSON is written row by row: one of ten thousand rows is never in memory as a whole.
-"""
-
-from collections.abc import Iterator
-from dataclasses import replace
 from datetime import datetime
-from typing import Any, Final
 
 from django.contrib.auth.models import AnonymousUser
-from django.http import HttpResponse, HttpResponseBase, StreamingHttpResponse
 from drf_spectacular.utils import OpenApiParameter, extend_schema
 from rest_framework.permissions import AllowAny
 from rest_framework.request import Request
+from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from leaderboard.api.parsers import UniformJSONRenderer
-from leaderboard.api.schema import errors, response_header
-from leaderboard.api.serializers import BoardSerializer, EntrySerializer
+from leaderboard.api.schema import errors
+from leaderboard.api.serializers import BoardSerializer
 from leaderboard.api.throttling import AsOfThrottle
 from leaderboard.api.views import current_split, published_edition
 from leaderboard.boards import boards, filters, snapshots
-from leaderboard.boards.boards import Board
 from leaderboard.exports import tables
-from leaderboard.http import A_PAST_DAY, one_of
 from leaderboard.models import Edition, Split
 
-# Rows: what a board of so many says is about a megabyte.
-MAX_WHOLE: Final = 1500
-ROWS_AT_ONCE: Final = 100
-_END: Final = b"]}"
 SORT = OpenApiParameter("sort", str, description="Name of a column; `-` before it: descending.")
 AT = OpenApiParameter("at", str, description="The board as of this date or time.")
 INTERVALS = OpenApiParameter(
@@ -44,20 +31,6 @@ MINE = OpenApiParameter(
     enum=list(tables.WITH_INTERVALS),
     description="`0` or `no`: the public board, without the rows that only your team sees.",
 )
-PARAMETERS = {
-    "sort": one_of(*boards.SORTS),
-    "at": A_PAST_DAY,
-    "intervals": tables.YES_OR_NO,
-    "mine": tables.YES_OR_NO,
-    **filters.PARAMETERS,
-}
-BEHIND = response_header(
-    "Board-Behind",
-    str,
-    "`true` if something was added a moment ago and is not in this response yet; repeat the request in a few "
-    "seconds, or with a token.",
-    statuses=[200],
-)
 FILTERS = [
     OpenApiParameter(name, str, description=f"{each.label}: {each.kind.takes}.")
     for name, each in filters.FILTERS.items()
@@ -66,7 +39,7 @@ FILTERS = [
 
 def _board(
     request: Request, *, split: Split, edition: Edition | None = None, at: datetime | None = None
-) -> HttpResponseBase:
+) -> Response:
     query = request.query_params
     mine = query.get("mine", "")
     has_own = not mine or tables.is_asked_for("mine", mine)
@@ -79,11 +52,7 @@ def _board(
         filters=filters.parse(query.dict()),
     )
     has_intervals = tables.is_asked_for("intervals", query.get("intervals", ""))
-    document = pieces(board, has_intervals=has_intervals)
-    # What the page cache takes in piece by piece. Of what is one reader's alone, the ETag needs the whole.
-    is_whole = len(board.entries) <= MAX_WHOLE or request.user.is_authenticated
-    kind = HttpResponse if is_whole else StreamingHttpResponse
-    return kind(document, content_type=UniformJSONRenderer.media_type)
+    return Response(BoardSerializer(board, context={"has_intervals": has_intervals}).data)
 
 
 class BoardView(APIView):
@@ -94,10 +63,10 @@ class BoardView(APIView):
 
     @extend_schema(
         operation_id="board",
-        parameters=[SORT, AT, INTERVALS, MINE, *FILTERS, BEHIND],
+        parameters=[SORT, AT, INTERVALS, MINE, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
-    def get(self, request: Request, split: str) -> HttpResponseBase:
+    def get(self, request: Request, split: str) -> Response:
         """Submissions and quoted rows, ranked by published MiD; filters do not change the ranks."""
         query = request.query_params
         at = boards.parse_time(query["at"]) if query.get("at") else None
@@ -111,28 +80,10 @@ class EditionBoardView(APIView):
 
     @extend_schema(
         operation_id="edition_board",
-        parameters=[SORT, INTERVALS, MINE, *FILTERS, BEHIND],
+        parameters=[SORT, INTERVALS, MINE, *FILTERS],
         responses={200: BoardSerializer, **errors(400, 404)},
     )
-    def get(self, request: Request, split: str, number: int) -> HttpResponseBase:
+    def get(self, request: Request, split: str, number: int) -> Response:
         """Submissions and quoted rows as this edition ranks them."""
         edition = published_edition(split, number)
         return _board(request, split=edition.split, edition=edition)
-
-
-def pieces(board: Board, *, has_intervals: bool) -> Iterator[bytes]:
-    """The document in pieces: what `BoardSerializer` says, byte for byte."""
-    context = {"has_intervals": has_intervals}
-    # Its rows are its last field.
-    frame = _rendered(BoardSerializer(replace(board, entries=()), context=context).data)
-    yield frame.removesuffix(_END)
-    told = EntrySerializer(context=context)
-    for first in range(0, len(board.entries), ROWS_AT_ONCE):
-        rows = [told.to_representation(entry) for entry in board.entries[first : first + ROWS_AT_ONCE]]
-        yield (b"," if first else b"") + _rendered(rows)[1:-1]
-    yield _END
-
-
-def _rendered(data: Any) -> bytes:
-    written: bytes = UniformJSONRenderer().render(data)
-    return written

@@ -14,12 +14,10 @@ from rest_framework.request import Request
 
 from leaderboard.api.exceptions import BadValue, whole_number
 from leaderboard.api.schema import response_header
-from leaderboard.http import NEVER
 
 Row = TypeVar("Row", bound=Model)
 MOST = 100
 
-QUERY = {"limit": NEVER, "after": NEVER}
 PARAMETERS = [
     OpenApiParameter("limit", int, description=f"Rows per page, 1 to {MOST}; default {MOST}."),
     response_header("Link", str, 'The next page, rel="next"; absent on the last page.', statuses=[200]),

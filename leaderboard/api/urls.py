@@ -9,7 +9,6 @@ from leaderboard.api import (
     compare_views,
     edition_views,
     method_views,
-    pagination,
     published_views,
     receipt_views,
     schema,
@@ -39,18 +38,18 @@ urlpatterns = [
     path("splits", cacheable(views.SplitsView.as_view()), name="api-splits"),
     path(
         "splits/<slug:split>/board",
-        cacheable(board_views.BoardView.as_view(), board_views.PARAMETERS),
+        cacheable(board_views.BoardView.as_view()),
         name="api-board",
     ),
     path("submissions/<uuid:submission_id>/withdraw", views.WithdrawView.as_view(), name="api-withdraw"),
     path(
         "splits/<slug:split>/editions",
-        cacheable(edition_views.EditionsView.as_view(), pagination.QUERY),
+        cacheable(edition_views.EditionsView.as_view()),
         name="api-editions",
     ),
     path(
         "splits/<slug:split>/editions/<int:number>/board",
-        cacheable(board_views.EditionBoardView.as_view(), board_views.PARAMETERS),
+        cacheable(board_views.EditionBoardView.as_view()),
         name="api-edition-board",
     ),
     path(
@@ -65,18 +64,18 @@ urlpatterns = [
     ),
     path(
         "splits/<slug:split>/changelog",
-        cacheable(edition_views.ChangelogView.as_view(), pagination.QUERY),
+        cacheable(edition_views.ChangelogView.as_view()),
         name="api-changelog",
     ),
     path("splits/<slug:split>/manifest", views.ManifestView.as_view(), name="manifest"),
     path(
         "published",
-        cacheable(published_views.PublishedTablesView.as_view()),
+        published_views.PublishedTablesView.as_view(),
         name="api-published-tables",
     ),
     path(
         "published/<slug:name>",
-        cacheable(published_views.PublishedTableView.as_view()),
+        published_views.PublishedTableView.as_view(),
         name="api-published-table",
     ),
     path("schema", schema.SchemaView.as_view(), name="api-schema"),

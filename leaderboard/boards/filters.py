@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from leaderboard.boards.rows import Entry
-from leaderboard.http import ANYTHING, Parameters, one_of
 from leaderboard.methods.details import DETAILS, MAX_FILTER_TEXT, YES_NO, Detail, Kind, free_text
 
 
@@ -50,14 +49,6 @@ FILTERS: Mapping[str, Filter] = {
     "q": Filter(free_text(MAX_FILTER_TEXT), "Method or team contains", lambda e: f"{e.method}\n{e.team}"),
 }
 """By the names in addresses, in the order of pages: first those to choose from, then those to type."""
-
-PARAMETERS: Parameters = {
-    name: one_of("", *(option.text.lower() for option in each.kind.options))
-    if each.kind.options
-    else ANYTHING
-    for name, each in FILTERS.items()
-}
-"""Which of their values are worth remembering a board for: choices are few, texts and limits are not."""
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,14 @@ from datetime import UTC, datetime, time, timedelta
 from typing import Final
 from uuid import UUID
 
+from django.core.cache import caches
+
 from leaderboard.boards import boards
 from leaderboard.boards.boards import Board
-from leaderboard.boards.snapshot_store import BoundedCache
 
 MONTH: Final = timedelta(days=30)
 
-_ranks = BoundedCache[dict[UUID, int]](8)
+_A_DAY_S: Final = 86_400
 
 
 def since(*, now: datetime) -> datetime:
@@ -44,16 +45,12 @@ def _ranks_before(board: Board, *, at: datetime) -> dict[UUID, int]:
     split, edition = board.split, board.edition
     if edition is None or edition.published_at is None or edition.published_at > at:
         return {}
-    key = f"{split.pk} {edition.pk} {at.isoformat()}"
-    found = _ranks.get(key)
-    if found is not None:
-        return found
-    if boards.edition_at(split, at) != edition:
-        return _ranks.put(key, {})
-    rows = boards.public_rows(split=split, edition=edition, at=at)
-    return _ranks.put(key, {row.method_id: row.rank for row in rows if row.method_id and row.rank})
 
+    def ranks() -> dict[UUID, int]:
+        if boards.edition_at(split, at) != edition:
+            return {}
+        rows = boards.public_rows(split=split, edition=edition, at=at)
+        return {row.method_id: row.rank for row in rows if row.method_id and row.rank}
 
-def forget() -> None:
-    """Forget what was read."""
-    _ranks.clear()
+    key = f"ranks:{split.pk}:{edition.pk}:{at.isoformat()}"
+    return caches["boards"].get_or_set(key, ranks, _A_DAY_S) or {}

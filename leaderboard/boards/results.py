@@ -8,7 +8,7 @@ from django.contrib.auth.models import AnonymousUser
 from evaluator.metrics.protocol import PRIMARY
 from leaderboard.boards import boards, snapshots
 from leaderboard.boards.rows import Entry, Profile, profile_of
-from leaderboard.boards.snapshot_store import Attempt
+from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Edition, Method, Split, User
 
 
@@ -47,7 +47,7 @@ def results(
         # One that is private is counted where it would stand.
         ranked = drawn.entries if is_shown else (*drawn.entries, entry)
         n_ranked = sum(other.rank is not None for other in ranked)
-        # What is private no snapshot has, because nobody else sees it.
+        # What is private is not among what everybody sees.
         own = snapshots.attempts(edition, methods=Method.objects.filter(pk=method.pk)) if not is_shown else ()
         attempts = own or tuple(each for each in drawn.attempts if each.method_id == method.pk)
         neighbours = _neighbours(entry, drawn.entries)

@@ -1,47 +1,34 @@
-"""Snapshots: the public rows of a board, drawn once for all readers.
+"""What everybody sees of a board: read once for all readers, and kept by the number of its split.
 
-A snapshot is stamped with the version of its split (`leaderboard/versions.py`) as of which it was drawn; with
-another version it is drawn again: by a worker that was told of the change, or by the first reader to find it.
-Only the page cache answers from an old one, and says so. Every snapshot is read from the database as
-of one moment, so none mixes two; its `etag` is the digest of what it says, so that a change which nobody can
-see changes nothing.
-
-A board as of a time is read in the same way for whoever asks, and remembered by this process alone: there are
-more times than can be kept.
+The number (`leaderboard/versions.py`) is read from the database by each request, so what is kept under it is
+never old. The rows are read as of one moment, so none mixes two. A board as of a time is kept in the same
+way, apart: anybody can ask for any number of times.
 """
 
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import datetime, timedelta
+from dataclasses import dataclass
+from datetime import datetime
 from functools import partial
-from typing import Any
+from typing import Any, Final
 from uuid import UUID
 
-import structlog
+import msgspec
+from django.core.cache import caches
 from django.db import connection, transaction
 from django.db.models import F, QuerySet
 from django.http import HttpRequest
-from django.utils import timezone
 
 from evaluator.metrics.protocol import OVERALL
 from leaderboard import versions
 from leaderboard.boards import boards
 from leaderboard.boards.rows import Entry
-from leaderboard.boards.snapshot_store import (
-    Attempt,
-    BoundedCache,
-    CurrentBoard,
-    StoredSnapshot,
-    decode,
-    encode,
-)
 from leaderboard.models import (
     Edition,
     Method,
     Score,
     SiteAnnouncement,
-    Snapshot,
     Split,
     Status,
     Visibility,
@@ -50,35 +37,35 @@ from leaderboard.models import (
 from leaderboard.models.benchmark import Listing
 from leaderboard.models.methods import MethodQuerySet
 
-log = structlog.get_logger(__name__)
 
-# Many changes in a row are drawn once, by whoever reads next, instead of after each of them.
-REDRAW_AFTER = timedelta(seconds=1)
-# The sweep holds a few of the snapshots against what the database says, each after so long.
-CHECK_AFTER = timedelta(minutes=2)
-MAX_CHECKS = 3
+@dataclass(frozen=True, slots=True)
+class Attempt:
+    """One standing submission of a method, with its overall scores."""
 
-# In rows; a small board counts as many as it may grow to. Ten thousand take 50 MB.
-MAX_ROWS, MIN_ROWS = 24_000, 1000
-
-
-def _n_rows(_: str, known: tuple[str, CurrentBoard]) -> int:
-    return min(max(len(known[1].entries), MIN_ROWS), MAX_ROWS)
+    method_id: UUID
+    submission_id: UUID
+    at: datetime
+    scores: Mapping[str, float | None]
 
 
-# By edition, each with the digest of its content: never wrong, at worst forgotten.
-snapshot_cache = BoundedCache[tuple[str, CurrentBoard]](MAX_ROWS, cost=_n_rows)
-# By split, edition, number and time.
-as_of_cache = BoundedCache[tuple[Entry, ...]](4)
-# One thread of this process draws, the others wait for it; who asks for one of the two never for the other.
-_drawing, _drawing_as_of = threading.Lock(), threading.Lock()
+@dataclass(frozen=True)
+class CurrentBoard:
+    """What everybody sees of an edition: the rows, ranked, and everything that was tried, newest first."""
+
+    entries: tuple[Entry, ...]
+    attempts: tuple[Attempt, ...] = ()
 
 
-# --- finding out what holds: one statement ---------------------------------------------------------------
+_BOARD: Final = msgspec.json.Decoder(CurrentBoard)
+# One thread of this process reads what another one needs as well.
+_reading = threading.Lock()
+
+
+# --- splits and editions: one statement ------------------------------------------------------------------
 
 
 def splits() -> list[Split]:
-    """The splits that are not switched off, with their published editions and with what is kept of these.
+    """The splits that are not switched off, with their published editions and the numbers of their boards.
 
     Archived ones come last. It is a whole page's first statement.
     """
@@ -99,20 +86,10 @@ def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
     return ""
 
 
-def state_of(request: HttpRequest) -> int:
-    """The sum of the versions of all boards as this request found them; see `versions.state`."""
-    return versions.state_of(_all_splits_of(request))
-
-
-def numbers_of(request: HttpRequest) -> dict[str, int]:
-    """The version of each of them, by split."""
-    return versions.numbers_of(_all_splits_of(request))
-
-
 def _all_splits() -> list[Split]:
     rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
     rows = rows.annotate(**SiteAnnouncement.of_every_row())
-    return list(_stamped(rows, to_edition="published_edition__"))
+    return list(rows.annotate(board_number=F("board_version__number")))
 
 
 def _all_splits_of(request: HttpRequest) -> list[Split]:
@@ -129,32 +106,21 @@ def _shown(rows: Sequence[Split]) -> list[Split]:
 
 
 def editions() -> "QuerySet[Edition]":
-    """Published editions of splits that are not switched off, with what is kept of them; to be filtered."""
+    """Published editions of splits that are not switched off, with their boards' numbers; to be filtered."""
     rows = (
         Edition.objects.filter(split__in=Split.objects.shown())
         .exclude(published_at=None)
         .select_related("split__published_edition__ground_truth", "ground_truth")
     )
-    return _stamped(rows, to_split="split__")
+    return rows.annotate(board_number=F("split__board_version__number"))
 
 
-def _stamped(rows: "QuerySet[Any]", *, to_edition: str = "", to_split: str = "") -> "QuerySet[Any]":
-    return rows.annotate(
-        kept_version=F(f"{to_edition}snapshot__version"),
-        kept_etag=F(f"{to_edition}snapshot__etag"),
-        board_number=F(f"{to_split}board_version__number"),
-    )
-
-
-def _etag(split: Split, edition: Edition) -> str:
-    """The etag of what is kept of the edition, if it holds; else nothing. Asks only if it was not yet."""
-    row: Any = edition
-    if not hasattr(row, "kept_etag") and split.published_edition_id == edition.pk:
-        row = split
-    if not hasattr(row, "kept_etag"):
-        row = editions().filter(pk=edition.pk).first()
-    holds = row is not None and row.kept_version == (row.board_number or 0)
-    return str(row.kept_etag) if holds else ""
+def _number(split: Any, edition: Any) -> int:
+    """The number of a split's board, as of when one of the two was read; asks only if neither has it."""
+    for row in (split, edition):
+        if hasattr(row, "board_number"):
+            return row.board_number or 0
+    return versions.number(split.pk)
 
 
 # --- reading ---------------------------------------------------------------------------------------------
@@ -172,87 +138,47 @@ board = partial(boards.board, read=_public_rows)
 """The same as `boards.board`, from what is kept; `split` is of `splits()` or `editions()`."""
 
 
-def _as_of(split: Any, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
-    """What everybody saw at that time, read once as long as no board of the split changes."""
-    key = f"{split.pk} {edition and edition.pk} {split.board_number} {at.isoformat()}"
-    found = as_of_cache.get(key)
-    if found is not None:
-        return found
-    with _drawing_as_of:
-        found = as_of_cache.get(key)
-        if found is None:
-            with _repeatable_read():
-                found = as_of_cache.put(key, boards.public_rows(split=split, edition=edition, at=at))
-    return found
+def _as_of(split: Split, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
+    """What everybody saw at that time."""
+
+    def rows() -> CurrentBoard:
+        return CurrentBoard(boards.public_rows(split=split, edition=edition, at=at))
+
+    key = f"{split.pk}:{edition and edition.pk}:{_number(split, edition)}:{at.isoformat()}"
+    return _kept(key, rows, cache="views").entries
 
 
 def shown(*, split: Split, edition: Edition) -> CurrentBoard:
     """What everybody sees of an edition that is or was the board, as of now."""
-    etag = _etag(split, edition)
-    found = _known(edition.pk, etag)
-    if found is None and etag:
-        found = _read([edition.pk]).get(edition.pk)
-    return found or _drawn_by_one(edition)
+    return _kept(f"rows:{edition.pk}:{_number(split, edition)}", partial(_now, edition.pk), cache="boards")
 
 
 def shown_on(rows: Sequence[Split]) -> list[tuple[Split, CurrentBoard]]:
     """What everybody sees of each of these splits' boards, where there is one; `rows` are of `splits()`."""
     with_board = [(split, split.published_edition) for split in rows if split.published_edition is not None]
-    etags = {edition.pk: _etag(split, edition) for split, edition in with_board}
-    found = {pk: _known(pk, etag) for pk, etag in etags.items()}
-    unread = [pk for pk, etag in etags.items() if etag and found[pk] is None]
-    if unread:
-        found.update(_read(unread))
-    return [(split, found[edition.pk] or _drawn_by_one(edition)) for split, edition in with_board]
+    return [(split, shown(split=split, edition=edition)) for split, edition in with_board]
 
 
-def _read(edition_ids: Sequence[int]) -> dict[int, CurrentBoard | None]:
-    """What is kept of these editions; None where another version of this program wrote it."""
-    rows = Snapshot.objects.filter(edition__in=edition_ids)
-    found = {}
-    for pk, etag, body in rows.values_list("edition", "etag", "body"):
-        # Of a large board, two at a time would be twice the memory.
-        snapshot_cache.forget(str(pk))
-        drawn = decode(bytes(body))
-        found[pk] = None if drawn is None else _remembered(pk, etag, drawn)
-    return found
+def _kept(key: str, read: Callable[[], CurrentBoard], *, cache: str) -> CurrentBoard:
+    """What is kept under a key, else what is read now: never older than the number in the key."""
+    body: bytes | None = caches[cache].get(key)
+    if body is None:
+        with _reading:
+            body = caches[cache].get(key) or _encoded(read)
+            caches[cache].set(key, body)
+    return _BOARD.decode(body)
 
 
-def _known(edition_id: int, etag: str) -> CurrentBoard | None:
-    """What this process knows of an edition, if it is what this etag names."""
-    found = snapshot_cache.get(str(edition_id))
-    return found[1] if found is not None and found[0] == etag else None
-
-
-def _remembered(edition_id: int, etag: str, drawn: CurrentBoard) -> CurrentBoard:
-    return snapshot_cache.put(str(edition_id), (etag, drawn))[1]
-
-
-def _drawn_by_one(edition: Edition) -> CurrentBoard:
-    """Draw it, or wait for the thread of this process that does."""
-    with _drawing:
-        stamped = editions().get(pk=edition.pk)
-        return _known(edition.pk, _etag(stamped.split, stamped)) or draw(edition)
-
-
-# --- drawing ---------------------------------------------------------------------------------------------
-
-
-def draw(edition: Edition) -> CurrentBoard:
-    """Draw an edition as everybody sees it now, and keep it."""
-    snapshot_cache.forget(str(edition.pk))
-    kept, drawn = _as_of_now(edition)
-    save(edition=edition, kept=kept)
-    return _remembered(edition.pk, kept.etag, drawn)
-
-
-def _as_of_now(edition: Edition) -> tuple[StoredSnapshot, CurrentBoard]:
+def _encoded(read: Callable[[], CurrentBoard]) -> bytes:
     with _repeatable_read():
-        rows = Edition.objects.select_related("split__published_edition", "ground_truth")
-        row = rows.get(pk=edition.pk)
-        version = versions.number(row.split_id)
-        drawn = read(row)
-    return encode(drawn, version=version), drawn
+        return msgspec.json.encode(read())
+
+
+def _now(edition_id: int) -> CurrentBoard:
+    """The edition as the database has it at this moment."""
+    edition = Edition.objects.select_related("split__published_edition", "ground_truth").get(pk=edition_id)
+    entries = boards.public_rows(split=edition.split, edition=edition)
+    return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
 
 
 @contextmanager
@@ -265,68 +191,6 @@ def _repeatable_read() -> Iterator[None]:
                 cursor.execute("SET TRANSACTION ISOLATION LEVEL REPEATABLE READ, READ ONLY")
         # SQLite: a transaction that begins IMMEDIATE is the only writer.
         yield
-
-
-def save(*, edition: Edition, kept: StoredSnapshot) -> None:
-    """Keep what was drawn of an edition, unless something newer is kept already."""
-    values = {"version": kept.version, "body": kept.body, "etag": kept.etag, "made_at": timezone.now()}
-    if not Snapshot.objects.filter(edition=edition, version__lte=kept.version).update(**values):
-        Snapshot.objects.bulk_create([Snapshot(edition=edition, **values)], ignore_conflicts=True)
-
-
-# --- by workers, unasked ---------------------------------------------------------------------------------
-
-
-def redraw(*, now: datetime) -> int:
-    """Draw the boards that changed and that nobody has drawn since. Returns how many that were.
-
-    One that was drawn a moment ago is left to its next reader: where changes come by the hundred, drawing
-    each would be all that the workers do.
-    """
-    return sum(_redraw(split, now=now) for split in splits())
-
-
-def _redraw(split: Split, *, now: datetime) -> bool:
-    if split.published_edition is None:
-        return False
-    recent = Snapshot.objects.filter(edition=split.published_edition, made_at__gt=now - REDRAW_AFTER)
-    if _etag(split, split.published_edition) or recent.exists():
-        return False
-    draw(split.published_edition)
-    return True
-
-
-def check(*, now: datetime) -> int:
-    """Draw the boards that changed, and hold some snapshots against the database. Returns how many differed.
-
-    None should: a verb that changes what everybody sees says so. One that was changed by other means, such
-    as by hand, is found here within minutes.
-    """
-    redraw(now=now)
-    old = Snapshot.objects.filter(made_at__lt=now - CHECK_AFTER).order_by("made_at")
-    return sum(_differed(row) for row in old.select_related("edition").defer("body")[:MAX_CHECKS])
-
-
-def _differed(row: Snapshot) -> bool:
-    """Draw it anew. Returns whether it said something else, though nobody had said that it changed."""
-    kept, _ = _as_of_now(row.edition)
-    has_differed = kept.version == row.version and kept.etag != row.etag
-    if has_differed:
-        log.warning("snapshot_differed", split=row.edition.split_id, edition=row.edition.number)
-        with transaction.atomic():
-            versions.changed(row.edition.split_id)
-        kept, _ = _as_of_now(row.edition)
-    save(edition=row.edition, kept=kept)
-    return has_differed
-
-
-# --- what everybody sees now -----------------------------------------------------------------------------
-
-
-def read(edition: Edition) -> CurrentBoard:
-    """The edition as the database has it, which comes with its split."""
-    entries = boards.public_rows(split=edition.split, edition=edition)
-    return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
 
 
 def attempts(edition: Edition, *, methods: MethodQuerySet) -> tuple[Attempt, ...]:

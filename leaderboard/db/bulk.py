@@ -13,8 +13,6 @@ from typing import Any, Final, TypeVar
 from django.db import connection
 from django.db.models import AutoField, Field, Model, QuerySet
 
-from leaderboard.db import prepared
-
 Fields = Sequence["Field[Any, Any]"]
 Rows = Sequence[Sequence[Any]]
 
@@ -65,7 +63,7 @@ def _execute(fields: Fields, rows: Rows, *, by_column: str, by_row: str) -> None
         [field.get_db_prep_save(value, connection) for value in column]
         for field, column in zip(fields, zip(*rows, strict=True), strict=True)
     ]
-    with prepared.cursor() as cursor:
+    with connection.cursor() as cursor:
         if connection.vendor == "postgresql":
             cursor.execute(by_column, columns)
         else:

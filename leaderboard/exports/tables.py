@@ -20,13 +20,11 @@ from leaderboard.boards.boards import Board
 from leaderboard.boards.filters import BadFilter
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports import bibtex
-from leaderboard.http import one_of
 from leaderboard.methods.details import DETAILS
 
 short_authors = layouts.short_authors
 
 WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
-YES_OR_NO: Final = one_of("", *WITH_INTERVALS)
 
 
 def is_asked_for(name: str, text: str) -> bool:

@@ -66,7 +66,7 @@ def change(
                 "reveal_at": reveal_at.isoformat() if reveal_at else None,
             },
         )
-        versions.changed_by_methods([row.pk], is_addition=True)
+        versions.changed_by_methods([row.pk])
     log.info("method_shown", method_id=str(row.pk), visibility=row.visibility)
     return row
 
@@ -133,7 +133,7 @@ def reveal_due(*, now: datetime) -> int:
             _number_taken_name(Method.objects.get(pk=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
-            versions.changed_by_methods([method_id], is_addition=True)
+            versions.changed_by_methods([method_id])
         n_revealed += 1
     return n_revealed
 

@@ -9,7 +9,7 @@ from leaderboard.models.benchmark import (
     Split,
     TruthComparison,
 )
-from leaderboard.models.boards import BoardVersion, Snapshot
+from leaderboard.models.boards import BoardVersion
 from leaderboard.models.inference import Analysis, Comparison, EditionRanges
 from leaderboard.models.limits import CachedValue
 from leaderboard.models.mails import Mail, MailKind, MutedKind

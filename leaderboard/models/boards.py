@@ -1,9 +1,8 @@
-"""What readers are answered from: a board as it was drawn last, and the number that says if it holds."""
+"""The number that says whether what is kept of a split's boards holds."""
 
 from django.db import models
-from django.utils import timezone
 
-from leaderboard.models.benchmark import Edition, Split
+from leaderboard.models.benchmark import Split
 
 
 class BoardVersion(models.Model):
@@ -16,25 +15,6 @@ class BoardVersion(models.Model):
     n_times_passed = models.PositiveSmallIntegerField(
         default=0, help_text="Of its split's opening and closing, how many its boards know to be over."
     )
-    exact_number = models.PositiveBigIntegerField(
-        default=0, help_text="The number of the last change that no reader may be late for."
-    )
-    behind_since = models.DateTimeField(
-        null=True, help_text="When a change last made the board that had been drawn an old one."
-    )
 
     def __str__(self) -> str:
         return f"{self.split_id} {self.number}"
-
-
-class Snapshot(models.Model):
-    """What everybody sees of an edition, as of one version of its split's boards."""
-
-    edition = models.OneToOneField(Edition, on_delete=models.CASCADE, related_name="snapshot")
-    version = models.PositiveBigIntegerField()
-    body = models.BinaryField()
-    etag = models.CharField(max_length=80)
-    made_at = models.DateTimeField(default=timezone.now)
-
-    def __str__(self) -> str:
-        return str(self.edition)

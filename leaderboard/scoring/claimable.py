@@ -21,12 +21,7 @@ def waiting(held: Collection[str] | None) -> QuerySet[Evaluation, tuple[Any, ...
     return scorable.values_list("pk", "attempt", "priority", "edition")
 
 
-def first(_: object, *, limit: int, held: frozenset[str] | None) -> QuerySet[Evaluation, tuple[Any, ...]]:
-    """The first so many of `waiting`."""
-    return waiting(held)[:limit]
-
-
-def running(*ids: uuid.UUID) -> QuerySet[Evaluation, tuple[Any, ...]]:
+def running(ids: Collection[uuid.UUID]) -> QuerySet[Evaluation, tuple[Any, ...]]:
     """Of these, what is claimed, locked: pk, attempt, lease_token, and the present time."""
     return (
         Evaluation.objects.select_for_update(no_key=True)

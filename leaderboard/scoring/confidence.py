@@ -371,5 +371,5 @@ def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, n
             or not shown.isdisjoint(ends)
         )
         if is_seen and present.published_at is not None:
-            versions.added_to(present.split_id)
+            versions.changed(present.split_id)
     return True

@@ -29,7 +29,7 @@ from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
 from leaderboard import audit, versions
-from leaderboard.db import bulk, repeated
+from leaderboard.db import bulk
 from leaderboard.db.clock import after, database_now, just_before
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.models.submissions import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
@@ -152,8 +152,8 @@ def claim(
     """
     token = token or uuid.uuid4()
     with transaction.atomic():
-        known = None if held is None else frozenset(held)
-        if not (rows := repeated.rows(claimable.first, limit=limit, held=known)):
+        rows = list(claimable.waiting(held)[:limit])
+        if not rows:
             return []
         alike = {"priority": rows[0][2], "edition": rows[0][3]}
         if alike["priority"] == Evaluation.PRIORITY_RESCORE and in_batches:
@@ -256,9 +256,8 @@ def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
     With each the present time, by the database's clock.
     """
     ids = [lease.evaluation_id for lease in leases]
-    rows = repeated.rows(claimable.running, of=ids[0]) if len(ids) == 1 else claimable.running(*ids)
     valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
-    return {row[0]: row[3] for row in rows if row[:3] in valid}
+    return {row[0]: row[3] for row in claimable.running(ids) if row[:3] in valid}
 
 
 def fail_attempt(

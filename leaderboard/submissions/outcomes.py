@@ -15,7 +15,7 @@ from evaluator.metrics import metrics
 from evaluator.metrics.protocol import OVERALL, PRIMARY
 from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry, Interval, profile_of, scored_of, submitted_entry
-from leaderboard.boards.snapshot_store import CurrentBoard
+from leaderboard.boards.snapshots import CurrentBoard
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
 from leaderboard.scoring import verdicts
 from leaderboard.submissions import submissions

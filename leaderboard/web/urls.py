@@ -2,10 +2,9 @@
 
 from django.urls import include, path, register_converter
 
-from leaderboard.http import cacheable, takes
+from leaderboard.http import cacheable
 from leaderboard.web.account import data_views, team_views, token_views
 from leaderboard.web.boards import (
-    board_query,
     board_views,
     chart_views,
     compare_views,
@@ -40,10 +39,10 @@ MAINTAINED_EDITION = [
     path("discard/", maintainer_views.discard, name="maintain_discard"),
 ]
 urlpatterns = [
-    path("", cacheable(landing_views.home, board_query.PARAMETERS), name="home"),
-    path("board/", takes(landing_views.main_board, board_query.PARAMETERS), name="main_board"),
-    path("board/<slug:split>/", cacheable(board_views.board, board_query.PARAMETERS), name="board"),
-    path("board/<slug:split>/charts/", takes(chart_views.board_charts), name="charts"),
+    path("", cacheable(landing_views.home), name="home"),
+    path("board/", landing_views.main_board, name="main_board"),
+    path("board/<slug:split>/", cacheable(board_views.board), name="board"),
+    path("board/<slug:split>/charts/", chart_views.board_charts, name="charts"),
     path(
         "board/<slug:split>/charts/progress.json",
         cacheable(chart_views.progress_options),
@@ -52,24 +51,24 @@ urlpatterns = [
     path("board/<slug:split>/editions/", cacheable(board_views.editions), name="editions"),
     path(
         "board/<slug:split>/editions/<int:number>/",
-        cacheable(board_views.edition, board_query.PARAMETERS),
+        cacheable(board_views.edition),
         name="edition",
     ),
     path(
         "board/<slug:split>.<export_format:chosen>",
-        cacheable(export_views.board, export_views.PARAMETERS),
+        cacheable(export_views.board),
         name="export",
     ),
     path(
         "board/<slug:split>/editions/<int:number>.<export_format:chosen>",
-        cacheable(export_views.edition, export_views.PARAMETERS),
+        cacheable(export_views.edition),
         name="edition_export",
     ),
     path("board/<slug:split>/feed.atom", cacheable(shared_views.feed), name="feed"),
     path("feed.atom", cacheable(shared_views.feed), name="feed_of_all"),
     path(
         "methods/<uuid:method_id>/badge.svg",
-        cacheable(shared_views.badge, shared_views.PARAMETERS),
+        cacheable(shared_views.badge),
         name="badge",
     ),
     path("robots.txt", crawler_views.robots, name="robots"),
@@ -86,7 +85,7 @@ urlpatterns = [
     path("submissions/<uuid:submission_id>/receipt.json", submission_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", submission_views.withdraw, name="withdraw"),
     path("methods/<uuid:method_id>/", cacheable(method_views.method), name="method"),
-    path("compare/", takes(compare_views.compare, compare_views.PARAMETERS), name="compare"),
+    path("compare/", compare_views.compare, name="compare"),
     path("methods/<uuid:method_id>/edit/", method_views.edit, name="method_edit"),
     path("methods/<uuid:method_id>/delete/", method_views.delete, name="method_delete"),
     path("methods/<uuid:method_id>/visibility/", method_views.change_visibility, name="method_visibility"),
@@ -109,12 +108,12 @@ urlpatterns = [
     path("docs/", docs_views.docs, name="docs"),
     path("docs/api/", docs_views.api_page, name="api_reference"),
     path("docs/api/<slug:operation_id>/", docs_views.api_operation, name="api_operation"),
-    path("docs/search/", takes(docs_views.find, docs_views.SEARCH_PARAMETERS), name="docs_search"),
+    path("docs/search/", docs_views.find, name="docs_search"),
     path("docs/<path:guide_name>/", docs_views.guide, name="guide"),
-    path("published/", cacheable(paper_charts.published_page), name="published"),
+    path("published/", paper_charts.published_page, name="published"),
     path(
         "published/<slug:table_name>.<slug:suffix>",
-        cacheable(paper_charts.published_table),
+        paper_charts.published_table,
         name="published_table",
     ),
     path("dist/", docs_views.dist, name="dist"),

@@ -12,7 +12,6 @@ from functools import partial
 import structlog
 
 from evaluator import Rejected
-from leaderboard.boards import snapshots
 from leaderboard.editions import ground_truth
 from leaderboard.scoring import analyses, comparisons, confidence, questions, sandbox, worker
 from leaderboard.storage import truth_values
@@ -36,8 +35,6 @@ def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], boo
     What fails is logged and left for the next time, and keeps nothing else from being done.
     """
     between = partial(_yield_to_live_work, rng=rng, is_stopping=is_stopping)
-    # Before all that lets submissions by: it takes a moment, and spares the next reader one.
-    snapshots.redraw(now=now)
     try:
         return sum(_done(task, between) for task in _tasks(now=now, between=between))
     except Stopping:

@@ -16,7 +16,6 @@ from django.db.models import BooleanField, ExpressionWrapper, Q
 from django.db.models.functions import Now
 
 from leaderboard import audit, versions
-from leaderboard.boards import snapshots
 from leaderboard.db import clock
 from leaderboard.mails import notices, outbox
 from leaderboard.methods import visibility
@@ -93,7 +92,6 @@ def sweep(*, rng: random.Random) -> None:
     lifecycle.release_expired(rng=rng)
     visibility.reveal_due(now=clock.database_now())
     versions.times_passed(now=clock.database_now())
-    snapshots.check(now=clock.database_now())
     analyses.delete_hidden()
     rate_limits.purge_expired(now=clock.database_now())
     due = Evaluation.objects.due()

@@ -19,7 +19,6 @@ from django.test import Client
 from django.utils import timezone
 
 from evaluator.predictions import sandbox
-from leaderboard.db import repeated
 from leaderboard.methods import visibility
 from leaderboard.models import Edition, Method, User
 from leaderboard.scoring import worker
@@ -44,8 +43,6 @@ def test_the_map_names_the_modules_that_a_file_passes(
 ) -> None:
     # What a process does once is no part of the way, so another file goes first.
     _walk(signed_in, owner, edition, factor=1.4)
-    # But the statements of a step, which PostgreSQL has made once, belong to it.
-    repeated._made.cache_clear()
     passed = _walk(signed_in, owner, edition, factor=1.1)
     steps = set(re.findall(r"`((?:leaderboard|evaluator)/[a-z_/]+\.py)`", _way())) - {FOR_PROGRAMS}
     beside = passed - steps

@@ -13,9 +13,9 @@ from django.http import HttpResponse, StreamingHttpResponse
 from django.test import Client
 
 from leaderboard.boards import filters
-from leaderboard.models import Method, Snapshot, Submission, User
+from leaderboard.models import Method, Submission, User
 from leaderboard.web.boards.board_query import BoardQuery
-from leaderboard.web.middleware import page_cache
+from tests.caching import forget_boards
 from tests.security.addresses import FILTERS, QUERIES, TOGETHER, addresses
 from tests.security.people import ADDRESS
 from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, START, build
@@ -175,15 +175,15 @@ def test_what_is_hidden_is_there_and_would_be_noticed(db: None, tmp_path: Path) 
     paths = ["/", f"/methods/{HIDDEN_METHODS[0]}/", "/board/test/?sort=team"]
 
     def look() -> list[Seen]:
-        page_cache.memory.clear()
+        forget_boards()
         return [seen(Client(REMOTE_ADDR=ADDRESS).get(path)) for path in paths]
 
     before = look()
     Method.objects.filter(pk=HIDDEN_METHODS[0]).update(visibility="ANONYMOUS", shown_at=START)
-    Snapshot.objects.all().delete()
+    forget_boards()
     assert all(one != other for one, other in zip(before, look(), strict=True))
     before = look()
     Method.objects.filter(pk=scene.methods[-1]).update(visibility="PUBLIC")
-    Snapshot.objects.all().delete()
+    forget_boards()
     assert b"Very Secret Net" not in before[0].body
     assert b"Very Secret Net" in look()[0].body

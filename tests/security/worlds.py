@@ -27,7 +27,6 @@ from leaderboard.models import (
     Evaluation,
     Membership,
     Method,
-    Snapshot,
     Split,
     Submission,
     Team,
@@ -36,8 +35,8 @@ from leaderboard.models import (
 from leaderboard.people import teams, tokens
 from leaderboard.storage import seeds, truth_values
 from leaderboard.submissions import submissions
-from leaderboard.web.middleware import page_cache
 from tests import builders
+from tests.caching import forget_boards
 
 START = datetime(2026, 3, 1, 12, 0, tzinfo=UTC)
 WITH_IDS = (Team, Method, Submission, Evaluation)
@@ -50,7 +49,7 @@ PUBLIC = (
     # team, method, factor, visibility
     ("Owls", "Foo++", 1.05, "PUBLIC"),
     ("Owls", "Foo", 1.20, "PUBLIC"),
-    ("Crows", "Deep Scale", 1.10, "PUBLIC"),
+    ("Crows", "Deep Range", 1.10, "PUBLIC"),
     ("Jays", "Wide", 1.30, "PUBLIC"),
     ("Strangers", "Their own", 1.25, "PUBLIC"),
     ("Strangers", "Their secret", 1.15, "PRIVATE"),
@@ -258,5 +257,4 @@ def _settle(scene: Scene, edition: Edition) -> None:
     Membership.objects.filter(team__in=scene.teams).update(joined_at=START)
     User.objects.filter(membership__team__in=scene.teams).update(date_joined=START)
     Edition.objects.update(inferred_at=START + timedelta(days=12))
-    Snapshot.objects.all().delete()
-    page_cache.memory.clear()
+    forget_boards()

@@ -11,22 +11,14 @@ from evaluator.metrics.protocol import known_metrics
 from leaderboard.boards import boards, filters
 from leaderboard.boards.boards import Board
 from leaderboard.boards.filters import FILTERS, Filter, Filters
-from leaderboard.http import A_PAST_DAY, Parameters, one_of
 from leaderboard.scoring import comparisons
 from leaderboard.templatetags.board import grouped
 
 PER_PAGE: Final = 100
 ALL_COLUMNS: Final = "both"
-_NAMES: Final = ("at", "sort", "columns", *filters.FILTERS, "page")
-_MAX_PAGE_DIGITS: Final = 6
-PARAMETERS: Final[Parameters] = {
-    "at": A_PAST_DAY,
-    "sort": one_of("", *boards.SORTS),
-    "columns": one_of("", ALL_COLUMNS, *known_metrics()),
-    **filters.PARAMETERS,
-    "page": one_of("", *map(str, range(1, 51))),
-}
+NAMES: Final = ("at", "sort", "columns", *filters.FILTERS, "page")
 """What a view of a board reads of its address."""
+_MAX_PAGE_DIGITS: Final = 6
 
 
 class BadView(ValueError):
@@ -59,7 +51,7 @@ class BoardQuery:
         '?sort=-mid&nerf=no'
         """
         wanted = {**self.given, "page": "", **changes}
-        return "?" + urlencode({name: wanted[name] for name in _NAMES if wanted.get(name)})
+        return "?" + urlencode({name: wanted[name] for name in NAMES if wanted.get(name)})
 
     def kept(self, *names: str) -> tuple[tuple[str, str], ...]:
         """What a form that asks for the rest has to send along."""
@@ -84,7 +76,7 @@ def parse(query: Mapping[str, str], *, now: datetime, has_time: bool = True) -> 
 
     `has_time` is False for the board of an edition, which is as it is. Raises one of `FAULTS`.
     """
-    given = {name: query[name].strip() for name in _NAMES if query.get(name, "").strip()}
+    given = {name: query[name].strip() for name in NAMES if query.get(name, "").strip()}
     at = boards.parse_time(given["at"]) if has_time and "at" in given else None
     if at is None:
         given.pop("at", None)

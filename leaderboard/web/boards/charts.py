@@ -17,7 +17,7 @@ from evaluator.metrics.metrics import MID
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import Entry
-from leaderboard.boards.snapshot_store import Attempt
+from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Visibility
 from leaderboard.web.boards.chart_options import (
     Chart,

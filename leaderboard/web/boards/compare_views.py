@@ -1,7 +1,6 @@
 """The page that sets two to five methods side by side."""
 
 from collections import Counter
-from typing import Final
 
 from django.http import HttpRequest, HttpResponse
 from django.shortcuts import render
@@ -10,19 +9,13 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
-from leaderboard.http import cacheable, matching
+from leaderboard.http import cacheable
 from leaderboard.models import Split
 from leaderboard.ops import rate_limits
 from leaderboard.scoring import comparisons, questions
 from leaderboard.web.boards import compare_tables
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 
-_ID: Final = r"[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}"
-PARAMETERS: Final = {
-    "split": matching(r"[a-zA-Z0-9_-]{0,32}"),
-    "m": matching(_ID, is_list=True),
-    "with": matching(rf"({_ID})?"),
-}
 NOT_FOUND, UNPROCESSABLE, TOO_MANY = 404, 400, 429
 # What the page offers to choose from; the board itself offers all.
 MAX_OFFERED = 50

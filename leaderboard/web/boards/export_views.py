@@ -30,7 +30,6 @@ from leaderboard.web.context_processors import split_or_404
 
 # What of a page's address changes what is taken along; a page of it is no table of its own.
 _NOT_OURS: Final = ("page",)
-PARAMETERS: Final = {**board_query.PARAMETERS, "intervals": tables.YES_OR_NO, "mine": tables.YES_OR_NO}
 NOBODYS: Final = (
     "The address asks for the rows of your team as well (mine=1), but you are not signed in; sign in, or use "
     "the address without mine=1."

@@ -1,6 +1,5 @@
 """What other places show of public rows: the badge of a README, and the feed."""
 
-from typing import Final
 from uuid import UUID
 
 from django.conf import settings
@@ -12,12 +11,9 @@ from django.views.decorators.http import require_safe
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import badges, feeds
-from leaderboard.http import matching
 from leaderboard.models import Method, Split
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.context_processors import split_or_404
-
-PARAMETERS: Final = {"split": matching(r"[a-zA-Z0-9_-]{0,32}")}
 
 
 @require_safe

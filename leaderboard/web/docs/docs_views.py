@@ -4,7 +4,7 @@ The documentation asks the database for nothing but the splits of the first page
 well. Long pages are compressed here: not every site has a proxy that does so.
 """
 
-from typing import Any, Final
+from typing import Any
 
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
@@ -15,13 +15,10 @@ from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards.snapshots import splits_of
-from leaderboard.http import ANYTHING, Parameters
 from leaderboard.pages import pages
 from leaderboard.pages.pages import PAGES
 from leaderboard.web import markdown
 from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
-
-SEARCH_PARAMETERS: Final[Parameters] = {"q": ANYTHING}
 
 
 @gzip_page

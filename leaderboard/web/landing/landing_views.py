@@ -36,7 +36,7 @@ class SplitDates:
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
     """The landing page. It was the main board once: addresses with a board's questions still lead there."""
-    if any(request.GET.get(name) for name in board_query.PARAMETERS):
+    if any(request.GET.get(name) for name in board_query.NAMES):
         return main_board(request)
     splits = splits_of(request)
     main = main_split(splits)
@@ -58,7 +58,7 @@ def main_board(request: HttpRequest) -> HttpResponse:
     main = main_split(splits_of(request))
     if main is None:
         raise Http404("There is no board yet.")
-    asked = {name: request.GET[name] for name in board_query.PARAMETERS if request.GET.get(name)}
+    asked = {name: request.GET[name] for name in board_query.NAMES if request.GET.get(name)}
     address = reverse("board", args=[main.pk])
     return HttpResponseRedirect(f"{address}?{urlencode(asked)}" if asked else address)
 

@@ -8,8 +8,6 @@ from csp.constants import NONE, SELF
 MIDDLEWARE: Final = [
     # First, so that every line that a request causes carries its id.
     "leaderboard.web.middleware.request_log.RequestLogMiddleware",
-    # What went through everything below before is answered here.
-    "leaderboard.web.middleware.page_cache.ReadyAnswerMiddleware",
     # What anything below answers, from memory or from a view, gets the same headers.
     "leaderboard.web.middleware.response_headers.HeadersMiddleware",
     "django.middleware.security.SecurityMiddleware",
@@ -21,7 +19,7 @@ MIDDLEWARE: Final = [
     # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
     "leaderboard.api.middleware.ApiHeadersMiddleware",
     # Before sessions and accounts, which somebody without either should not pay for.
-    "leaderboard.web.middleware.page_cache.PageCacheMiddleware",
+    "leaderboard.web.middleware.public_answers.PublicAnswersMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
     "django.middleware.common.CommonMiddleware",
     "django.middleware.csrf.CsrfViewMiddleware",

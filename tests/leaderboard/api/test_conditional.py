@@ -3,11 +3,13 @@
 from typing import Any
 
 import pytest
+from django.db import connection
 from django.test import Client
+from django.test.utils import CaptureQueriesContext
 
 from leaderboard.models import Edition, Submission, User
-from leaderboard.web.middleware.page_cache import memory
 from tests import builders
+from tests.caching import forget_boards
 from tests.openapi import schema
 
 pytestmark = pytest.mark.slow
@@ -93,6 +95,8 @@ def test_the_tag_of_a_manifest_is_its_digest(edition: Edition) -> None:
 def test_an_answer_is_remembered_whole_also_when_the_first_who_asks_has_it(shown: Submission) -> None:
     address = "/api/v1/splits/test/board"
     tag = Client().get(address)["ETag"]
-    memory.clear()
+    forget_boards()
     assert Client().get(address, headers={"If-None-Match": tag}).status_code == 304
-    assert memory.get(address) is not None
+    with CaptureQueriesContext(connection) as captured:
+        assert Client().get(address)["ETag"] == tag
+    assert len(captured) == 1

@@ -13,9 +13,10 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.benchmark import splits
-from leaderboard.models import AuditEvent, Edition, PublishedResult, Snapshot, Split
+from leaderboard.models import AuditEvent, Edition, PublishedResult, Split
 from leaderboard.models.benchmark import SINCE_EVER
 from leaderboard.scoring import confidence
+from tests.caching import forget_boards
 from tests.editions import board_now, corrected, open_edition, paper, publish, quote, roll_back
 from tests.leaderboard.web.test_every_page import assert_sound
 
@@ -57,7 +58,7 @@ def test_a_row_that_is_added_or_replaced_changes_no_board_of_the_past_and_no_for
     assert "Deep Scale" not in on_board()
     assert representations(client, at) == before
     # Nor does what is kept of them, once it is drawn anew.
-    Snapshot.objects.all().delete()
+    forget_boards()
     assert representations(client, at) == before
     later = client.get(f"/board/test.csv?at={timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}").text
     assert "Later" in later

@@ -10,6 +10,7 @@ from django.utils import timezone
 from leaderboard.boards import boards, movement
 from leaderboard.models import Edition, Evaluation, Method, Publication, Split, Submission, User
 from tests import board_rows, builders, pages
+from tests.caching import forget_boards
 
 pytestmark = pytest.mark.slow
 
@@ -17,7 +18,6 @@ pytestmark = pytest.mark.slow
 @pytest.fixture
 def months(edition: Edition, owner: User) -> list[Method]:
     """Eight methods, of which all but two are two months old, as is the edition."""
-    movement.forget()
     methods = board_rows.fill(edition, n=8, user=owner)
     then = timezone.now() - timedelta(days=60)
     old = [method.pk for method in methods[:6]]
@@ -47,7 +47,7 @@ def test_ranks_have_moved_as_the_two_boards_say(months: list[Method]) -> None:
 def test_ranks_of_another_edition_and_boards_of_the_past_have_not_moved(months: list[Method]) -> None:
     assert movement.moved(board_of(days_ago=10), now=timezone.now()) == {}
     Edition.objects.update(published_at=timezone.now())
-    movement.forget()
+    forget_boards()
     assert movement.moved(board_of(), now=timezone.now()) == {}
 
 

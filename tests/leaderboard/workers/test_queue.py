@@ -14,7 +14,7 @@ import pytest
 from django.db import connection, connections
 from django.utils import timezone
 
-from leaderboard.boards import snapshots
+from leaderboard import versions
 from leaderboard.models import Edition, Evaluation, Status, SweepBeat, User
 from leaderboard.ops import health
 from leaderboard.scoring import worker
@@ -98,7 +98,7 @@ def test_a_sweep_that_breaks_is_not_written_down(db: None, monkeypatch: pytest.M
     def break_off(*, now: datetime) -> int:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(snapshots, "check", break_off)
+    monkeypatch.setattr(versions, "times_passed", break_off)
     with pytest.raises(OSError, match="no space"):
         queue.sweep_if_due(rng=random.Random(0), stopping=threading.Event())
     assert health.sweep_age_s() is None, "so that /readyz goes on saying that nobody sweeps"

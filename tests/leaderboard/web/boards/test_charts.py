@@ -15,7 +15,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.boards import snapshots
-from leaderboard.boards.snapshot_store import Attempt
+from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User
 from leaderboard.web.boards import charts
 from tests import builders, pages

@@ -1,0 +1,158 @@
+"""Answers to anybody: what is the same for all readers without an account, kept while no board changes.
+
+Whoever brings neither a session nor a token is anybody. What such a reader is shown changes only with the
+numbers of the boards (`leaderboard/versions.py`) and with the day (rows are new for some days), so both are
+part of the key: the number is read from the database for each request, and a kept answer is never old. A view
+says with `http.cacheable` that this is so of its answer. The middleware stands before sessions and accounts,
+and sees whether one of them leaves a cookie with the answer's first reader.
+
+Each process has two caches, each of a bounded number of answers: one for plain addresses, and one for those
+with a query, so that what anybody can make up, as a text to find, pushes out no plain page. Answers are kept
+compressed, which takes an eighth of the memory. There is no secret of the reader in them, so that their
+compressed length betrays none.
+"""
+
+import gzip
+import hashlib
+import re
+from collections.abc import Callable
+from typing import Any, Final, NamedTuple
+from urllib.parse import urlencode
+
+from django.conf import settings
+from django.contrib.messages.storage.cookie import CookieStorage
+from django.core.cache import caches
+from django.core.exceptions import DisallowedHost
+from django.http import HttpRequest, HttpResponse, HttpResponseBase, HttpResponseNotModified
+from django.utils import timezone
+
+from leaderboard import versions
+from leaderboard.boards import filters
+from leaderboard.http import is_cacheable, is_known
+
+Next = Callable[[HttpRequest], HttpResponseBase]
+
+# Where such views are; elsewhere no request asks for the number.
+PREFIXES: Final = (
+    *("/board/", "/methods/", "/compare/", "/feed", "/sitemap", "/api/v1/splits", "/api/v1/methods/"),
+)
+# All that such views read of an address. What else it names is dropped, such as what a social network adds.
+KNOWN: Final = frozenset(
+    {
+        *("at", "sort", "columns", *filters.FILTERS, "page", "intervals", "mine", "limit", "after"),
+        *("split", "m", "with"),
+    }
+)
+MAX_BYTES: Final = 1_000_000  # of an answer that is kept, compressed
+# "gzip;q=0" asks for anything but that.
+_GZIP: Final = re.compile(r"\bgzip\b(?!\s*;\s*q=0(?:\.0*)?\s*(?:,|$))")
+# Boards of other times are drawn for their one reader, and counted; of days there are few.
+_DAY: Final = re.compile("[0-9]{4}-[0-9]{2}-[0-9]{2}")
+# Shared caches may keep it, but ask every time whether it holds.
+ANYBODYS: Final = "public, no-cache"
+VARY: Final = "Accept-Encoding, Authorization, Cookie, HX-Request"
+# Of the headers that a view sets, those that are everybody's. What is left of a rate, say, is one reader's.
+SHARED_HEADERS: Final = (
+    *("Content-Type", "Content-Disposition", "Content-Language", "Link", "Allow"),
+    "Cross-Origin-Resource-Policy",
+)
+# A browser lets this one of a 304 replace what it has kept: left out, a badge would be forbidden elsewhere.
+HEADER_OF_304: Final = "Cross-Origin-Resource-Policy"
+
+
+class Answer(NamedTuple):
+    """What is kept: the digest of the bytes, the headers that are everybody's, and the bytes, compressed."""
+
+    digest: str
+    headers: dict[str, str]
+    packed: bytes
+
+
+class PublicAnswersMiddleware:
+    """Answers anybody from the cache, and keeps there what views of that kind answer."""
+
+    def __init__(self, get_response: Next) -> None:
+        self._get_response = get_response
+
+    def __call__(self, request: HttpRequest) -> HttpResponseBase:
+        """Answer, or ask the view."""
+        path = request.path_info
+        if not (path == "/" or path.startswith(PREFIXES)) or not is_anybodys(request):
+            return self._get_response(request)
+        at = request.GET.get("at", "")
+        if at and not _DAY.fullmatch(at):
+            return self._get_response(request)
+        query = _known_query(request)
+        request.known_query = query  # type: ignore[attr-defined]  # our own, as `user` is Django's
+        # Before the view looks: what it reads may be newer than this number, and is never older.
+        text = f"{path}?{query} {versions.state()} {timezone.now():%Y-%m-%d}"
+        key = hashlib.sha256(text.encode()).hexdigest()
+        cache = caches["views" if query else "boards"]
+        kept = cache.get(key)
+        if kept is None:
+            response: Any = self._get_response(request)
+            if request.method == "HEAD" or not _may_be_kept(response):
+                return response
+            kept = _answer_of(response)
+            if len(kept.packed) <= MAX_BYTES:
+                cache.set(key, tuple(kept))
+        return _response(request, Answer(*kept))
+
+
+def is_anybodys(request: HttpRequest) -> bool:
+    """Whether nothing about the request says who asks, and it asks for one of our names."""
+    return (
+        request.method in {"GET", "HEAD"}
+        and "HTTP_AUTHORIZATION" not in request.META
+        and "HTTP_HX_REQUEST" not in request.META
+        and settings.SESSION_COOKIE_NAME not in request.COOKIES
+        and CookieStorage.cookie_name not in request.COOKIES
+        and _is_ours(request)
+    )
+
+
+def _is_ours(request: HttpRequest) -> bool:
+    """Whether the site answers to the name that is asked; for another one, the layers refuse."""
+    try:
+        request.get_host()
+    except DisallowedHost:
+        return False
+    return True
+
+
+def _known_query(request: HttpRequest) -> str:
+    """What the address names of `KNOWN`, in one order."""
+    return urlencode([(name, text) for name in sorted(KNOWN) for text in request.GET.getlist(name)])
+
+
+def _may_be_kept(response: HttpResponseBase) -> bool:
+    """Whether the view says so, and the answer is whole and sets nothing for its one reader."""
+    return is_cacheable(response) and response.status_code == 200 and not response.cookies
+
+
+def _answer_of(response: HttpResponse) -> Answer:
+    headers = {name: response[name] for name in SHARED_HEADERS if response.has_header(name)}
+    # The same bytes compress to the same: a moment within would give each process its own.
+    packed = gzip.compress(response.content, 6, mtime=0)
+    return Answer(hashlib.sha256(response.content).hexdigest()[:32], headers, packed)
+
+
+def _response(request: HttpRequest, kept: Answer) -> HttpResponse:
+    """The response to one reader: 304 if they have it, compressed if they take that."""
+    is_packed = _GZIP.search(request.META.get("HTTP_ACCEPT_ENCODING", "")) is not None
+    etag = f'"{kept.digest}-gz"' if is_packed else f'"{kept.digest}"'
+    response: HttpResponse
+    if is_known(request, etag):
+        response = HttpResponseNotModified()
+        if HEADER_OF_304 in kept.headers:
+            response[HEADER_OF_304] = kept.headers[HEADER_OF_304]
+    else:
+        body = kept.packed if is_packed else gzip.decompress(kept.packed)
+        response = HttpResponse(b"" if request.method == "HEAD" else body, headers=kept.headers)
+        response["Content-Length"] = str(len(body))
+        if is_packed:
+            response["Content-Encoding"] = "gzip"
+    response["ETag"] = etag
+    response["Cache-Control"] = ANYBODYS
+    response["Vary"] = VARY
+    return response
