@@ -192,6 +192,9 @@ RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
+# Files of a team in 24 hours, on all splits together, that are rejected, are cancelled, or stop the process
+# that reads them; 0: any number.
+MAX_TEAM_REJECTED_PER_DAY = env.int("TSTTC_MAX_TEAM_REJECTED_PER_DAY", default=30)
 
 # --- rank ranges --------------------------------------------------------------------------------------------
 
@@ -217,7 +220,8 @@ CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.
 CHILD_MEMORY_BYTES = env.int("TSTTC_CHILD_MEMORY_BYTES", default=1_500_000_000)
-CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=60)
+# Seconds; and one more for every 25,000 sequences of the manifest.
+CHILD_CPU_S = env.int("TSTTC_CHILD_CPU_S", default=4)
 
 # --- Celery: a broker message is only a nudge, the database is the queue ------------------------------------
 

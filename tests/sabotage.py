@@ -61,6 +61,7 @@ STRIKES = "tests/leaderboard/scoring/test_lifecycle_strikes.py"
 QUEUE = "tests/leaderboard/workers/test_queue.py"
 OUTAGES = "tests/leaderboard/errors/test_outages.py"
 CHILD = "tests/leaderboard/scoring/test_sandbox.py"
+TAKEN_OVER = "tests/leaderboard/scoring/test_readers_taken_over.py"
 RUNS = "tests/leaderboard/scoring/test_sandbox_runs.py"
 
 SABOTAGES = (
@@ -123,8 +124,8 @@ SABOTAGES = (
     Sabotage(
         "claim what somebody else has",
         "leaderboard/models/submissions.py",
-        "waiting = self.filter(status=Status.QUEUED, due_at__lte=Now())",
-        "waiting = self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
+        "return self.filter(status=Status.QUEUED, due_at__lte=Now())",
+        "return self.filter(status__in=[Status.QUEUED, Status.RUNNING], due_at__lte=Now())",
         f"{STEPS}::test_what_is_claimed_is_not_claimed_again",
     ),
     Sabotage(
@@ -253,7 +254,7 @@ SABOTAGES = (
         "evaluator/limits.py",
         "    resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))\n",
         "",
-        f"{RUNS}::test_file_that_kills_its_reader_is_given_up_after_three_runs_and_the_next_is_scored",
+        f"{RUNS}::test_file_that_kills_its_reader_is_tried_again_behind_the_next_and_given_up_after_three_runs",
     ),
     Sabotage(
         "no processor limit for the child",
@@ -265,9 +266,23 @@ SABOTAGES = (
     Sabotage(
         "the child may open files and sockets",
         "evaluator/limits.py",
-        "    resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))\n",
+        "    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))\n",
         "    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))\n",
         f"{CHILD}::test_child_may_open_nothing_write_nothing_and_start_nothing",
+    ),
+    Sabotage(
+        "the child may make any system call",
+        "evaluator/limits.py",
+        "        system_calls.allow_only_reading(own_limits=own_limits)",
+        "        pass",
+        f"{TAKEN_OVER}::test_reader_that_is_taken_over_reaches_nothing",
+    ),
+    Sabotage(
+        "the child says whose values these are",
+        "leaderboard/scoring/sandbox.py",
+        '    if header.get("digest") != digest:',
+        "    if False:",
+        f"{TAKEN_OVER}::test_a_lie_is_refused_in_words[the digest of another team's file]",
     ),
     Sabotage(
         "the child outlives its worker",

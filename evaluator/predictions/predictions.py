@@ -137,7 +137,15 @@ def sha256_digest(data: bytes) -> str:
 MAX_UNPACKED_BYTES: Final = 64 * 1024 * 1024
 """What a gzip archive may unpack to, far above what the largest split needs."""
 
+MAX_GZIP_MEMBERS: Final = 2_000
+"""What a gzip archive may consist of: gzip and pigz write one member, bgzip one for each 64 KB of text."""
+
 GZIP: Final = b"\x1f\x8b"
+_CHUNK_BYTES: Final = 1 << 16
+_PADDING: Final = re.compile(rb"\x00*")
+MAX_COLUMNS: Final = 1_000
+"""What a line of a CSV table may have, far more than the columns that are read."""
+
 NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
 VALUES: Final = {"ttc": "ttc", "ttc_s": "ttc", "scale_ratio": "scale_ratio"}
 RATES: Final = ("fps", "frame_gap")
@@ -165,23 +173,43 @@ def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
 
 
 def _unpacked(data: bytes) -> bytes:
-    """The content of a gzip archive, of all its members; nothing beyond the limit is ever unpacked."""
-    parts, n_bytes = list[bytes](), 0
-    while data:
-        # A child that reads files may open nothing, and zlib opens nothing.
-        reader = zlib.decompressobj(wbits=31)
+    """The content of a gzip archive, of all its members; nothing beyond the limits is ever unpacked."""
+    parts, start, n_members, n_left = list[bytes](), 0, 0, MAX_UNPACKED_BYTES
+    while start < len(data):
+        n_members += 1
+        if n_members > MAX_GZIP_MEMBERS:
+            message = (
+                f"The gzip archive has more than {MAX_GZIP_MEMBERS:,} members; expected at most "
+                f"{MAX_GZIP_MEMBERS:,}, as gzip, pigz and bgzip write them."
+            )
+            raise reject("too-many-members", message, f"byte {start}")
+        content, end = _member(data, start, max_bytes=n_left)
+        parts.append(content)
+        n_left -= len(content)
+        padding = _PADDING.match(data, end)
+        start = padding.end() if padding else end
+    return b"".join(parts)
+
+
+def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
+    """The content of the member that begins at `start`, and where it ends; at most `max_bytes` of content."""
+    # A child that reads files may open nothing, and zlib opens nothing.
+    reader, parts = zlib.decompressobj(wbits=31), list[bytes]()
+    while not reader.eof:
+        if start >= len(data):
+            raise reject("not-json", "The file is not an intact gzip archive: it ends too early.")
+        # In pieces: zlib copies what comes behind the member's end.
+        piece = data[start : start + _CHUNK_BYTES]
         try:
-            parts.append(reader.decompress(data, MAX_UNPACKED_BYTES + 1 - n_bytes))
+            parts.append(reader.decompress(piece, max_bytes + 1))
         except zlib.error as error:
             raise reject("not-json", f"The file is not an intact gzip archive: {error}.") from None
-        n_bytes += len(parts[-1])
-        if n_bytes > MAX_UNPACKED_BYTES:
+        max_bytes -= len(parts[-1])
+        if max_bytes < 0:
             message = f"The archive unpacks to more than {MAX_UNPACKED_BYTES:,} bytes; expected at most that."
             raise reject("too-large", message)
-        if not reader.eof:
-            raise reject("not-json", "The file is not an intact gzip archive: it ends too early.")
-        data = reader.unused_data.lstrip(b"\x00")
-    return b"".join(parts)
+        start += len(piece) - len(reader.unused_data)
+    return b"".join(parts), start
 
 
 def _is_table(data: bytes) -> bool:
@@ -202,20 +230,30 @@ def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
     except UnicodeDecodeError as error:
         message = f"Byte {error.start:,} of the table is not UTF-8; expected CSV text encoded in UTF-8."
         raise reject("not-utf8", message, f"byte {error.start}") from None
-    rows = csv.reader(io.StringIO(text.lstrip(), newline=""), strict=True)
+    rows = csv.reader(_lines(text.lstrip(), max_rows=max_rows), strict=True)
     try:
         header = [name.strip() for name in next(rows)]
-        return document_of(header, _checked(rows, n_fields=len(header), max_rows=max_rows))
+        return document_of(header, _checked(rows, n_fields=len(header)))
     except csv.Error as error:
         message = f"This is not a CSV table: {error}."
         raise reject("bad-csv", message, f"line {rows.line_num}") from None
 
 
-def _checked(rows: Iterator[list[str]], *, n_fields: int, max_rows: int | None) -> Iterator[list[str]]:
-    for number, row in enumerate(filter(None, rows), start=1):
+def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
+    """The lines of a table, its header first; refused before the fields of a line take memory."""
+    for number, line in enumerate(io.StringIO(text, newline="")):
         if max_rows is not None and number > max_rows:
             message = f"The table has more than {max_rows:,} rows; expected one for each sequence."
             raise reject("too-many-members", message)
+        n_fields = line.count(",") + 1
+        if n_fields > MAX_COLUMNS:
+            message = f"The line has up to {n_fields:,} fields; expected at most {MAX_COLUMNS:,}."
+            raise reject("too-many-members", message, f"line {number + 1}")
+        yield line
+
+
+def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]:
+    for number, row in enumerate(filter(None, rows), start=1):
         if len(row) != n_fields:
             message = f"The row has {len(row)} fields; expected {n_fields}, as the header."
             raise reject("bad-csv", message, f"row {number}")
@@ -243,7 +281,7 @@ def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> 
     `Rejected` for a table without the columns that it needs.
     """
     keys, value, rate = columns_of(header)
-    columns = {name: header.index(name) for name in header}
+    columns = {name: header.index(name) for name in (*keys, value, *([rate] if rate else []))}
     places = [columns[name] for name in keys]
     members, ratios = list[str](), list[str]()
     for row in rows:

@@ -6,7 +6,7 @@ from typing import ClassVar, NamedTuple, Self
 
 from django.contrib.auth.models import AnonymousUser
 from django.db import models
-from django.db.models import F, Q
+from django.db.models import Exists, F, OuterRef, Q
 from django.db.models.functions import Now
 from django.utils import timezone
 
@@ -137,9 +137,31 @@ class EvaluationQuerySet(models.QuerySet["Evaluation"]):
     """Questions about evaluations."""
 
     def due(self) -> Self:
-        """What waits and may be begun, the most urgent and oldest first."""
-        waiting = self.filter(status=Status.QUEUED, due_at__lte=Now())
-        return waiting.order_by("priority", "queued_at")
+        """What waits and may be begun, in the order in which workers take it."""
+        return self.filter(status=Status.QUEUED, due_at__lte=Now()).in_turn()
+
+    def in_turn(self) -> Self:
+        """In the order in which workers take them: last what has stopped its reader before.
+
+        Of files that are equally urgent, those of teams and people none of whose files is being read go
+        first, then the oldest. So one team cannot keep all readers while others wait.
+        """
+        running = Evaluation.objects.filter(status=Status.RUNNING, priority=Evaluation.PRIORITY_LIVE)
+        # Asked beside and not joined, so that whoever locks what waits locks nothing else.
+        of_the_same = Submission.objects.filter(
+            Q(method__team__in=running.values("submission__method__team"))
+            | Q(submitted_by__in=running.values("submission__submitted_by")),
+            pk=OuterRef("submission"),
+        )
+        return self.order_by("n_poison_strikes", "priority", Exists(of_the_same), "queued_at")
+
+    def suspect(self) -> Self:
+        """What came to nothing although no machine failed: those whose file may be the cause."""
+        return self.filter(
+            status=Status.SYSTEM_ERROR,
+            n_poison_strikes__gt=0,
+            n_infrastructure_strikes__lt=MAX_INFRASTRUCTURE_STRIKES,
+        )
 
     def scorable(self, held: Collection[str]) -> Self:
         """What is scored against a ground truth of one of these digests."""
@@ -225,6 +247,15 @@ class Evaluation(models.Model):
             return None
         rivals = [row for row in self.submission.evaluations.all() if row.status == Status.SCORED]
         return max((row.edition.number for row in rivals if row.edition.published_at), default=None)
+
+    @property
+    def is_file_suspect(self) -> bool:
+        """Whether it came to nothing, and not because machines failed: its file may be the cause."""
+        return (
+            self.status == Status.SYSTEM_ERROR
+            and self.n_poison_strikes > 0
+            and self.n_infrastructure_strikes < MAX_INFRASTRUCTURE_STRIKES
+        )
 
     @property
     def is_final(self) -> bool:

@@ -4,8 +4,9 @@ Nothing is counted up or down. What is spent follows from the submissions and wh
 can drift: a submission costs a slot while it waits or runs, and for good once it is scored. Rejected,
 cancelled or failed by our fault it costs none. Rejected and cancelled files have a limit of their own: all of
 them are kept, and whoever could send any number of them would fill the disk. So have files that stopped the
-process that read them, until a maintainer has had them read again: that is our fault, and each costs minutes.
-All files that a team sends within a day, whatever came of them, have a number of bytes in common.
+process that read them, until a maintainer has had them read again: that is our fault, and each costs seconds
+of a reader. Both have another limit for all splits together. All files that a team sends within a day,
+whatever came of them, have a number of bytes in common.
 
 Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
 have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people. One person
@@ -14,27 +15,36 @@ have deleted one of them (see `mailboxes`).
 """
 
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
-from typing import Final
 
 from django.conf import settings
 from django.db import transaction
-from django.db.models import Exists, OuterRef, Q, QuerySet
+from django.db.models import BooleanField, Exists, ExpressionWrapper, OuterRef, Q, QuerySet
 
 from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
-from leaderboard.models.quotas import MAX_SPAN, excess
-from leaderboard.models.submissions import MAX_POISON_STRIKES
+from leaderboard.models.quotas import excess
 from leaderboard.people import accounts
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.rules import BYTES_WINDOW, REJECTED_WINDOW, UNLIMITED, Rules, rules_of
+from leaderboard.quotas.spans import parse_span, span
 
-__all__ = ["UNLIMITED", "Quota", "QuotaExceeded", "Rules", "override", "require", "rules_of", "span", "state"]
+__all__ = [
+    "UNLIMITED",
+    "Quota",
+    "QuotaExceeded",
+    "Rules",
+    "override",
+    "parse_span",
+    "require",
+    "rules_of",
+    "span",
+    "state",
+]
 
 
 class QuotaExceeded(Exception):
@@ -126,7 +136,36 @@ def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now
 
 def _state(*, team: Team | None, user: User, split: Split, rules: Rules, now: datetime) -> Quota:
     spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
-    return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
+    quota = weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
+    # Rules without this limit are those of a team that somebody trusts with any number.
+    if quota.is_open and rules.rejected_limit is not None and settings.MAX_TEAM_REJECTED_PER_DAY:
+        quota = _with_rejected(quota, team=team, user=user, now=now)
+    return quota
+
+
+def _with_rejected(quota: Quota, *, team: Team | None, user: User, now: datetime) -> Quota:
+    """The quota, closed if too many of the team's files were rejected on all splits together."""
+    rows = Submission.objects.filter(_theirs(team, user), submitted_at__gt=now - REJECTED_WINDOW)
+    times = rows.filter(_is_rejected()).order_by("submitted_at").values_list("submitted_at", flat=True)
+    opens_at = _until(list(times), limit=settings.MAX_TEAM_REJECTED_PER_DAY, window=REJECTED_WINDOW)
+    if opens_at is None:
+        return quota
+    sentence = (
+        "Your team has reached its limit for all splits together: within 24 hours, "
+        f"{counted(len(times), 'file')} that were rejected, were cancelled, or stopped the process "
+        f"that read them; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
+    )
+    return replace(quota, is_open=False, next_slot_at=opens_at, sentence=sentence)
+
+
+def _is_rejected() -> Q:
+    """Submissions that were rejected, cancelled by their team, or stopped the process that read them."""
+    evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
+    live = evaluations.filter(priority=Evaluation.PRIORITY_LIVE)
+    # By its team: those of an edition that was given up are cancelled as well.
+    cancelled = Q(Exists(live.filter(status=Status.CANCELLED)), withdrawn_at__isnull=False)
+    rejected = Q(Exists(live.filter(status=Status.REJECTED))) | Q(Exists(live.suspect())) | cancelled
+    return rejected & ~Q(Exists(evaluations.filter(status=Status.SCORED)))
 
 
 def _spent(
@@ -145,26 +184,18 @@ def _spent(
             is_scored=Exists(evaluations.filter(status=Status.SCORED)),
             is_given_back=Exists(board.filter(status=Status.REJECTED)),
             is_pending=Exists(live.filter(status__in=[Status.QUEUED, Status.RUNNING])),
-            is_rejected=Exists(live.filter(status=Status.REJECTED)),
-            is_poison=Exists(
-                live.filter(status=Status.SYSTEM_ERROR, n_poison_strikes__gte=MAX_POISON_STRIKES)
-            ),
-            # By its team: those of an edition that was given up are cancelled as well.
-            is_cancelled=Exists(live.filter(status=Status.CANCELLED, submission__withdrawn_at__isnull=False)),
+            is_rejected=ExpressionWrapper(_is_rejected(), BooleanField()),
         )
         .order_by("submitted_at")
-        .values_list(
-            *("submitted_at", "is_scored", "is_given_back", "is_pending"),
-            *("is_rejected", "is_cancelled", "is_poison"),
-        )
+        .values_list("submitted_at", "is_scored", "is_given_back", "is_pending", "is_rejected")
     )
     spent, rejected = [], []
-    for submitted_at, is_scored, is_given_back, is_pending, *is_one_too_many in rows:
+    for submitted_at, is_scored, is_given_back, is_pending, is_rejected in rows:
         if is_scored and is_given_back:
             continue
         if is_scored or is_pending:
             spent.append(submitted_at)
-        elif any(is_one_too_many):
+        elif is_rejected:
             rejected.append(submitted_at)
     return spent, rejected
 
@@ -273,24 +304,6 @@ def _n(count: int | None) -> str:
     return "1 submission" if count == 1 else f"{count} submissions"
 
 
-def span(time: timedelta) -> str:
-    """A span of time in words.
-
-    >>> span(timedelta(days=30)), span(timedelta(days=1)), span(timedelta(minutes=90))
-    ('30 days', '24 hours', '90 minutes')
-    >>> span(timedelta(0)), span(timedelta(days=-3)), span(timedelta(seconds=0.4))
-    ('0 seconds', '-3 days', '0 seconds')
-    """
-    seconds = round(time.total_seconds())
-    if seconds < 0:
-        return f"-{span(-time)}"
-    units = ((86_400, "day", 2), (3_600, "hour", 1), (60, "minute", 1))
-    fits = (unit for unit in units if seconds % unit[0] == 0 and seconds >= unit[2] * unit[0])
-    unit_s, name, _ = next(fits, (1, "second", 0))
-    n = seconds // unit_s
-    return f"1 {name}" if n == 1 else f"{n:,} {name}s"
-
-
 def _minute_after(at: datetime) -> datetime:
     """The first whole minute that is not before this moment: whoever waits until then is not early."""
     whole = at.replace(second=0, microsecond=0)
@@ -359,32 +372,3 @@ def end_override(*, row: QuotaOverride, actor: User | None, reason: str = "") ->
             actor=actor,
             details={"split": row.split_id, "reason": reason},
         )
-
-
-_UNITS: Final = {
-    "day": timedelta(days=1),
-    "hour": timedelta(hours=1),
-    "minute": timedelta(minutes=1),
-    "second": timedelta(seconds=1),
-}
-_SPAN: Final = re.compile(rf"\s*([\d,]{{1,12}})\s*({'|'.join(_UNITS)})s?\s*", re.ASCII | re.IGNORECASE)
-
-
-def parse_span(text: str, *, field: str = "") -> timedelta:
-    """The span of a text such as `quotas.span` writes, also of none (0 days). Raises `Refused`."""
-    found = _SPAN.fullmatch(text)
-    number = found[1].replace(",", "") if found else ""
-    if found is None or not number:
-        raise Refused(
-            "bad-value",
-            f"{text.strip()[:40]!r} is not a span of time; expected one like 30 days or 90 minutes.",
-            field=field,
-        )
-    n, unit = int(number), _UNITS[found[2].lower()]
-    if n > MAX_SPAN // unit:
-        raise Refused(
-            "bad-value",
-            f"That is longer than ten years; expected at most {span(MAX_SPAN)}.",
-            field=field,
-        )
-    return n * unit

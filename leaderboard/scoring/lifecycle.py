@@ -4,7 +4,7 @@
                       -> REJECTED         the file is at fault
                       -> QUEUED           a strike: the lease ran out, or the parsing child died;
                                           or handed back before it was begun
-                      -> SYSTEM_ERROR     strikes exhausted: our fault
+                      -> SYSTEM_ERROR     strikes exhausted, or another try is of no use: our fault
     QUEUED | RUNNING  -> CANCELLED        by its team
     SYSTEM_ERROR      -> QUEUED           retried by a maintainer
 
@@ -261,16 +261,19 @@ def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
     return {row[0]: row[3] for row in rows if row[:3] in valid}
 
 
-def fail_attempt(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> Status:
+def fail_attempt(
+    lease: Lease, *, strike: Strike, reason: str, rng: random.Random, is_last: bool = False
+) -> Status:
     """End a run that came to nothing, with a strike. Returns the state it left: QUEUED or SYSTEM_ERROR.
 
-    Raises `LostRace` if the lease is no longer valid.
+    With `is_last` there is no other try before a maintainer asks for one. Raises `LostRace` if the lease is
+    no longer valid.
     """
     with transaction.atomic():
         evaluation = _held(lease).select_for_update(no_key=True).first()
         if evaluation is None:
             raise LostRace(f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer valid")
-        return _strike(evaluation, strike=strike, reason=reason, rng=rng)
+        return _strike(evaluation, strike=strike, reason=reason, rng=rng, is_last=is_last)
 
 
 def release(leases: Sequence[Lease]) -> int:
@@ -314,11 +317,14 @@ def release_expired(*, rng: random.Random) -> int:
     return len(expired)
 
 
-def _strike(evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.Random) -> Status:
+def _strike(
+    evaluation: Evaluation, *, strike: Strike, reason: str, rng: random.Random, is_last: bool = False
+) -> Status:
     """Count a strike against a locked RUNNING row and send it back, or give up on it."""
     n_poison = evaluation.n_poison_strikes + (strike is Strike.POISON)
     n_infrastructure = evaluation.n_infrastructure_strikes + (strike is Strike.INFRASTRUCTURE)
     exhausted = n_poison >= MAX_POISON_STRIKES or n_infrastructure >= MAX_INFRASTRUCTURE_STRIKES
+    exhausted = exhausted or is_last
     changes: dict[str, Any] = {
         "n_poison_strikes": n_poison,
         "n_infrastructure_strikes": n_infrastructure,

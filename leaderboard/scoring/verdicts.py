@@ -1,7 +1,7 @@
 """Sentences about the end of scoring; pages ask for them, so this module computes nothing."""
 
 from evaluator.counting import counted
-from evaluator.scoring.significance import MIN_DEGREES, too_few_recordings
+from evaluator.scoring.significance import MIN_DEGREES, too_few_units
 from leaderboard.models import Edition, Evaluation, Status
 from leaderboard.scoring import lifecycle
 
@@ -19,13 +19,7 @@ def sentence_of(evaluation: Evaluation) -> str:
             n = evaluation.n_problems
             return f"The file is at fault: it has {counted(n, 'problem')}, so it was not scored."
         case Status.SYSTEM_ERROR:
-            tries = f"{n_failed} times" if n_failed != 1 else "once"
-            is_poison = evaluation.n_poison_strikes >= lifecycle.MAX_POISON_STRIKES
-            counts = " Until then it counts as a rejected file for 24 hours." if is_poison else ""
-            return (
-                f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
-                f"the file, and a maintainer can retry it.{counts}"
-            )
+            return _of_system_error(evaluation, n_failed=n_failed)
         case Status.CANCELLED:
             return "The team cancelled the submission before it was scored."
         case Status.QUEUED | Status.RUNNING if n_failed:
@@ -34,13 +28,30 @@ def sentence_of(evaluation: Evaluation) -> str:
     return ""
 
 
+def _of_system_error(evaluation: Evaluation, *, n_failed: int) -> str:
+    """Why scoring was given up."""
+    counts = " Until then it counts as a rejected file for 24 hours." if evaluation.is_file_suspect else ""
+    if evaluation.is_file_suspect and evaluation.n_poison_strikes < lifecycle.MAX_POISON_STRIKES:
+        # Given up before its strikes were exhausted.
+        return (
+            "Reading the file took more processor time than a file for this split may take, so it was not "
+            "scored; `tsttc check` reads it on your machine without this limit. We keep the file, and a "
+            f"maintainer can have it read again.{counts}"
+        )
+    tries = f"{n_failed} times" if n_failed != 1 else "once"
+    return (
+        f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
+        f"the file, and a maintainer can retry it.{counts}"
+    )
+
+
 def why_no_interval(edition: Edition) -> str:
     """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
 
-    A worker finds out how many recordings an edition effectively has, and writes it beside the edition; until
-    then only an edition with too few recordings in all is known to have none.
+    A worker finds out how many units an edition effectively has, and writes it beside the edition; until
+    then only an edition with too few units in all is known to have none.
     """
-    most = max(edition.n_effective.values(), default=float(edition.ground_truth.n_recordings))
+    most = max(edition.n_effective.values(), default=float(edition.unit_count))
     if most >= MIN_DEGREES:
         return ""
-    return f"There are no confidence intervals: {too_few_recordings(most)}."
+    return f"There are no confidence intervals: {too_few_units(most, unit=edition.unit)}."

@@ -36,7 +36,8 @@ class TruthDamaged(Exception):
 # The store, the disk, the private directory or the child's start failed: another try may well succeed.
 OUR_FAULTS = (OSError, sandbox.ChildNotReady, TruthDamaged)
 # The child died of the file, or our own code failed on it, or the database refused what came of it. Tried
-# again in case the machine was to blame, but not often: it would end the same way.
+# again in case the machine was to blame, but not often: it would end the same way. Not again where the child
+# used up its processor time, which does not depend on what else the machine does.
 FAULTS_OF_THE_FILE = (
     sandbox.ChildDied,
     sandbox.LeaseLost,
@@ -269,7 +270,8 @@ def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: ra
         _fail_attempt(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
     except FAULTS_OF_THE_FILE as fault:
         log.warning("evaluation_failed", exc_info=fault)
-        _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng)
+        is_last = isinstance(fault, sandbox.ChildOutOfTime)
+        _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng, is_last=is_last)
     else:
         log.info(
             "evaluation_finished",
@@ -366,9 +368,13 @@ def rejection(rejected: Rejected) -> Outcome:
     return Outcome(status=Status.REJECTED, scores={}, problems=problems, n_problems=rejected.n_problems)
 
 
-def _fail_attempt(lease: Lease, *, strike: Strike, reason: str, rng: random.Random) -> None:
+def _fail_attempt(
+    lease: Lease, *, strike: Strike, reason: str, rng: random.Random, is_last: bool = False
+) -> None:
     try:
-        _retry_on_disconnect(lambda: lifecycle.fail_attempt(lease, strike=strike, reason=reason, rng=rng))
+        _retry_on_disconnect(
+            lambda: lifecycle.fail_attempt(lease, strike=strike, reason=reason, rng=rng, is_last=is_last)
+        )
     except LostRace as race:
         log.warning("evaluation_lost", evaluation_id=str(lease.evaluation_id), reason=str(race))
 

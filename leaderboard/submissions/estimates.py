@@ -166,5 +166,11 @@ def _n_ahead(evaluation: Evaluation) -> int:
     earlier = Q(priority__lt=evaluation.priority) | Q(
         priority=evaluation.priority, queued_at__lt=evaluation.queued_at
     )
-    waiting = Evaluation.objects.filter(earlier, status=Status.QUEUED, due_at__lte=Now())
+    # What has stopped its reader waits behind all others.
+    waiting = Evaluation.objects.filter(
+        earlier,
+        status=Status.QUEUED,
+        due_at__lte=Now(),
+        n_poison_strikes__lte=evaluation.n_poison_strikes,
+    )
     return waiting.exclude(pk=evaluation.pk).count()

@@ -28,7 +28,7 @@ class State:
     heading: str
     none: str
     since: str  # the time that its rows tell
-    order: tuple[str, ...]
+    order: tuple[str, ...]  # empty: as workers take it
 
 
 STATES: Final[Mapping[str, State]] = {
@@ -40,10 +40,7 @@ STATES: Final[Mapping[str, State]] = {
         ("-finished_at",),
     ),
     "running": State(Status.RUNNING, "Running", "No running evaluations.", "started_at", ("started_at",)),
-    # As workers take it.
-    "waiting": State(
-        Status.QUEUED, "Waiting", "No waiting evaluations.", "queued_at", ("priority", "queued_at")
-    ),
+    "waiting": State(Status.QUEUED, "Waiting", "No waiting evaluations.", "queued_at", ()),
 }
 
 
@@ -110,9 +107,11 @@ def _of(split: str) -> QuerySet[Evaluation]:
 
 def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:
     """One of the lists, without the columns that are large and not shown."""
-    rows = _of(split).filter(status=state.status).defer("report", "problems")
+    rows = Evaluation.objects.filter(status=state.status)
+    rows = rows.order_by(*state.order, "pk") if state.order else rows.in_turn()
+    rows = rows.filter(submission__split=split) if split else rows
     people = rows.select_related("submission__method__team", "submission__submitted_by", "edition")
-    return people.order_by(*state.order, "pk")
+    return people.defer("report", "problems")
 
 
 def _row(evaluation: Evaluation, state: State, *, now: datetime) -> dict[str, Any]:

@@ -4,9 +4,10 @@ import gzip
 import zlib
 from typing import Any
 
+import numpy as np
 import pytest
 
-from evaluator import Rejected, convert, read_predictions, scale_ratio_to_ttc
+from evaluator import Problem, Rejected, convert, read_predictions, scale_ratio_to_ttc
 from evaluator.predictions import predictions
 from evaluator.predictions.predictions import sha256_digest
 from tests.evaluator.worlds import EXAMPLES, Tsttc, flat, make_truth
@@ -105,8 +106,62 @@ def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch
     assert [problem.code for problem in caught.value.problems] == ["too-many-members"]
 
 
+def refusal(data: bytes) -> Problem:
+    with pytest.raises(Rejected) as caught:
+        read_predictions(data, manifest=MANIFEST)
+    [problem] = caught.value.problems
+    return problem
+
+
+def test_an_archive_as_bgzip_writes_the_largest_is_read() -> None:
+    blocks = GOOD + b" " * (predictions.MAX_UNPACKED_BYTES - len(GOOD))
+    members = [gzip.compress(blocks[at : at + 65_280]) for at in range(0, len(blocks), 65_280)]
+    members.append(gzip.compress(b""))
+    assert len(members) == 1030 < predictions.MAX_GZIP_MEMBERS
+    assert read_predictions(b"".join(members), manifest=MANIFEST).ttc_s[0] == 1.5
+
+
+def test_members_may_be_longer_than_what_is_read_at_once_and_have_zeros_between() -> None:
+    long = np.random.default_rng(0).integers(0, 256, 300_000, dtype=np.uint8).tobytes()
+    data = gzip.compress(long) + b"\x00" * 200_000 + gzip.compress(GOOD) + b"\x00" * 512
+    assert predictions.json_of(data) == long + GOOD
+    assert refusal(gzip.compress(long)[:-1]).message.endswith("it ends too early.")
+
+
+def test_an_archive_of_too_many_members_is_refused_with_the_place_of_the_first_too_many() -> None:
+    empty = gzip.compress(b"", mtime=0)
+    good = gzip.compress(GOOD) + empty * (predictions.MAX_GZIP_MEMBERS - 1)
+    assert read_predictions(good, manifest=MANIFEST).ttc_s[0] == 1.5
+    assert refusal(good + empty) == Problem(
+        "too-many-members",
+        "The gzip archive has more than 2,000 members; expected at most 2,000, as gzip, pigz and bgzip write "
+        "them.",
+        f"byte {len(good)}",
+    )
+
+
+def test_a_table_may_have_other_columns_but_not_any_number_of_them() -> None:
+    wide = b"".join(b",c%d" % i for i in range(predictions.MAX_COLUMNS - 2))
+    rows = b"".join(b"%d,1.5%b\n" % (i, b"," * (len(wide.split(b",")) - 1)) for i in range(3))
+    assert read_predictions(b"anno_id,ttc" + wide + b"\n" + rows, manifest=MANIFEST).ttc_s[0] == 1.5
+    assert refusal(b"anno_id,ttc" + wide + b",more\n" + rows) == Problem(
+        "too-many-members", "The line has up to 1,001 fields; expected at most 1,000.", "line 1"
+    )
+    assert refusal(b"anno_id,ttc\n0,1\n1," + b"," * 2000).where == "line 3"
+
+
+def test_empty_lines_are_no_rows_but_not_any_number_of_them() -> None:
+    spaced = table("anno_id", "ttc", end="\n\n")
+    assert read_predictions(spaced, manifest=MANIFEST).ttc_s[0] == 1.5
+    assert refusal(spaced + b"\n" * 200_000).code == "too-many-members"
+
+
 def test_every_command_takes_them(tsttc: Tsttc) -> None:
     data = gzip.compress((EXAMPLES / "predictions.json").read_bytes())
     result = tsttc("score", "-", "--truth", EXAMPLES / "truth.csv", stdin=data)
     assert result.exit_code == 0
     assert tsttc("check", "-", "--manifest", EXAMPLES / "manifest.csv", stdin=data).exit_code == 0
+    hostile = gzip.compress(b"", mtime=0) * 900_000
+    result = tsttc("check", "-", "--manifest", EXAMPLES / "manifest.csv", stdin=hostile)
+    assert result.exit_code == 1
+    assert "The gzip archive has more than 2,000 members; expected at most 2,000" in result.output

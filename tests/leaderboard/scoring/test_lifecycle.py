@@ -8,8 +8,9 @@ from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
 from pytest_django import DjangoCaptureOnCommitCallbacks
 
-from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
+from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Score, Status, Submission, User
 from leaderboard.ops import broker
+from leaderboard.people import teams
 from leaderboard.scoring import lifecycle
 from leaderboard.scoring.lifecycle import MAX_POISON_STRIKES, Lease, LostRace, Outcome, Strike
 from tests.leaderboard.web.maintain import queue_rows
@@ -78,6 +79,53 @@ def test_most_urgent_then_oldest_goes_first(edition: Edition, owner: User) -> No
     Evaluation.objects.filter(pk=older.pk).update(queued_at=Now() - timedelta(days=1))
     assert list(Evaluation.objects.due()) == [older, newer, rescored]
     assert [queue_rows.claim().evaluation_id for _ in range(3)] == [older.pk, newer.pk, rescored.pk]
+
+
+def test_a_file_that_stopped_its_reader_goes_behind_all_others(edition: Edition, owner: User) -> None:
+    struck, rescored = (
+        queue_rows.queued(edition, owner),
+        queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE),
+    )
+    queue_rows.give_back(queue_rows.claim(), Strike.POISON)
+    queue_rows.make_due()
+    later = queue_rows.queued(edition, owner)
+    expected = [later.pk, rescored.pk, struck.pk]
+    assert [queue_rows.claim().evaluation_id for _ in range(3)] == expected
+
+
+def test_a_team_none_of_whose_files_is_being_read_goes_first(
+    edition: Edition, owner: User, teammate: User, stranger: User
+) -> None:
+    first, second = queue_rows.queued(edition, owner), queue_rows.queued(edition, owner)
+    of_a_teammate = queue_rows.queued(edition, teammate)
+    of_a_stranger = queue_rows.queued(edition, stranger)
+    lease = queue_rows.claim()
+    assert lease.evaluation_id == first.pk
+    assert list(Evaluation.objects.due()) == [of_a_stranger, second, of_a_teammate]
+    assert queue_rows.claim().evaluation_id == of_a_stranger.pk
+    # Nobody else waits: a reader that is free takes what there is.
+    assert queue_rows.claim().evaluation_id == second.pk
+    lifecycle.finalise(lease, SCORED)
+
+
+def test_a_person_who_changes_teams_has_no_second_turn(edition: Edition, owner: User, stranger: User) -> None:
+    queue_rows.queued(edition, owner)
+    queue_rows.claim()
+    elsewhere = queue_rows.queued(edition, owner)
+    method = Method.objects.create(team=teams.team_of(user=stranger), name="Elsewhere")
+    Submission.objects.filter(pk=elsewhere.submission_id).update(method=method)
+    of_a_stranger = queue_rows.queued(edition, stranger)
+    assert list(Evaluation.objects.due()) == [of_a_stranger, elsewhere]
+
+
+def test_rescoring_of_a_teams_files_takes_no_turn_of_its_new_ones(
+    edition: Edition, owner: User, stranger: User
+) -> None:
+    queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
+    queue_rows.claim()
+    older = queue_rows.queued(edition, owner)
+    newer = queue_rows.queued(edition, stranger)
+    assert list(Evaluation.objects.due()) == [older, newer]
 
 
 def test_claim_takes_no_more_than_its_limit_and_each_has_its_own_lease(edition: Edition, owner: User) -> None:

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 from django.db import connection, transaction
+from django.db.models.functions import Now
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import (
@@ -61,10 +62,11 @@ class Expected:
         """Whether this lease may still decide the evaluation."""
         return self.status == Status.RUNNING and self.lease == lease
 
-    def struck(self, strike: Strike) -> Status:
+    def struck(self, strike: Strike, *, is_last: bool = False) -> Status:
         """Count a strike; the state that follows."""
         self.strikes[strike] += 1
-        self.status = Status.SYSTEM_ERROR if self.strikes[strike] >= LIMITS[strike] else Status.QUEUED
+        is_over = is_last or self.strikes[strike] >= LIMITS[strike]
+        self.status = Status.SYSTEM_ERROR if is_over else Status.QUEUED
         return self.status
 
 
@@ -150,15 +152,16 @@ class Life(RuleBasedStateMachine):
         with pytest.raises(LostRace):
             lifecycle.finalise(replace(lease, **changes), outcome)  # type: ignore[arg-type]  # either field
 
-    @rule(lease=leases, strike=st.sampled_from(Strike))
-    def give_back(self, lease: Lease, strike: Strike) -> None:
+    @rule(lease=leases, strike=st.sampled_from(Strike), is_last=st.booleans())
+    def give_back(self, lease: Lease, strike: Strike, is_last: bool) -> None:
         expected = self.model[lease.evaluation_id]
+        said: dict[str, Any] = {"strike": strike, "reason": "x", "rng": random.Random(0)}
         if expected.holds(lease):
-            status = lifecycle.fail_attempt(lease, strike=strike, reason="x", rng=random.Random(0))
-            assert status == expected.struck(strike)
+            status = lifecycle.fail_attempt(lease, is_last=is_last, **said)
+            assert status == expected.struck(strike, is_last=is_last)
         else:
             with pytest.raises(LostRace):
-                lifecycle.fail_attempt(lease, strike=strike, reason="x", rng=random.Random(0))
+                lifecycle.fail_attempt(lease, is_last=is_last, **said)
 
     @rule(some=st.lists(leases, max_size=4, unique_by=lambda lease: lease.evaluation_id))
     def hand_back(self, some: list[Lease]) -> None:
@@ -218,7 +221,9 @@ class Life(RuleBasedStateMachine):
         pk, expected = next(iter(self.model.items()))
         while expected.status == Status.QUEUED:
             queue_rows.make_due()
-            Evaluation.objects.filter(pk=pk).update(priority=-1)
+            # First in line, whatever its strikes.
+            others = Evaluation.objects.filter(status=Status.QUEUED).exclude(pk=pk)
+            others.update(due_at=Now() + timedelta(days=1))
             lease = queue_rows.claim()
             assert lease.evaluation_id == pk
             expected.attempt += 1

@@ -1,5 +1,6 @@
 """`leaderboard.scoring.lifecycle`: what happens to a run that came to nothing."""
 
+import random
 from datetime import timedelta
 
 import pytest
@@ -58,6 +59,21 @@ def test_exhausted_strikes_are_a_system_error_without_scores(
     assert row.last_error == "the disk failed"
     assert AuditEvent.objects.filter(verb="system_error", noun_id=row.pk).count() == 1
     assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
+
+
+def test_a_run_that_is_the_last_leaves_a_system_error_until_a_maintainer_retries_it(
+    edition: Edition, owner: User, maintainer: User
+) -> None:
+    evaluation = queue_rows.queued(edition, owner)
+    lease = queue_rows.claim()
+    said = {"reason": "reading the file took more than 4 s of processor time", "rng": random.Random(0)}
+    assert lifecycle.fail_attempt(lease, strike=Strike.POISON, is_last=True, **said) == Status.SYSTEM_ERROR
+    row = queue_rows.row(lease)
+    assert (row.attempt, row.n_poison_strikes, row.last_error) == (1, 1, said["reason"])
+    assert row.is_file_suspect
+    assert AuditEvent.objects.filter(verb="system_error", noun_id=row.pk).count() == 1
+    lifecycle.retry(evaluation=evaluation, actor=maintainer)
+    assert queue_rows.claim().attempt == 2
 
 
 @pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])

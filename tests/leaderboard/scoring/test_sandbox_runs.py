@@ -49,21 +49,43 @@ def strikes(submission: Submission) -> tuple[int, int]:
     return row.n_poison_strikes, row.n_infrastructure_strikes
 
 
-def test_file_that_kills_its_reader_is_given_up_after_three_runs_and_the_next_is_scored(
+def test_file_that_kills_its_reader_is_tried_again_behind_the_next_and_given_up_after_three_runs(
     edition: Edition, owner: User, settings: Settings, tmp_path: Path
 ) -> None:
     truth = truth_values.load(edition.ground_truth_id)
     settings.CHILD_MEMORY_BYTES = reader_memory_bytes(truth, directory=tmp_path)
     bomb = builders.submit(owner, bomb_file(0), method="Bomb")
     healthy = builders.submit(owner, builders.predictions(edition), method="Healthy")
-    for _ in range(MAX_POISON_STRIKES):
+    assert run_next()
+    assert strikes(bomb) == (1, 0)
+    assert run_next()
+    assert submissions.progress(healthy).state == Status.SCORED
+    assert strikes(bomb) == (1, 0)
+    for _ in range(1, MAX_POISON_STRIKES):
         assert run_next()
     assert strikes(bomb) == (MAX_POISON_STRIKES, 0)
     assert submissions.progress(bomb).state == Status.SYSTEM_ERROR
     assert submissions.progress(bomb).fault_is_ours
-    assert run_next()
-    assert submissions.progress(healthy).state == Status.SCORED
     assert not run_next()
+
+
+def test_file_that_takes_too_much_processor_time_is_read_once_and_its_team_reads_why(
+    edition: Edition, owner: User, settings: Settings
+) -> None:
+    # No time at all: the reader's first tick of processor time is one too many.
+    settings.CHILD_CPU_S = 0
+    hostile = b"anno_id,ttc\n" + b"".join(b"%d,x\n" % i for i in range(100_000))
+    slow = builders.submit(owner, hostile, method="Slow")
+    assert run_next()
+    assert strikes(slow) == (1, 0)
+    assert not run_next()
+    assert submissions.progress(slow).state == Status.SYSTEM_ERROR
+    assert submissions.progress(slow).fault_is_ours
+    assert submissions.progress(slow).sentence == (
+        "Reading the file took more processor time than a file for this split may take, so it was not "
+        "scored; `tsttc check` reads it on your machine without this limit. We keep the file, and a "
+        "maintainer can have it read again. Until then it counts as a rejected file for 24 hours."
+    )
 
 
 def test_run_that_takes_too_long_is_ended_and_held_against_the_file(
