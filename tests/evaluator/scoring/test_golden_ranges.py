@@ -1,6 +1,7 @@
 """Rank ranges of large boards stay what they are, to the last digit.
 
-`tests/golden/rank_ranges.json` has what an earlier program made of these boards, which kept all pairs and their maxima.
+`tests/golden/rank_ranges.json` has what an earlier program made of these boards, which kept all pairs and
+their maxima.
 """
 
 import hashlib
@@ -16,7 +17,7 @@ GOLDEN = json.loads((REPOSITORY / "tests" / "golden" / "rank_ranges.json").read_
 
 
 def board(*, n_entries: int, n_recordings: int, n_columns: int, step: float, n_quoted: int) -> RankRanges:
-    """The ranges of a made-up board: some entries alike, some without a value, rows from papers among them."""
+    """The ranges of a made-up board: some entries alike, some without a value, some from papers."""
     rng = np.random.default_rng([n_entries, n_recordings])
     counts = np.ceil(rng.lognormal(3, 1, (n_recordings, n_columns)))
     shared = rng.lognormal(0, 0.5, (n_recordings, n_columns))
