@@ -1,13 +1,13 @@
 # One image for web, worker and the maintainers' commands; docker-compose.yml says which does what.
 
-FROM python:3.11.15-slim-bookworm AS environment
+FROM python:3.11.15-slim-trixie AS environment
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/tsttc
 WORKDIR /build
 COPY requirements.lock ./
 RUN /opt/tsttc/bin/pip install --quiet --require-hashes -r requirements.lock
 
-FROM python:3.11.15-slim-bookworm
+FROM python:3.11.15-slim-trixie
 ENV PATH=/opt/tsttc/bin:$PATH \
     PYTHONUNBUFFERED=1 \
     PYTHONDONTWRITEBYTECODE=1 \
@@ -17,6 +17,11 @@ ENV PATH=/opt/tsttc/bin:$PATH \
     DJANGO_SETTINGS_MODULE=leaderboard.settings \
     TSTTC_DATA_DIR=/var/lib/tsttc \
     TSTTC_STATIC_ROOT=/srv/tsttc/staticfiles
+
+# For `backup` and `restore`. Debian 13 has version 17, which has to be the database's in docker-compose.yml, or a later one.
+RUN apt-get update -qq \
+    && apt-get install -y -qq --no-install-recommends postgresql-client \
+    && rm -rf /var/lib/apt/lists/*
 
 # Volumes take over the owner of the directory that they are first mounted on.
 RUN groupadd --gid 10001 tsttc \

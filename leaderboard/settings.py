@@ -210,11 +210,6 @@ MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_0
 # that reads them; 0: any number.
 MAX_TEAM_REJECTED_PER_DAY = env.int("TSTTC_MAX_TEAM_REJECTED_PER_DAY", default=30)
 
-# --- rank ranges --------------------------------------------------------------------------------------------
-
-# Of memory of each worker, for the pairs of a board that it keeps; a board that needs more costs all pairs.
-KEPT_PAIRS_MB = env.int("TSTTC_KEPT_PAIRS_MB", default=256)
-
 # --- the life of an evaluation (seconds; see leaderboard/scoring/lifecycle.py) ------------------------------
 
 LEASE_S = env.float("TSTTC_LEASE_S", default=60.0)

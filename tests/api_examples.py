@@ -24,7 +24,7 @@ TIMES = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(?:\.\d+)?(?:Z|\+00:00)")
 UUIDS = re.compile(r"[0-9a-f]{8}-[0-9a-f]{4}-4[0-9a-f]{3}-[89ab][0-9a-f]{3}-[0-9a-f]{12}")
 DAYS = re.compile(r"\b20[23]\d-\d\d-\d\d\b(?!T)")
 PSEUDONYM = re.compile(r"Anonymous [0-9a-f]{6}")
-MEASURED = {"rate_per_s": 3.6, "signature": "3x…Q", "key_id": "kPrK…o4"}
+MEASURED = {"rate_per_s": 3.6}
 HEADERS = ("Location", "Link")
 MAX_LINES = 4
 MAX_WIDTH = 200
@@ -62,6 +62,8 @@ def send(call: Call, client: Client, known: Mapping[str, str], *, file: bytes) -
     response = getattr(client, call.method.lower())(target, **options)
     is_json = "json" in response.headers.get("Content-Type", "")
     body = response.getvalue().decode() if response.streaming else response.text
+    if response.headers.get("Content-Type") == "application/jwt":
+        body = f"{body[:20]}…"  # the rest is another one each time
     shown = {name: response.headers[name] for name in HEADERS if name in response.headers}
     return {
         "status": f"{response.status_code} {HTTPStatus(response.status_code).phrase}",

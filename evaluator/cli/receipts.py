@@ -31,7 +31,7 @@ def receipt(*, submission_id: str, output: Path | None, url: str) -> None:
 
     \b
     Example:
-      tsttc receipt 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 -o receipt.json
+      tsttc receipt 1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11 -o receipt.jwt
     """
     with connect(url, with_token=True) as client:
         data = client.receipt(submission_id)
@@ -65,8 +65,8 @@ def verify(*, receipt_path: Path, keys_path: Path | None, url: str, as_json: boo
 
     \b
     Examples:
-      tsttc verify receipt.json --server https://leaderboard.example.org
-      tsttc verify receipt.json --keys tsttc-receipt-keys.json
+      tsttc verify receipt.jwt --server https://leaderboard.example.org
+      tsttc verify receipt.jwt --keys tsttc-receipt-keys.json
     """
     from evaluator.receipts import NotVerified, read_keys  # noqa: PLC0415 -- needed here alone
     from evaluator.receipts import verify as verified_by  # noqa: PLC0415 -- as above

@@ -217,7 +217,7 @@ class Client(Connection):
         return one(self._retry(lambda: self._http.post(address, json=body)), Method)
 
     def receipt(self, submission_id: str) -> bytes:
-        """The signed receipt of a scored submission, JSON as it came. Raises ClientError."""
+        """The signed receipt of a scored submission, a JSON Web Token as it came. Raises ClientError."""
         return self._asked("submissions", submission_id, "receipt").content
 
     def receipt_keys(self) -> bytes:

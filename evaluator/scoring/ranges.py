@@ -9,21 +9,37 @@ was before it was rounded. Two quoted rows are never compared.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Hashable, KeysView, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.pairs import ENTRY, LOWER_END, UPPER_END, Integers, Pairs
-from evaluator.scoring.uncertainty import Booleans
+from evaluator.scoring.uncertainty import CONFIDENCE, Booleans, Weights
+
+Integers = NDArray[np.int64]
 
 N_RANK_FLIPS: Final = 2_000
 """All pairs are compared at once, 19,900 of 200 entries; their critical value is read from so many draws."""
 
-# Of a board that is kept: room for so many entries more than it has.
-_ROOM: Final = 32
+# Beside an entry's own sum of squares, what is below this is left of rounding: the pair is alike.
+_ALIKE: Final = 1e-12
+# Of a float64: sums that are multiples of the last of so many digits are added without rounding.
+_DIGITS: Final = 52
+# So many rows of all pairs are measured at once.
+_ROWS: Final = 256
+# So many pairs, times all draws, are a fraction of a second of work.
+_BLOCK: Final = 1 << 13
+# So many float32 stay in the processor's cache.
+_CELLS: Final = 1 << 16
+_DRAWS: Final = 250
+
+_ENTRY: Final = 0
+# Of a quoted row's value: entries may be worse than its upper end, and better than its lower end.
+_UPPER_END: Final = 1
+_LOWER_END: Final = -1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,144 +91,160 @@ def rank_ranges(
     been rounded from the entry's: so a range holds the published rank as well, which takes quoted values as
     exact. `between` is called every fraction of a second.
     """
-    first = _n_ends(quoted)
-    low = np.zeros(published.shape, dtype=np.int64)
-    high = low.copy()
+    low, high = np.zeros((2, *published.shape), dtype=np.int64)
     signs = _signs(rng, n_recordings=sums.shape[1])
     for column in np.flatnonzero(usable).tolist():
         present = np.flatnonzero(np.isfinite(published[:, column]))
-        if not present.size:
-            continue
-        pairs = _column(signs, quoted, column, n_slots=first + len(published), between=between)
-        pairs.add(
-            first + present,
-            sums=sums[present, :, column],
-            values=published[present, column],
-            kind=ENTRY,
-            between=between,
-        )
-        found = _ranges(pairs, between=between)
-        low[present, column], high[present, column] = (ends[first + present] for ends in found)
+        if present.size:
+            rows = _rows(sums[present, :, column], published[present, column], quoted, column)
+            n_better, n_worse = _told_apart(rows, signs, between)
+            low[present, column] = 1 + n_better[: len(present)]
+            n_rows = np.count_nonzero(rows.kind != _LOWER_END)
+            high[present, column] = n_rows - n_worse[: len(present)]
     return RankRanges(low, high)
 
 
-class KeptRanges:
-    """The rank ranges of a board whose pairs are kept: an entry more or less costs its own pairs alone.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Rows:
+    """What takes part in a column: its entries, then both ends of its quoted rows. `sums` are (n, G)."""
 
-    Whatever came and went before, they are those of `rank_ranges` of the present entries, bit for bit. Rows
-    from papers stay as they are. After an exception it is of no use any more.
+    sums: Floats
+    values: Floats
+    kind: Integers
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Pairs:
+    """Pairs of rows: which is worse if any is, how much in standard errors, and 1 / √ΣD²; all (n,).
+
+    t is 0 where neither can be called worse. Of a two-sided pair the opposite, that the better one is worse,
+    can never be found and takes part as well.
     """
 
-    def __init__(
-        self,
-        *,
-        n_recordings: int,
-        usable: Booleans,
-        rng: np.random.Generator,
-        quoted: Quoted | None = None,
-        n_entries: int = 0,
-    ) -> None:
-        self._n_columns, self._first = len(usable), _n_ends(quoted)
-        self._slot_of: dict[Hashable, int] = {}
-        n_slots = self._first + n_entries + _ROOM
-        self._free = list(range(n_slots - 1, self._first - 1, -1))
-        signs = _signs(rng, n_recordings=n_recordings)
-        self._columns = {
-            column: _column(signs, quoted, column, n_slots=n_slots)
-            for column in np.flatnonzero(usable).tolist()
-        }
-        self._n_slots = n_slots
+    worse: NDArray[np.int32]
+    better: NDArray[np.int32]
+    t: Weights
+    inverse: Weights
+    is_two_sided: Booleans
 
-    @property
-    def keys(self) -> KeysView[Hashable]:
-        """Of the entries that are there."""
-        return self._slot_of.keys()
+    def of(self, chosen: NDArray[np.intp] | slice) -> _Pairs:
+        """Those of them."""
+        return _Pairs(
+            self.worse[chosen],
+            self.better[chosen],
+            self.t[chosen],
+            self.inverse[chosen],
+            self.is_two_sided[chosen],
+        )
 
-    @property
-    def nbytes(self) -> int:
-        """What it takes of memory."""
-        return sum(pairs.nbytes for pairs in self._columns.values())
 
-    @staticmethod
-    def nbytes_of(n_entries: int, *, n_recordings: int, n_columns: int) -> int:
-        """What so many entries take, about."""
-        return n_columns * Pairs.nbytes_of(n_entries + _ROOM, n_recordings=n_recordings, n_draws=N_RANK_FLIPS)
+def _rows(sums: Floats, values: Floats, quoted: Quoted | None, column: int) -> _Rows:
+    kinds = np.full(len(values), _ENTRY)
+    if quoted is not None:
+        present = np.isfinite(quoted.values[:, column])
+        half = quoted.half_widths[present, column]
+        for kind in (_UPPER_END, _LOWER_END):
+            ends = quoted.values[present, column] + kind * half
+            sums = np.concatenate([sums, ends[:, None] * quoted.counts[:, column]])
+            values = np.concatenate([values, ends])
+            kinds = np.concatenate([kinds, np.full(len(ends), kind)])
+    return _Rows(_exact(sums), values, kinds)
 
-    def remove(self, keys: Collection[Hashable], *, between: Callable[[], None] = lambda: None) -> None:
-        """Take entries off the board."""
-        slots = [self._slot_of.pop(key) for key in keys]
-        for pairs in self._columns.values():
-            pairs.remove(np.array(slots, dtype=np.intp), between=between)
-        self._free += slots
 
-    def add(
-        self,
-        keys: Sequence[Hashable],
-        *,
-        sums: Floats,
-        published: Floats,
-        between: Callable[[], None] = lambda: None,
-    ) -> None:
-        """Put entries on the board, by their `sums` (n, G, columns) and `published` values (n, columns)."""
-        missing = len(keys) - len(self._free)
-        if missing > 0:
-            n_slots = self._n_slots + missing + _ROOM
-            self._free = [*range(n_slots - 1, self._n_slots - 1, -1), *self._free]
-            self._n_slots = n_slots
-        slots = np.array([self._free.pop() for _ in keys], dtype=np.intp)
-        self._slot_of |= zip(keys, slots.tolist(), strict=True)
-        for column, pairs in self._columns.items():
-            pairs.reserve(self._n_slots)
-            present = np.flatnonzero(np.isfinite(published[:, column]))
-            pairs.add(
-                slots[present],
-                sums=sums[present, :, column],
-                values=published[present, column],
-                kind=ENTRY,
-                between=between,
-            )
+def _exact(sums: Floats) -> Floats:
+    """Sums (n, G) as multiples of a power of two, so that no sum of them, signs turned, is rounded.
 
-    def ranges(self, keys: Sequence[Hashable], *, between: Callable[[], None] = lambda: None) -> RankRanges:
-        """The ranges of these entries among all that are there."""
-        slots = np.array([self._slot_of[key] for key in keys], dtype=np.intp)
-        low, high = np.zeros((2, len(keys), self._n_columns), dtype=np.int64)
-        for column, pairs in self._columns.items():
-            low[:, column], high[:, column] = (ends[slots] for ends in _ranges(pairs, between=between))
-        return RankRanges(low, high)
+    They lose nothing that the sum of all had not lost: the last of 52 binary digits of Σ|S|. So ranges do not
+    depend on the order of entries.
+    """
+    _, exponents = np.frexp(np.abs(sums).sum(axis=1, keepdims=True))
+    return np.asarray(np.ldexp(np.rint(np.ldexp(sums, _DIGITS - exponents)), exponents - _DIGITS))
+
+
+def _told_apart(rows: _Rows, signs: Floats, between: Callable[[], None]) -> tuple[Integers, Integers]:
+    """Of every row, how many are significantly better, and how many worse: step-down over all pairs."""
+    blocks = []
+    for start in range(0, len(rows.values), _ROWS):
+        between()
+        blocks.append(_measured(rows, start))
+    parts = (np.concatenate([getattr(each, name) for each in blocks]) for name in _Pairs.__slots__)
+    pairs = _Pairs(*parts)
+    pairs = pairs.of(np.argsort(pairs.t, kind="stable"))
+    turned = (rows.sums @ signs).astype(np.float32)
+    up_to = _largest_up_to(turned, pairs, between)
+    n_left, critical = len(pairs.t), _critical(up_to[-1])
+    while (n_now := int(np.searchsorted(pairs.t, np.float32(critical), side="right"))) < n_left:
+        n_left = n_now
+        n_whole = n_left // _BLOCK
+        rest, _ = _largest(turned, pairs.of(slice(n_whole * _BLOCK, n_left)))
+        critical = _critical(np.maximum(up_to[n_whole], rest))
+    n = len(rows.values)
+    return np.bincount(pairs.worse[n_left:], minlength=n), np.bincount(pairs.better[n_left:], minlength=n)
+
+
+def _measured(rows: _Rows, start: int) -> _Pairs:
+    """The pairs of some rows with all before them, by ΣD² = Q_aa + Q_bb − 2 Q_ab."""
+    own = rows.sums[start : start + _ROWS]
+    stop = start + len(own)
+    nth, earlier = np.tril_indices(len(own), start - 1, stop)
+    later = nth + start
+    is_pair = (rows.kind[later] == _ENTRY) | (rows.kind[earlier] == _ENTRY)
+    nth, later, earlier = nth[is_pair], later[is_pair], earlier[is_pair]
+    squares, totals = np.einsum("ng,ng->n", rows.sums, rows.sums), rows.sums.sum(axis=1)
+    gaps = squares[later] + squares[earlier] - 2 * (own @ rows.sums[:stop].T)[nth, earlier]
+    is_alike = gaps <= _ALIKE * np.maximum(squares[later], squares[earlier])
+    inverse = np.where(is_alike, 0.0, 1 / np.sqrt(np.where(is_alike, 1.0, gaps)))
+    t = (totals[later] - totals[earlier]) * inverse
+    # Of an entry and an end of a quoted row only one may be called worse; of two entries that with the
+    # larger value, and of two that are published alike neither.
+    side = rows.kind[earlier] - rows.kind[later]
+    order = np.sign(rows.values[later] - rows.values[earlier])
+    t[~((order * t > 0) & ((side == 0) | (side == order)))] = 0.0
+    is_later_worse = np.where(t == 0, side >= 0, t > 0)
+    return _Pairs(
+        worse=np.where(is_later_worse, later, earlier).astype(np.int32),
+        better=np.where(is_later_worse, earlier, later).astype(np.int32),
+        t=np.abs(t).astype(np.float32),
+        inverse=inverse.astype(np.float32),
+        is_two_sided=side == 0,
+    )
+
+
+def _largest_up_to(turned: Weights, pairs: _Pairs, between: Callable[[], None]) -> Weights:
+    """In every draw the largest rise over the first 0, 1, 2, … blocks, and over all opposites."""
+    found = [np.zeros(turned.shape[1], dtype=np.float32)]
+    opposite = found[0]
+    for start in range(0, len(pairs.t), _BLOCK):
+        between()
+        rise, fall = _largest(turned, pairs.of(slice(start, start + _BLOCK)))
+        found.append(np.maximum(found[-1], rise))
+        opposite = np.maximum(opposite, fall)
+    return np.maximum(np.stack(found), opposite)
+
+
+def _largest(turned: Weights, pairs: _Pairs) -> tuple[Weights, Weights]:
+    """In every draw how far the worse of a pair rises above the better at most, in standard errors.
+
+    And the opposite, of two-sided pairs; neither is below 0.
+    """
+    rise, fall = np.zeros((2, turned.shape[1]), dtype=np.float32)
+    for first in range(0, turned.shape[1], _DRAWS):
+        draws = slice(first, first + _DRAWS)
+        some = np.ascontiguousarray(turned[:, draws])
+        for start in range(0, len(pairs.t), _CELLS // _DRAWS):
+            part = pairs.of(slice(start, start + _CELLS // _DRAWS))
+            rises = some[part.worse] - some[part.better]
+            rises *= part.inverse[:, None]
+            rise[draws] = np.maximum(rise[draws], rises.max(axis=0))
+            fall[draws] = np.maximum(fall[draws], -rises[part.is_two_sided].min(axis=0, initial=0))
+    return rise, fall
+
+
+def _critical(largest: Weights) -> float:
+    return float(np.quantile(largest, CONFIDENCE, method="higher"))
 
 
 def _signs(rng: np.random.Generator, *, n_recordings: int) -> Floats:
     """The draws by which recordings are turned, −1 or 1: (G, draws)."""
     drawn = rng.integers(0, 2, size=(N_RANK_FLIPS, n_recordings), dtype=np.int8)
     return np.ascontiguousarray(drawn.T, dtype=np.float64) * 2 - 1
-
-
-def _n_ends(quoted: Quoted | None) -> int:
-    return 0 if quoted is None else 2 * len(quoted.values)
-
-
-def _column(
-    signs: Floats,
-    quoted: Quoted | None,
-    column: int,
-    *,
-    n_slots: int,
-    between: Callable[[], None] = lambda: None,
-) -> Pairs:
-    """A column with both ends of its quoted rows in the first slots."""
-    pairs = Pairs(signs, n_slots=n_slots)
-    if quoted is None:
-        return pairs
-    values, half = quoted.values[:, column], quoted.half_widths[:, column]
-    present = np.flatnonzero(np.isfinite(values))
-    for first, kind in ((0, UPPER_END), (len(values), LOWER_END)):
-        ends = (values + kind * half)[present]
-        sums = ends[:, None] * quoted.counts[:, column]
-        pairs.add(first + present, sums=sums, values=ends, kind=kind, between=between)
-    return pairs
-
-
-def _ranges(pairs: Pairs, *, between: Callable[[], None]) -> tuple[Integers, Integers]:
-    """Of every slot both ends of its range; 0 where there is no entry."""
-    n_better, n_worse = pairs.told_apart(pairs.step_down(between=between))
-    return np.where(pairs.is_entry, 1 + n_better, 0), np.where(pairs.is_entry, pairs.n_rows - n_worse, 0)

@@ -23,7 +23,7 @@ from leaderboard.storage.files import CHUNK_BYTES
 LIST: Final = "backup.json"
 FILES: Final = "files"
 GROUND_TRUTH: Final = "ground-truth"
-FORMAT: Final = 1
+FORMAT: Final = 2
 # Sums and manifests that workers make anew, and files that somebody writes at this moment.
 _MADE_ANEW: Final = "bags"
 _DIRECTORIES: Final = ("TSTTC_DATA_DIR", "TSTTC_FILES_DIR", "TSTTC_GROUND_TRUTH_DIR")
@@ -37,10 +37,9 @@ class NoBackup(Exception):
 
 @dataclass(frozen=True)
 class RowFile:
-    """One file with rows: a table of PostgreSQL, or a whole SQLite database."""
+    """The file with all rows: an archive of PostgreSQL, or an SQLite database."""
 
     name: str
-    columns: list[str]
     sha256: str
 
 
@@ -74,7 +73,8 @@ class Contents:
             document = json.loads(path.read_text(encoding="utf-8"))
             if document["format"] != FORMAT:
                 raise NoBackup(f"{path} has the format {document['format']!r}; expected {FORMAT}.")
-            found = cls(**{**document, "parts": [RowFile(**part) for part in document["parts"]]})
+            parts = [RowFile(part["name"], part["sha256"]) for part in document["parts"]]
+            found = cls(**{**document, "parts": parts})
             found.require_names_of_ours(path)
             return found
         except OSError as fault:

@@ -1,37 +1,29 @@
-"""The rows of a database as files, and back: COPY on PostgreSQL, the whole file on SQLite.
+"""The rows of a database as one file, and back: pg_dump and pg_restore, or SQLite's own backup."""
 
-No program beside Python is needed, so a container and a machine do the same, and a backup of one version of
-PostgreSQL can be restored into another.
-"""
-
-import gzip
+import os
+import re
 import sqlite3
+import subprocess
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 from django.contrib.auth import get_user_model
 from django.core.management import call_command
 from django.db import connection, transaction
-from django.db.backends.utils import CursorWrapper
 from django.db.migrations.executor import MigrationExecutor
-from psycopg import sql
+from psycopg import pq
 
-from leaderboard.backups.contents import Contents, NoBackup, RowFile, digest_at
+from leaderboard.backups import contents
+from leaderboard.backups.contents import Contents, NoBackup, RowFile
 from leaderboard.models import GroundTruth, Submission
-from leaderboard.storage.files import CHUNK_BYTES, replacing
+from leaderboard.storage.files import replacing
 
-SQLITE: Final = "leaderboard.sqlite3"
-# `migrate` writes the first; the second counts wrong passwords, and expires within hours.
-_LEFT_OUT: Final = frozenset({"django_migrations", "leaderboard_cache"})
-_COMPRESSION: Final = 3
-# The database computes the others by itself.
-_COLUMNS: Final = (
-    "SELECT column_name FROM information_schema.columns WHERE table_schema = current_schema() "
-    "AND table_name = %s AND is_generated = 'NEVER' ORDER BY ordinal_position"
-)
+ROWS: Final = {"postgresql": "leaderboard.dump", "sqlite": "leaderboard.sqlite3"}
 _SNAPSHOT: Final = "SET TRANSACTION ISOLATION LEVEL REPEATABLE READ READ ONLY"
+# Owner and rights are those of the place; `grant` gives the rights.
+_OURS_ALONE: Final = ("--no-owner", "--no-privileges")
 
 
 @contextmanager
@@ -45,46 +37,29 @@ def one_moment() -> Iterator[None]:
 
 
 def save(folder: Path) -> list[RowFile]:
-    """Write every row into files of a folder; to be called within `one_moment`."""
+    """Write every row into a file of the folder; to be called within `one_moment`. Raises `NoBackup`."""
+    path = folder / ROWS[connection.vendor]
     if connection.vendor == "sqlite":
-        return [_save_sqlite(folder / SQLITE)]
-    with connection.cursor() as cursor:
-        tables = sorted(set(connection.introspection.table_names(cursor)) - _LEFT_OUT)
-        return [_save_table(cursor, table, folder / f"{table}.copy.gz") for table in tables]
-
-
-def _save_table(cursor: CursorWrapper, table: str, path: Path) -> RowFile:
-    cursor.execute(_COLUMNS, [table])
-    columns = [name for (name,) in cursor.fetchall()]
-    statement = sql.SQL("COPY {} ({}) TO STDOUT").format(
-        sql.Identifier(table), sql.SQL(", ").join(map(sql.Identifier, columns))
-    )
-    with (
-        replacing(path) as unfinished,
-        gzip.open(unfinished, "wb", compresslevel=_COMPRESSION) as out,
-        connection.wrap_database_errors,
-        _driver(cursor).copy(statement) as rows,
-    ):
-        for chunk in rows:
-            out.write(chunk)
-    return RowFile(table, columns, digest_at(path))
-
-
-def _save_sqlite(path: Path) -> RowFile:
-    # Nobody writes while our transaction lasts, so another connection reads what it reads.
-    source = sqlite3.connect(f"file:{connection.settings_dict['NAME']}?mode=ro", uri=True)
-    with replacing(path) as unfinished:
-        target = sqlite3.connect(unfinished)
-        try:
+        # Nobody writes while our transaction lasts, so another connection reads what it reads.
+        uri = f"file:{connection.settings_dict['NAME']}?mode=ro"
+        with (
+            replacing(path) as unfinished,
+            closing(sqlite3.connect(uri, uri=True)) as source,
+            closing(sqlite3.connect(unfinished)) as target,
+        ):
             source.backup(target)
-        finally:
-            target.close()
-            source.close()
-    return RowFile(path.name, [], digest_at(path))
+    else:
+        with connection.cursor() as cursor:
+            cursor.execute("SELECT pg_export_snapshot()")
+            (moment,) = cursor.fetchone()
+        # The cache counts wrong passwords; what it has expires within hours.
+        options = ("--format=custom", f"--snapshot={moment}", "--exclude-table-data=leaderboard_cache")
+        _run("pg_dump", *options, *_OURS_ALONE, f"--file={path}")
+    return [RowFile(path.name, contents.digest_at(path))]
 
 
-def require_fresh() -> None:
-    """Refuse a database in which somebody has worked. Raises `NoBackup`."""
+def require_fresh(kept: Contents) -> None:
+    """Refuse a database in which somebody has worked, or of another version. Raises `NoBackup`."""
     if get_user_model()._meta.db_table not in connection.introspection.table_names():
         return
     for model in (get_user_model(), Submission, GroundTruth):
@@ -93,16 +68,23 @@ def require_fresh() -> None:
                 f"The database has {model._meta.verbose_name_plural} already; expected a new database, "
                 "without tables or just migrated. Nothing was changed."
             )
-
-
-def require_known(contents: Contents) -> None:
-    """Refuse a backup that this version or this kind of database cannot take. Raises `NoBackup`."""
-    if contents.vendor != connection.vendor:
+    if contents.applied_migrations() != kept.migrations:
         raise NoBackup(
-            f"The backup is one of {contents.vendor}, the database is {connection.vendor}; expected the same."
+            "The database has other migrations than the backup; expected a database without tables. "
+            "Nothing was changed."
         )
+
+
+def require_known(kept: Contents) -> None:
+    """Refuse a backup that this version or this kind of database cannot take. Raises `NoBackup`."""
+    if kept.vendor != connection.vendor:
+        raise NoBackup(
+            f"The backup is one of {kept.vendor}, the database is {connection.vendor}; expected the same."
+        )
+    if [part.name for part in kept.parts] != [ROWS[connection.vendor]]:
+        raise NoBackup(f"The backup does not name {ROWS[connection.vendor]}; expected that file alone.")
     known = set(MigrationExecutor(connection).loader.disk_migrations)
-    newer = [f"{app} {name}" for app, name in contents.migrations if (app, name) not in known]
+    newer = [f"{app} {name}" for app, name in kept.migrations if (app, name) not in known]
     if newer:
         raise NoBackup(
             f"The backup has the migration {newer[-1]}, which this version does not know; expected the "
@@ -110,73 +92,52 @@ def require_known(contents: Contents) -> None:
         )
 
 
-def load(folder: Path, contents: Contents) -> None:
-    """Put the rows into a fresh database, as its owner, all or none; then bring it to this version."""
+def load(folder: Path) -> None:
+    """Put the rows into a fresh database, as its owner, all or none; then bring it to this version.
+
+    Raises `NoBackup`.
+    """
+    path = folder / ROWS[connection.vendor]
+    connection.ensure_connection()
     if connection.vendor == "sqlite":
-        connection.ensure_connection()
-        source = sqlite3.connect(folder / SQLITE)
-        try:
+        with closing(sqlite3.connect(path)) as source:
             source.backup(connection.connection)
-        finally:
-            source.close()
     else:
-        _migrate_to(contents)
-        with transaction.atomic(), connection.cursor() as cursor:
-            _load_tables(cursor, folder, contents.parts)
+        # The schema alone: what else is in a database, such as extensions, belongs to its server.
+        options = ("--clean", "--if-exists", "--single-transaction", "--exit-on-error", "--schema=public")
+        name = connection.connection.info.dbname
+        _run("pg_restore", *options, *_OURS_ALONE, f"--dbname={name}", str(path))
     call_command("migrate", interactive=False, verbosity=0)
 
 
-def _migrate_to(contents: Contents) -> None:
-    """Make the tables that the backup knows, and no later ones."""
-    executor = MigrationExecutor(connection)
-    wanted = {(app, name) for app, name in contents.migrations}
-    later = set(executor.loader.applied_migrations) - wanted
-    if later:
-        app, name = min(later)
-        raise NoBackup(
-            f"The database has the migration {app} {name}, which is later than the backup; expected a "
-            "database without tables. Nothing was changed."
-        )
-    nodes = executor.loader.graph.node_map
-    followed = {parent.key for key in wanted for parent in nodes[key].parents if parent.key[0] == key[0]}
-    executor.migrate(sorted(wanted - followed))
+def _run(program: str, *arguments: str) -> None:
+    """Run a client program of PostgreSQL on the database of the site. Raises `NoBackup`."""
+    connection.ensure_connection()
+    server = connection.connection.info.server_version // 10_000
+    expected = f"expected that of PostgreSQL {server} or later, for example from Debian's postgresql-client"
+    try:
+        shown = _output(program, "--version")
+    except OSError as fault:
+        raise NoBackup(f"{program} cannot be run here ({fault.strerror}); {expected}.") from None
+    version = re.search(r"\d+", shown)
+    if not version or int(version[0]) < server:
+        raise NoBackup(f"The program here is {shown}, too old for the server; {expected}.")
+    _output(program, *arguments)
 
 
-def _load_tables(cursor: CursorWrapper, folder: Path, parts: list[RowFile]) -> None:
-    names = [sql.Identifier(part.name) for part in parts]
-    # The triggers of the audit log refuse to empty it; only its owner can say so.
-    switch = sql.SQL("ALTER TABLE {} {} TRIGGER USER")
-    for name in names:
-        _execute(cursor, switch.format(name, sql.SQL("DISABLE")))
-    _execute(cursor, sql.SQL("TRUNCATE {}").format(sql.SQL(", ").join(names)))
-    for part in parts:
-        columns = sql.SQL(", ").join(map(sql.Identifier, part.columns))
-        statement = sql.SQL("COPY {} ({}) FROM STDIN").format(sql.Identifier(part.name), columns)
-        with (
-            gzip.open(folder / f"{part.name}.copy.gz", "rb") as rows,
-            connection.wrap_database_errors,
-            _driver(cursor).copy(statement) as copy,
-        ):
-            while chunk := rows.read(CHUNK_BYTES):
-                copy.write(chunk)
-    # Foreign keys are checked at the end of a transaction, and a table that waits for that cannot be altered.
-    cursor.execute("SET CONSTRAINTS ALL IMMEDIATE")
-    for part, name in zip(parts, names, strict=True):
-        _execute(cursor, switch.format(name, sql.SQL("ENABLE")))
-        for sequence in connection.introspection.get_sequences(cursor, part.name):
-            last = sql.SQL("SELECT setval(pg_get_serial_sequence({}, {}), max({})) FROM {}").format(
-                sql.Literal(part.name),
-                sql.Literal(sequence["column"]),
-                sql.Identifier(sequence["column"]),
-                name,
-            )
-            _execute(cursor, last)
+def _output(*command: str) -> str:
+    done = subprocess.run(  # noqa: S603 - PostgreSQL's own programs, nothing of a visitor's
+        command, env=os.environ | _variables(), capture_output=True, text=True, check=False
+    )
+    if done.returncode:
+        raise NoBackup(f"{command[0]} failed, and the database is as it was: {done.stderr.strip()}")
+    return done.stdout.strip()
 
 
-def _execute(cursor: CursorWrapper, statement: sql.Composed) -> None:
-    cursor.execute(statement.as_string(_driver(cursor).connection))
-
-
-def _driver(cursor: CursorWrapper) -> Any:
-    """The driver's own cursor, which knows COPY."""
-    return cursor.cursor
+def _variables() -> dict[str, str]:
+    """What our own connection was made with, as variables of libpq: everybody can read a command line."""
+    info = connection.connection.info
+    used = {**info.get_parameters(), "password": info.password}
+    known = pq.Conninfo.get_defaults()
+    names = {option.keyword.decode(): option.envvar.decode() for option in known if option.envvar}
+    return {names[key]: text for key, text in used.items() if text and key in names}

@@ -36,7 +36,7 @@ def restore(*, source: str) -> Restored:
     kept = Contents.read(folder)
     _require_whole(folder, kept)
     database.require_known(kept)
-    database.require_fresh()
+    database.require_fresh(kept)
     private = Path(settings.GROUND_TRUTH_DIR)
     _require_no_others(private, kept)
     private.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -46,14 +46,14 @@ def restore(*, source: str) -> Restored:
     for name in kept.files:
         with (folder / contents.FILES / name).open("rb") as file:
             files.store().save(name, File(file))
-    database.load(folder / kept.database, kept)
+    database.load(folder / kept.database)
     return Restored(kept, _verified_boards(kept), _keys_away(kept))
 
 
 def _require_whole(folder: Path, kept: Contents) -> None:
     """Every file of the backup has the bytes that it had when it was made."""
     wanted = {
-        **{f"{kept.database}/{_file_of(part.name)}": part.sha256 for part in kept.parts},
+        **{f"{kept.database}/{part.name}": part.sha256 for part in kept.parts},
         **{f"{contents.FILES}/{name}": digest for name, digest in kept.files.items()},
         **{f"{contents.GROUND_TRUTH}/{name}": digest for name, digest in kept.ground_truth.items()},
     }
@@ -63,10 +63,6 @@ def _require_whole(folder: Path, kept: Contents) -> None:
             f"The backup is damaged; nothing was changed. {len(damaged):,} of {len(wanted):,} files are "
             f"missing or have other bytes:\n{contents.listed(damaged)}"
         )
-
-
-def _file_of(part: str) -> str:
-    return part if part == database.SQLITE else f"{part}.copy.gz"
 
 
 def _require_no_others(private: Path, kept: Contents) -> None:

@@ -6,7 +6,7 @@ id, which never changes. It attests to one edition for ever, also once a later o
 """
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Final
 
 from django.conf import settings
 from django.core.checks import CheckMessage, Error
@@ -17,6 +17,8 @@ from leaderboard.boards.rows import flat_scores
 from leaderboard.models import Evaluation, Status, Submission
 from leaderboard.submissions import submissions
 
+MEDIA_TYPE: Final = "application/jwt"
+
 
 class NoReceipt(Exception):
     """There is no receipt for this; `code` is stable."""
@@ -26,7 +28,7 @@ class NoReceipt(Exception):
         self.code = code
 
 
-def receipt(*, submission: Submission, edition_number: int | None = None) -> dict[str, Any]:
+def receipt(*, submission: Submission, edition_number: int | None = None) -> str:
     """The signed receipt of what a submission scored, in the edition of that number or in the present one.
 
     The same every time, unless its method was renamed. Raises `NoReceipt`.

@@ -82,7 +82,7 @@ urlpatterns = [
     path(
         "submissions/<uuid:submission_id>/state/", submission_views.submission_state, name="submission_state"
     ),
-    path("submissions/<uuid:submission_id>/receipt.json", submission_views.receipt, name="receipt"),
+    path("submissions/<uuid:submission_id>/receipt.jwt", submission_views.receipt, name="receipt"),
     path("submissions/<uuid:submission_id>/withdraw/", submission_views.withdraw, name="withdraw"),
     path("methods/<uuid:method_id>/", cacheable(method_views.method), name="method"),
     path("compare/", compare_views.compare, name="compare"),

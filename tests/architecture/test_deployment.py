@@ -236,6 +236,14 @@ def test_images_are_pinned() -> None:
     assert [image for image in images if not re.search(r":\d+\.\d+", image)] == []
 
 
+def test_the_programs_for_backups_are_not_older_than_the_database() -> None:
+    of_debian = {"bookworm": 15, "trixie": 17}
+    dockerfile = (REPOSITORY / "Dockerfile").read_text()
+    release = re.findall(r"^FROM \S+-(\w+)", dockerfile, flags=re.MULTILINE)[-1]
+    assert "install -y -qq --no-install-recommends postgresql-client" in dockerfile
+    assert of_debian[release] >= int(SERVICES["db"]["image"].split(":")[1].split(".")[0])
+
+
 def test_the_image_runs_as_nobody_in_particular() -> None:
     users = re.findall(r"^USER (\S+)", (REPOSITORY / "Dockerfile").read_text(), flags=re.MULTILINE)
     assert users[-1] not in {"root", "0"}

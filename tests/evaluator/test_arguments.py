@@ -262,7 +262,7 @@ def test_things_are_short_in_a_notebook() -> None:
 
 WITHOUT_THE_COMMAND = """
 import sys
-for name in ("click", "cryptography", "httpx", "keyring", "rich", "pandas", "matplotlib"):
+for name in ("click", "cryptography", "jwt", "httpx", "keyring", "rich", "pandas", "matplotlib"):
     sys.modules[name] = None
 import evaluator
 truth = evaluator.read_truth("truth.csv")

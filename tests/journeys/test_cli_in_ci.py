@@ -19,6 +19,7 @@ from pathlib import Path
 import psycopg
 import pytest
 
+from evaluator import receipts
 from tests.evaluator.toolkit_folders import camera, write_folder
 from tests.journeys import recipes
 from tests.journeys.cutting import Cut, CutNetwork, MovingNetwork
@@ -108,7 +109,7 @@ def test_job_waits_for_its_scores_and_can_prove_them(job: Job) -> None:
     assert (scored["state"], scored["commit"]) == ("SCORED", "c0ffee")
     assert scored["scores"]["mid"] == round(json.loads(offline.stdout)["scores"]["overall"]["mid"], 1)
 
-    receipt, keys = job.home / "receipt.json", job.home / "keys.json"
+    receipt, keys = job.home / "receipt.jwt", job.home / "keys.json"
     assert job.tsttc("receipt", scored["id"], "-o", receipt).returncode == 0
     verified = job.tsttc("verify", receipt)
     assert verified.stdout.startswith("The receipt is valid.\n"), verified.stderr
@@ -116,7 +117,9 @@ def test_job_waits_for_its_scores_and_can_prove_them(job: Job) -> None:
     offline_url = f"http://127.0.0.1:{free_port()}"
     said = json.loads(job.at(offline_url)("verify", receipt, "--keys", keys, "--json").stdout)
     assert (said["submission"], said["scores"]["mid"]) == (scored["id"], scored["scores"]["mid"])
-    receipt.write_text(receipt.read_text().replace(f'"{scored["scores"]["mid"]:.1f}"', '"0.01"'))
+    header, payload, signature = receipt.read_text().strip().split(".")
+    said = receipts.decode(payload).decode().replace(f'"{scored["scores"]["mid"]:.1f}"', '"0.01"')
+    receipt.write_text(f"{header}.{receipts.encode(said.encode())}.{signature}")
     forged = job.tsttc("verify", receipt)
     assert (forged.returncode, forged.stdout) == (1, "")
     assert "The signature does not fit what the receipt says" in forged.stderr

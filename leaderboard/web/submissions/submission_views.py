@@ -208,6 +208,6 @@ def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
         document = receipts.receipt(submission=found)
     except receipts.NoReceipt as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=409)
-    response = JsonResponse(document, json_dumps_params={"indent": 2, "ensure_ascii": False})
-    response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{found.pk}.json"'
+    response = HttpResponse(document, content_type=receipts.MEDIA_TYPE)
+    response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{found.pk}.jwt"'
     return response

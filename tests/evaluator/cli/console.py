@@ -211,7 +211,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
     compared = {"split": "val", "edition": 2, "is_complete": True, "reason": "", "entries": []}
     pair = {"differences": differences, "sentence": sentence}
     site.put("GET /api/v1/compare", Reply(compared | {"pairs": [pair]}))
-    site.put(f"GET /api/v1/submissions/{ID}/receipt", Reply(RECEIPT))
+    site.put(f"GET /api/v1/submissions/{ID}/receipt", Reply(RECEIPT.encode()))
     mine = {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE", "pseudonym": "Anonymous 5d2c1f"}
     site.put("GET /api/v1/methods", Reply([mine]))
     site.put(f"GET /api/v1/methods/{METHOD_ID}", Reply(mine))

@@ -124,7 +124,7 @@ def test_the_store_takes_back_what_it_has_names_for(name: str, tmp_path: Path) -
 
 
 @pytest.mark.parametrize(
-    ("text", "message"), [("{", "is damaged"), ('{"format": 9}', "has the format 9; expected 1")]
+    ("text", "message"), [("{", "is damaged"), ('{"format": 9}', "has the format 9; expected 2")]
 )
 def test_a_list_that_cannot_be_read_says_so(tmp_path: Path, text: str, message: str) -> None:
     (tmp_path / contents.LIST).write_text(text)

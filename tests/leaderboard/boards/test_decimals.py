@@ -7,6 +7,7 @@ import json
 import re
 from pathlib import Path
 
+import jwt
 import pytest
 from django.apps import apps
 from django.core.management import call_command
@@ -94,7 +95,9 @@ def test_every_form_has_the_editions_decimals(
         line = next(line for line in body.splitlines() if "Foo" in line)
         assert texts["mid"] in line
         assert texts["mid_high"] in line
-    texts["receipt"] = receipts.receipt(submission=submission)["scores"]["mid"]
+    texts["receipt"] = jwt.decode(
+        receipts.receipt(submission=submission), options={"verify_signature": False}
+    )["scores"]["mid"]
     for form, address in {
         "badge": f"/methods/{submission.method_id}/badge.svg?split=test",
         "feed": "/board/test/feed.atom",

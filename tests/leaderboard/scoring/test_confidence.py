@@ -338,7 +338,7 @@ def test_a_worker_s_own_look_computes_what_no_message_told_of(
 def test_a_large_board_rests_between_two_rounds(
     inferred: list[Submission], edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(confidence, "REST_PER_KEPT_PAIR", timedelta(seconds=1))
+    monkeypatch.setattr(confidence, "REST_PER_PAIR", timedelta(seconds=1))
     submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
     held = truth_values.readable_digests()
     assert stale(now=timezone.now(), held=held) == []

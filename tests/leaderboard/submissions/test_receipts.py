@@ -138,7 +138,7 @@ def test_receipt_is_a_file_on_the_submissions_page(
     page = pages.page(client.get(f"/submissions/{scored.pk}/"))
     [link] = [a for a in page.all("a") if a.text == "Signed receipt"]
     response = client.get(link.attributes["href"])
-    assert f'filename="tsttc-receipt-{scored.pk}.json"' in response.headers["Content-Disposition"]
+    assert f'filename="tsttc-receipt-{scored.pk}.jwt"' in response.headers["Content-Disposition"]
     assert verified(response.content).submission == str(scored.pk)
     client.force_login(stranger)
     assert client.get(link.attributes["href"]).status_code == 404
@@ -148,7 +148,7 @@ def test_there_is_no_link_and_no_file_before_the_score(edition: Edition, client:
     waiting = builders.submit(owner, builders.predictions(edition))
     client.force_login(owner)
     assert "Signed receipt" not in client.get(f"/submissions/{waiting.pk}/").content.decode()
-    assert client.get(f"/submissions/{waiting.pk}/receipt.json").status_code == 409
+    assert client.get(f"/submissions/{waiting.pk}/receipt.jwt").status_code == 409
 
 
 def test_command_makes_a_key_that_signs(settings: Settings) -> None:

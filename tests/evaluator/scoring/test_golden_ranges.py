@@ -1,0 +1,47 @@
+"""Rank ranges of large boards stay what they are, to the last digit.
+
+`tests/golden/rank_ranges.json` has what an earlier program made of these boards, which kept all pairs and
+their maxima.
+"""
+
+import hashlib
+import json
+
+import numpy as np
+import pytest
+
+from evaluator.scoring.ranges import Quoted, RankRanges, rank_ranges
+from tests.services import REPOSITORY
+
+GOLDEN = json.loads((REPOSITORY / "tests" / "golden" / "rank_ranges.json").read_text())
+
+
+def board(*, n_entries: int, n_recordings: int, n_columns: int, step: float, n_quoted: int) -> RankRanges:
+    """The ranges of a made-up board: some entries alike, some without a value, some from papers."""
+    rng = np.random.default_rng([n_entries, n_recordings])
+    counts = np.ceil(rng.lognormal(3, 1, (n_recordings, n_columns)))
+    shared = rng.lognormal(0, 0.5, (n_recordings, n_columns))
+    means = 20 + step * np.arange(n_entries)[:, None] + rng.normal(0, 0.2, (n_entries, n_columns))
+    noise = rng.normal(0, 4, (n_entries, n_recordings, n_columns))
+    sums = (means[:, None] * shared + noise) * counts
+    sums[1::17] = sums[::17][: len(sums[1::17])]
+    published = np.round(sums.sum(axis=1) / counts.sum(axis=0), 1)
+    published[2::13, n_columns - 1] = np.nan
+    usable = np.arange(n_columns) != 1
+    values = np.round(rng.uniform(18, 24 + step * n_entries, (n_quoted, n_columns)), 1)
+    values[:1, 0] = np.nan
+    quoted = Quoted(values, np.where(np.isnan(values), np.nan, 0.05), counts) if n_quoted else None
+    signs = np.random.default_rng(5)
+    return rank_ranges(sums, published=published, usable=usable, rng=signs, quoted=quoted)
+
+
+def digest(found: RankRanges) -> str:
+    """Of both ends of all ranges."""
+    return hashlib.sha256(np.stack([found.low, found.high]).astype("<i8").tobytes()).hexdigest()
+
+
+@pytest.mark.parametrize("case", GOLDEN, ids=lambda case: case["board"]["n_entries"])
+def test_ranges_are_those_of_the_program_that_kept_all_pairs(case: dict[str, dict[str, int]]) -> None:
+    found = board(**case["board"])  # type: ignore[arg-type]  # as they are recorded
+    assert [found.low[:9, 0].tolist(), found.high[:9, 0].tolist()] == case["first"]
+    assert digest(found) == case["digest"]

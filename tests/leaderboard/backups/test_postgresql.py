@@ -1,0 +1,183 @@
+"""A database of PostgreSQL comes back as it was, and what cannot be done is said in one sentence."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+import psycopg
+import pytest
+from psycopg import sql
+
+from leaderboard.backups import contents
+from tests.prepared import database_url, migrated_database
+from tests.services import POSTGRES_ADMIN_URL, REPOSITORY, ServiceMissing, check_postgres, skip_or_fail
+
+pytestmark = [pytest.mark.services, pytest.mark.slow]
+
+WORK = """
+import django; django.setup()
+import sys
+from django.core.management import call_command
+from leaderboard.models import User
+call_command("import_truth", "test", sys.argv[1])
+for name in ("ada", "bob"):
+    User.objects.create(email=f"{name}@example.org", name="O'Hara \\\\ “τ”\\t")
+"""
+# Somebody works on: the ids go on where they were, and the audit log refuses to be changed.
+GO_ON = """
+import django; django.setup()
+from django.core.management import call_command
+from django.db import IntegrityError, connection
+from leaderboard.models import User
+User.objects.create(email="eve@example.org")
+call_command("verify_audit")
+try:
+    connection.cursor().execute("DELETE FROM leaderboard_auditevent")
+except IntegrityError as fault:
+    print(fault)
+"""
+PASSWORD = "correct-horse-battery"
+CASTS = re.compile(r"::(character varying|text)(\[\])?|[()]")
+
+
+@contextmanager
+def empty_database() -> Iterator[str]:
+    name = f"tsttc_test_{os.urandom(6).hex()}"
+    with psycopg.connect(POSTGRES_ADMIN_URL, autocommit=True) as admin:
+        admin.execute(sql.SQL("CREATE DATABASE {} TEMPLATE template0").format(sql.Identifier(name)))
+        try:
+            yield database_url(name)
+        finally:
+            admin.execute(sql.SQL("DROP DATABASE {} WITH (FORCE)").format(sql.Identifier(name)))
+
+
+def run(*command: str, url: str, data: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+    environment = {name: text for name, text in os.environ.items() if not name.startswith("TSTTC_")}
+    return subprocess.run(
+        [sys.executable, *command],
+        cwd=REPOSITORY,
+        env=environment
+        | {"DJANGO_SETTINGS_MODULE": "leaderboard.settings", "TSTTC_DATABASE_URL": url}
+        | {"TSTTC_DATA_DIR": str(data), **variables},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def content(url: str) -> list[str]:
+    """Tables, rows, triggers, constraints and sequences, in words."""
+    # Counters of wrong passwords, and when the tables were made.
+    without = [f"--exclude-table-data={name}" for name in ("leaderboard_cache", "django_migrations")]
+    command = ["pg_dump", "--no-owner", "--no-privileges", *without, url]
+    text = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    # The key of \restrict is another one each time.
+    lines = [line for line in text.splitlines() if not line.startswith(("\\restrict", "\\unrestrict"))]
+    # The server writes the types of a list in one of two ways, which mean the same.
+    return [CASTS.sub("", line) if "ARRAY[" in line else line for line in lines]
+
+
+class Source(NamedTuple):
+    """A site with rows, and a backup of it that the role of the application made."""
+
+    url: str
+    url_of_role: str
+    backup: Path
+    commands: str  # how the programs were called
+
+
+@pytest.fixture(scope="module")
+def source(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Source]:
+    try:
+        check_postgres()
+    except ServiceMissing as missing:
+        skip_or_fail(missing)
+    folder = tmp_path_factory.mktemp("source")
+    data, backup, log = folder / "data", folder / "backup", folder / "log"
+    program(folder / "bin" / "pg_dump", f'echo "$@" >> {log}; exec {shutil.which("pg_dump")} "$@"')
+    name = f"tsttc_test_{os.urandom(6).hex()}"
+    with migrated_database() as url:
+        role = {"TSTTC_APPLICATION_ROLE": name, "TSTTC_APPLICATION_PASSWORD": PASSWORD}
+        for command in (["-c", WORK, str(REPOSITORY / "examples/truth.csv")], ["manage.py", "grant"]):
+            done = run(*command, url=url, data=data, **role)
+            assert done.returncode == 0, done.stderr
+        server = urlsplit(url)
+        of_role = f"postgres://{name}:{PASSWORD}@{server.hostname}:{server.port}{server.path}"
+        done = run("manage.py", "backup", str(backup), url=of_role, data=data, PATH=path_of(folder / "bin"))
+        assert done.returncode == 0, done.stderr
+        yield Source(url, of_role, backup, log.read_text())
+    with psycopg.connect(POSTGRES_ADMIN_URL, autocommit=True) as admin:
+        admin.execute(sql.SQL("DROP ROLE {}").format(sql.Identifier(name)))
+
+
+def program(path: Path, text: str) -> None:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(0o755)
+
+
+def path_of(folder: Path) -> str:
+    return f"{folder}:{os.environ['PATH']}"
+
+
+@pytest.mark.parametrize("place", [empty_database, migrated_database])
+def test_what_was_restored_into_a_fresh_database_is_what_was_saved_and_goes_on(
+    source: Source, place: Callable[[], AbstractContextManager[str]], tmp_path: Path
+) -> None:
+    with place() as new:
+        done = run("manage.py", "restore", str(source.backup), url=new, data=tmp_path)
+        assert "1 board is the same byte for byte" in done.stdout, done.stderr
+        assert content(new) == content(source.url)
+        again = run("manage.py", "restore", str(source.backup), url=new, data=tmp_path)
+        assert "The database has users already" in again.stderr
+        assert content(new) == content(source.url)
+        went_on = run("-c", GO_ON, url=new, data=tmp_path)
+        assert went_on.returncode == 0, went_on.stderr
+        assert "append-only" in went_on.stdout
+
+
+def test_the_command_line_of_the_program_has_no_password(source: Source) -> None:
+    assert "--format=custom" in source.commands
+    assert PASSWORD not in source.commands
+
+
+def test_an_archive_that_cannot_be_read_leaves_the_database_as_it_was(source: Source, tmp_path: Path) -> None:
+    folder = tmp_path / "backup"
+    shutil.copytree(source.backup, folder)
+    [archive] = folder.glob("database-*/leaderboard.dump")
+    archive.write_bytes(archive.read_bytes()[:-100])
+    made = json.loads((folder / contents.LIST).read_text())
+    made["parts"][0]["sha256"] = contents.digest_at(archive)
+    (folder / contents.LIST).write_text(json.dumps(made))
+    with empty_database() as new:
+        before = content(new)
+        done = run("manage.py", "restore", str(folder), url=new, data=tmp_path / "new")
+        assert "pg_restore failed, and the database is as it was: pg_restore: error: " in done.stderr
+        assert content(new) == before
+
+
+@pytest.mark.parametrize(
+    ("script", "message"),
+    [
+        ("echo 'pg_dump (PostgreSQL) 9.6.24'", "The program here is pg_dump (PostgreSQL) 9.6.24, too old"),
+        (None, "pg_dump cannot be run here (No such file or directory); expected that of PostgreSQL"),
+    ],
+)
+def test_a_program_that_is_old_or_not_there_is_named(
+    source: Source, script: str | None, message: str, tmp_path: Path
+) -> None:
+    if script:
+        program(tmp_path / "bin" / "pg_dump", script)
+    data = source.backup.parent / "data"
+    new, path = tmp_path / "new", str(tmp_path / "bin")
+    done = run("manage.py", "backup", str(new), url=source.url_of_role, data=data, PATH=path)
+    assert f"There is no new backup. {message}" in done.stderr
+    assert list(new.iterdir()) == []
