@@ -59,14 +59,13 @@ def open_edition(
     path: Path | None = None,
     digest: str | None = None,
     protocol: str | None = None,
-    decimals: int | None = None,
 ) -> Edition:
     """Open an edition beside the published one and queue every standing submission for it.
 
     The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
-    stays unless given. It publishes with the split's `decimals` of now unless others are given. Asked again
-    for the same, it goes on with what is there, also with an edition that was rolled back: nothing is queued
-    twice. `actor` None is the machine's command line.
+    stays unless given. It publishes with the split's `decimals` of now. Asked again for the same, it goes on
+    with what is there, also with an edition that was rolled back: nothing is queued twice. `actor` None is
+    the machine's command line.
     Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file is at fault; nothing changes then.
     """
     require_maintainer(actor, to="change editions")
@@ -85,19 +84,16 @@ def open_edition(
         row = _imported(split, digest)
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).get(pk=split.pk)
-        decimals = split.decimals if decimals is None else decimals
         edition = split.editions.filter(
-            ground_truth=row, protocol=protocol, decimals=decimals, discarded_at=None
+            ground_truth=row, protocol=protocol, decimals=split.decimals, discarded_at=None
         ).first()
         if edition is None:
-            edition = ground_truth.new_edition(
-                split=split, row=row, protocol=protocol, decimals=decimals, now=now, actor=actor
-            )
+            edition = ground_truth.new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
         elif edition.pk == split.published_edition_id:
             raise Refused(
                 "edition-refused",
-                f"{edition} has this ground truth, protocol and number of decimals ({decimals}), and is the "
-                "current board already.",
+                f"{edition} has this ground truth, protocol and number of decimals ({split.decimals}), "
+                "and is the current board already.",
             )
         queue_active(edition)
     return edition
