@@ -193,7 +193,7 @@ def _end_admission(scene: Scene) -> Deed:
     if not scene.team.admissions.exists():
         _admit(scene, scene.team)()
     row = Admission.objects.get(team=scene.team)
-    return partial(admissions.end, row=row, actor=scene.world.maintainer)
+    return partial(admissions.end, row=row, reason="Left.", actor=scene.world.maintainer)
 
 
 def _token(scene: Scene) -> Deed:
@@ -324,7 +324,9 @@ VERBS: Mapping[str, Callable[[Scene], Deed]] = {
     "leave alone": _leave_alone,
     "remove a member": _remove,
     "hand over": lambda scene: partial(teams.hand_over, team=scene.team, to=scene.member, actor=scene.owner),
-    "appoint": lambda scene: partial(teams.appoint, team=scene.team, to=scene.member, reason="Gone."),
+    "appoint": lambda scene: partial(
+        teams.appoint, team=scene.team, to=scene.member, reason="Gone.", actor=None
+    ),
     "invite": lambda scene: partial(invitations.make, team=scene.team, actor=scene.owner, now=timezone.now()),
     "revoke an invitation": _revoke_invitation,
     "join": lambda scene: _accept(scene, scene.newcomer),

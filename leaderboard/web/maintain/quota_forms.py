@@ -94,6 +94,6 @@ class OverrideForm(SiteForm):
 
 
 class EndForm(SiteForm):
-    """Why a team's own rules end."""
+    """Why a team's own rules end, or its admission begins or ends."""
 
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)
