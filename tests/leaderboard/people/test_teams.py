@@ -278,7 +278,7 @@ def test_who_would_leave_methods_to_nobody_says_that_they_know(
 # --- the administration ------------------------------------------------------------------------------------
 
 
-def test_administration_shows_no_secret_of_an_invitation_and_deletes_nobody_who_sent_something(
+def test_administration_shows_no_secret_of_an_invitation_or_an_account_and_deletes_nobody(
     keeper: Client, edition: Edition, owner: User, stranger: User, team: Team
 ) -> None:
     builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
@@ -287,5 +287,7 @@ def test_administration_shows_no_secret_of_an_invitation_and_deletes_nobody_who_
     assert "_save" not in shown
     assert secret not in shown
     assert invitation.secret_hash not in shown
-    assert keeper.post(f"/admin/leaderboard/user/{owner.pk}/delete/", {"post": "yes"}).status_code == 403
-    assert keeper.get(f"/admin/leaderboard/user/{stranger.pk}/delete/").status_code == 200
+    shown = keeper.get(f"/admin/leaderboard/user/{owner.pk}/change/").content.decode()
+    assert owner.email in shown
+    assert owner.password not in shown
+    assert keeper.post(f"/admin/leaderboard/user/{stranger.pk}/delete/", {"post": "yes"}).status_code == 403
