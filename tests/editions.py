@@ -49,10 +49,10 @@ def extended(tmp_path: Path) -> Path:
 
 
 def open_edition(
-    path: Path | None = None, *, actor: User | None = None, protocol: str | None = None
+    path: Path | None = None, *, split: str = "test", actor: User | None = None, protocol: str | None = None
 ) -> Edition:
     return corrections.open_edition(
-        split_name="test", path=path, protocol=protocol, now=timezone.now(), actor=actor
+        split_name=split, path=path, protocol=protocol, now=timezone.now(), actor=actor
     )
 
 

@@ -50,9 +50,8 @@ HIDDEN_QUOTA: Final[Mapping[str, Any]] = {
 NAMES: Final = tuple(field.name for field in fields(Policy))
 
 
-def first_policy(*, title: str = "", is_hidden: bool) -> Policy:
-    """The policy with which a new split starts: on no page, and with a quota where its values are hidden."""
-    return Policy(title=title, listing=Listing.OFF, **(HIDDEN_QUOTA if is_hidden else {}))
+FIRST_POLICY: Final = Policy(title="", listing=Listing.OFF, **HIDDEN_QUOTA)
+"""What the form of a new split begins with: on no page, and the quota of hidden ground truth."""
 
 
 def policy_of(split: Split) -> Policy:

@@ -59,15 +59,14 @@ def open_edition(
     path: Path | None = None,
     digest: str | None = None,
     protocol: str | None = None,
-    decimals: int | None = None,
 ) -> Edition:
     """Open an edition beside the published one and queue every standing submission for it.
 
     The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
-    stays unless given. It publishes with the split's `decimals` of now unless others are given, and its unit
-    is that of the rule: a board that keeps recordings from before moves to days by this. Asked again for the
-    same, it goes on with what is there, also with an edition that was rolled back: nothing is queued
-    twice. `actor` None is the machine's command line.
+    stays unless given. It publishes with the split's `decimals` of now, and its unit is that of the rule: a
+    board that keeps recordings from before moves to days by this. Asked again for the same, it goes on with
+    what is there, also with an edition that was rolled back: nothing is queued twice. `actor` None is the
+    machine's command line.
     Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file is at fault; nothing changes then.
     """
     require_maintainer(actor, to="change editions")
@@ -87,19 +86,16 @@ def open_edition(
     unit = ground_truth.units_of(row).kind
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).get(pk=split.pk)
-        decimals = split.decimals if decimals is None else decimals
         edition = split.editions.filter(
-            ground_truth=row, protocol=protocol, decimals=decimals, unit=unit, discarded_at=None
+            ground_truth=row, protocol=protocol, decimals=split.decimals, unit=unit, discarded_at=None
         ).first()
         if edition is None:
-            edition = ground_truth.new_edition(
-                split=split, row=row, protocol=protocol, decimals=decimals, now=now, actor=actor
-            )
+            edition = ground_truth.new_edition(split=split, row=row, protocol=protocol, now=now, actor=actor)
         elif edition.pk == split.published_edition_id:
             raise Refused(
                 "edition-refused",
-                f"{edition} has this ground truth, protocol and number of decimals ({decimals}), and is the "
-                "current board already.",
+                f"{edition} has this ground truth, protocol and number of decimals ({split.decimals}), "
+                "and is the current board already.",
             )
         queue_active(edition)
     return edition

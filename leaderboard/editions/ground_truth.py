@@ -104,7 +104,7 @@ def _require_own(split: Split, row: GroundTruth | None) -> None:
         raise Refused(
             "edition-refused",
             f"This ground truth belongs to the split {row.split_id!r} already; a split that shares it is "
-            f"made with: manage.py add_split NAME --same-truth-as {row.split_id}",
+            "added at /maintain/splits/add/.",
         )
 
 
@@ -171,12 +171,11 @@ def new_edition(
     protocol: str,
     now: datetime,
     actor: User | None,
-    decimals: int | None = None,
 ) -> Edition:
     """The next edition of a split whose row the caller has locked; not yet its board.
 
-    It publishes with the split's decimals of this moment, or with `decimals`, for ever, and keeps the unit
-    that the rule gives now.
+    It publishes with the split's decimals of this moment, for ever, and keeps the unit that the rule gives
+    now.
     """
     found = units_of(row)
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
@@ -185,7 +184,7 @@ def new_edition(
         number=last + 1,
         ground_truth=row,
         protocol=protocol,
-        decimals=split.decimals if decimals is None else decimals,
+        decimals=split.decimals,
         unit=found.kind,
         n_units=None if found.kind == RECORDING else len(found),
         opened_at=now,

@@ -41,7 +41,7 @@ class UserManager(BaseUserManager["User"]):
         return user
 
     def create_superuser(self, email: str, password: str | None = None, **fields: Any) -> "User":
-        """A maintainer's account with every permission."""
+        """A maintainer's account, which may also look at `/admin/`."""
         return self.create_user(email, password, is_staff=True, is_superuser=True, **fields)
 
 

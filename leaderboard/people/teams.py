@@ -12,7 +12,7 @@ from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
 
 from leaderboard import audit, versions
-from leaderboard.errors.refusals import Refused
+from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Invitation, Membership, Method, QuotaOverride, Team, User
 from leaderboard.people import accounts
 from leaderboard.people.names import MAX_NAME, clean_name, require_rename_possible, skeleton
@@ -163,8 +163,9 @@ def hand_over(*, team: Team, to: User, actor: User) -> None:
         audit.record(verb="handed_over", noun="Team", noun_id=row.pk, actor=actor, details={"user": to.pk})
 
 
-def appoint(*, team: Team, to: User, reason: str, actor: User | None = None) -> None:
-    """Make a member the owner, as a maintainer does where the owner is gone. Raises `Refused`."""
+def appoint(*, team: Team, to: User, reason: str, actor: User | None) -> None:
+    """Make a member the owner, where the owner is gone. Raises `NotMaintainer` and `Refused`."""
+    require_maintainer(actor, to="appoint owners of teams")
     with transaction.atomic():
         row = locked(team)[0]
         heir = _membership_in(row, to)

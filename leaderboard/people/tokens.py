@@ -13,7 +13,7 @@ from knox.settings import CONSTANTS
 
 from evaluator.counting import counted
 from leaderboard import audit
-from leaderboard.errors.refusals import Refused
+from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import ApiToken, Scope, Split, User
 from leaderboard.people import accounts
 
@@ -186,6 +186,13 @@ def revoke(*, token: ApiToken, now: datetime, actor: User | None, how: str = "")
                 names={"name": token.name},
             )
     return bool(changed)
+
+
+def revoke_all(*, user: User, reason: str, actor: User | None, now: datetime) -> None:
+    """End all tokens of a person at once. Raises `NotMaintainer`."""
+    require_maintainer(actor, to="revoke tokens of others")
+    for token in ApiToken.objects.filter(user=user):
+        revoke(token=token, now=now, actor=actor, how=f"by a maintainer: {reason}")
 
 
 def revoke_leaked(*, secret: str, now: datetime) -> None:

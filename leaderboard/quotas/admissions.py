@@ -56,12 +56,12 @@ def admit(*, team: Team, split: Split, reason: str, actor: User | None, now: dat
     return row
 
 
-def end(*, row: Admission, actor: User | None) -> None:
+def end(*, row: Admission, reason: str, actor: User | None) -> None:
     """Take the admission back; what was sent stays. Raises `NotMaintainer`."""
     require_maintainer(actor, to="admit teams")
     with transaction.atomic():
         row.delete()
-        details = {"split": row.split_id}
+        details = {"split": row.split_id, "reason": reason}
         audit.record(verb="admission_ended", noun="Team", noun_id=row.team_id, actor=actor, details=details)
 
 

@@ -34,7 +34,7 @@ from leaderboard.quotas import mailboxes
 from leaderboard.submissions.moderation import masked
 
 # Addresses below it exist nowhere (RFC 2606).
-_NOWHERE = "forgotten.invalid"
+NOWHERE = "forgotten.invalid"
 
 
 def export(*, user: User) -> dict[str, Any]:
@@ -147,7 +147,7 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
 def delete_late_rows() -> None:
     """Delete what requests wrote into the tables of allauth while their account was being deleted."""
     for model in (EmailAddress, Authenticator, SocialAccount):
-        model.objects.filter(user__is_active=False, user__email__endswith=f"@{_NOWHERE}").delete()
+        model.objects.filter(user__is_active=False, user__email__endswith=f"@{NOWHERE}").delete()
 
 
 def _delete_rows(user: User) -> None:
@@ -178,7 +178,7 @@ def _blank(user: User) -> None:
 
 def _nowhere(user: User) -> str:
     """What stands in a blank account instead of its address."""
-    return f"{user.pk}@{_NOWHERE}"
+    return f"{user.pk}@{NOWHERE}"
 
 
 def _moment(at: datetime | None) -> str | None:

@@ -136,8 +136,14 @@ urlpatterns = [
         quota_views.end_override,
         name="maintain_quota_end",
     ),
+    path("maintain/admissions/<uuid:team_id>/<slug:split>/", quota_views.admit, name="maintain_admit"),
+    path(
+        "maintain/admissions/<uuid:team_id>/<slug:split>/end/",
+        quota_views.end_admission,
+        name="maintain_admission_end",
+    ),
     path("maintain/teams/<uuid:team_id>/", moderation_views.team, name="maintain_team"),
-    path("maintain/deeds/<slug:deed_name>/<uuid:subject_id>/", moderation_views.deed, name="maintain_deed"),
+    path("maintain/deeds/<slug:deed_name>/<slug:subject_id>/", moderation_views.deed, name="maintain_deed"),
     path("maintain/published/", published_views.published, name="maintain_published"),
     path(
         "maintain/published/<slug:split>/<slug:slug>/remove/",

@@ -143,6 +143,8 @@ LINES: dict[str, Line] = {
     "maintain_team_quotas": line(GET=KEEPERS),
     "maintain_quota": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_quota_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_admit": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
+    "maintain_admission_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_splits": line(GET=KEEPERS),
     "maintain_team": line(GET=KEEPERS),
     "maintain_deed": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"deed_name": "rename-team"}),

@@ -7,7 +7,6 @@ from uuid import UUID
 
 from allauth.account.models import EmailAddress
 from django.conf import settings
-from django.contrib.auth.models import Group
 from django.contrib.sessions.backends.db import SessionStore
 from django.http import HttpResponseBase
 from django.test import Client
@@ -124,7 +123,6 @@ def populate(edition: Edition) -> World:
 
 def _fill_the_administration(maintainer: User, submission: Submission) -> None:
     """A row of every model that the administration shows and that nothing above has made."""
-    Group.objects.create(name="a group")
     EmailAddress.objects.create(user=maintainer, email=maintainer.email, primary=True, verified=True)
     team, split, now = submission.method.team, submission.split, timezone.now()
     admissions.admit(team=team, split=split, reason="a test", actor=maintainer, now=now)

@@ -120,7 +120,7 @@ def test_no_value_leaves_the_workers(tmp_path: Path, postgres_url: str, redis_ur
         await_that(lambda: _is_done(keeper, rescoring), what="the second edition is scored")
         _look(owner, start=_start(sent), limit=90)
         _look(keeper, start=_start(sent), limit=120)
-        site.manage("publish_edition", "test", "2", "--reason", "Labels.")
+        keeper.post_form("/maintain/test/editions/2/publish/", {"replaces": "1", "reason": "Labels."})
         _look(owner, start=_start(sent), limit=60)
         kept = kept_in(redis_url)
         for client in (owner, keeper, program):

@@ -1,4 +1,4 @@
-"""`manage.py open_edition SPLIT`."""
+"""`manage.py open_edition SPLIT --truth PATH`."""
 
 import sys
 import time
@@ -6,7 +6,9 @@ from argparse import ArgumentParser
 from pathlib import Path
 from typing import Any
 
+from django.conf import settings
 from django.core.management.base import CommandError
+from django.urls import reverse
 from django.utils import timezone
 
 from evaluator.counting import counted
@@ -22,21 +24,15 @@ class Command(RefusingCommand):
     """Opens an edition beside the published one."""
 
     help = (
-        "Open an edition with corrected ground truth or another protocol and re-score all submissions "
-        "that are not withdrawn. Nothing public changes; after an interruption run the command again."
+        "Open an edition with corrected ground truth and re-score all submissions that are not withdrawn. "
+        "Nothing public changes; after an interruption run the command again."
     )
 
     def add_arguments(self, parser: ArgumentParser) -> None:
         """SPLIT, what is new, and whether to wait."""
         parser.add_argument("split")
-        parser.add_argument("--truth", type=Path, help="CSV file or annotation folder; default: unchanged")
+        parser.add_argument("--truth", type=Path, required=True, help="CSV file or annotation folder")
         parser.add_argument("--protocol", choices=sorted(PROTOCOLS), help="default: unchanged")
-        parser.add_argument(
-            "--decimals",
-            type=int,
-            choices=[1, 2],
-            help="with how many decimals it publishes; default: as the split says now",
-        )
         parser.add_argument(
             "--dry-run", action="store_true", help="only say what --truth would change; keep nothing"
         )
@@ -57,7 +53,6 @@ class Command(RefusingCommand):
             split_name=options["split"],
             path=options["truth"],
             protocol=options["protocol"],
-            decimals=options["decimals"],
             now=timezone.now(),
             actor=None,
         )
@@ -77,13 +72,14 @@ class Command(RefusingCommand):
             self._follow(edition)
         self.stdout.write(line(corrections.progress(edition)))
         self.stdout.write(
-            f"Inspect the preview first: manage.py preview_edition {edition.split_id} {edition.number}"
+            f"Compare and publish it at {settings.SITE_URL}"
+            f"{reverse('maintain_edition', args=[edition.split_id, edition.number])}"
         )
 
     def _look(self, options: dict[str, Any]) -> None:
         """Say what the labels of a file would change, and write it down by recording if asked."""
-        if not options["dry_run"] or options["truth"] is None:
-            raise CommandError("--dry-run needs --truth PATH, and --diff needs --dry-run.")
+        if not options["dry_run"]:
+            raise CommandError("--diff needs --dry-run.")
         found = label_changes.look(split_name=options["split"], path=options["truth"])
         counts, rows = found.counts, found.recordings
         self.stdout.write(

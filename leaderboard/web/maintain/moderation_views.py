@@ -7,6 +7,7 @@ from uuid import UUID
 
 from django import forms
 from django.contrib import messages
+from django.core.exceptions import ValidationError
 from django.db.models import F, Q
 from django.http import Http404, HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect, render
@@ -14,7 +15,8 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Evaluation, Membership, Method, Submission, Team
+from leaderboard.models import Evaluation, Method, Submission, Team, User
+from leaderboard.people import teams, tokens
 from leaderboard.people.names import MAX_NAME
 from leaderboard.submissions import forgetting, moderation
 from leaderboard.submissions.moderation import MAX_REASON
@@ -77,7 +79,7 @@ _RENAMED: Final = (
 class Deed:
     """Something that a maintainer does to an object of others: what the page says, and what is done."""
 
-    model: type[Team | Method | Submission | Membership]
+    model: type[Team | Method | Submission | User]
     heading: str
     lead: str
     button: str
@@ -94,6 +96,13 @@ def _move(*, subject: Method, name: str, now: object, **told: Any) -> None:
             "bad-value", f"{how} called {name!r}; expected the name or the id of one team.", field="name"
         )
     moderation.move_method(method=subject, to=found[0], **told)
+
+
+def _appoint(*, subject: User, now: object, **told: Any) -> None:
+    team = _team_of(subject)
+    if team is None:
+        raise Refused("bad-value", "The person is in no team; expected a member of a team.")
+    teams.appoint(team=team, to=subject, **told)
 
 
 DEEDS: Final[Mapping[str, Deed]] = {
@@ -146,30 +155,46 @@ DEEDS: Final[Mapping[str, Deed]] = {
         DeedForm,
         lambda subject, **told: moderation.withdraw_entry(submission=subject, is_hidden=True, **told),
     ),
+    "appoint-owner": Deed(
+        User,
+        "Make the person the owner of the team",
+        "They own the team from now on, in place of the present owner, who stays a member.",
+        "Make owner",
+        DeedForm,
+        _appoint,
+    ),
     "close-account": Deed(
-        Membership,
+        User,
         "Close the account",
         "Nobody can sign in to it or use its tokens. Its entries stay.",
         "Close account",
         DeedForm,
-        lambda subject, now, **told: moderation.set_active(user=subject.user, is_active=False, **told),
+        lambda subject, now, **told: moderation.set_active(user=subject, is_active=False, **told),
     ),
     "open-account": Deed(
-        Membership,
+        User,
         "Open the account again",
         "The person can sign in again.",
         "Open account",
         DeedForm,
-        lambda subject, now, **told: moderation.set_active(user=subject.user, is_active=True, **told),
+        lambda subject, now, **told: moderation.set_active(user=subject, is_active=True, **told),
+    ),
+    "revoke-tokens": Deed(
+        User,
+        "Revoke the API tokens of the person",
+        "All of them end at once. The person can create new ones.",
+        "Revoke tokens",
+        DeedForm,
+        lambda subject, **told: tokens.revoke_all(user=subject, **told),
     ),
     "forget-person": Deed(
-        Membership,
+        User,
         "Forget the person",
         "The account, its addresses, tokens and invitations are deleted, also file names and notes. "
         "A team without other members loses its name. Scores stay. This cannot be undone.",
         "Forget person",
         DeedForm,
-        lambda subject, **told: forgetting.forget(user=subject.user, **told),
+        lambda subject, **told: forgetting.forget(user=subject, **told),
     ),
 }
 
@@ -202,32 +227,36 @@ def _with_states(sent: Iterable[Submission]) -> list[Submission]:
 
 
 @maintainers_form
-def deed(request: HttpRequest, deed_name: str, subject_id: UUID) -> HttpResponse:
+def deed(request: HttpRequest, deed_name: str, subject_id: str) -> HttpResponse:
     """Say what a deed does, ask for the reason, and do it."""
     if deed_name not in DEEDS:
         raise Http404
     chosen = DEEDS[deed_name]
-    key = "handle" if chosen.model is Membership else "pk"
-    subject: Any = get_object_or_404(chosen.model, **{key: subject_id})
+    try:
+        subject: Any = get_object_or_404(chosen.model, pk=chosen.model._meta.pk.to_python(subject_id))
+    except ValidationError as fault:
+        raise Http404 from fault
     form: SiteForm = chosen.form.asked(request)
-    team_id = _team_of(subject).pk
+    team = _team_of(subject)
     if form.is_valid():
         with form.refusals():
             told = {**form.cleaned_data, "actor": maintainer_of(request), "now": timezone.now()}
             chosen.do(subject=subject, **told)
             messages.success(request, f"Done: {chosen.heading[:1].lower()}{chosen.heading[1:]}.")
-            return redirect("maintain_team", team_id)
-    about = {"deed": chosen, "subject": _name_of(subject), "team": _team_of(subject)}
+            return redirect("maintain_team", team.pk) if team else redirect("maintain_quotas")
+    about = {"deed": chosen, "subject": _name_of(subject), "team": team}
     return form_page(request, "maintain/deed.html", form, **about)
 
 
-def _team_of(subject: Team | Method | Submission | Membership) -> Team:
+def _team_of(subject: Team | Method | Submission | User) -> Team | None:
     if isinstance(subject, Team):
         return subject
+    if isinstance(subject, User):
+        return teams.current_team_of(user=subject)
     return subject.method.team if isinstance(subject, Submission) else subject.team
 
 
-def _name_of(subject: Team | Method | Submission | Membership) -> str:
+def _name_of(subject: Team | Method | Submission | User) -> str:
     if isinstance(subject, Submission):
         return f"{subject.method.name} on {subject.split_id}, {subject.submitted_at:%Y-%m-%d %H:%M} UTC"
-    return subject.user.email if isinstance(subject, Membership) else subject.name
+    return subject.email if isinstance(subject, User) else subject.name

@@ -15,9 +15,9 @@ _FOR_MAINTAINERS: Final = "One sentence for maintainers and the audit log. The t
 
 
 class TeamLookup(SiteForm):
-    """A part of a team's name, or of the address of somebody in it."""
+    """A part of a team's name, or of somebody's address."""
 
-    team = forms.CharField(label="Team, or email address of a member", required=False, max_length=254)
+    team = forms.CharField(label="Team, or email address of a person", required=False, max_length=254)
 
 
 class SpanField(forms.CharField):
@@ -94,6 +94,6 @@ class OverrideForm(SiteForm):
 
 
 class EndForm(SiteForm):
-    """Why a team's own rules end."""
+    """Why a team's own rules end, or its admission begins or ends."""
 
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)

@@ -9,6 +9,7 @@ from leaderboard.models import QuotaOverride, Split, Team, User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.people import names
 from leaderboard.quotas import quotas
+from leaderboard.submissions import forgetting
 from leaderboard.templatetags.board import grouped
 
 MAX_FOUND = 50
@@ -79,6 +80,12 @@ def teams_like(text: str) -> list[Team]:
     if look:
         fits |= Q(look__contains=look)
     return list(Team.objects.filter(fits).prefetch_related("members").order_by("name")[: MAX_FOUND + 1])
+
+
+def people_alone(text: str) -> QuerySet[User]:
+    """Accounts with this text in their address that are in no team."""
+    alone = User.objects.filter(email__icontains=text, membership=None)
+    return alone.exclude(email__endswith=f"@{forgetting.NOWHERE}").order_by("email")[:MAX_FOUND]
 
 
 def _most(count: int | None) -> str:

@@ -10,8 +10,8 @@ from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from leaderboard.models import QuotaOverride, Split, Team
-from leaderboard.quotas import quotas, rules
+from leaderboard.models import Admission, QuotaOverride, Split, Team
+from leaderboard.quotas import admissions, quotas, rules
 from leaderboard.web.maintain import quota_tables
 from leaderboard.web.maintain.maintainer_views import (
     form_page,
@@ -37,6 +37,7 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
         "text": text,
         "found": found[: quota_tables.MAX_FOUND],
         "is_cut": len(found) > quota_tables.MAX_FOUND,
+        "people": quota_tables.people_alone(text) if text else [],
         "splits": [(split, quota_tables.rules_of(split)) for split in Split.objects.all()],
         "page": page,
         "overrides": [(row, quota_tables.rules_of(row)) for row in page],
@@ -88,6 +89,40 @@ def end_override(request: HttpRequest, team_id: UUID, split: str) -> HttpRespons
     lead = "The rules of the split apply to the team again from the next submission."
     words = {"heading": "Delete the override for", "lead": lead, "button": "Delete override"}
     return _form(request, form, team=own.team, split=own.split, own=own, words=words)
+
+
+@maintainers_form
+def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
+    """Admit a team to a split."""
+    team, found = get_object_or_404(Team, pk=team_id), get_object_or_404(Split, pk=split)
+    form = EndForm.asked(request)
+    if form.is_valid():
+        actor, now = maintainer_of(request), timezone.now()
+        try:
+            admissions.admit(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
+        except Team.DoesNotExist:
+            raise Http404 from None  # it has just ended
+        messages.success(request, f"{team.name} is admitted to {split}.")
+        return redirect("maintain_team_quotas", team.pk)
+    lead = "The team can submit to the split from now on."
+    words = {"heading": "Admit a team", "lead": lead, "button": "Admit"}
+    subject = f"{team.name} on {split}"
+    return form_page(request, "maintain/deed.html", form, deed=words, team=team, subject=subject)
+
+
+@maintainers_form
+def end_admission(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
+    """Take the admission of a team back."""
+    row = get_object_or_404(Admission.objects.select_related("team"), team=team_id, split=split)
+    form = EndForm.asked(request)
+    if form.is_valid():
+        admissions.end(row=row, actor=maintainer_of(request), **form.cleaned_data)
+        messages.success(request, f"{row.team.name} is not admitted to {split} any more.")
+        return redirect("maintain_team_quotas", team_id)
+    lead = "The team can submit nothing more to the split. What it sent stays."
+    words = {"heading": "Revoke an admission", "lead": lead, "button": "Revoke the admission"}
+    subject = f"{row.team.name} on {split}"
+    return form_page(request, "maintain/deed.html", form, deed=words, team=row.team, subject=subject)
 
 
 def _form(

@@ -40,7 +40,7 @@ def splits(request: HttpRequest) -> HttpResponse:
 @maintainers_form
 def add(request: HttpRequest) -> HttpResponse:
     """Make a split."""
-    form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(policy.first_policy(is_hidden=True)))
+    form = NewSplitForm.asked(request, initial=PolicyForm.filled_with(policy.FIRST_POLICY))
     if form.is_valid():
         with form.refusals():
             split = new_splits.add_split(now=timezone.now(), actor=maintainer_of(request), **form.wanted())

@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 from django.core.files.uploadedfile import SimpleUploadedFile
-from django.core.management import CommandError, call_command
 from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.benchmark import splits
+from leaderboard.benchmark import papers, splits
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, PublishedResult, Split
 from leaderboard.models.benchmark import SINCE_EVER
 from leaderboard.scoring import confidence
@@ -79,9 +79,9 @@ def test_a_row_that_is_removed_leaves_the_board_and_stays_on_those_of_the_past(
     assert "Later" not in on_board()
     assert representations(Client(), at) == before
     assert keeper.get(page).status_code == 404
-    with pytest.raises(CommandError, match="quotes no row 'later'; expected one of deep-scale"):
-        call_command("remove_published", "test", "later", reason="Again.")
-    call_command("remove_published", "test", "sot", reason="A typo.")
+    with pytest.raises(Refused, match="quotes no row 'later'; expected one of deep-scale"):
+        splits.remove_published(split_name="test", slug="later", reason="Again.", now=timezone.now())
+    assert keeper.post(f"{PAGE}test/sot/remove/", {"reason": "A typo."}).status_code == 302
     assert "SOT" not in on_board()
     assert AuditEvent.objects.filter(verb="removed", noun="PublishedResult").count() == 2
     assert quote("later").added == ("test/later",)
@@ -119,20 +119,23 @@ def test_rows_that_come_with_their_split_stand_since_ever_and_later_ones_since_t
     assert all(timezone.now() - row.added_at < A_DAY for row in later)
 
 
+def import_paper(document: dict[str, Any]) -> splits.Imported:
+    """Import a document as JSON."""
+    data = json.dumps(document).encode()
+    return splits.import_published(document=papers.parse(data), now=timezone.now())
+
+
 @pytest.mark.usefixtures("benchmark")
-def test_a_document_is_imported_once_and_another_content_replaces_only_when_told(tmp_path: Path) -> None:
-    path = tmp_path / "paper.json"
-    path.write_text(json.dumps(paper("later", mid=1.0)))
-    call_command("import_published", str(path))
-    call_command("import_published", str(path))
+def test_a_document_is_imported_once_and_another_content_replaces_only_when_told() -> None:
+    assert import_paper(paper("later", mid=1.0)).added
+    assert import_paper(paper("later", mid=1.0)).unchanged
     assert AuditEvent.objects.filter(verb="imported").count() == 1
-    path.write_text(json.dumps(paper("later", mid=2.0)))
     with pytest.raises(
-        CommandError, match="already has the row 'later', which differs in scores; expected the same content"
+        Refused, match="already has the row 'later', which differs in scores; expected the same content"
     ):
-        call_command("import_published", str(path))
+        import_paper(paper("later", mid=2.0))
     assert on_board()["Later"] == 1.0
-    call_command("import_published", str(path), replace=True)
+    assert quote("later", mid=2.0).replaced
     assert on_board()["Later"] == 2.0
     assert PublishedResult.objects.filter(slug="later").count() == 2
 
@@ -163,14 +166,10 @@ def test_a_document_is_imported_once_and_another_content_replaces_only_when_told
         ),
     ],
 )
-def test_a_document_that_is_none_is_refused_in_words(
-    tmp_path: Path, change: dict[str, Any], sentence: str
-) -> None:
-    path = tmp_path / "paper.json"
-    path.write_text(json.dumps(paper() | change))
+def test_a_document_that_is_none_is_refused_in_words(change: dict[str, Any], sentence: str) -> None:
     n_before = PublishedResult.objects.count()
-    with pytest.raises(CommandError, match=sentence):
-        call_command("import_published", str(path))
+    with pytest.raises(Refused, match=sentence):
+        import_paper(paper() | change)
     assert PublishedResult.objects.count() == n_before
 
 

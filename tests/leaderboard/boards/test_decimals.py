@@ -10,7 +10,6 @@ from pathlib import Path
 import jwt
 import pytest
 from django.apps import apps
-from django.core.management import call_command
 from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
@@ -25,8 +24,9 @@ from tests.editions import publish
 pytestmark = pytest.mark.slow
 
 
-def open_again(decimals: int | None = None) -> Edition:
-    return corrections.open_edition(split_name="test", now=timezone.now(), actor=None, decimals=decimals)
+def open_again(*, decimals: int) -> Edition:
+    Split.objects.filter(pk="test").update(decimals=decimals)
+    return corrections.open_edition(split_name="test", now=timezone.now(), actor=None)
 
 
 def test_hidden_splits_publish_one_decimal_and_open_ones_two(benchmark: None) -> None:
@@ -45,11 +45,10 @@ def test_an_edition_has_its_decimals_for_ever_and_the_next_one_those_of_the_spli
     entries: list[Submission], edition: Edition
 ) -> None:
     with pytest.raises(Refused, match=r"number of decimals \(1\), and is the current board already"):
-        open_again()
-    Split.objects.filter(pk="test").update(decimals=2)
-    second = open_again()
+        open_again(decimals=1)
+    second = open_again(decimals=2)
     assert (second.number, second.decimals, second.ground_truth_id) == (2, 2, edition.ground_truth_id)
-    assert open_again() == second
+    assert open_again(decimals=2) == second
     edition.refresh_from_db()
     assert edition.decimals == 1
     builders.score_all()
@@ -60,12 +59,6 @@ def test_an_edition_has_its_decimals_for_ever_and_the_next_one_those_of_the_spli
             assert abs(value - change.old[name]) < 0.051
     publish(second)
     assert open_again(decimals=1) == edition
-
-
-def test_the_command_opens_an_edition_with_other_decimals(edition: Edition) -> None:
-    out = io.StringIO()
-    call_command("open_edition", "test", decimals=2, stdout=out)
-    assert "decimals 2;" in out.getvalue()
 
 
 def test_other_decimals_than_one_and_two_are_refused_by_the_database(edition: Edition) -> None:

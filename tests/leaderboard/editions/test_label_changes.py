@@ -59,9 +59,9 @@ def test_a_dry_run_says_what_would_change_and_keeps_nothing(edition: Edition, tm
     assert sorted(configured.GROUND_TRUTH_DIR.iterdir()) == kept
 
 
-def test_a_dry_run_without_labels_is_refused(edition: Edition, tmp_path: Path) -> None:
-    with pytest.raises(CommandError, match="--dry-run needs --truth PATH"):
-        call_command("open_edition", "test", dry_run=True)
+def test_a_diff_without_a_dry_run_or_a_published_edition_is_refused(edition: Edition, tmp_path: Path) -> None:
+    with pytest.raises(CommandError, match="--diff needs --dry-run"):
+        call_command("open_edition", "test", truth=tmp_path / "any.csv", diff=tmp_path / "diff.csv")
     with pytest.raises(CommandError, match="no published edition to compare with"):
         call_command("open_edition", "val", dry_run=True, truth=tmp_path / "any.csv")
 

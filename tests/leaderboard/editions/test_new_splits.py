@@ -1,12 +1,10 @@
-"""Splits and challenges without code: made, changed, archived and switched off, from a page or a command."""
+"""Splits and challenges without code: made, changed, archived and switched off on a page."""
 
 from datetime import UTC, datetime, timedelta
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import pytest
-from django.core.management import CommandError, call_command
 from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
@@ -53,16 +51,27 @@ def change(name: str, **values: Any) -> Split:
     return policy.change(split_name=name, policy=wanted, actor=None)
 
 
+def add(name: str, *, policy: Policy, same_truth_as: str = "", actor: User | None = None) -> Split:
+    return new_splits.add_split(
+        name=name,
+        policy=policy,
+        is_hidden=None if same_truth_as else False,
+        same_truth_as=same_truth_as,
+        now=timezone.now(),
+        actor=actor,
+    )
+
+
 @pytest.fixture
 def challenge(edition: Edition) -> Split:
     """A challenge on the ground truth of the test split."""
-    call_command(
-        *("add_split", "challenge", "--title", "Challenge", "--same-truth-as", "test"),
-        *("--closes", "2099-03-01 23:59 Europe/Berlin", "--limit", "1", "--window", "7 days"),
-        *("--min-gap", "0 hours", "--listing", "listed"),
-        stdout=StringIO(),
+    closes_at = moments.parse("2099-03-01 23:59 Europe/Berlin")
+    week = timedelta(days=7)
+    return add(
+        "challenge",
+        policy=Policy(title="Challenge", closes_at=closes_at, quota_limit=1, quota_window=week),
+        same_truth_as="test",
     )
-    return Split.objects.get(pk="challenge")
 
 
 # --- making one ------------------------------------------------------------------------------------------
@@ -113,46 +122,37 @@ def test_a_corrected_board_leaves_a_challenge_on_the_same_truth_as_it_is_until_i
     assert own_score(before) != own_score(values[0])
 
 
-@pytest.mark.parametrize("origin", [["--hidden"], ["--same-truth-as", "test"]])
+@pytest.mark.parametrize("origin", ["hidden", "as test"])
 def test_new_split_on_hidden_values_starts_off_the_pages_with_the_quota_of_the_test_split(
-    edition: Edition, client: Client, origin: list[str]
+    keeper: Client, edition: Edition, origin: str
 ) -> None:
-    said = StringIO()
-    call_command("add_split", "winter", "--title", "Winter", *origin, stdout=said)
+    sent = {"name": "winter", "title": "Winter", "truth": origin}
+    assert keeper.post(ADD, filled_in(get(keeper, ADD)) | sent).status_code == 302
     winter = Split.objects.get(pk="winter")
     quota = (winter.quota_limit, winter.quota_window, winter.quota_min_gap, winter.quota_rejected_limit)
     assert quota == (3, timedelta(days=30), timedelta(hours=24), 20)
     assert winter.listing == "OFF"
-    assert "manage.py change_split winter --listing listed" in said.getvalue()
     for address in ("/", "/board/test/", "/docs/", "/compare/", "/api/v1/splits", "/sitemap.xml"):
-        assert b"inter" not in client.get(address).content.replace(b"interval", b"").replace(
+        assert b"inter" not in Client().get(address).content.replace(b"interval", b"").replace(
             b"Winterthur", b""
         )
 
 
-def test_new_open_split_has_no_limit_unless_one_is_given(benchmark: None) -> None:
-    call_command("add_split", "night", "--title", "Night", "--open", stdout=StringIO())
+def test_an_empty_limit_of_a_new_split_is_no_limit(keeper: Client, benchmark: None) -> None:
+    sent = {"name": "night", "title": "Night", "truth": "hidden", "quota_limit": ""}
+    assert keeper.post(ADD, filled_in(get(keeper, ADD)) | sent).status_code == 302
     assert Split.objects.get(pk="night").quota_limit is None
-    call_command("add_split", "day", "--title", "Day", "--hidden", "--limit", "none", stdout=StringIO())
-    assert Split.objects.get(pk="day").quota_limit is None
 
 
-def test_form_of_a_new_split_begins_with_the_quota_of_the_test_split_and_switched_off(
-    keeper: Client, edition: Edition
-) -> None:
-    form = get(keeper, ADD).one("main")
-    values = {
-        each.attributes["name"]: each.attributes.get("value")
-        for each in form.all("input")
-        if "name" in each.attributes
-    }
-    assert (values["quota_limit"], values["quota_window"], values["quota_min_gap"]) == (
-        "3",
-        "30 days",
-        "24 hours",
-    )
-    chosen = [each.attributes["value"] for each in form.all("option") if "selected" in each.attributes]
-    assert "OFF" in chosen
+def filled_in(page: pages.Element) -> dict[str, str]:
+    """What a form has in its fields; no box of it is ticked."""
+    form = page.one("main").one("form")
+    fields = [each.attributes for each in form.all("input") if each.attributes.get("type") != "checkbox"]
+    values = {each["name"]: each.get("value", "") for each in fields}
+    for select in form.all("select"):
+        chosen = [each for each in select.all("option") if "selected" in each.attributes]
+        values[select.attributes["name"]] = chosen[0].attributes["value"] if chosen else ""
+    return values
 
 
 def test_split_without_ground_truth_cannot_be_listed(
@@ -185,45 +185,34 @@ def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Clien
     assert "Challenge 2027" in get(keeper, SPLITS).one("main").text
     [event] = AuditEvent.objects.filter(noun="Split", verb="added")
     assert (event.noun_id, event.details["same_truth_as"]) == ("challenge-2027", "test")
-    bad = {
-        "name": ("Test 2", "The name 'Test 2' cannot be used"),
-        "title": ("", "No title was given"),
-        "closes_at": ("2099-03-01", "is not a date with a time"),
-        "opens_at": ("2099-03-01 10:00", "has no time zone"),
-        "quota_window": ("-3 days", "'-3 days' is not a span of time"),
-        "quota_limit": ("-1", "The number is negative"),
-        "position": ("99999", TOO_FAR),
-        "quota_rejected_limit": (str(10**12), TOO_MANY),
-    }
-    for field, (value, sentence) in bad.items():
+    for field, value, sentence in (
+        ("name", "Test 2", "The name 'Test 2' cannot be used"),
+        ("name", "challenge-2027", "There is a split 'challenge-2027' already"),
+        ("name", "audit", "and none of add, announcement"),
+        ("title", "", "No title was given"),
+        ("closes_at", "2099-03-01", "is not a date with a time"),
+        ("closes_at", "2020-01-01 00:00 UTC", "is in the past"),
+        ("opens_at", "2099-03-01 10:00", "has no time zone"),
+        ("quota_window", "-3 days", "'-3 days' is not a span of time"),
+        ("quota_limit", "-1", "The number is negative"),
+        ("position", "99999", TOO_FAR),
+        ("quota_rejected_limit", str(10**12), TOO_MANY),
+    ):
         refused = keeper.post(ADD, {**NEW, "name": "other", field: value})
         assert refused.status_code == 422, field
         wrong = assert_sound(refused).one("div", class_="wrong")
         assert sentence in wrong.text
-    assert keeper.post(ADD, NEW).status_code == 422  # the name is taken
     assert Split.objects.count() == 4
 
 
-def test_command_makes_a_split_that_opens_with_its_import_and_refuses_in_a_sentence(benchmark: None) -> None:
-    out = StringIO()
-    call_command("add_split", "night", "--title", "Night", "--open", "--decimals", "2", stdout=out)
-    assert "manage.py import_truth night PATH" in out.getvalue()
-    assert not Split.objects.get(pk="night").is_hidden
-    for arguments, sentence in (
-        (("night", "--title", "N", "--open"), "There is a split 'night' already"),
-        (("audit", "--title", "N", "--open"), "and none of add, announcement"),
-        (("a", "--title", "", "--open"), "The field 'title' is empty"),
-        (("a", "--title", "N", "--same-truth-as", "val"), "expected one of: none, because none has"),
-        (("a", "--title", "N", "--open", "--closes", "2020-01-01 00:00 UTC"), "is in the past"),
-        (("a", "--title", "N", "--open", "--window", "0 days"), "The window is 0:00:00"),
-        (("a", "--title", "N", "--open", "--limit", "-2"), "'-2' is not a whole number"),
-        # The words of the page.
-        (("a", "--title", "N", "--open", "--rejected-limit", str(10**12)), TOO_MANY),
-        (("a", "--title", "N", "--open", "--position", "99999"), TOO_FAR),
-    ):
-        with pytest.raises(CommandError, match=sentence):
-            call_command("add_split", *arguments)
-    assert Split.objects.count() == 4
+def test_page_adds_a_split_with_open_ground_truth_that_waits_for_its_import(
+    keeper: Client, benchmark: None
+) -> None:
+    sent = {**NEW, "name": "night", "truth": "open", "listing": "OFF", "decimals": "2"}
+    assert keeper.post(ADD, sent).status_code == 302
+    night = Split.objects.get(pk="night")
+    assert (night.is_hidden, night.decimals, night.published_edition) == (False, 2, None)
+    assert "manage.py import_truth night PATH" in get(keeper, "/maintain/").one("main").text
 
 
 def test_a_challenge_reveals_no_more_decimals_of_hidden_values(challenge: Split) -> None:
@@ -235,14 +224,14 @@ def test_only_maintainers_add_and_change(owner: User, benchmark: None) -> None:
     with pytest.raises(NotMaintainer):
         policy.change(split_name="val", policy=Policy(title="Mine"), actor=owner)
     with pytest.raises(NotMaintainer):
-        new_splits.add_split(
-            name="mine",
-            policy=Policy(title="Mine"),
-            is_hidden=False,
-            same_truth_as="",
-            now=timezone.now(),
-            actor=owner,
-        )
+        add("mine", policy=Policy(title="Mine"), actor=owner)
+
+
+def test_a_challenge_needs_a_split_with_ground_truth_and_every_split_a_window(benchmark: None) -> None:
+    with pytest.raises(Refused, match="expected one of: none, because none has"):
+        add("a", policy=Policy(title="N"), same_truth_as="val")
+    with pytest.raises(Refused, match="The window is 0:00:00"):
+        add("a", policy=Policy(title="N", quota_window=timedelta(0)))
 
 
 @pytest.mark.parametrize(
@@ -258,12 +247,7 @@ def test_database_keeps_out_what_makes_no_sense(benchmark: None, values: dict[st
 
 def test_page_changes_a_policy_and_the_audit_trail_has_both_values(keeper: Client, edition: Edition) -> None:
     address = f"{SPLITS}test/"
-    form = get(keeper, address).one("main").one("form")
-    sent = {e.attributes["name"]: e.attributes.get("value", "") for e in form.all("input")}
-    for select in form.all("select"):
-        [chosen] = [e for e in select.all("option") if "selected" in e.attributes]
-        sent[select.attributes["name"]] = chosen.attributes["value"]
-    del sent["needs_admission"]
+    sent = filled_in(get(keeper, address))
     assert keeper.post(address, {**sent, "title": "Test set", "quota_limit": "4"}).status_code == 302
     split = Split.objects.get(pk="test")
     assert (split.title, split.quota_limit, split.quota_window) == ("Test set", 4, timedelta(days=30))
@@ -273,18 +257,12 @@ def test_page_changes_a_policy_and_the_audit_trail_has_both_values(keeper: Clien
     assert "Test set" in keeper.get("/board/test/").text
 
 
-def test_command_changes_what_is_given_and_nothing_else(benchmark: None) -> None:
-    out = StringIO()
-    call_command("change_split", "val", "--closes", "2099-01-01 00:00 UTC", "--limit", "none", stdout=out)
-    split = Split.objects.get(pk="val")
-    assert (split.quota_limit, split.title, split.quota_window) == (None, "Validation", timedelta(days=1))
-    assert "quota_limit: 50 → None" in out.getvalue()
-    call_command("change_split", "val", "--closes", "none", stdout=out)
-    assert Split.objects.get(pk="val").closes_at is None
-    with pytest.raises(CommandError, match="There is no split 'nope'; expected one of test, val, demo"):
-        call_command("change_split", "nope", "--title", "N")
-    with pytest.raises(CommandError, match="expected to open before it closes"):
-        call_command("change_split", "val", "--opens", "2099-01-02 00:00 Z", "--closes", "2099-01-01 00:00 Z")
+def test_a_change_that_makes_no_sense_is_refused(benchmark: None) -> None:
+    with pytest.raises(Refused, match="There is no split 'nope'; expected one of test, val, demo"):
+        policy.change(split_name="nope", policy=Policy(title="N"), actor=None)
+    now = timezone.now()
+    with pytest.raises(Refused, match="expected to open before it closes"):
+        change("val", opens_at=now + timedelta(days=2), closes_at=now + timedelta(days=1))
 
 
 # --- archived, and switched off --------------------------------------------------------------------------
@@ -369,8 +347,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
         [line] = pages.page(visitor.get(address)).all("p", class_="announcement")
         assert line.text == text
     assert keeper.get("/submit/").text.count("Maintenance &lt;b&gt;today") == 1
-    late = ("add_split", "late", "--title", "Late", "--same-truth-as", "test", "--listing", "listed")
-    call_command(*late, stdout=StringIO())
+    assert keeper.post(ADD, {**NEW, "name": "late"}).status_code == 302
     [line] = pages.page(visitor.get("/board/late/")).all("p", class_="announcement")
     assert line.text == text
     told = visitor.get("/api/v1/splits").json()
@@ -387,9 +364,9 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     assert versions.times_passed(now=timezone.now()) == 4
     assert "Val only" not in visitor.get("/board/val/").text
     assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
-    call_command("set_announcement", "Known error", "--until", "2099-01-01 00:00 AoE", stdout=StringIO())
+    assert keeper.post(page, sent | {"announcement": "Known error"}).status_code == 302
     assert "Known error" in visitor.get("/board/test/").text
-    call_command("set_announcement", stdout=StringIO())
+    assert keeper.post(page, {}).status_code == 302
     assert not SiteAnnouncement.objects.exists()
     assert "Known error" not in visitor.get("/board/test/").text
 

@@ -4,7 +4,6 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
-from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
 
@@ -52,9 +51,6 @@ def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_know
     with pytest.raises(Refused) as refused:
         publish(adding)
     assert sentence in str(refused.value)
-    with pytest.raises(CommandError) as failed:
-        call_command("publish_edition", "test", "2", "--reason", "More labels.")
-    assert sentence in str(failed.value)
     data = {"replaces": "1", "reason": "More labels."}
     answer = keeper.post(PUBLISH, data)
     assert answer.status_code == 422
@@ -66,11 +62,6 @@ def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_know
     assert keeper.post(PUBLISH, {**data, "leave_out": "on"}).status_code == 302
     assert Publication.objects.get(edition=adding).left_out == [str(sent.pk)]
     assert keeper.get("/api/v1/splits/test/changelog").json()[0]["n_left_out"] == 1
-
-
-def test_the_command_publishes_with_leave_out(adding: Edition) -> None:
-    call_command("publish_edition", "test", "2", "--reason", "More labels.", "--leave-out")
-    assert Split.objects.get(pk="test").published_edition == adding
 
 
 def test_the_slot_is_given_back_for_as_long_as_the_board_rejects_the_entry(

@@ -4,7 +4,6 @@ import logging
 import re
 from datetime import timedelta
 from io import StringIO
-from pathlib import Path
 
 import pytest
 from allauth.account.models import EmailAddress
@@ -193,15 +192,16 @@ def test_tokens_that_end_and_splits_that_close_are_told_to_those_whom_it_concern
 
 
 def test_an_announcement_reaches_the_teams_of_a_split_once(
-    edition: Edition, owner: User, stranger: User, tmp_path: Path
+    edition: Edition, owner: User, stranger: User
 ) -> None:
     builders.submit(owner, builders.predictions(edition))
-    text = tmp_path / "text"
-    text.write_text("The server moves.")
-    for people in ("1 person", "0 people"):
-        out = StringIO()
-        call_command("announce", "test", str(text), subject="Maintenance\nBcc: x@example.org", stdout=out)
-        assert f"Queued for {people}." in out.getvalue()
+    announcement = announcements.written(
+        split=Split.objects.get(pk="test"),
+        subject="Maintenance\nBcc: x@example.org",
+        text="The server moves.",
+    )
+    for n_people in (1, 0):
+        assert announcements.announce(announcement, now=timezone.now(), actor=None) == n_people
     assert told() == [(owner.email, "announcement")]
     assert "\n" not in Mail.objects.get().subject
 

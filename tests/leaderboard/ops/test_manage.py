@@ -1,14 +1,16 @@
 """The entry of the commands, as a shell meets it."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 from django.conf import settings
+from django.core.management import get_commands
 
-from tests.services import environment_of_its_own
+from tests.services import REPOSITORY, environment_of_its_own
 
 pytestmark = pytest.mark.slow
 
@@ -27,3 +29,28 @@ def test_a_command_whose_reader_has_left_ends_without_a_traceback() -> None:
     )
     os.close(writer)
     assert (done.returncode, done.stderr) == (141, "")
+
+
+def test_every_command_has_one_row_among_the_places_of_maintainers_and_one_in_the_list() -> None:
+    own = {name for name, app in get_commands().items() if app == "leaderboard"}
+    guide = (REPOSITORY / "docs/maintainers.md").read_text("utf-8")
+    table = guide.partition("## Where each thing is done\n")[2].partition("\n## ")[0]
+    places = [set(re.findall(r"`(?:make )?(\w+)[^`]*`", row)) & own for row in table.splitlines()]
+    assert sorted(name for row in places for name in row) == sorted(own)
+    listed = (
+        (REPOSITORY / "docs/operations.md").read_text("utf-8").partition("## The maintainers' commands\n")[2]
+    )
+    rows = re.findall(r"^\| `(\w+)", listed.partition("\n## ")[0], re.MULTILINE)
+    assert own - set(rows) == {"build_wheel", "demo"}  # of the installation, and of `make demo`
+
+
+def test_every_command_that_a_document_or_a_page_names_is_there() -> None:
+    sources = [*REPOSITORY.glob("docs/**/*.md"), *REPOSITORY.glob("templates/**/*.html")]
+    sources += (REPOSITORY / "leaderboard").rglob("*.py")
+    missing = [
+        f"{source.relative_to(REPOSITORY)}: {name}"
+        for source in sources
+        for name in re.findall(r"manage\.py (\w+)", source.read_text("utf-8"))
+        if name not in get_commands() and name != "COMMAND"
+    ]
+    assert missing == []

@@ -2,10 +2,8 @@
 
 import re
 from datetime import timedelta
-from io import StringIO
 
 import pytest
-from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
 
@@ -233,51 +231,6 @@ def test_who_left_sees_nothing_private_of_the_team_any_more(
     assert [client.get(address).status_code for address in addresses] == [404] * 3
 
 
-# --- the maintainers' command ------------------------------------------------------------------------------
-
-
-def appoint_owner(team: str, email: str, reason: str = "Her account is closed.") -> str:
-    out = StringIO()
-    call_command("appoint_owner", team, email, "--reason", reason, stdout=out)
-    return out.getvalue()
-
-
-def test_of_teams_of_one_name_the_owner_is_appointed_by_id(
-    owner: User, teammate: User, stranger: User, team: Team
-) -> None:
-    teams.create(user=stranger, name="Owls", now=timezone.now())
-    with pytest.raises(CommandError, match=f"2 teams are called 'Owls'; expected one .*{team.pk}"):
-        appoint_owner("Owls", teammate.email)
-    assert appoint_owner(str(team.pk), teammate.email).startswith(teammate.email)
-
-
-def test_a_maintainer_appoints_an_owner_where_the_owner_is_gone(
-    owner: User, teammate: User, team: Team
-) -> None:
-    User.objects.filter(pk=owner.pk).update(is_active=False)
-    assert appoint_owner("Owls", "Teammate@example.org") == "teammate@example.org owns the team Owls.\n"
-    assert owners(team) == [teammate]
-    (event,) = AuditEvent.objects.filter(verb="appointed_owner")
-    assert event.details == {"user": teammate.pk, "from": [owner.pk], "reason": "Her account is closed."}
-
-
-@pytest.mark.parametrize(
-    ("team_name", "email", "reason", "said"),
-    [
-        ("Nobody", "teammate@example.org", "Gone.", "No team is called 'Nobody'."),
-        ("Owls", "nobody@example.org", "Gone.", "There is no account for 'nobody@example.org'."),
-        ("Owls", "stranger@example.org", "Gone.", "That person is not in the team 'Owls'"),
-        ("Owls", "teammate@example.org", " ", "No reason was given"),
-    ],
-)
-def test_an_appointment_that_cannot_be_changes_nothing(
-    owner: User, stranger: User, team: Team, team_name: str, email: str, reason: str, said: str
-) -> None:
-    with pytest.raises(CommandError, match=said):
-        appoint_owner(team_name, email, reason)
-    assert owners(team) == [owner]
-
-
 # --- the page ----------------------------------------------------------------------------------------------
 
 
@@ -325,7 +278,7 @@ def test_who_would_leave_methods_to_nobody_says_that_they_know(
 # --- the administration ------------------------------------------------------------------------------------
 
 
-def test_administration_shows_no_secret_of_an_invitation_and_deletes_nobody_who_sent_something(
+def test_administration_shows_no_secret_of_an_invitation_or_an_account_and_deletes_nobody(
     keeper: Client, edition: Edition, owner: User, stranger: User, team: Team
 ) -> None:
     builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
@@ -334,5 +287,7 @@ def test_administration_shows_no_secret_of_an_invitation_and_deletes_nobody_who_
     assert "_save" not in shown
     assert secret not in shown
     assert invitation.secret_hash not in shown
-    assert keeper.post(f"/admin/leaderboard/user/{owner.pk}/delete/", {"post": "yes"}).status_code == 403
-    assert keeper.get(f"/admin/leaderboard/user/{stranger.pk}/delete/").status_code == 200
+    shown = keeper.get(f"/admin/leaderboard/user/{owner.pk}/change/").content.decode()
+    assert owner.email in shown
+    assert owner.password not in shown
+    assert keeper.post(f"/admin/leaderboard/user/{stranger.pk}/delete/", {"post": "yes"}).status_code == 403

@@ -10,6 +10,7 @@ from leaderboard.models import Admission, AuditEvent, Edition, Split, Submission
 from leaderboard.people import teams
 from leaderboard.quotas import admissions
 from tests import builders, pages
+from tests.leaderboard.web.test_every_page import assert_sound
 
 SENTENCE = (
     "Only admitted teams can submit to test, and your team is not one of them; write to jury@example.org."
@@ -63,14 +64,14 @@ def test_an_admitted_team_submits_until_its_admission_ends(
     builders.submit(teammate, builders.predictions(by_admission))
     with pytest.raises(admissions.NotAdmitted):
         builders.submit(stranger, builders.predictions(by_admission))
-    admissions.end(row=row, actor=maintainer)
+    admissions.end(row=row, reason="Left.", actor=maintainer)
     with pytest.raises(admissions.NotAdmitted):
         builders.submit(owner, builders.predictions(by_admission, factor=1.2))
     assert Submission.objects.count() == 1
     events = AuditEvent.objects.filter(noun_id=str(team.pk), verb__in=["admitted", "admission_ended"])
     assert [(event.verb, event.actor, event.details) for event in events.order_by("pk")] == [
         ("admitted", maintainer, {"split": "test", "reason": "R"}),
-        ("admission_ended", maintainer, {"split": "test"}),
+        ("admission_ended", maintainer, {"split": "test", "reason": "Left."}),
     ]
 
 
@@ -88,11 +89,12 @@ def test_maintainers_admit_from_the_page_of_a_team_and_nobody_else_does(
     [link] = [a for a in pages.page(keeper.get(page)).all("a") if a.text == "admit it to test"]
     address = link.attributes["href"] or ""
     assert keeper.get(address).status_code == 200
-    form = {"team": str(team.pk), "split": "test", "reason": "They asked."}
-    assert keeper.post(address, form).status_code == 302
+    assert_sound(keeper.post(address, {"reason": " "}))
+    assert keeper.post(address, {"reason": "They asked."}).status_code == 302
     assert Admission.objects.get().admitted_by == maintainer
     [link] = [a for a in pages.page(keeper.get(page)).all("a") if a.text == "revoke its admission to test"]
-    assert keeper.post(link.attributes["href"] or "", {"post": "yes"}).status_code == 302
+    assert keeper.post(link.attributes["href"] or "", {"reason": "It left."}).status_code == 302
     assert not Admission.objects.exists()
+    assert keeper.get(link.attributes["href"] or "").status_code == 404
     with pytest.raises(NotMaintainer):
         admit(team, owner)

@@ -1,7 +1,6 @@
 """Moderation and forgetting: a name is gone wherever it stood, and nothing that is left names the person."""
 
 import json
-from io import StringIO
 
 import pytest
 from allauth.account.models import EmailAddress
@@ -9,7 +8,6 @@ from allauth.mfa.models import Authenticator
 from allauth.socialaccount.models import SocialAccount
 from django.contrib.admin.models import LogEntry
 from django.core import serializers
-from django.core.management import CommandError, call_command
 from django.test import Client
 from django.utils import timezone
 
@@ -27,7 +25,6 @@ from leaderboard.models import (
     Team,
     User,
 )
-from leaderboard.ops import environment
 from leaderboard.people import teams
 from leaderboard.submissions import forgetting, moderation
 from leaderboard.workers import upkeep
@@ -130,10 +127,9 @@ def test_a_method_moves_to_another_team_with_its_submissions(
 def test_a_closed_account_signs_in_nowhere_until_it_is_opened(
     keeper: Client, client: Client, team: Team, teammate: User, maintainer: User
 ) -> None:
-    member = Membership.objects.get(user=teammate)
-    do(keeper, "close-account", member.handle)
+    do(keeper, "close-account", teammate.pk)
     assert not Client().login(email=teammate.email, password="correct horse")
-    do(keeper, "open-account", member.handle)
+    do(keeper, "open-account", teammate.pk)
     assert Client().login(email=teammate.email, password="correct horse")
     with pytest.raises(Refused, match="your own account"):
         moderation.set_active(user=maintainer, is_active=False, reason="R", actor=maintainer)
@@ -146,6 +142,37 @@ def test_only_maintainers_moderate(owner: User, stranger: User, team: Team) -> N
         forgetting.forget(user=owner, reason="R", actor=stranger, now=timezone.now())
 
 
+def test_a_maintainer_makes_a_member_the_owner(
+    keeper: Client, team: Team, owner: User, teammate: User, stranger: User, maintainer: User
+) -> None:
+    User.objects.filter(pk=owner.pk).update(is_active=False)
+    do(keeper, "appoint-owner", teammate.pk)
+    assert Membership.objects.get(team=team, is_owner=True).user == teammate
+    event = AuditEvent.objects.get(verb="appointed_owner")
+    assert (event.actor, event.details["from"]) == (maintainer, [owner.pk])
+    answer = keeper.post(f"/maintain/deeds/appoint-owner/{stranger.pk}/", {"reason": "R"})
+    assert "The person is in no team" in assert_sound(answer).one("div", class_="form-errors").text
+
+
+def test_a_maintainer_revokes_all_tokens_of_a_person(keeper: Client, owner: User, maintainer: User) -> None:
+    headers = {"Authorization": f"Bearer {builders.token(owner)}"}
+    assert Client().get("/api/v1/quota", headers=headers).status_code == 200
+    do(keeper, "revoke-tokens", owner.pk)
+    assert Client().get("/api/v1/quota", headers=headers).status_code == 401
+    event = AuditEvent.objects.get(verb="revoked")
+    assert (event.actor, event.details["how"]) == (maintainer, "by a maintainer: A complaint.")
+
+
+def test_a_person_without_a_team_is_found_by_address(keeper: Client, team: Team) -> None:
+    alone = User.objects.create_user("alone@example.org", "x")
+    page = get(keeper, "/maintain/quotas/?team=Alone@").one("section").text
+    assert "alone@example.org" in page
+    assert "owner@example.org" not in page
+    do(keeper, "forget-person", alone.pk)
+    assert "No results." in get(keeper, "/maintain/quotas/?team=forgotten").one("section").text
+    assert keeper.get("/maintain/deeds/forget-person/nobody/").status_code == 404
+
+
 # --- forgetting ------------------------------------------------------------------------------------------
 
 
@@ -156,7 +183,7 @@ def everything() -> str:
 
 
 def test_a_forgotten_person_is_named_nowhere_and_their_scores_stay(
-    edition: Edition, owner: User, client: Client
+    edition: Edition, owner: User, keeper: Client
 ) -> None:
     sent = published(edition, owner, method="Stays")
     Submission.objects.filter(pk=sent.pk).update(note="by ada", filename="ada.json")
@@ -166,10 +193,9 @@ def test_a_forgotten_person_is_named_nowhere_and_their_scores_stay(
     builders.token(owner)
     Mail.objects.create(kind="scored", recipient="second@example.org", subject="Ada Lovelace", text="T")
     audit.seal()
+    client = Client()
     client.force_login(owner)
-    out = StringIO()
-    call_command("forget_person", "owner@example.org", "--reason", "They asked.", stdout=out)
-    assert str(owner.pk) in out.getvalue()
+    do(keeper, "forget-person", owner.pk)
     left = everything()
     assert [
         text for text in ("owner@", "second@", "Lovelace", "Owls", "ada.json", "by ada") if text in left
@@ -182,8 +208,6 @@ def test_a_forgotten_person_is_named_nowhere_and_their_scores_stay(
     assert "Lovelace" not in board
     assert client.get("/submissions/").status_code == 302  # the session has ended
     assert not Membership.objects.filter(user=owner).exists()
-    with pytest.raises(CommandError, match="no account with that address"):
-        call_command("forget_person", "owner@example.org", "--reason", "R")
 
 
 def test_a_team_goes_on_without_its_owner(team: Team, owner: User, teammate: User) -> None:
@@ -244,16 +268,6 @@ def test_what_is_written_into_a_blank_account_is_deleted_with_the_next_cleaning(
     assert list(EmailAddress.objects.values_list("email", flat=True)) == ["stays@example.org"]
     assert not Authenticator.objects.exists()
     assert not SocialAccount.objects.exists()
-
-
-def test_the_command_needs_the_key_of_the_web_processes(owner: User, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(environment, "PRODUCTION", True)
-    monkeypatch.delenv("TSTTC_SECRET_KEY", raising=False)
-    with pytest.raises(CommandError, match="TSTTC_SECRET_KEY is not set; expected the one of the web"):
-        call_command("forget_person", owner.email, "--reason", "R")
-    monkeypatch.setenv("TSTTC_SECRET_KEY", "k")
-    call_command("forget_person", owner.email, "--reason", "R")
-    assert not User.objects.filter(email=owner.email).exists()
 
 
 def test_the_export_names_no_method_of_a_team_that_the_person_has_left(

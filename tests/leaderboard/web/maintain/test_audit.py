@@ -4,14 +4,15 @@ import csv
 import io
 import json
 from datetime import UTC, timedelta
+from io import StringIO
 
 import pytest
+from django.core.management import CommandError, call_command
 from django.http import HttpResponseBase, StreamingHttpResponse
 from django.test import Client
-from django.urls import reverse
 
 from leaderboard import audit
-from leaderboard.models import AuditEvent, Edition, Split, User
+from leaderboard.models import AuditEvent, Edition, User
 from leaderboard.storage import truth_values
 from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -139,57 +140,40 @@ def test_a_long_trail_has_pages_that_keep_the_question(keeper: Client, db: None)
     assert len(rows(keeper.get(PAGE + older.attributes["href"]))) == 50
 
 
-# --- the administration ----------------------------------------------------------------------------------
+# --- the role of a maintainer ----------------------------------------------------------------------------
 
 
-def test_a_changed_quota_is_audited_with_its_values(
-    keeper: Client, benchmark: None, maintainer: User
-) -> None:
-    address = reverse("admin:leaderboard_split_change", args=["test"])
-    form = keeper.get(address).context["adminform"].form
-    present = {name: form.initial.get(name) for name in form.fields}
-    data = {name: "" if value is None else value for name, value in present.items()} | {"quota_limit": 7}
-    data |= {"quota_window": "30 00:00:00", "quota_min_gap": "24:00:00"}
-    for name in ("opens_at", "closes_at"):
-        data |= {f"{name}_0": "", f"{name}_1": ""}
-    assert keeper.post(address, data).status_code == 302
-    assert Split.objects.get(pk="test").quota_limit == 7
-    event = AuditEvent.objects.get(verb="changed", noun="Split", noun_id="test", actor=maintainer)
-    assert event.details["quota_limit"] == "7"
-    assert event.details["said"] == [{"changed": {"fields": ["Quota limit"]}}]
+def test_who_becomes_a_maintainer_and_who_no_longer_is_one_is_audited(owner: User) -> None:
+    call_command("set_maintainer", "Owner@example.org", reason="She helps out.", stdout=StringIO())
+    assert User.objects.get(pk=owner.pk).is_maintainer
+    call_command("set_maintainer", owner.email, reason="She left.", end=True, stdout=StringIO())
+    assert not User.objects.get(pk=owner.pk).is_maintainer
+    events = AuditEvent.objects.filter(verb="changed", noun="User", noun_id=owner.pk).order_by("pk")
+    assert [event.details for event in events] == [
+        {"is_maintainer": True, "reason": "She helps out."},
+        {"is_maintainer": False, "reason": "She left."},
+    ]
 
 
-def test_who_became_a_maintainer_is_audited(keeper: Client, owner: User, maintainer: User) -> None:
-    address = reverse("admin:leaderboard_user_change", args=[owner.pk])
-    data = {"email": owner.email, "name": owner.name, "is_active": "on", "is_staff": "on"}
-    data |= {
-        "date_joined_0": "2026-11-20",
-        "date_joined_1": "12:00:00",
-        "last_login_0": "",
-        "last_login_1": "",
-    }
-    assert keeper.post(address, data).status_code == 302
-    event = AuditEvent.objects.get(verb="changed", noun="User", noun_id=owner.pk, actor=maintainer)
-    assert (event.details["is_staff"], event.details["is_superuser"]) == ("True", "False")
+def test_a_closed_account_is_no_maintainers_and_a_role_needs_a_reason(owner: User) -> None:
+    with pytest.raises(CommandError, match="The field 'reason' is empty"):
+        call_command("set_maintainer", owner.email, reason=" ")
+    User.objects.filter(pk=owner.pk).update(is_active=False)
+    with pytest.raises(CommandError, match="closed or deleted"):
+        call_command("set_maintainer", owner.email, reason="She helps out.")
+    assert not User.objects.get(pk=owner.pk).is_staff
 
 
 # --- nothing that is nobody's business -------------------------------------------------------------------
 
 
-def test_no_secret_and_no_true_value_stands_in_the_trail(
-    edition: Edition, owner: User, maintainer: User, client: Client
-) -> None:
+def test_no_secret_and_no_true_value_stands_in_the_trail(edition: Edition, owner: User) -> None:
     token = builders.token(owner)
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()
-    client.force_login(maintainer)
-    address = reverse("admin:auth_user_password_change", args=[owner.pk])
-    client.post(address, {"password1": "new horse battery", "password2": "new horse battery"})
     told = json.dumps([[e.noun_id, e.details] for e in AuditEvent.objects.all()])
     truth = truth_values.load(edition.ground_truth_id).ttc_s.tolist()
     assert token not in told
     assert token.removeprefix("tsttc_")[9:] not in told
-    assert "horse" not in told
     assert owner.password not in told
     assert not [value for value in truth if repr(value) in told]
-    assert AuditEvent.objects.filter(noun="User", verb="changed").count() == 1
