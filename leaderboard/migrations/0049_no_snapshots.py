@@ -5,7 +5,7 @@ from django.db import migrations
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("leaderboard", "0045_no_late_boards"),
+        ("leaderboard", "0048_no_late_boards"),
     ]
 
     operations = [

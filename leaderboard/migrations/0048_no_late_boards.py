@@ -5,7 +5,7 @@ from django.db import migrations
 
 class Migration(migrations.Migration):
     dependencies = [
-        ("leaderboard", "0044_unit_of_editions"),
+        ("leaderboard", "0047_no_allowances"),
     ]
 
     operations = [
