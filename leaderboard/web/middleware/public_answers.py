@@ -60,7 +60,7 @@ SHARED_HEADERS: Final = (
 HEADER_OF_304: Final = "Cross-Origin-Resource-Policy"
 
 
-class Answer(NamedTuple):
+class PublicAnswer(NamedTuple):
     """What is kept: the digest of the bytes, the headers that are everybody's, and the bytes, compressed."""
 
     digest: str
@@ -96,7 +96,7 @@ class PublicAnswersMiddleware:
             kept = _answer_of(response)
             if len(kept.packed) <= MAX_BYTES:
                 cache.set(key, tuple(kept))
-        return _response(request, Answer(*kept))
+        return _response(request, PublicAnswer(*kept))
 
 
 def is_anybodys(request: HttpRequest) -> bool:
@@ -130,14 +130,14 @@ def _may_be_kept(response: HttpResponseBase) -> bool:
     return is_cacheable(response) and response.status_code == 200 and not response.cookies
 
 
-def _answer_of(response: HttpResponse) -> Answer:
+def _answer_of(response: HttpResponse) -> PublicAnswer:
     headers = {name: response[name] for name in SHARED_HEADERS if response.has_header(name)}
     # The same bytes compress to the same: a moment within would give each process its own.
     packed = gzip.compress(response.content, 6, mtime=0)
-    return Answer(hashlib.sha256(response.content).hexdigest()[:32], headers, packed)
+    return PublicAnswer(hashlib.sha256(response.content).hexdigest()[:32], headers, packed)
 
 
-def _response(request: HttpRequest, kept: Answer) -> HttpResponse:
+def _response(request: HttpRequest, kept: PublicAnswer) -> HttpResponse:
     """The response to one reader: 304 if they have it, compressed if they take that."""
     is_packed = _GZIP.search(request.META.get("HTTP_ACCEPT_ENCODING", "")) is not None
     etag = f'"{kept.digest}-gz"' if is_packed else f'"{kept.digest}"'
