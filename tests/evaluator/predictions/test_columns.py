@@ -14,6 +14,7 @@ from evaluator.metrics.scale import Floats
 from evaluator.predictions import columns
 from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
+from tests.evaluator.faulty_files import CASES, FURTHER, MANIFEST
 from tests.evaluator.worlds import envelope, flat, make_truth
 
 SMALL = make_truth([4.0, -10.0, 1.0]).manifest
@@ -306,6 +307,11 @@ def test_no_bytes_raise_anything_but_a_rejection(data: bytes) -> None:
         assert all(line.isprintable() for line in str(outcome).splitlines())
     else:
         assert np.abs(outcome).min() > 0
+
+
+@pytest.mark.parametrize("name", [*CASES, *FURTHER])
+def test_the_known_files_read_the_same_both_ways(name: str) -> None:
+    assert_equivalent(FURTHER[name] if name in FURTHER else CASES[name][0], MANIFEST)
 
 
 # --- which way is taken ----------------------------------------------------------------------------------
