@@ -23,7 +23,7 @@ SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-runs test test-fast chaos sabotage bench docs lint format screenshots lock echarts clean
+.PHONY: help demo demo-runs test test-fast chaos sabotage bench lint format screenshots lock echarts clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -48,9 +48,6 @@ sabotage: $(DEV_STAMP) ## break one line of the code at a time; a named test mus
 
 bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md, and say which hold
 	@$(PY) -m benchmarks
-
-docs: $(DEV_STAMP) ## build the documentation as a site into build/site/
-	@NO_MKDOCS_2_WARNING=1 $(PY) -m mkdocs build --strict
 
 lint: $(DEV_STAMP) ## style, types and the direction of imports
 	$(PY) -m ruff check .

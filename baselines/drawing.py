@@ -18,7 +18,7 @@ from baselines.clips import Image
 
 FONT: Final = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Liberation Sans', Arial, sans-serif"
 PNG_SCALE: Final = 2
-JPEG_QUALITY: Final = 88
+_JPEG_QUALITY: Final = 88
 
 Anchor = Literal["start", "middle", "end"]
 
@@ -104,22 +104,19 @@ class Figure:
     title: str
     shapes: list[Shape] = field(default_factory=list)
 
-    def svg(self, *, jpeg_quality: int = JPEG_QUALITY) -> str:
-        """SVG with its pictures inside, without scripts, styles or references to other files.
-
-        `jpeg_quality` is from 1 to 100; lower is smaller.
-        """
+    def svg(self) -> str:
+        """SVG with its pictures inside, without scripts, styles or references to other files."""
         lines = [
             f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {self.width} {self.height}" '
             f'width="{self.width}" height="{self.height}" role="img" font-family="{FONT}">',
             f"<title>{escape(self.title)}</title>",
             f'<rect width="{self.width}" height="{self.height}" fill="{self.theme.ground}"/>',
-            *(_svg_of(shape, jpeg_quality) for shape in self.shapes),
+            *map(_svg_of, self.shapes),
             "</svg>",
         ]
         return "\n".join(lines) + "\n"
 
-    def pixels(self) -> Image:
+    def _pixels(self) -> Image:
         """The figure painted with `PNG_SCALE` pixels a unit: (height, width, 3), blue first."""
         shape = (self.height * PNG_SCALE, self.width * PNG_SCALE, 3)
         canvas: Image = np.full(shape, _bgr(self.theme.ground), dtype=np.uint8)
@@ -129,12 +126,12 @@ class Figure:
 
     def png(self) -> bytes:
         """PNG with `PNG_SCALE` pixels a unit."""
-        return encoded(self.pixels(), ".png")
+        return _encoded(self._pixels(), ".png")
 
 
-def encoded(pixels: Image, ending: str, *, quality: int = JPEG_QUALITY) -> bytes:
-    """Pixels as a file with this ending, `.png` or `.jpg`; `quality`, from 1 to 100, is a JPEG's."""
-    done, data = cv2.imencode(ending, pixels, [cv2.IMWRITE_JPEG_QUALITY, quality] if ending == ".jpg" else [])
+def _encoded(pixels: Image, ending: str) -> bytes:
+    options = [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY] if ending == ".jpg" else []
+    done, data = cv2.imencode(ending, pixels, options)
     if not done:
         raise ArithmeticError(f"OpenCV cannot encode an image of shape {pixels.shape}.")
     return data.tobytes()
@@ -143,10 +140,10 @@ def encoded(pixels: Image, ending: str, *, quality: int = JPEG_QUALITY) -> bytes
 # --- SVG ---------------------------------------------------------------------------------------------------
 
 
-def _svg_of(shape: Shape, jpeg_quality: int) -> str:
+def _svg_of(shape: Shape) -> str:
     match shape:
         case Picture():
-            data = _jpeg(shape.pixels, jpeg_quality)
+            data = base64.b64encode(_encoded(shape.pixels, ".jpg")).decode()
             return (
                 f'<image x="{shape.x:g}" y="{shape.y:g}" width="{shape.width:g}" height="{shape.height:g}" '
                 f'preserveAspectRatio="none" href="data:image/jpeg;base64,{data}"/>'
@@ -168,10 +165,6 @@ def _svg_of(shape: Shape, jpeg_quality: int) -> str:
                 f'<text x="{shape.x:.2f}" y="{shape.y:.2f}" fill="{shape.colour}" font-size="{shape.size:g}" '
                 f'text-anchor="{shape.anchor}"{weight}>{escape(shape.text)}</text>'
             )
-
-
-def _jpeg(pixels: Image, quality: int) -> str:
-    return base64.b64encode(encoded(pixels, ".jpg", quality=quality)).decode()
 
 
 # --- PNG ---------------------------------------------------------------------------------------------------

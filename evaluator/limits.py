@@ -1,6 +1,10 @@
 """What a child process that reads untrusted bytes gives up before it sees the first of them.
 
 It writes `READY` when that is done: a child that ends before has seen nothing of what it was to read.
+
+`limit` alone leaves to whoever takes the child over: to compute until the processor time ends, to signal and
+to unlink what its user may, and any fault of the kernel. `forbid_calls` takes the second away, and most of
+the kernel with it, where the kernel filters calls.
 """
 
 import ctypes
@@ -8,9 +12,12 @@ import resource
 import signal
 import sys
 
+from evaluator import system_calls
+
 READY = b"ready\n"
 EXIT_OUT_OF_MEMORY = 77
 _PR_SET_PDEATHSIG = 1
+_PR_SET_DUMPABLE = 4
 
 
 def obey_the_parent_alone() -> None:
@@ -25,15 +32,34 @@ def obey_the_parent_alone() -> None:
         ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
+def keep_memory_private() -> None:
+    """Refuse other processes of this user this one's memory, environment and descriptors.
+
+    Debuggers and profilers as well, and the kernel writes no core. Processes that are forked inherit it.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)
+
+
 def limit(*, memory_bytes: int, cpu_s: int) -> None:
-    """Give up what parsing does not need. Irrevocable for this process."""
+    """Give up what parsing does not need. Irrevocable for this process, unless it is root's."""
+    keep_memory_private()
     resource.setrlimit(resource.RLIMIT_AS, (memory_bytes, memory_bytes))
     resource.setrlimit(resource.RLIMIT_CPU, (cpu_s, cpu_s + 1))
     resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_NPROC, (0, 0))
-    # Standard input, output and error are open already; nothing else ever will be.
-    resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))
+    # What is open stays open. With room for three, whoever closed one could open another.
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
+
+
+def forbid_calls(*, own_limits: bool = False) -> None:
+    """Allow only the system calls that reading needs, where the kernel can do that. Irrevocable.
+
+    `own_limits` are needed by `allow_cpu`. Raises `OSError` if the kernel takes no filter after all.
+    """
+    if system_calls.why_unavailable() is None:
+        system_calls.allow_only_reading(own_limits=own_limits)
 
 
 def allow_cpu(seconds: int) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Final
 
@@ -18,6 +18,12 @@ MAX_LISTED: Final = 20
 """At most so many lines of one kind, or places in one line, are listed; the rest are counted."""
 
 _MAX_QUOTED: Final = 60
+
+# Of a rejection that another process has written. A message has at most 21 pointers, of 2,400 characters each
+# where all of them have to be escaped; a place may be a path.
+_MAX_LINES: Final = 1000
+_MAX_COUNTED: Final = 10**9
+_MAX_CHARS: Final = {"code": 100, "message": 60_000, "where": 10_000}
 
 PROBLEM_CODES: Final[dict[str, str]] = {
     # prediction files
@@ -118,9 +124,36 @@ class Rejected(Exception):
         """`{"n_problems": …, "problems": [{"code", "message", "where"}, …]}`."""
         return {"n_problems": self.n_problems, "problems": [asdict(problem) for problem in self.problems]}
 
+    @classmethod
+    def from_dict(cls, given: Mapping[str, object]) -> Rejected:
+        """The rejection that `as_dict` has written, by a process that is not trusted.
+
+        Raises `ValueError` for what `as_dict` never writes: another form, more lines or longer texts than a
+        reader makes, or a code that there is not.
+        """
+        n_problems, lines = given.get("n_problems"), given.get("problems")
+        if type(n_problems) is not int or not 0 < n_problems <= _MAX_COUNTED:
+            raise ValueError("it has no number of problems")
+        if not isinstance(lines, list) or not 0 < len(lines) <= _MAX_LINES:
+            raise ValueError(f"it has no list of 1 to {_MAX_LINES} problems")
+        return cls(map(_problem, lines), n_problems=n_problems)
+
     def to_json(self) -> str:
         """The text of `as_dict()`."""
         return json.dumps(self.as_dict(), ensure_ascii=False)
+
+
+def _problem(given: object) -> Problem:
+    texts = given if isinstance(given, dict) else {}
+    if texts.keys() != _MAX_CHARS.keys():
+        raise ValueError(f"a problem has other fields than {', '.join(_MAX_CHARS)}")
+    for name, most in _MAX_CHARS.items():
+        text = texts[name]
+        if not isinstance(text, str) or len(text) > most:
+            raise ValueError(f"the {name} of a problem is no text of at most {most:,} characters")
+    if texts["code"] not in PROBLEM_CODES:
+        raise ValueError("the code of a problem is none of ours")
+    return Problem(**texts)
 
 
 def _restored(problems: tuple[Problem, ...], n_problems: int) -> Rejected:

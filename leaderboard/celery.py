@@ -4,8 +4,16 @@ import os
 import random
 
 from celery import Celery
-from celery.signals import setup_logging, worker_process_init, worker_process_shutdown, worker_shutdown
+from celery.signals import (
+    setup_logging,
+    worker_init,
+    worker_process_init,
+    worker_process_shutdown,
+    worker_shutdown,
+)
 from django_structlog.celery.steps import DjangoStructLogInitStep
+
+from evaluator.limits import keep_memory_private
 
 os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
 
@@ -19,6 +27,12 @@ app.steps["worker"].add(DjangoStructLogInitStep)
 @setup_logging.connect  # that somebody listens is what keeps Celery from installing its own handlers
 def use_own_logging(**_: object) -> None:
     """Leave logging as `leaderboard/ops/logs.py` set it up."""
+
+
+@worker_init.connect  # before the processes that run tasks are forked, which inherit it
+def keep_secrets_from_readers(**_: object) -> None:
+    """Refuse other processes of this user, readers of files among them, a worker's memory and secrets."""
+    keep_memory_private()
 
 
 @worker_process_init.connect  # Celery has no other door into the processes that run tasks

@@ -61,6 +61,7 @@ STRIKES = "tests/leaderboard/scoring/test_lifecycle_strikes.py"
 QUEUE = "tests/leaderboard/workers/test_queue.py"
 OUTAGES = "tests/leaderboard/errors/test_outages.py"
 CHILD = "tests/leaderboard/scoring/test_sandbox.py"
+TAKEN_OVER = "tests/leaderboard/scoring/test_readers_taken_over.py"
 RUNS = "tests/leaderboard/scoring/test_sandbox_runs.py"
 
 SABOTAGES = (
@@ -265,9 +266,23 @@ SABOTAGES = (
     Sabotage(
         "the child may open files and sockets",
         "evaluator/limits.py",
-        "    resource.setrlimit(resource.RLIMIT_NOFILE, (3, 3))\n",
+        "    resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))\n",
         "    resource.setrlimit(resource.RLIMIT_NOFILE, (64, 64))\n",
         f"{CHILD}::test_child_may_open_nothing_write_nothing_and_start_nothing",
+    ),
+    Sabotage(
+        "the child may make any system call",
+        "evaluator/limits.py",
+        "        system_calls.allow_only_reading(own_limits=own_limits)",
+        "        pass",
+        f"{TAKEN_OVER}::test_reader_that_is_taken_over_reaches_nothing",
+    ),
+    Sabotage(
+        "the child says whose values these are",
+        "leaderboard/scoring/sandbox.py",
+        '    if header.get("digest") != digest:',
+        "    if False:",
+        f"{TAKEN_OVER}::test_a_lie_is_refused_in_words[the digest of another team's file]",
     ),
     Sabotage(
         "the child outlives its worker",

@@ -95,12 +95,12 @@ class Epoch:
     """What an epoch came to: the mean loss of a pair, and the evaluator's scores on the other sequences.
 
     `n_left_out` counts the sequences that nothing was learned from: a frame or a box is missing or too small,
-    or the network has no such scale ratio.
+    or the network has no such scale ratio. Number 0 has the scores before epoch 1, and no loss.
     """
 
     number: int
     n_left_out: int
-    loss: float
+    loss: float | None
     mid: float
     rte: float
     mid_by_range: dict[str, float | None]
@@ -290,8 +290,10 @@ def train(
 ) -> list[Epoch]:
     """Train, and write to `out` the weights of the epoch with the least MiD.
 
-    `progress` is told how many sequences were learned from, of `epochs` times those of the source. A training
-    that was ended has left `out` with `.part` after it; the same call goes on after the last whole epoch.
+    With a `start`, the epochs begin with number 0: how the start scores, used as `recipe.use` says, which
+    should be its own use. `progress` is told how many sequences were learned from, of `epochs` times those of
+    the source. A training that was ended has left `out` with `.part` after it; the same call goes on after
+    the last whole epoch.
     Raises `Rejected` where no sequence can be used, `DeviceMissing` and `OSError`.
     """
     if device == "cuda" and not torch.cuda.is_available():
@@ -299,12 +301,16 @@ def train(
     key = _key(source, recipe, start)
     part = out.with_name(out.name + ".part")
     network, epochs = _begun(part, key=key, recipe=recipe, start=start, device=device)
+    if start is not None and not epochs:
+        scores = validation.scores(network.operations(), use=recipe.use)
+        epochs.append(_epoch(scores, number=0, losses=(), n_left_out=0))
     for epoch in epochs:
         after_epoch(epoch)
     n_rows = source.truth.n_sequences
-    n_done = len(epochs) * n_rows
+    n_before = epochs[-1].number if epochs else 0
+    n_done = n_before * n_rows
     progress(n_done)
-    for number in range(len(epochs), recipe.epochs):
+    for number in range(n_before, recipe.epochs):
         rng = np.random.default_rng([recipe.seed, number])
         losses: list[float] = []
         fitting = network.operations() if recipe.fit_weight else None
@@ -322,7 +328,7 @@ def train(
         n_done = (number + 1) * n_rows
         scores = validation.scores(network.operations(), use=recipe.use)
         epoch = _epoch(scores, number=number + 1, losses=losses, n_left_out=n_rows - len(losses))
-        is_best = all(epoch.mid <= earlier.mid for earlier in epochs)
+        is_best = all(epoch.mid <= earlier.mid for earlier in epochs if earlier.number)
         epochs.append(epoch)
         if is_best:
             write_weights(out, network.weights(card=card_of(recipe, source, epochs)))
@@ -335,7 +341,7 @@ def train(
 def _epoch(scores: dict[str, Any], *, number: int, losses: Sequence[float], n_left_out: int) -> Epoch:
     overall = scores.pop("overall")
     by_range = {name: means["mid"] for name, means in scores.items()}
-    loss = float(np.mean(losses))
+    loss = float(np.mean(losses)) if losses else None
     return Epoch(number, n_left_out, loss, float(overall["mid"]), float(overall["rte"]), by_range)
 
 

@@ -132,7 +132,7 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
     yield from lines
     if any(entry.intervals for entry in found.entries):
         yield ""
-        yield layouts.BRACKETS
+        yield layouts.brackets(found.unit, found.n_units)
     if found.floor:
         from evaluator.scoring.scoring import floor_sentence  # noqa: PLC0415 -- loads numpy
 

@@ -15,12 +15,13 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.gates import named
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units
-from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
-from evaluator.cli.reading import TABLE, naming, predictions_of
+from evaluator.cli.options import default_option, json_option, sendable, slug, unit_option, url_option
+from evaluator.cli.reading import TABLE, naming, predictions_of, units_asked
 from evaluator.cli.tokens import has_token
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.significance import Difference
 from evaluator.tables.sentences import influence, others, p_cell, sentence
+from evaluator.units import in_words
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Compared
@@ -45,14 +46,24 @@ Scores = Mapping[str, float | None]
     metavar="FILE",
     help="Ground truth: compare FIRST and SECOND as prediction files, offline.",
 )
+@unit_option
 @url_option
 @json_option
-def compare(*, first: str, second: str, split: str, truth_path: Path | None, url: str, as_json: bool) -> None:
+def compare(
+    *,
+    first: str,
+    second: str,
+    split: str,
+    truth_path: Path | None,
+    unit: str | None,
+    url: str,
+    as_json: bool,
+) -> None:
     """Compare FIRST with SECOND, methods of a board by name or id, or with --truth two prediction files.
 
     Each column shows the difference, its 95 % confidence interval and the p-value of a two-sided test. Both
-    resample whole recordings, because sequences of one recording resemble each other. Negative means that
-    FIRST is better.
+    resample whole days or recordings, because sequences of one recording resemble each other, and recordings
+    of one day. Negative means that FIRST is better.
 
     \b
     Examples:
@@ -60,8 +71,10 @@ def compare(*, first: str, second: str, split: str, truth_path: Path | None, url
       tsttc compare new.json old.json --truth annotations/val/
     """
     if truth_path is not None:
-        _compare_files(Path(first), Path(second), truth_path, as_json=as_json)
+        _compare_files(Path(first), Path(second), truth_path, unit=unit, as_json=as_json)
         return
+    if unit is not None:
+        raise click.UsageError("--unit needs --truth; a board's edition keeps its own unit.")
     with connect(url, with_token=has_token(url)) as client:
         board = client.board(split)
         entries = [named(board, name) for name in (first, second)]
@@ -90,6 +103,8 @@ def _server_s_words(
     edition = f" · edition {found.edition}" if found.edition is not None else ""
     yield printable(f"{found.split}{edition}")
     yield units(scores[0])
+    if any(gap.low is not None for gap in found.differences().values()):
+        yield f"95 % confidence intervals and p-values over {in_words(found.unit, found.n_units)}"
     yield ""
     yield from table(names, scores, found.differences(), decimals=found.decimals)
     said = found.pairs[0].sentence if found.pairs else ""
@@ -99,18 +114,19 @@ def _server_s_words(
     yield from filter(None, (others(found.differences()),))
 
 
-def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool) -> None:
+def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | None, as_json: bool) -> None:
     from evaluator import compare_predictions, evaluate, published, read_predictions, read_truth  # noqa: PLC0415 -- numpy
 
     with naming(truth_path):
         truth = read_truth(truth_path)
+    taken = units_asked(truth, unit)
     read, reports = [], []
     for path in (first, second):
         with naming(path):
             predictions = read_predictions(predictions_of(path), manifest=truth.manifest)
             read.append(predictions)
             reports.append(evaluate(predictions, truth))
-    found = compare_predictions(read[0], read[1], truth)
+    found = compare_predictions(read[0], read[1], truth, unit=taken.kind)
     if as_json:
         differences = {
             name: {
@@ -124,6 +140,8 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
             {
                 "first": reports[0].as_dict(),
                 "second": reports[1].as_dict(),
+                "unit": taken.kind,
+                "n_units": len(taken),
                 "differences": differences,
             }
         )
@@ -132,6 +150,8 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, as_json: bool
         click.echo(line)
     click.echo("")
     click.echo(units(reports[0].flat()))
+    if any(gap.low is not None for gap in found.values()):
+        click.echo(f"95 % confidence intervals and p-values over {taken}")
     names = str(first), str(second)
     if PRIMARY in found:
         click.echo(printable(sentence(*names, name=PRIMARY, found=found[PRIMARY])))

@@ -75,6 +75,8 @@ def _origin(board: Board, *, address: str) -> layouts.Origin:
         ground_truth=board.ground_truth,
         n_sequences=board.n_sequences,
         n_recordings=board.n_recordings,
+        unit=board.unit,
+        n_units=board.n_units,
         moment=_moment(board.at or board.updated_at),
         has_own_rows=any(mark_of(entry) for entry in board.entries if entry.withdrawn_at is None),
     )

@@ -19,7 +19,7 @@ from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
 from evaluator.metrics.protocol import PRIMARY, known_names
-from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_recordings
+from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_units
 from evaluator.tables.sentences import p_text
 
 if TYPE_CHECKING:
@@ -238,7 +238,7 @@ def judge_against(
     if compared.withheld:
         raise undecided(f"{words}. {compared.withheld.rstrip('.')}", hint="Compare without --significant.")
     if difference is None or difference.p_below is None:
-        few = too_few_recordings(None if difference is None else difference.n_effective)
+        few = too_few_units(None if difference is None else difference.n_effective, unit=compared.unit)
         raise undecided(f"there are {few} for a p-value")
     if difference.is_significant:
         raise _worse(f"{words}; {in_numbers(difference, decimals=decimals)}")

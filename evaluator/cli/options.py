@@ -12,6 +12,7 @@ from urllib.parse import urlsplit
 import click
 
 from evaluator.cli.paths import server_of_login
+from evaluator.units import KINDS, MIN_DAYS
 
 DEFAULT_URL = "http://127.0.0.1:8000"
 TOKEN_VARIABLE = "TSTTC_TOKEN"  # noqa: S105 -- the name of a variable, not a token
@@ -57,6 +58,17 @@ def url_option(command: Command) -> Command:
         show_envvar=True,
         callback=_site,
         help="Address of the leaderboard.",
+    )(command)
+
+
+def unit_option(command: Command) -> Command:
+    """--unit: what intervals and tests take as independent."""
+    return click.option(
+        "--unit",
+        type=click.Choice(list(KINDS)),
+        help="What intervals take as independent, as the board's edition says; default: the column unit of "
+        f"the ground truth, else days if all recordings have dates and there are {MIN_DAYS} days, else "
+        "recordings.",
     )(command)
 
 

@@ -6,13 +6,17 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import click
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, rejected
 from evaluator.problems import Rejected
+
+if TYPE_CHECKING:
+    from evaluator import GroundTruth
+    from evaluator.units import Units
 
 TABLE: Final = click.Path(exists=True, path_type=Path)
 FOLDER: Final = click.Path(exists=True, file_okay=False, path_type=Path)
@@ -25,6 +29,14 @@ def naming(path: Path) -> Iterator[None]:
         yield
     except Rejected as fault:
         raise rejected(name_of(path), fault) from None
+
+
+def units_asked(truth: GroundTruth, unit: str | None) -> Units:
+    """The units of `--unit`, or by the rule."""
+    try:
+        return truth.manifest.units_by(unit)
+    except ValueError as fault:
+        raise click.BadParameter(str(fault), param_hint="--unit") from None
 
 
 def name_of(path: Path) -> str:

@@ -13,20 +13,29 @@ from evaluator.cli import gates
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, result_in_words, short_name, units
-from evaluator.cli.options import default_option, json_option
-from evaluator.cli.reading import TABLE, name_of, naming, predictions_of, without_pyarrow, write_bytes
+from evaluator.cli.options import default_option, json_option, unit_option
+from evaluator.cli.reading import (
+    TABLE,
+    name_of,
+    naming,
+    predictions_of,
+    units_asked,
+    without_pyarrow,
+    write_bytes,
+)
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.counting import counted
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PROTOCOLS
 from evaluator.tables.results import WRITERS, ResultRow, names_of
+from evaluator.units import in_words
 
 if TYPE_CHECKING:
     from evaluator import GroundTruth, Report
     from evaluator.problems import FileWarning
+    from evaluator.units import Units
 
 GROUPS: Final = ("recording", "camera", "range", "occlusion", "lane", "box-size")
 FORMATS: Final = ("table", *WRITERS)
-FEW: Final = "one needs 8 recordings of equal size, or more of unequal size"
 KINDS: Final = ("error", "scatter", "distribution")
 
 several_predictions = click.argument(
@@ -72,8 +81,9 @@ class _Scored:
     "--intervals",
     "with_intervals",
     is_flag=True,
-    help="Also 95 % confidence intervals (bootstrap over recordings), as on the board.",
+    help="Also 95 % confidence intervals (bootstrap over days or recordings), as on the board.",
 )
+@unit_option
 @click.option(
     "--per-sequence",
     "per_sequence",
@@ -97,6 +107,7 @@ def score(
     protocol: str,
     by: str | None,
     with_intervals: bool,
+    unit: str | None,
     per_sequence: Path | None,
     form: str,
     fail_if: list[gates.Condition],
@@ -118,19 +129,23 @@ def score(
     """
     if as_json and form != "table":
         raise click.UsageError("--json and --format exclude each other; choose one of them.")
+    if unit is not None and not with_intervals:
+        raise click.UsageError("--unit is that of intervals; add --intervals.")
     truth = _truth(truth_path)
     found = list(_scored(predictions, truth, protocol=protocol))
-    rows = [row for one in found for row in _rows(one, by=by, with_intervals=with_intervals)]
+    taken = units_asked(truth, unit) if with_intervals else None
+    rows = [row for one in found for row in _rows(one, by=by, taken=taken)]
     if not as_json:
         for one in found:
             _warn(one, alone=len(found) == 1)
     if per_sequence is not None:
         write_bytes(per_sequence, _per_sequence(found, per_sequence), option="--per-sequence")
-    if with_intervals and not as_json and not any(any(row.intervals.values()) for row in rows):
-        click.echo(f"There are no confidence intervals: {FEW}.", err=True)
+    if taken and not as_json and not any(any(row.intervals.values()) for row in rows):
+        few = f"one needs 8 {in_words(taken.kind)} of equal size, or more of unequal size"
+        click.echo(f"There are no confidence intervals: {few}.", err=True)
     tabular = by is not None or with_intervals or len(found) > 1
     gates.told(
-        _document(found, rows if tabular else [], by=by),
+        _document(found, rows if tabular else [], by=by, taken=taken),
         show=lambda: click.echo(_shown(found, rows, by=by, form=form), nl=False),
         judge=lambda: _judge(fail_if, found),
         as_json=as_json,
@@ -229,16 +244,17 @@ def _scored(paths: Sequence[Path], truth: GroundTruth, *, protocol: str) -> Iter
         )
 
 
-def _rows(found: _Scored, *, by: str | None, with_intervals: bool) -> Iterator[ResultRow]:
-    report = found.report
+def _rows(found: _Scored, *, by: str | None, taken: Units | None) -> Iterator[ResultRow]:
+    """The rows of one file; with intervals over the units that are `taken`."""
+    report, drawn = found.report, "" if taken is None else str(taken)
     if by is not None:
         try:
-            groups = report.breakdown(by, with_intervals=with_intervals)
+            groups = report.breakdown(by, with_intervals=bool(taken), unit=taken.kind if taken else None)
         except ValueError as fault:  # the ground truth lacks the column
             raise click.BadParameter(str(fault), param_hint="--by") from None
         for one in groups:
-            ends = one.intervals if with_intervals else {}
-            yield ResultRow(found.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends)
+            ends = one.intervals if taken else {}
+            yield ResultRow(found.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends, drawn)
         return
     assert report.details is not None  # noqa: S101 -- it was asked for
     yield ResultRow(
@@ -247,16 +263,19 @@ def _rows(found: _Scored, *, by: str | None, with_intervals: bool) -> Iterator[R
         report.n_sequences,
         report.details.truth.manifest.n_recordings,
         report.flat(),
-        _intervals(report) if with_intervals else {},
+        _intervals(report, taken) if taken else {},
+        drawn,
     )
 
 
-def _intervals(report: Report) -> dict[str, tuple[float, float] | None]:
+def _intervals(report: Report, taken: Units) -> dict[str, tuple[float, float] | None]:
     from evaluator import confidence_intervals  # noqa: PLC0415 -- numpy, as above
 
     assert report.details is not None  # noqa: S101 -- it was asked for
     details = report.details
-    return confidence_intervals(details.predictions, details.truth, protocol=details.protocol)
+    return confidence_intervals(
+        details.predictions, details.truth, protocol=details.protocol, unit=taken.kind
+    )
 
 
 def _warn(found: _Scored, *, alone: bool) -> None:
@@ -265,7 +284,9 @@ def _warn(found: _Scored, *, alone: bool) -> None:
     echo_warnings(found.warnings)
 
 
-def _document(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None) -> dict[str, Any]:
+def _document(
+    found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | None, taken: Units | None
+) -> dict[str, Any]:
     """One file is its own document; several are listed as `files`. What was asked for beside is added."""
     documents: list[dict[str, Any]] = []
     for one in found:
@@ -276,6 +297,8 @@ def _document(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | 
             document["groups"] = [_group_document(row) for row in own]
         elif own and own[0].intervals:
             document["intervals"] = own[0].intervals
+        if taken:
+            document |= {"unit": taken.kind, "n_units": len(taken)}
         documents.append(document)
     if len(documents) == 1:
         return documents[0]
@@ -299,6 +322,7 @@ def _shown(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | Non
         lines = list(_in_words(found[0].report, rows[0]))
     else:
         lines = [*_table(rows, by=by), "", units(rows[0].scores), _counts_in_words(found[0].report)]
+        lines += [f"95 % confidence intervals; bootstrap over {rows[0].units}"] if rows[0].units else []
     return "".join(f"{line}\n" for line in lines)
 
 
@@ -314,6 +338,8 @@ def _in_words(report: Report, row: ResultRow) -> Iterator[str]:
     yield f"protocol     {report.protocol}"
     yield f"truth        {report.truth_digest}"
     yield f"predictions  {report.predictions_digest}"
+    if row.units:
+        yield f"intervals    95 %, bootstrap over {row.units}"
 
 
 def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:

@@ -12,6 +12,7 @@ import msgspec
 
 from evaluator.problems import FileWarning, Problem
 from evaluator.scoring.significance import Difference
+from evaluator.units import RECORDING
 
 FINAL_STATES = frozenset({"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"})
 
@@ -140,7 +141,8 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
 class Board(msgspec.Struct, frozen=True, kw_only=True):
     """The ranked entries of a split in an edition; `document` is the server's answer unabridged.
 
-    `floor` are the scores of the ground truth itself; None where the server does not say them.
+    `floor` are the scores of the ground truth itself; None where the server does not say them. `unit` is what
+    its intervals and ranks take as independent, `n_units` how many there are; None is not known.
     """
 
     split: str
@@ -152,6 +154,8 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     ground_truth: str | None = None
     n_sequences: int | None = None
     n_recordings: int | None = None
+    unit: str = RECORDING
+    n_units: int | None = None
     floor: dict[str, float | None] | None = None
     at: str | None = None
     updated_at: str | None = None
@@ -220,6 +224,8 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
     decimals: int = 2
     is_complete: bool = True
     reason: str = ""
+    unit: str = RECORDING
+    n_units: int | None = None
 
     @property
     def withheld(self) -> str:

@@ -35,11 +35,10 @@ class Terms:
         """The terms of these times to contact, whose shapes broadcast."""
         import numpy as np  # noqa: PLC0415 -- as the docstring above says
 
+        from evaluator.arrays import as_floats  # noqa: PLC0415 -- loads numpy
         from evaluator.metrics.scale import exact_log, scale_ratio_10hz  # noqa: PLC0415 -- loads numpy
 
-        predicted, true = np.broadcast_arrays(
-            np.asarray(predicted_ttc_s, dtype=np.float64), np.asarray(true_ttc_s, dtype=np.float64)
-        )
+        predicted, true = np.broadcast_arrays(as_floats(predicted_ttc_s), as_floats(true_ttc_s))
         return cls(predicted, true, scale_ratio_10hz(predicted), exact_log(scale_ratio_10hz(true)))
 
 

@@ -13,6 +13,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from evaluator.arrays import as_floats
+
 Floats = NDArray[np.float64]
 
 FRAME_RATE_HZ: Final = 10.0
@@ -26,7 +28,7 @@ def fps_of_gap(frame_gap: ArrayLike) -> Floats:
     >>> float(fps_of_gap(5))
     2.0
     """
-    return FRAME_RATE_HZ / np.asarray(frame_gap, dtype=np.float64)
+    return FRAME_RATE_HZ / as_floats(frame_gap)
 
 
 def scale_ratio_to_ttc(scale_ratio: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
@@ -37,9 +39,9 @@ def scale_ratio_to_ttc(scale_ratio: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
     >>> float(scale_ratio_to_ttc(1.0, fps_hz=2))
     inf
     """
-    alpha = np.asarray(scale_ratio, dtype=np.float64)
+    alpha = as_floats(scale_ratio)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        return np.asarray(1.0 / (np.asarray(fps_hz, dtype=np.float64) * (1.0 / alpha - 1.0)))
+        return np.asarray(1.0 / (as_floats(fps_hz) * (1.0 / alpha - 1.0)))
 
 
 def ttc_to_scale_ratio(ttc_s: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
@@ -48,9 +50,9 @@ def ttc_to_scale_ratio(ttc_s: ArrayLike, *, fps_hz: ArrayLike) -> Floats:
     >>> float(ttc_to_scale_ratio(2.0, fps_hz=2))
     0.8
     """
-    tau = np.asarray(ttc_s, dtype=np.float64)
+    tau = as_floats(ttc_s)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-        return np.asarray(1.0 / (1.0 / (np.asarray(fps_hz, dtype=np.float64) * tau) + 1.0))
+        return np.asarray(1.0 / (1.0 / (as_floats(fps_hz) * tau) + 1.0))
 
 
 def convert_rate(scale_ratio: ArrayLike, *, from_fps_hz: ArrayLike, to_fps_hz: ArrayLike) -> Floats:
@@ -59,8 +61,8 @@ def convert_rate(scale_ratio: ArrayLike, *, from_fps_hz: ArrayLike, to_fps_hz: A
     >>> round(float(convert_rate(0.8, from_fps_hz=2, to_fps_hz=10)), 6)
     0.952381
     """
-    alpha = np.asarray(scale_ratio, dtype=np.float64)
-    rate = np.asarray(from_fps_hz, dtype=np.float64) / np.asarray(to_fps_hz, dtype=np.float64)
+    alpha = as_floats(scale_ratio)
+    rate = as_floats(from_fps_hz) / as_floats(to_fps_hz)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         return np.asarray(1.0 / (rate * (1.0 / alpha - 1.0) + 1.0))
 
@@ -73,7 +75,7 @@ def scale_ratio_10hz(ttc_s: ArrayLike) -> Floats:
     >>> round(float(scale_ratio_10hz(2.0)), 9)
     0.952380045
     """
-    tau = np.asarray(ttc_s, dtype=np.float64)
+    tau = as_floats(ttc_s)
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         ratio = np.asarray(tau * 10.0)
         np.divide(1.0, ratio, out=ratio)

@@ -22,7 +22,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final, NoReturn
 
-from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, limit, obey_the_parent_alone
+from evaluator.limits import (
+    EXIT_OUT_OF_MEMORY,
+    READY,
+    forbid_calls,
+    keep_memory_private,
+    limit,
+    obey_the_parent_alone,
+)
 from evaluator.predictions.sandbox import answer, warm_up
 from evaluator.problems import Rejected
 from evaluator.truth.truth import Manifest
@@ -116,8 +123,7 @@ def _read(
         # The wish to end with the parent is not inherited, and comes too late for one that has ended by now.
         obey_the_parent_alone()
         if os.getppid() == server:
-            limit(memory_bytes=memory_bytes, cpu_s=cpu_s)
-            code = _answer(manifest)
+            code = _answer(manifest, memory_bytes=memory_bytes, cpu_s=cpu_s)
     except MemoryError:
         code = EXIT_OUT_OF_MEMORY
     except BaseException:  # noqa: BLE001 - whatever it is, the child must not go on as a second server
@@ -126,8 +132,10 @@ def _read(
         os._exit(code)
 
 
-def _answer(manifest: Manifest) -> int:
+def _answer(manifest: Manifest, *, memory_bytes: int, cpu_s: int) -> int:
     with os.fdopen(0, "rb", closefd=False) as source, os.fdopen(1, "wb", closefd=False) as out:
+        limit(memory_bytes=memory_bytes, cpu_s=cpu_s)
+        forbid_calls()
         out.write(READY)
         out.flush()
         out.write(answer(source.read(), manifest=manifest))
@@ -137,6 +145,7 @@ def _answer(manifest: Manifest) -> int:
 def main() -> None:
     """Serve on the socket that is standard input."""
     obey_the_parent_alone()
+    keep_memory_private()
     # What a library of the worker has opened without care is none of a reader's business.
     os.closerange(N_DESCRIPTORS, resource.getrlimit(resource.RLIMIT_NOFILE)[0])
     gc.freeze()

@@ -17,10 +17,10 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from evaluator.arguments import Source, data_of, require
+from evaluator.arrays import in_row_order
 from evaluator.counting import counted
 from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import KeyKind, read_slowly
@@ -70,15 +70,15 @@ class Predictions:
         """Predictions from values in the manifest's order, without a file.
 
         Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, (n,). Without a `digest`,
-        that of the seconds' little-endian float64 bytes is taken. Raises `ValueError` for another shape and
-        for arguments that do not fit together, `Rejected` for scale ratios that are not greater than 0; other
-        forbidden values are found by `evaluate`.
+        that of the seconds' little-endian float64 bytes is taken. Raises `ValueError` for another shape, a
+        Series in another order and arguments that do not fit together, `TypeError` for a dict, `Rejected`
+        for scale ratios that are not greater than 0; other forbidden values are found by `evaluate`.
         """
         require(manifest, Manifest, name="manifest")
         name, given = ("scale_ratio", scale_ratio) if ttc_s is None else ("ttc_s", ttc_s)
         if given is None or (ttc_s is not None and scale_ratio is not None):
             raise ValueError("Give either ttc_s or scale_ratio.")
-        values = np.array(given, dtype=np.float64)
+        values = in_row_order(given, name=name, anno_id=manifest.anno_id)
         if values.shape != (manifest.n_sequences,):
             raise ValueError(f"{name} has the shape {values.shape}; expected ({manifest.n_sequences},).")
         rate_hz = rate_of(is_ratio=ttc_s is None, fps_hz=fps_hz, frame_gap=frame_gap)

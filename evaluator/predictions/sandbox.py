@@ -3,7 +3,8 @@
 It writes `READY` to its standard output, reads a prediction file from its standard input, and writes one line
 of JSON, followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the
 first untrusted byte is read it gives up memory, processor time, new processes and the right to open anything,
-sockets included. A child that ends before `READY` has seen nothing of the file.
+sockets included, and where the kernel can do that all system calls but those that reading needs. A child that
+ends before `READY` has seen nothing of the file.
 """
 
 import json
@@ -12,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, limit, obey_the_parent_alone
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, forbid_calls, limit, obey_the_parent_alone
 from evaluator.predictions.columns import key_words
 from evaluator.predictions.predictions import read_sent
 from evaluator.problems import Rejected
@@ -67,6 +68,7 @@ def main() -> None:
     manifest = Manifest.load(Path(sys.argv[1]))
     warm_up(manifest)
     limit(memory_bytes=int(sys.argv[2]), cpu_s=int(sys.argv[3]))
+    forbid_calls()
     out = sys.stdout.buffer
     out.write(READY)
     out.flush()

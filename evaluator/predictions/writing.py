@@ -6,12 +6,13 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from evaluator.arguments import require
+from evaluator.arrays import in_row_order
 from evaluator.counting import counted
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap
 from evaluator.predictions.documents import parse, read_document
@@ -38,7 +39,7 @@ def write_predictions(
 
     Raises `ValueError` for arguments that do not fit together, `Rejected` for values that no file may hold.
     """
-    values = _values(ttc_s, scale_ratio)
+    values = _values(ttc_s, scale_ratio, manifest)
     names = _names(manifest, keys, n_values=len(values))
     header = _header(ttc_s is None, fps_hz, frame_gap)
     require_values(values, names, is_ratio=ttc_s is None)
@@ -67,10 +68,11 @@ def template(manifest: Manifest) -> bytes:
     return f"{{\n{members}\n}}\n".encode()
 
 
-def _values(ttc_s: ArrayLike | None, scale_ratio: ArrayLike | None) -> Floats:
+def _values(ttc_s: ArrayLike | None, scale_ratio: ArrayLike | None, manifest: Manifest | None) -> Floats:
     if (ttc_s is None) == (scale_ratio is None):
         raise ValueError("Give either ttc_s or scale_ratio.")
-    values = np.asarray(ttc_s if ttc_s is not None else scale_ratio, dtype=np.float64)
+    name, given = ("scale_ratio", scale_ratio) if ttc_s is None else ("ttc_s", ttc_s)
+    values = in_row_order(given, name=name, anno_id=None if manifest is None else manifest.anno_id)
     if values.ndim != 1:
         raise ValueError(f"The values have the shape {values.shape}; expected (n,).")
     return values
@@ -81,7 +83,7 @@ def _names(manifest: Manifest | None, keys: Sequence[str | int] | None, *, n_val
         raise ValueError("Give either manifest or keys.")
     if manifest is not None:
         require(manifest, Manifest, name="manifest")
-    names = manifest.anno_id_keys if manifest is not None else tuple(map(str, keys or ()))
+    names = manifest.anno_id_keys if manifest is not None else tuple(map(str, () if keys is None else keys))
     if len(names) != n_values:
         raise ValueError(f"Found {counted(n_values, 'value')} for {counted(len(names), 'sequence')}.")
     if len(set(names)) != len(names):
@@ -119,6 +121,10 @@ def _header(is_ratio: bool, fps_hz: float | None, frame_gap: int | None) -> dict
         return {"unit": "ttc"}
     if (fps_hz is None) == (frame_gap is None):
         raise ValueError("Scale ratios need either fps_hz or frame_gap.")
+    rate: Any
+    name, rate = ("frame_gap", frame_gap) if fps_hz is None else ("fps_hz", fps_hz)
+    if n_values := np.size(rate) if np.ndim(rate) else 0:
+        raise ValueError(f"{name} has {n_values} values; expected one number for all sequences.")
     if fps_hz is not None:
         if not 0 < fps_hz < float("inf"):
             raise ValueError(f"fps_hz is {fps_hz}; expected a finite number greater than 0.")

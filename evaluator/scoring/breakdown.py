@@ -1,8 +1,8 @@
 """Scores of groups of sequences: by recording, camera, TTC range, occlusion, lane and size of the box.
 
 Groups are made from the manifest, the true times and what the annotations say of the object; within a group
-the errors are averaged as the protocol says. Confidence intervals come from the bootstrap over recordings
-that the board uses.
+the errors are averaged as the protocol says. Confidence intervals come from the bootstrap over days or
+recordings that the board uses.
 """
 
 from __future__ import annotations
@@ -75,8 +75,8 @@ class Details:
 class GroupScores:
     """The scores of one group by their names: None where it has no sequence of a TTC range.
 
-    `intervals` are the 95 % confidence intervals; None where there are too few recordings, or none were
-    asked for.
+    `intervals` are the 95 % confidence intervals; None where there are too few days or recordings, or none
+    were asked for.
     """
 
     group: str
@@ -87,10 +87,15 @@ class GroupScores:
 
 
 def breakdown(
-    details: Details, errors: Mapping[str, Floats], *, by: str, with_intervals: bool = False
+    details: Details,
+    errors: Mapping[str, Floats],
+    *,
+    by: str,
+    with_intervals: bool = False,
+    unit: str | None = None,
 ) -> list[GroupScores]:
     """The scores of every group of `by`, one of `GROUPS`. `errors` are those of every sequence by metric,
-    (n,) each.
+    (n,) each; `unit` is that of the intervals, as in `confidence_intervals`.
 
     Raises `ValueError` for an unknown `by`, and where the ground truth lacks the column that it needs.
     """
@@ -102,6 +107,7 @@ def breakdown(
         has_ranges=by != "range",
         # One recording has no interval, however many sequences it has.
         with_intervals=with_intervals and by != "recording",
+        unit=unit,
     )
 
 
@@ -112,6 +118,7 @@ def scores_of(
     groups: Mapping[str, Rows],
     has_ranges: bool = True,
     with_intervals: bool = False,
+    unit: str | None = None,
 ) -> list[GroupScores]:
     """The scores of groups of sequences, given as the rows of each by its name."""
     manifest, ttc_s = details.truth.manifest, details.truth.ttc_s
@@ -135,7 +142,7 @@ def scores_of(
                     recordings, n = manifest.recording_index[part], manifest.n_recordings
                     sums.append(np.bincount(recordings, weights=values[part], minlength=n).astype(np.float64))
                     counts.append(np.bincount(recordings, minlength=n).astype(np.float64))
-    ends = _intervals(details.truth, sums, counts)
+    ends = _intervals(details.truth, sums, counts, unit=unit)
     return [
         GroupScores(
             group,
@@ -148,14 +155,17 @@ def scores_of(
     ]
 
 
-def _intervals(truth: GroundTruth, sums: Sequence[Floats], counts: Sequence[Floats]) -> list[Ends | None]:
+def _intervals(
+    truth: GroundTruth, sums: Sequence[Floats], counts: Sequence[Floats], *, unit: str | None
+) -> list[Ends | None]:
     """The interval of each column, all by the same weights."""
     if not sums:
         return []
-    from evaluator.scoring.uncertainty import bootstrap_of  # noqa: PLC0415 -- a circle
+    from evaluator.scoring.uncertainty import bootstrap_of, by_units  # noqa: PLC0415 -- a circle
 
-    columns = np.stack(counts, axis=1)
-    low, high = bootstrap_of(truth.digest, columns).intervals(np.stack(sums, axis=1)[None])
+    units = truth.manifest.units_by(unit)
+    columns, rows = (by_units(np.stack(each, axis=1), units) for each in (counts, sums))
+    low, high = bootstrap_of(truth.digest, columns).intervals(rows[None])
     return [
         (one, other) if np.isfinite(one) else None
         for one, other in zip(low[0].tolist(), high[0].tolist(), strict=True)

@@ -1,8 +1,8 @@
 """The difference of two entries: a sign-flip test, and the confidence interval that belongs to it.
 
-Both come from the same random signs. D_g is the sum of errors of recording g of the first entry less that of
-the second, n_g the number of its sequences. Signs split the recordings into two halves, + and −; were neither
-entry better, whatever stands in one half could as well stand in the other.
+Both come from the same random signs. D_g is the sum of errors of unit g (a day or a recording) of the first
+entry less that of the second, n_g the number of its sequences. Signs split the units into two halves, + and
+−; were neither entry better, whatever stands in one half could as well stand in the other.
 """
 
 from __future__ import annotations
@@ -19,8 +19,9 @@ from evaluator.predictions.predictions import Predictions
 from evaluator.scoring.report import published
 from evaluator.scoring.scoring import Scorer
 from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
-from evaluator.scoring.uncertainty import degrees_of, generator_of, usable_columns
+from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns
 from evaluator.truth.truth import GroundTruth
+from evaluator.units import RECORDING
 
 N_SIGN_FLIPS: Final = 9_999
 P_DECIMALS: Final = 4
@@ -54,7 +55,7 @@ def sign_flips(
 
     Since both entries have the same sequences, ΣD_g / n is the difference of their means, and no ratio has to
     be linearised. The test assumes that D_g is symmetric where neither is better, as likely to be −D_g. A
-    recording is turned as a whole, since its sequences are not independent. Without any difference p is 1.
+    unit is turned as a whole, since its sequences are not independent. Without any difference p is 1.
 
     The p of a difference δ is that of the test of D_g − δ n_g. With a sum of S₊ over n₊ sequences in the one
     half, S₋ over n₋ in the other, a vector of signs counts against δ if its two halves disagree about it,
@@ -66,7 +67,7 @@ def sign_flips(
     ends at the k-th largest of the upper ones, with k the smallest number for which (1 + k) / (R + 1) ≥ 0.05.
     A half without any sequence says nothing: its vector of signs counts against every δ.
 
-    Where no δ is excluded, as in a column without sequences or with very few recordings, the ends are −∞
+    Where no δ is excluded, as in a column without sequences or with very few units, the ends are −∞
     and ∞.
     """
     n_columns = differences.shape[1]
@@ -84,7 +85,7 @@ def sign_flips(
     low, high = _ends(lower, upper)
     with np.errstate(invalid="ignore"):
         observed = total[:n_columns] / total[n_columns:]
-    # An end may lie beyond what was observed by rounding alone, where all recordings differ by the same.
+    # An end may lie beyond what was observed by rounding alone, where all units differ by the same.
     p = np.asarray((1 + n_as_large) / (n_flips + 1))
     return SignFlips(p, np.fmin(low, observed), np.fmax(high, observed))
 
@@ -123,14 +124,16 @@ def difference(
     names: Sequence[str],
     signs: np.random.Generator,
     n_flips: int = N_SIGN_FLIPS,
+    unit: str = RECORDING,
 ) -> dict[str, Difference]:
     """Compare the sums of two entries over the same sequences, (G, columns) each; nothing is rounded.
 
-    `names` are those of the columns, a protocol's `score_names`. A column without sequences is absent.
+    `names` are those of the columns, a protocol's `score_names`; `unit` is the kind of the units whose sums
+    they are. A column without sequences is absent.
     """
     gaps, n, degrees = first - second, counts.sum(axis=0), degrees_of(counts)
     found = sign_flips(gaps, counts, rng=signs, n_flips=n_flips)
-    # With 8 degrees of freedom there are 8 recordings, and an end is missing after a few dozen flips alone.
+    # With 8 degrees of freedom there are 8 units, and an end is missing after a few dozen flips alone.
     is_known = usable_columns(counts) & np.isfinite(found.low) & np.isfinite(found.high)
     return {
         name: Difference(
@@ -139,6 +142,7 @@ def difference(
             high=float(found.high[i]) if is_known[i] else None,
             p=float(found.p[i]) if is_known[i] else None,
             n_effective=float(degrees[i]),
+            unit=unit,
         )
         for i, name in enumerate(names)
         if n[i] > 0
@@ -148,9 +152,9 @@ def difference(
 def influence(
     differences: Floats, counts: Floats, *, rng: np.random.Generator, n_flips: int = N_SIGN_FLIPS
 ) -> Influence:
-    """Leave recordings out until a difference is not significant, and until it has the other sign.
+    """Leave units out until a difference is not significant, and until it has the other sign.
 
-    `differences` and `counts` are those of one column, (G,) each. First left out are the recordings that
+    `differences` and `counts` are those of one column, (units,) each. First left out are the units that
     favour the better entry most. For the sign no other choice needs fewer; for the p of the rest another
     one might (Broderick, Giordano and Meager, arXiv 2011.14999), so that number is an upper bound.
     """
@@ -172,7 +176,7 @@ def influence(
         return bool(rest.p[0] < SIGNIFICANT)
 
     return Influence(
-        n_recordings=int((counts > 0).sum()),
+        n_units=int((counts > 0).sum()),
         n_to_undecided=_first_false(is_significant, n_to_turn or n_favouring) if is_significant(0) else None,
         n_to_turn=n_to_turn,
     )
@@ -186,10 +190,10 @@ def with_influence(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> dict[str, Difference]:
-    """Add to `found` on how few recordings the difference in overall MiD rests.
+    """Add to `found` on how few units the difference in overall MiD rests.
 
-    `differences` and `counts` are (G, columns), `names` those of the columns. Where there are too few
-    recordings for a p, nothing is added.
+    `differences` and `counts` are (units, columns), `names` those of the columns. Where there are too few
+    units for a p, nothing is added.
     """
     overall = found.get(PRIMARY)
     if overall is None or overall.p_below is None:
@@ -265,29 +269,35 @@ def compare_predictions(
     protocol: str | Protocol = DEFAULT_PROTOCOL,
     n_flips: int = N_SIGN_FLIPS,
     decimals: int | None = PUBLISHED_DECIMALS,
+    unit: str | None = None,
 ) -> dict[str, Difference]:
     """Compare two sets of predictions of the same sequences: first minus second under each score name.
 
     The random numbers belong to the ground truth's revision, so these are the numbers of an open board's own
-    comparison, rounded as there to so many `decimals` (None: not at all). A column without sequences is
-    absent. Raises as `evaluator.evaluate` does.
+    comparison, rounded as there to so many `decimals` (None: not at all). `unit` is as in
+    `confidence_intervals`. A column without sequences is absent. Raises as `evaluator.evaluate` does.
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     one, other = (Scorer(truth, rules).report(each, keep_bags=True) for each in (first, second))
     assert one.bags is not None  # noqa: S101 - they were asked for
     assert other.bags is not None  # noqa: S101 - they were asked for
+    units = truth.manifest.units_by(unit)
+    sums, other_sums, counts = (
+        by_units(each, units) for each in (one.bags.sums, other.bags.sums, one.bags.counts)
+    )
     found = difference(
-        one.bags.sums,
-        other.bags.sums,
-        one.bags.counts,
+        sums,
+        other_sums,
+        counts,
         names=rules.score_names,
         signs=generator_of(truth.digest, purpose="signs"),
         n_flips=n_flips,
+        unit=units.kind,
     )
     found = with_influence(
         found,
-        differences=one.bags.sums - other.bags.sums,
-        counts=one.bags.counts,
+        differences=sums - other_sums,
+        counts=counts,
         names=rules.score_names,
         rng=generator_of(truth.digest, purpose="influence"),
     )

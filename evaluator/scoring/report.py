@@ -116,14 +116,17 @@ class Report:
 
     # --- a closer look ------------------------------------------------------------------------------------
 
-    def breakdown(self, by: str, *, with_intervals: bool = False) -> list[GroupScores]:
+    def breakdown(
+        self, by: str, *, with_intervals: bool = False, unit: str | None = None
+    ) -> list[GroupScores]:
         """The scores of each group: `by` is recording, camera, range, occlusion, lane or box-size.
 
-        Raises `ValueError` for another `by`, for a ground truth that does not have what the groups need, and
-        for a report without sequences.
+        `unit` is that of the intervals, as in `confidence_intervals`. Raises `ValueError` for another `by`,
+        for a ground truth that does not have what the groups or the units need, and for a report without
+        sequences.
         """
         errors, details = self._kept()
-        return breakdown(details, errors, by=by, with_intervals=with_intervals)
+        return breakdown(details, errors, by=by, with_intervals=with_intervals, unit=unit)
 
     def by(self, group: str, *, with_intervals: bool = False) -> pd.DataFrame:
         """The same as a frame, indexed by the group: columns `n_sequences`, `n_recordings`, then the scores.

@@ -8,12 +8,14 @@ from dataclasses import dataclass, field, replace
 from statistics import NormalDist
 from typing import Final
 
+from evaluator.units import RECORDING, in_words
+
 SIGNIFICANT: Final = 0.05
 P_CLASSES: Final = (0.001, 0.01, SIGNIFICANT)
 """Below which of these a p lies is told where the p itself is not."""
 
 MIN_DEGREES: Final = 8.0
-"""With fewer degrees of freedom nothing is said of a mean: too few recordings to know how much they vary."""
+"""With fewer degrees of freedom nothing is said of a mean: too few units to know how much they vary."""
 
 # Of the normal distribution's 97.5 % point: what a difference must be to be found with a power of 80 %.
 _DETECTABLE: Final = (1.959964 + 0.841621) / 1.959964
@@ -30,13 +32,13 @@ def p_below(p: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Influence:
-    """How many of the recordings have to be left out before a difference is another one.
+    """How many of the units (recordings or days) have to be left out before a difference is another one.
 
     `n_to_undecided`: until it is not significant, None where it is not; `n_to_turn`: until it has the other
-    sign, None where no recordings suffice.
+    sign, None where no units suffice.
     """
 
-    n_recordings: int
+    n_units: int
     n_to_undecided: int | None = None
     n_to_turn: int | None = None
 
@@ -46,9 +48,10 @@ class Difference:
     """First minus second in one column: below 0 the first is better. Computed here or told by a server.
 
     `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
-    are too few recordings. `p_below` is the smallest of `P_CLASSES` that p is below, else 1: it is what
-    judges, alone where p is not told, and follows from p where it is not given. `n_effective` is the
-    effective number of recordings, and `influence` on how few of them it rests, where that is known.
+    are too few units. `p_below` is the smallest of `P_CLASSES` that p is below, else 1: it is what judges,
+    alone where p is not told, and follows from p where it is not given. `n_effective` is the effective number
+    of units, `unit` what these are: recording, day or given. `influence` says on how few of them the
+    difference rests, where that is known.
     """
 
     difference: float
@@ -58,6 +61,7 @@ class Difference:
     p_below: float | None = None
     n_effective: float | None = None
     influence: Influence | None = field(default=None, repr=False)
+    unit: str = field(default=RECORDING, repr=False)
 
     def __post_init__(self) -> None:
         """Give `p_below` where p says it."""
@@ -139,21 +143,20 @@ def _upper(found: Difference) -> float | None:
     return found.p_below if found.p is None else found.p
 
 
-def too_few_recordings(n_effective: float | None) -> str:
+def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:
     """Why there is no interval and no p.
 
-    >>> too_few_recordings(5.34)
+    >>> too_few_units(5.34)
     'too few recordings (effective number 5.3; at least 8 needed)'
-    >>> too_few_recordings(7.99)
-    'too few recordings (effective number 7.9; at least 8 needed)'
-    >>> too_few_recordings(None)
+    >>> too_few_units(7.99, unit="day")
+    'too few days (effective number 7.9; at least 8 needed)'
+    >>> too_few_units(None)
     'too few recordings'
     """
+    few = f"too few {in_words(unit)}"
     if n_effective is None:
-        return "too few recordings"
-    return (
-        f"too few recordings (effective number {cut_off(n_effective):.1f}; at least {MIN_DEGREES:g} needed)"
-    )
+        return few
+    return f"{few} (effective number {cut_off(n_effective):.1f}; at least {MIN_DEGREES:g} needed)"
 
 
 def cut_off(n_effective: float) -> float:

@@ -1,18 +1,20 @@
-"""Confidence intervals of means: a bootstrap over recordings.
+"""Confidence intervals of means: a bootstrap over units, which are days or recordings.
 
 Sequences of one recording ("bag") resemble each other, so 28,600 of them know less than 28,600 independent
-ones would. What is drawn anew here is therefore the recording, never the sequence. With S_g and n_g the sum
-of an error and the number of sequences of recording g, a published mean is θ = ΣS_g / Σn_g, and
+ones would, and so do recordings of one day. What is drawn anew here is therefore the unit (`evaluator.units`
+says which it is), never the sequence. With S_g and n_g the sum of an error and the number of sequences of
+unit g, a published mean is θ = ΣS_g / Σn_g, and
 
     θ⁽ᵇ⁾ = Σ w_bg S_g / Σ w_bg n_g        w_bg ~ Exp(1), b = 1 … B
 
-is what it might have been (a Bayesian bootstrap of recordings). An Exp(1) weight is never 0, so no interval
+is what it might have been (a Bayesian bootstrap of units). An Exp(1) weight is never 0, so no interval
 of the ground truth runs empty. One matrix of weights belongs to a ground truth and is shared by all that
 is scored against it. `evaluator.scoring.differences` compares two entries, `evaluator.scoring.ranges` all
 of a board.
 
 Everything is a function of the sums and of the seed: the same numbers give the same answer, in whatever order
-they come. Arrays have one row for each recording and one column for each score name.
+they come. Arrays have one row for each unit and one column for each score name; `by_units` makes them from
+those of recordings.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ from evaluator.scoring.report import RecordingSums
 from evaluator.scoring.scoring import Scorer
 from evaluator.scoring.significance import MIN_DEGREES
 from evaluator.truth.truth import GroundTruth
+from evaluator.units import RECORDING, Units
 
 CONFIDENCE: Final = 0.95
 N_RESAMPLES: Final = 10_000
@@ -47,49 +50,62 @@ def generator_of(digest: str, *, purpose: str) -> np.random.Generator:
     return np.random.default_rng(int.from_bytes(seed))
 
 
+def by_units(rows: Floats, units: Units) -> Floats:
+    """Sums or counts of recordings (…, G, columns) as those of their units (…, U, columns).
+
+    Where the unit is the recording, they are the same array.
+    """
+    if units.kind == RECORDING:
+        return rows
+    index = np.array(units.index)
+    order = np.argsort(index, kind="stable")
+    first = np.searchsorted(index[order], np.arange(len(units)))
+    return np.asarray(np.add.reduceat(rows[..., order, :], first, axis=-2))
+
+
 def degrees_of(counts: Floats) -> Floats:
-    """The degrees of freedom of each column of `counts` (G, columns): its effective number of recordings.
+    """The degrees of freedom of each column of `counts` (G, columns): its effective number of units.
 
         (Σn²)² / Σn⁴
 
-    Satterthwaite's for a variance that is a sum of one square for each recording, with weights n². Recordings
-    of equal size count as many as they are; a few long ones among many short ones as little more than the
-    few. 0 for a column without sequences.
+    Satterthwaite's for a variance that is a sum of one square for each unit, with weights n². Units of equal
+    size count as many as they are; a few long ones among many short ones as little more than the few. 0 for
+    a column without sequences.
     """
     squares, fourths = (counts**2).sum(axis=0), (counts**4).sum(axis=0)
     return np.asarray(np.divide(squares**2, fourths, out=np.zeros_like(squares), where=fourths > 0))
 
 
 def usable_columns(counts: Floats) -> Booleans:
-    """Which columns of `counts` (G, columns) have enough recordings: at least 8 degrees of freedom."""
+    """Which columns of `counts` (G, columns) have enough units: at least 8 degrees of freedom."""
     return np.asarray(degrees_of(counts) >= MIN_DEGREES)
 
 
 class Bootstrap:
     """The shared weights of one ground truth, ready for the sums of many entries.
 
-    `counts` is (G, columns), sequences per recording; all entries have the same, since intervals are made by
-    the truth. A recording without sequences in an interval says nothing of it.
+    `counts` is (G, columns), sequences per unit; all entries have the same, since intervals are made by the
+    truth. A unit without sequences in an interval says nothing of it.
     """
 
     def __init__(self, counts: Floats, *, rng: np.random.Generator, n_resamples: int = N_RESAMPLES) -> None:
         self._counts = counts
         self._n = counts.sum(axis=0)
-        # Recordings in rows: a product with sums is then contiguous in the resamples.
+        # Units in rows: a product with sums is then contiguous in the resamples.
         self._weights: Weights = np.ascontiguousarray(
             rng.standard_exponential((n_resamples, len(counts)), dtype=np.float32).T
         )
 
     @cached_property
     def usable(self) -> Booleans:
-        """Which columns have enough recordings."""
+        """Which columns have enough units."""
         return usable_columns(self._counts)
 
     @cached_property
     def _tails(self) -> Floats:
-        """What lies beyond either end of an interval, of every column: less than 2.5 % for few recordings.
+        """What lies beyond either end of an interval, of every column: less than 2.5 % for few units.
 
-        They count as (Σn)² / Σn² recordings of equal size for the mean, and as `degrees_of` for its error.
+        They count as (Σn)² / Σn² units of equal size for the mean, and as `degrees_of` for its error.
         """
         squares = (self._counts**2).sum(axis=0)
         effective = np.divide(self._n**2, squares, out=np.ones_like(squares), where=squares > 0)
@@ -146,9 +162,9 @@ class Bootstrap:
 
 
 def _tail(n_effective: float, *, degrees: float) -> float:
-    """The share of resamples beyond either end of a 95 % interval of so many recordings of equal size.
+    """The share of resamples beyond either end of a 95 % interval of so many units of equal size.
 
-    Bare percentiles are those of a normal distribution whose variance is known, and n recordings scatter a
+    Bare percentiles are those of a normal distribution whose variance is known, and n units scatter a
     little less about their own mean than about the true one: Φ(−t(97.5 %) · √(n / (n − 1))), the expanded
     percentiles of Hesterberg (The American Statistician 69, 2015), with Student's t of the degrees of freedom
     that the variance is known by. Both are taken as 3 at least; below 8 degrees there is no interval anyway.
@@ -210,12 +226,22 @@ def recording_sums(
 
 
 def confidence_intervals(
-    predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
+    predictions: Predictions,
+    truth: GroundTruth,
+    *,
+    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    unit: str | None = None,
 ) -> dict[str, tuple[float, float] | None]:
-    """The 95 % interval of each number, as the board shows it; None where there is none."""
+    """The 95 % interval of each number, as the board shows it; None where there is none.
+
+    `unit` is recording, day or given; None: by the rule, `truth.manifest.units`. Raises `ValueError` for a
+    unit that the recordings do not have.
+    """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
+    units = truth.manifest.units_by(unit)
     bags = recording_sums(predictions, truth, protocol=rules)
-    low, high = (ends[0] for ends in bootstrap_of(truth.digest, bags.counts).intervals(bags.sums[None]))
+    sums, counts = (by_units(each, units) for each in (bags.sums, bags.counts))
+    low, high = (ends[0] for ends in bootstrap_of(truth.digest, counts).intervals(sums[None]))
     return {
         name: (float(low[i]), float(high[i])) if np.isfinite(low[i]) else None
         for i, name in enumerate(rules.score_names)

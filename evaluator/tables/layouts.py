@@ -14,12 +14,9 @@ from typing import Final
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, metric_of, split_name
 from evaluator.tables.escaping import latex, latex_comment, markdown, markdown_address
+from evaluator.units import RECORDING, in_words
 
 ABSENT: Final = "–"
-BRACKETS: Final = (
-    "In square brackets: 95 % confidence interval, bootstrap over recordings. In round brackets behind a "
-    "rank: rank range at 95 %."
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +51,8 @@ class Origin:
     ground_truth: str | None = None  # its digest
     n_sequences: int | None = None
     n_recordings: int | None = None
+    unit: str = RECORDING  # of the intervals
+    n_units: int | None = None
     moment: datetime | None = None  # as of which
     has_own_rows: bool = False
 
@@ -162,7 +161,7 @@ def as_latex(export: Export) -> str:
         last += len(names)
     return "\n".join(
         [
-            *map(latex_comment, [*about(export.origin), *_caption(rows)]),
+            *map(latex_comment, [*about(export.origin), *_caption(rows, export.origin)]),
             r"% It needs \usepackage{booktabs}.",
             rf"\begin{{tabular}}{{rll{'r' * len(columns)}}}",
             r"\toprule",
@@ -178,9 +177,22 @@ def as_latex(export: Export) -> str:
     )
 
 
-def _caption(rows: Sequence[Row]) -> tuple[str, ...]:
+def _caption(rows: Sequence[Row], origin: Origin) -> tuple[str, ...]:
     """What the brackets are, in a table that has some."""
-    return (BRACKETS,) if any(cell.low and cell.high for row in rows for cell in row.cells) else ()
+    has_some = any(cell.low and cell.high for row in rows for cell in row.cells)
+    return (brackets(origin.unit, origin.n_units),) if has_some else ()
+
+
+def brackets(unit: str, n_units: int | None) -> str:
+    """What the brackets of a table with intervals are.
+
+    >>> brackets("day", 42)  # doctest: +ELLIPSIS
+    'In square brackets: 95 % confidence interval, bootstrap over 42 days. In round brackets behind ...
+    """
+    return (
+        f"In square brackets: 95 % confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
+        "brackets behind a rank: rank range at 95 %."
+    )
 
 
 def latex_row(row: Row) -> str:
@@ -235,7 +247,7 @@ def as_markdown(export: Export) -> str:
     # The address comes last in its line, and is a link.
     words = markdown(first.removesuffix(export.origin.address))
     source = f"{words} {markdown_address(export.origin.address)}"
-    for line in (*_caption(rows), source, *map(markdown, others)):
+    for line in (*_caption(rows, export.origin), source, *map(markdown, others)):
         lines += ["", line]
     return "\n".join([*lines, ""])
 

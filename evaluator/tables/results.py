@@ -19,7 +19,10 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True, slots=True)
 class ResultRow:
-    """The scores of one file, or of one group of its sequences, by their names; None has no value."""
+    """The scores of one file, or of one group of its sequences, by their names; None has no value.
+
+    `units` says in words what the intervals take as independent, as "42 days".
+    """
 
     file: str
     group: str | None
@@ -27,6 +30,7 @@ class ResultRow:
     n_recordings: int
     scores: Mapping[str, float | None]
     intervals: Mapping[str, Ends | None] = field(default_factory=dict)
+    units: str = ""
 
 
 def names_of(rows: Sequence[ResultRow], *, by: str | None) -> list[tuple[str, Callable[[ResultRow], str]]]:
@@ -61,18 +65,16 @@ def as_markdown(rows: Sequence[ResultRow], *, by: str | None) -> str:
     for row in rows:
         texts = [markdown(of(row)) for _, of in names]
         lines.append([*texts, *cells_of(row), f"{row.n_sequences:,}"])
-    units = ", ".join(metric.heading for metric in grouped_names(scores))
-    return "".join(f"| {' | '.join(line)} |\n" for line in lines) + f"\n{units}; lower is better.\n"
+    return "".join(f"| {' | '.join(line)} |\n" for line in lines) + f"\n{_caption(rows)}\n"
 
 
 def as_latex(rows: Sequence[ResultRow], *, by: str | None) -> str:
     """A tabular of booktabs; without its head, a row is one for a table that is there already."""
     names, scores = names_of(rows, by=by), list(rows[0].scores)
     heads = [title for title, _ in names] + _titles(scores)
-    units = ", ".join(metric.heading for metric in grouped_names(scores))
     return "\n".join(
         [
-            f"% {units}; lower is better.",
+            f"% {_caption(rows)}",
             rf"\begin{{tabular}}{{{'l' * len(names)}{'r' * len(scores)}}}",
             r"\toprule",
             rf"{' & '.join(map(latex, heads))} \\",
@@ -87,6 +89,15 @@ def as_latex(rows: Sequence[ResultRow], *, by: str | None) -> str:
             "",
         ]
     )
+
+
+def _caption(rows: Sequence[ResultRow]) -> str:
+    """What the numbers are, and the brackets where there are some."""
+    metrics = ", ".join(metric.heading for metric in grouped_names(rows[0].scores))
+    said = f"{metrics}; lower is better."
+    if not any(row.units and any(row.intervals.values()) for row in rows):
+        return said
+    return f"{said} In square brackets: 95 % confidence interval, bootstrap over {rows[0].units}."
 
 
 def cells_of(row: ResultRow) -> Iterator[str]:

@@ -8,7 +8,8 @@ from typing import Final
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY, column_words, metric_of
-from evaluator.scoring.significance import SIGNIFICANT, Difference, best_of, too_few_recordings
+from evaluator.scoring.significance import SIGNIFICANT, Difference, best_of, too_few_units
+from evaluator.units import in_words
 
 _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
@@ -46,7 +47,7 @@ def sentence(
 ) -> str:
     """What a difference in one column means, in words; `decimals` are those in which values are published.
 
-    `withheld` says why there is no interval, in a sentence, where it is not for too few recordings.
+    `withheld` says why there is no interval, in a sentence, where it is not for too few units.
 
     >>> sentence("A", "B", name="mid_crucial", found=Difference(-4.1, -5.3, -2.9, 0.0003))
     "A's MiD on crucial is 4.1 lower than B's (95 % confidence interval: 2.9 to 5.3 lower; p = 0.0003)."
@@ -68,7 +69,8 @@ The difference is not significant. The test detects a difference above 2.0 with 
     if withheld:
         return f"{gap}. {withheld}"
     if found.low is None or found.high is None or found.p_below is None:
-        return f"{gap}; there are {too_few_recordings(found.n_effective)} to say whether that is significant."
+        few = too_few_units(found.n_effective, unit=found.unit)
+        return f"{gap}; there are {few} to say whether that is significant."
     ends = _ends(found.difference, found.low, found.high, digits)
     if found.is_significant and 0 in (found.low, found.high):
         # So it is on a hidden split alone, where p judges and the ends only say how large.
@@ -121,7 +123,7 @@ def _digits(found: Difference, decimals: int) -> int:
 
 
 def influence(first: str, second: str, *, found: Difference) -> str:
-    """On how few recordings a difference rests; empty where that is not known.
+    """On how few units a difference rests; empty where that is not known.
 
     >>> from evaluator.scoring.significance import Influence
     >>> found = Difference(-0.4, -0.5, -0.2, 0.0003, influence=Influence(700, 39, 59))
@@ -140,7 +142,8 @@ def influence(first: str, second: str, *, found: Difference) -> str:
     if not parts:
         return ""
     (n, words), *rest = parts
-    head = f"Without the {n:,} of {known.n_recordings:,} recordings that favour {better} most, the difference"
+    of_all = in_words(found.unit, known.n_units)
+    head = f"Without the {n:,} of {of_all} that favour {better} most, the difference"
     return "; ".join([f"{head} {words}", *(f"without {n:,}, it {words}" for n, words in rest)]) + "."
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import IO, Final
 
-from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, allow_cpu, limit, obey_the_parent_alone
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, allow_cpu, forbid_calls, limit, obey_the_parent_alone
 from evaluator.problems import Rejected
 from evaluator.truth.annotations import read_files
 
@@ -50,6 +50,7 @@ def main() -> None:
     memory_bytes = int(sys.argv[1])
     with_ttc, with_boxes, with_frames = (argument == "1" for argument in sys.argv[2:5])
     limit(memory_bytes=memory_bytes, cpu_s=MAX_CPU_S)
+    forbid_calls(own_limits=True)
     answers = sys.stdout.buffer
     answers.write(READY)
     answers.flush()

@@ -5,8 +5,10 @@ them in the order in which the file system lists the files, which differs betwee
 order is the same.
 
 On Linux the pickles are read by a child process that has little memory and time, and may open nothing
-(`annotation_child`). Other systems have no such limits, and the files are read here. No pickle runs code on
-either, but there one that was made for it may take all memory, or never end.
+(`annotation_child`). Its answer is believed no more than the files are: one of another form is the files'
+fault, and one that is longer than the child's memory is not read to its end. Other systems have no such
+limits, and the files are read here. No pickle runs code on either, but there one that was made for it may
+take all memory, or never end.
 """
 
 from __future__ import annotations
@@ -16,11 +18,13 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from types import NoneType
 from typing import IO, Any, Final
 
-from evaluator.problems import Problem, Rejected, reject
+from evaluator.problems import Rejected, reject
 from evaluator.truth.annotations import AnnotatedFiles, read_files
 from evaluator.truth.csv_tables import Table
 
@@ -33,6 +37,22 @@ HAS_LIMITS: Final = sys.platform == "linux" and bool(sys.executable)
 _BASE_BYTES: Final = 512 * 1024 * 1024
 _BYTES_PER_BYTE: Final = 32
 _EXTENSION: Final = ".pkl"
+_KINDS: Final[dict[str, tuple[type, ...]]] = {
+    "anno_id": (int,),
+    "bag_stamp": (str,),
+    "cam_id": (str,),
+    "ts_ns": (int,),
+    "track_id": (str,),
+    "ttc_s": (float,),
+    "places": (int, str),
+    "occ_ratio": (float, NoneType),
+    "same_lane": (bool, NoneType),
+    "box2d": (list, NoneType),
+}
+"""What the columns of the child's table hold."""
+_MAX_COMPLAINT_BYTES: Final = 64 * 1024
+_PATIENCE_S: Final = 10.0
+_EXPECTED: Final = "expected annotations of the toolkit"
 
 
 def read_annotations(
@@ -149,7 +169,7 @@ def _asked(
     from evaluator.limits import READY  # noqa: PLC0415 -- nothing of it is on Windows
 
     asking, answering = _pipes(child)
-    if answering.readline() != READY:
+    if answering.readline(len(READY)) != READY:
         raise _not_started(folder, _last_words(child))
     for name, data in _contents(folder, files):
         try:
@@ -158,16 +178,16 @@ def _asked(
             asking.flush()
         except BrokenPipeError:
             pass  # it died of this file, or has refused it: the next line says which
-        line = answering.readline()
+        line = answering.readline(memory_bytes)
         if not line:
             raise reject(*_end_of(child, memory_bytes=memory_bytes), name)
         if line.strip():
-            return _decoded(line)
+            return _decoded(line, name)
     asking.close()
-    line = answering.readline()
+    line = answering.readline(memory_bytes)
     if not line:
         raise reject(*_end_of(child, memory_bytes=memory_bytes), folder.name)
-    return _decoded(line)
+    return _decoded(line, folder.name)
 
 
 def _pipes(child: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
@@ -181,7 +201,15 @@ def _not_started(folder: Path, cause: str) -> Rejected:
 
 
 def _last_words(child: subprocess.Popen[bytes]) -> str:
-    _, complaint = child.communicate()
+    complaint = child.stderr.read(_MAX_COMPLAINT_BYTES) if child.stderr else b""
+    with suppress(BrokenPipeError):  # for what it has not read
+        if child.stdin:
+            child.stdin.close()
+    try:
+        child.wait(timeout=_PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        child.kill()  # it has closed its answer, and goes on
+        child.wait()
     last_line = complaint[-2000:].decode(errors="replace").strip().rpartition("\n")[2]
     return f"exit code {child.returncode}, {last_line[:200]}"
 
@@ -193,26 +221,36 @@ def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, 
     from evaluator.limits import EXIT_OUT_OF_MEMORY  # noqa: PLC0415 -- as READY
 
     last_words = _last_words(child)
-    expected = "expected annotations of the toolkit"
     if child.returncode == EXIT_OUT_OF_MEMORY:
-        return "too-large", f"Reading the file needs more than {memory_bytes >> 20:,} MiB; {expected}."
+        return "too-large", f"Reading the file needs more than {memory_bytes >> 20:,} MiB; {_EXPECTED}."
     if child.returncode == -signal.SIGXCPU:
-        return "too-large", f"Reading the file takes too long for its size; {expected}."
+        return "too-large", f"Reading the file takes too long for its size; {_EXPECTED}."
     if child.returncode < 0:
-        message = f"Reading the file ended its process with signal {-child.returncode}; {expected}."
+        message = f"Reading the file ended its process with signal {-child.returncode}; {_EXPECTED}."
         return "bad-annotations", message
-    return "bad-annotations", f"Reading the file failed ({last_words}); {expected}."
+    return "bad-annotations", f"Reading the file failed ({last_words}); {_EXPECTED}."
 
 
-def _decoded(line: bytes) -> AnnotatedFiles:
-    """The child's answer; raises `Rejected` when that is what it says."""
-    answer: dict[str, Any] = json.loads(line)
-    if "problems" in answer:
-        problems = [Problem(**problem) for problem in answer["problems"]]
-        raise Rejected(problems, n_problems=answer["n_problems"])
-    return AnnotatedFiles(
-        Table(**answer["table"]),
-        answer["n_sequences"],
-        boxes=answer["boxes"],
-        frame_ttc_s=answer["frames"],
-    )
+def _decoded(line: bytes, where: str) -> AnnotatedFiles:
+    """The child's answer; raises `Rejected` when that is what it says, or when it says nothing known."""
+    try:
+        answer: dict[str, Any] = json.loads(line)
+        if "problems" in answer:
+            raise Rejected.from_dict(answer)
+        table, counts = _table(answer["table"]), answer["n_sequences"]
+        if sum(counts) != len(table.anno_id):
+            raise ValueError("the files have another number of sequences than the table")
+        return AnnotatedFiles(table, counts, boxes=answer["boxes"], frame_ttc_s=answer["frames"])
+    except (ValueError, TypeError, LookupError, RecursionError):
+        message = f"Reading the file gave an answer of another form; {_EXPECTED}."
+        raise reject("bad-annotations", message, where) from None
+
+
+def _table(columns: dict[str, Any]) -> Table:
+    """Raises `TypeError` or `ValueError` for columns of another kind or length than `Table` says."""
+    table = Table(**columns)
+    for name, kinds in _KINDS.items():
+        column = getattr(table, name)
+        if len(column) not in {0, len(table.anno_id)} or not all(type(value) in kinds for value in column):
+            raise ValueError(f"{name} is no column of the table")
+    return table

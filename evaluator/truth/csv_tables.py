@@ -26,6 +26,8 @@ from evaluator.truth.objects import FIELDS, OBJECT_COLUMNS, text_of
 
 COLUMNS: Final = ("anno_id", "bag_stamp", "cam_id", "ts", "track_id", "ttc")
 MANIFEST_COLUMNS: Final = COLUMNS[:-1]
+UNIT: Final = "unit"
+"""The column by which a ground truth names the unit of each recording; most have none."""
 
 _STORE_FORMAT: Final = 1
 _MAX_FIELD: Final = 200
@@ -48,7 +50,8 @@ _NUMBER: Final = re.compile(
 class Table:
     """Columns as they were read, one item per sequence, and the place of each row for messages.
 
-    Those of `OBJECT_COLUMNS` are empty where the source does not have them; None in them is a missing value.
+    Those of `OBJECT_COLUMNS` and `unit` are empty where the source does not have them; None in the former is
+    a missing value.
     """
 
     anno_id: list[int] = field(default_factory=list)
@@ -61,6 +64,12 @@ class Table:
     occ_ratio: list[float | None] = field(default_factory=list)
     same_lane: list[bool | None] = field(default_factory=list)
     box2d: list[list[float] | None] = field(default_factory=list)
+    unit: list[str] = field(default_factory=list)
+
+    @property
+    def manifest_columns(self) -> tuple[str, ...]:
+        """The columns of its manifest: with `unit` where it has that."""
+        return (*MANIFEST_COLUMNS, UNIT) if self.unit else MANIFEST_COLUMNS
 
     def where(self, row: int) -> str:
         """`line 3` of a CSV, or whatever the source calls the row."""
@@ -82,6 +91,7 @@ class Table:
             "ts": map(str, self.ts_ns),
             "track_id": self.track_id,
             "ttc": map(repr, self.ttc_s),
+            UNIT: self.unit,
             **{name: map(text_of, getattr(self, name)) for name in OBJECT_COLUMNS},
         }
         return list(map(",".join, zip(*(values[name] for name in columns), strict=True)))
@@ -89,15 +99,17 @@ class Table:
     def digests(self) -> tuple[str, str]:
         """`sha256:…` of the texts of the manifest and of the whole table, rows in ascending anno_id.
 
-        The latter is empty where there are no times to contact.
+        The latter is empty where there are no times to contact. A table without units has the digests that
+        it had before there were any.
         """
-        lines = self._lines(MANIFEST_COLUMNS)
+        columns = self.manifest_columns
+        lines = self._lines(columns)
         whole = list(map(",".join, zip(lines, map(repr, self.ttc_s), strict=True))) if self.ttc_s else []
         ids = self.anno_id
         if any(map(operator.gt, ids, ids[1:])):
             order = sorted(range(len(ids)), key=ids.__getitem__)
             lines, whole = ([some[row] for row in order] for some in (lines, whole or lines))
-        return _digest(MANIFEST_COLUMNS, lines), _digest(COLUMNS, whole) if self.ttc_s else ""
+        return _digest(columns, lines), _digest((*columns, "ttc"), whole) if self.ttc_s else ""
 
 
 def _text(columns: tuple[str, ...], lines: list[str]) -> str:
@@ -141,7 +153,7 @@ def read_text(source: Source) -> str:
 def read_csv(source: Source, *, with_ttc: bool) -> Table:
     """Read `COLUMNS` from a CSV file with a header; more columns are ignored, their order is free.
 
-    With `with_ttc` also those of `OBJECT_COLUMNS` that are there.
+    Also `unit` where it is there, and with `with_ttc` those of `OBJECT_COLUMNS`.
 
     Raises `Rejected` for an unreadable file, missing columns and malformed fields, by line.
     """
@@ -172,11 +184,13 @@ def _read_columns(text: str, columns: tuple[str, ...]) -> Table | None:
     fields = ",".join(lines).split(",")
     column = {name: fields[header.index(name) :: len(header)] for name in columns}
     names = [column[name] for name in ("bag_stamp", "cam_id", "track_id")]
+    unit = fields[header.index(UNIT) :: len(header)] if UNIT in header else []
     anno_id, ts_ns = _whole_numbers(column["anno_id"]), _whole_numbers(column["ts"])
     ttc_s = _seconds(column.get("ttc", []))
-    if anno_id is None or ts_ns is None or ttc_s is None or any(map(name_fault, set().union(*names))):
+    if anno_id is None or ts_ns is None or ttc_s is None or any(map(name_fault, set().union(*names, unit))):
         return None
-    table = Table(anno_id, names[0], names[1], ts_ns, names[2], ttc_s, places=list(range(2, len(lines) + 2)))
+    table = Table(anno_id, names[0], names[1], ts_ns, names[2], ttc_s, unit=unit)
+    table.places = list(range(2, len(lines) + 2))
     for name, position in _of_objects(header, columns).items():
         try:
             read = map(FIELDS[name], map(str.strip, fields[position :: len(header)]))
@@ -219,7 +233,8 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
             f"expected {','.join(columns)}.",
             "line 1",
         )
-    positions = [header.index(name) for name in columns]
+    columns = (*columns, UNIT) if UNIT in header else columns
+    positions = {name: header.index(name) for name in columns}
     extra = _of_objects(header, columns)
     table, findings, places = Table(), Findings(), []
     for row in rows:
@@ -230,7 +245,8 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
             findings.add("bad-csv", found, f"line {rows.line_num}")
             continue
         places.append(rows.line_num)
-        _read_row([row[position] for position in positions], table, findings, f"line {rows.line_num}")
+        fields = {name: row[position] for name, position in positions.items()}
+        _read_row(fields, table, findings, f"line {rows.line_num}")
         for name, position in extra.items():
             getattr(table, name).append(_of_object(name, row[position], findings, f"line {rows.line_num}"))
     findings.raise_if_any()
@@ -238,20 +254,17 @@ def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
     return table
 
 
-def _read_row(fields: list[str], table: Table, findings: Findings, where: str) -> None:
-    anno_id, bag_stamp, cam_id, ts, track_id, *ttc = fields
-    table.anno_id.append(_whole("anno_id", anno_id, findings, where))
-    table.ts_ns.append(_whole("ts", ts, findings, where))
-    for column, name, text in (
-        (table.bag_stamp, "bag_stamp", bag_stamp),
-        (table.cam_id, "cam_id", cam_id),
-        (table.track_id, "track_id", track_id),
-    ):
-        column.append(text)
-        fault = name_fault(text)
-        if fault:
-            findings.add("bad-field", f"{name} is {quoted(text)}: {fault}.", where)
-    for text in ttc:
+def _read_row(fields: Mapping[str, str], table: Table, findings: Findings, where: str) -> None:
+    table.anno_id.append(_whole("anno_id", fields["anno_id"], findings, where))
+    table.ts_ns.append(_whole("ts", fields["ts"], findings, where))
+    for name in ("bag_stamp", "cam_id", "track_id", UNIT):
+        if name in fields:
+            text = fields[name]
+            getattr(table, name).append(text)
+            if fault := name_fault(text):
+                findings.add("bad-field", f"{name} is {quoted(text)}: {fault}.", where)
+    if "ttc" in fields:
+        text = fields["ttc"]
         if _NUMBER.fullmatch(text.strip()):
             table.ttc_s.append(float(text))
         else:
@@ -322,7 +335,7 @@ def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> Stored:
         raise reject(
             "unreadable", f"The file is not a saved ground truth or manifest: {error}.", path.name
         ) from None
-    kinds = _STORE_KINDS | ({"ttc_s": "f"} if with_ttc else {})
+    kinds = _STORE_KINDS | ({"ttc_s": "f"} if with_ttc else {}) | ({UNIT: "U"} if UNIT in arrays else {})
     digests = {"manifest_digest", "truth_digest"} if with_ttc else {"manifest_digest"}
     shapes = {arrays[name].shape for name in kinds if name in arrays}
     if (
@@ -340,7 +353,7 @@ def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> Stored:
     )
     if is_sealed:
         return stored
-    names = (*columns["bag_stamp"], *columns["cam_id"], *columns["track_id"])
+    names = (*columns["bag_stamp"], *columns["cam_id"], *columns["track_id"], *stored.table.unit)
     if any(map(name_fault, names)) or min((*columns["anno_id"], *columns["ts_ns"], 0)) < 0:
         raise reject("bad-field", "The file holds malformed names or negative numbers.", path.name)
     return stored

@@ -7,7 +7,7 @@ from the toolkit's annotation folders.
 Both are named by a digest, "sha256:" and the hex SHA-256 of their canonical text: the header line, then one
 line per sequence in ascending anno_id, fields separated by commas, times to contact as the shortest decimal
 that reads back to the same float64, lines ended by a line feed. The order of the rows therefore does not
-change the digest.
+change the digest. A column `unit`, where there is one, stands in the manifest, before the times to contact.
 """
 
 from __future__ import annotations
@@ -27,15 +27,19 @@ from evaluator.metrics.protocol import Interval
 from evaluator.metrics.scale import Floats, exact_log, scale_ratio_10hz
 from evaluator.problems import Findings, quoted, reject
 from evaluator.truth.annotation_folders import read_annotations
-from evaluator.truth.csv_tables import COLUMNS, MANIFEST_COLUMNS, Table, load_store, read_csv, save_store
+from evaluator.truth.csv_tables import UNIT, Table, load_store, read_csv, save_store
 from evaluator.truth.objects import OBJECT_COLUMNS, Objects
+from evaluator.units import Units, units_of
 
 Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
 class Manifest:
-    """The sequences of a split in file order, all that participants may know. Arrays are (n,), read-only."""
+    """The sequences of a split in file order, all that participants may know. Arrays are (n,), read-only.
+
+    `unit` is empty unless the ground truth names the unit of every recording.
+    """
 
     anno_id: Integers
     bag_stamp: tuple[str, ...]
@@ -43,6 +47,7 @@ class Manifest:
     ts_ns: Integers
     track_id: tuple[str, ...]
     digest: str
+    unit: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -51,7 +56,7 @@ class Manifest:
 
     @classmethod
     def from_table(cls, table: Table) -> Manifest:
-        """Check the rows; raises `Rejected` for an empty table and for duplicate ids or natural keys."""
+        """Check the rows; raises `Rejected` for none, duplicate ids or natural keys, and unclear units."""
         return cls._checked(table, table.digests()[0])
 
     @classmethod
@@ -63,6 +68,7 @@ class Manifest:
         if len(set(table.anno_id)) < len(table.anno_id):
             _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
         _find_duplicates(findings, "duplicate-natural-keys", "natural key", manifest.natural_keys, table)
+        _find_two_units(findings, table)
         findings.raise_if_any()
         return manifest
 
@@ -78,6 +84,7 @@ class Manifest:
             ts_ns=ts_ns,
             track_id=tuple(table.track_id),
             digest=digest,
+            unit=tuple(table.unit),
         )
 
     @property
@@ -132,6 +139,17 @@ class Manifest:
         """Number of distinct recordings (bag_stamps)."""
         return len(self.recordings)
 
+    @cached_property
+    def units(self) -> Units:
+        """The units of `recordings`, by the rule: those of the column `unit`, else days, else recordings."""
+        return self.units_by(None)
+
+    def units_by(self, kind: str | None) -> Units:
+        """The units of one kind, or by the rule. Raises `ValueError` where these recordings have no such."""
+        return units_of(
+            self.recordings, given=dict(zip(self.bag_stamp, self.unit, strict=bool(self.unit))), kind=kind
+        )
+
     def to_table(self) -> Table:
         """The columns as lists, without times to contact."""
         return Table(
@@ -140,11 +158,13 @@ class Manifest:
             cam_id=list(self.cam_id),
             ts_ns=self.ts_ns.tolist(),
             track_id=list(self.track_id),
+            unit=list(self.unit),
         )
 
     def to_csv(self) -> bytes:
         """The public table: a header and one row per sequence in file order, UTF-8, ended by line feeds."""
-        return self.to_table().text(MANIFEST_COLUMNS).encode()
+        table = self.to_table()
+        return table.text(table.manifest_columns).encode()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz` that `load` reads back exactly."""
@@ -159,6 +179,7 @@ class Manifest:
             "cam_id": np.array(self.cam_id, dtype=np.str_),
             "ts_ns": self.ts_ns,
             "track_id": np.array(self.track_id, dtype=np.str_),
+            **({UNIT: np.array(self.unit, dtype=np.str_)} if self.unit else {}),
         }
 
     @classmethod
@@ -246,7 +267,7 @@ class GroundTruth:
         """The whole table with τ, in file order, as `read_truth` reads it; what is known of objects too."""
         table = self.to_table()
         known = tuple(name for name in OBJECT_COLUMNS if getattr(table, name))
-        return table.text(COLUMNS + known).encode()
+        return table.text((*table.manifest_columns, "ttc", *known)).encode()
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write an `.npz` that `load` reads back exactly."""
@@ -323,6 +344,19 @@ def _find_duplicates(findings: Findings, code: str, noun: str, keys: Sequence[st
         if earlier != row:
             message = f"The {noun} {quoted(key)} is already used at {table.where(earlier)}; expected it once."
             findings.add(code, message, table.where(row))
+
+
+def _find_two_units(findings: Findings, table: Table) -> None:
+    """A recording lies in one unit: its sequences are not independent of each other."""
+    first: dict[str, int] = {}
+    for row, (recording, unit) in enumerate(zip(table.bag_stamp, table.unit, strict=bool(table.unit))):
+        earlier = first.setdefault(recording, row)
+        if table.unit[earlier] != unit:
+            message = (
+                f"The recording {quoted(recording)} has the unit {quoted(unit)} here and "
+                f"{quoted(table.unit[earlier])} at {table.where(earlier)}; expected one unit for a recording."
+            )
+            findings.add("two-units", message, table.where(row))
 
 
 def _check_digest(*, stored: str, found: str, path: str | os.PathLike[str]) -> None:

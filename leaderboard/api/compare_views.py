@@ -16,7 +16,15 @@ from evaluator.tables import sentences
 from leaderboard.api.authentication import require_split
 from leaderboard.api.exceptions import edition_number
 from leaderboard.api.schema import errors, response_header
-from leaderboard.api.serializers import DECIMALS, EDITION, SPLIT, EntrySerializer, NamedSerializer
+from leaderboard.api.serializers import (
+    DECIMALS,
+    EDITION,
+    N_UNITS,
+    SPLIT,
+    UNIT,
+    EntrySerializer,
+    NamedSerializer,
+)
 from leaderboard.api.views import current_split, published_edition
 from leaderboard.ops import rate_limits
 from leaderboard.scoring import comparisons
@@ -30,26 +38,26 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     low = serializers.FloatField(
         allow_null=True,
         help_text="Lower end of the 95 % confidence interval, rounded outwards where the ground truth is "
-        "hidden; null: too few recordings, or withheld.",
+        "hidden; null: too few units, or withheld.",
     )
     high = serializers.FloatField(
         allow_null=True,
         help_text="Upper end of the 95 % confidence interval, rounded outwards where the ground truth is "
-        "hidden; null: too few recordings, or withheld.",
+        "hidden; null: too few units, or withheld.",
     )
     p = serializers.FloatField(
         allow_null=True,
-        help_text="p-value of the two-sided cluster sign-flip test, four decimals; null: too few recordings, "
+        help_text="p-value of the two-sided cluster sign-flip test, four decimals; null: too few units, "
         "withheld, or the ground truth is hidden and only `p_below` is published.",
     )
     p_below = serializers.FloatField(
         allow_null=True,
-        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few recordings, "
+        help_text="The smallest of 0.001, 0.01 and 0.05 that p is below, else 1; null: too few units, "
         "or withheld.",
     )
     n_effective = serializers.FloatField(
         allow_null=True,
-        help_text="Effective number of recordings in this column; below 8 there is no confidence interval "
+        help_text="Effective number of units in this column; below 8 there is no confidence interval "
         "and no p.",
     )
     is_significant = serializers.BooleanField(
@@ -58,7 +66,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
     detectable_difference = serializers.SerializerMethodField(
         help_text="The smallest difference that the test detects with about 80 % power, an estimate; null: "
-        "this one is significant, or there are too few recordings."
+        "this one is significant, or there are too few units."
     )
     sentence = serializers.SerializerMethodField(
         help_text="The result as a sentence. Its p is uncorrected, for this column and pair alone."
@@ -125,6 +133,8 @@ class ComparedSerializer(serializers.Serializer[Compared]):
     split = serializers.CharField(source="split.name", help_text=SPLIT)
     edition = serializers.IntegerField(source="edition.number", help_text=EDITION)
     decimals = serializers.IntegerField(source="edition.decimals", help_text=DECIMALS)
+    unit = serializers.CharField(source="edition.unit", help_text=UNIT)
+    n_units = serializers.IntegerField(source="edition.unit_count", help_text=N_UNITS)
     is_complete = serializers.BooleanField(
         help_text="Whether every pair is computed; if not, repeat the request after Retry-After seconds."
     )

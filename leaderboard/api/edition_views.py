@@ -19,9 +19,11 @@ from leaderboard.api.serializers import (
     GROUND_TRUTH,
     N_RECORDINGS,
     N_SEQUENCES,
+    N_UNITS,
     NULLABLE,
     PROTOCOL,
     SPLIT,
+    UNIT,
     absolute,
 )
 from leaderboard.editions import corrections, preview
@@ -41,6 +43,8 @@ class EditionSerializer(serializers.Serializer[Edition]):
     )
     n_sequences = serializers.IntegerField(source="ground_truth.n_sequences", help_text=N_SEQUENCES)
     n_recordings = serializers.IntegerField(source="ground_truth.n_recordings", help_text=N_RECORDINGS)
+    unit = serializers.CharField(help_text=UNIT)
+    n_units = serializers.IntegerField(source="unit_count", help_text=N_UNITS)
     published_at = serializers.DateTimeField(help_text="When it was first published.")
     is_board = serializers.SerializerMethodField(help_text="Whether it is the split's current edition.")
     url = serializers.SerializerMethodField(help_text="URL of its permanent page.")

@@ -34,6 +34,8 @@ DECIMALS: Final = "Decimals that the edition publishes of scores, confidence int
 GROUND_TRUTH: Final = "Digest of the ground truth."
 N_SEQUENCES: Final = "Number of sequences in the ground truth."
 N_RECORDINGS: Final = "Number of recordings that the sequences come from."
+UNIT: Final = "What intervals, tests and rank ranges take as independent: `recording`, `day` or `given`."
+N_UNITS: Final = "Number of such units."
 OPENS_AT: Final = "When submissions open; null: as soon as there is ground truth."
 CLOSES_AT: Final = "When submissions close; null: never."
 METHOD_ID: Final = "Id of the method; null for a result quoted from a paper."
@@ -294,9 +296,7 @@ class UncertaintySerializer(serializers.Serializer[Interval]):
 
     low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95 % confidence interval.")
     high = serializers.FloatField(allow_null=True, help_text="Upper end of the 95 % confidence interval.")
-    rank_low = serializers.IntegerField(
-        allow_null=True, help_text="Best rank of the rank range in this column."
-    )
+    rank_low = serializers.IntegerField(allow_null=True, help_text="Best rank of the rank range.")
     rank_high = serializers.IntegerField(allow_null=True, help_text="Worst rank of the rank range.")
     is_with_best = serializers.BooleanField(
         allow_null=True,
@@ -365,10 +365,8 @@ class EntrySerializer(serializers.Serializer[Entry]):
         for name, field in self.fields.items():
             # A field that belongs to a serializer has a source; "*" is the whole row.
             source = instance if field.source == "*" else getattr(instance, str(field.source))
-            if name != "intervals":
-                told[name] = _value(field, source)
-            else:
-                told[name] = _value(field, source if self.context.get("has_intervals") else {})
+            is_left_out = name == "intervals" and not self.context.get("has_intervals")
+            told[name] = _value(field, {} if is_left_out else source)
         return told
 
 
@@ -388,6 +386,8 @@ class BoardSerializer(serializers.Serializer[Board]):
     n_recordings = serializers.IntegerField(
         source="edition.ground_truth.n_recordings", help_text=N_RECORDINGS, **NULLABLE
     )
+    unit = serializers.CharField(source="edition.unit", help_text=UNIT, **NULLABLE)
+    n_units = serializers.IntegerField(source="edition.unit_count", help_text=N_UNITS, **NULLABLE)
     floor = ScoresSerializer(
         source="edition.floor",
         help_text="Scores of the ground truth itself, submitted as predictions: hardly any file scores "

@@ -87,7 +87,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
     )
     awaits_intervals = serializers.BooleanField(
         help_text="Whether the confidence intervals are being computed: they follow the scores within "
-        "seconds. False also where there will be none, for example with too few recordings."
+        "seconds. False also where there will be none, for example with too few days or recordings."
     )
     rank = serializers.IntegerField(
         allow_null=True,

@@ -2,7 +2,7 @@
 
 A snapshot is stamped with the version of its split (`leaderboard/versions.py`) as of which it was drawn; with
 another version it is drawn again: by a worker that was told of the change, or by the first reader to find it.
-Only the page cache answers from an old one, and says so (ADR 76). Every snapshot is read from the database as
+Only the page cache answers from an old one, and says so. Every snapshot is read from the database as
 of one moment, so none mixes two; its `etag` is the digest of what it says, so that a change which nobody can
 see changes nothing.
 

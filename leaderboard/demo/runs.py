@@ -66,6 +66,7 @@ class Run:
 RUNS = (
     Run("alignment", "alignment"),
     Run("deep-scale", "deep-scale"),
+    Run("deep-scale-head", "deep-scale", {"decoding": "head"}),
     Run("tracking", "tracking"),
     Run("pixel-mse", "pixel-mse"),
     Run("pixel-mse-toolkit", "pixel-mse", {"variant": "toolkit"}),

@@ -64,8 +64,9 @@ def open_edition(
     """Open an edition beside the published one and queue every standing submission for it.
 
     The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
-    stays unless given. It publishes with the split's `decimals` of now unless others are given. Asked again
-    for the same, it goes on with what is there, also with an edition that was rolled back: nothing is queued
+    stays unless given. It publishes with the split's `decimals` of now unless others are given, and its unit
+    is that of the rule: a board that keeps recordings from before moves to days by this. Asked again for the
+    same, it goes on with what is there, also with an edition that was rolled back: nothing is queued
     twice. `actor` None is the machine's command line.
     Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file is at fault; nothing changes then.
     """
@@ -83,11 +84,12 @@ def open_edition(
         row = ground_truth.add(split_name=split_name, path=path, now=now, actor=actor)
     else:
         row = _imported(split, digest)
+    unit = ground_truth.units_of(row).kind
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).get(pk=split.pk)
         decimals = split.decimals if decimals is None else decimals
         edition = split.editions.filter(
-            ground_truth=row, protocol=protocol, decimals=decimals, discarded_at=None
+            ground_truth=row, protocol=protocol, decimals=decimals, unit=unit, discarded_at=None
         ).first()
         if edition is None:
             edition = ground_truth.new_edition(

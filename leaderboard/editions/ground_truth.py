@@ -15,10 +15,11 @@ import evaluator
 from evaluator.counting import counted
 from evaluator.metrics.protocol import INTERVALS, OVERALL, get_protocol, known_intervals
 from evaluator.predictions.revisions import Comparison, compare
+from evaluator.units import RECORDING, Units
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
-from leaderboard.storage import files, truth_values
+from leaderboard.storage import files, manifests, truth_values
 
 
 def import_truth(
@@ -155,6 +156,14 @@ def count_changes(old: GroundTruth, new: GroundTruth) -> None:
     _keep_comparison(old, new, compare(truth_values.load(old.digest), truth_values.load(new.digest)))
 
 
+def units_of(row: GroundTruth) -> Units:
+    """What a new edition of a ground truth takes as independent, by its public manifest.
+
+    Raises `OSError` if the store does not have that whole.
+    """
+    return manifests.load(row.manifest_digest).units
+
+
 def new_edition(
     *,
     split: Split,
@@ -166,8 +175,10 @@ def new_edition(
 ) -> Edition:
     """The next edition of a split whose row the caller has locked; not yet its board.
 
-    It publishes with the split's decimals of this moment, or with `decimals`, for ever.
+    It publishes with the split's decimals of this moment, or with `decimals`, for ever, and keeps the unit
+    that the rule gives now.
     """
+    found = units_of(row)
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(
         split=split,
@@ -175,6 +186,8 @@ def new_edition(
         ground_truth=row,
         protocol=protocol,
         decimals=split.decimals if decimals is None else decimals,
+        unit=found.kind,
+        n_units=None if found.kind == RECORDING else len(found),
         opened_at=now,
         opened_by=actor,
     )

@@ -15,6 +15,7 @@ from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
 from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
+from evaluator.units import RECORDING
 from leaderboard.boards.boards import Board
 from leaderboard.boards.filters import BadFilter
 from leaderboard.boards.rows import Entry, Interval
@@ -81,6 +82,8 @@ def _origin(board: Board, *, address: str) -> layouts.Origin:
         ground_truth=truth.digest if truth else None,
         n_sequences=truth.n_sequences if truth else None,
         n_recordings=truth.n_recordings if truth else None,
+        unit=edition.unit if edition else RECORDING,
+        n_units=edition.unit_count if edition else None,
         moment=board.at or board.updated_at,
         has_own_rows=any(mark_of(entry) for entry in board.entries if entry.withdrawn_at is None),
     )

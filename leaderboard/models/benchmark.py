@@ -11,6 +11,7 @@ from django.utils import timezone
 from evaluator.metrics.protocol import Protocol, get_protocol
 from leaderboard.models.people import User
 from leaderboard.models.quotas import QuotaRules
+from leaderboard.models.units import UnitOfInference
 
 # Of quoted rows that stand since their split exists: before any time that a board can sensibly be asked for.
 SINCE_EVER = datetime(1970, 1, 1, tzinfo=UTC)
@@ -232,7 +233,7 @@ class TruthComparison(models.Model):
         return f"{self.old_id} to {self.new_id}"
 
 
-class Edition(models.Model):
+class Edition(UnitOfInference):
     """Ground truth, protocol and decimals of a split: the frame in which a ranking lives."""
 
     split = models.ForeignKey(Split, on_delete=models.PROTECT, related_name="editions")
@@ -258,7 +259,7 @@ class Edition(models.Model):
     n_effective = models.JSONField(
         default=dict,
         blank=True,
-        help_text="Effective number of recordings by score name: the degrees of freedom of its interval.",
+        help_text="Effective number of units by score name: the degrees of freedom of its interval.",
     )
 
     class Meta:
@@ -266,11 +267,12 @@ class Edition(models.Model):
         constraints = [
             models.UniqueConstraint(fields=["split", "number"], name="edition_number_once_per_split"),
             models.UniqueConstraint(
-                fields=["split", "ground_truth", "protocol", "decimals"],
+                fields=["split", "ground_truth", "protocol", "decimals", "unit"],
                 condition=models.Q(discarded_at=None),
                 name="one_edition_per_ground_truth_and_protocol",
             ),
             models.CheckConstraint(condition=models.Q(decimals__in=[1, 2]), name="decimals_one_or_two"),
+            *UnitOfInference.Meta.constraints,
             models.CheckConstraint(
                 condition=models.Q(published_at=None) | models.Q(discarded_at=None),
                 name="published_editions_stay",

@@ -70,7 +70,7 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
         return
     truth = truth_values.load(evaluation.edition.ground_truth_id)
     predictions = sandbox.of(evaluation.submission.sent_file, evaluation.edition)
-    content = content_of(predictions, truth, rules=evaluation.edition.rules)
+    content = content_of(predictions, truth, rules=evaluation.edition.rules, unit=evaluation.edition.unit)
     with transaction.atomic():
         if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:
             return
@@ -83,13 +83,17 @@ def delete_hidden() -> None:
 
 
 def content_of(
-    predictions: evaluator.Predictions, truth: evaluator.GroundTruth, *, rules: Protocol
+    predictions: evaluator.Predictions,
+    truth: evaluator.GroundTruth,
+    *,
+    rules: Protocol,
+    unit: str | None = None,
 ) -> dict[str, Any]:
     """The error analysis of one submission. The points drawn are the same for all submissions. It has
 
     - `curve`: the mean errors by true time to contact, a list of `{"low_s", "high_s", "n", "mid", …,
       "intervals"}` in ascending order, one for each bin [low_s, high_s) that has sequences; `intervals` are
-      the 95 % confidence intervals `{"mid": [low, high], …}` of those means that have enough recordings;
+      the 95 % confidence intervals `{"mid": [low, high], …}` of those means that have enough units;
     - `distribution`: `{"mid": […], …}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
     - `histogram`: a list of `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the
       last has `"high": None` and holds all that is larger;
@@ -110,7 +114,7 @@ def content_of(
     return {
         "n_sequences": truth.n_sequences,
         "n_recordings": truth.manifest.n_recordings,
-        "curve": _curve(truth, errors, decimals),
+        "curve": _curve(truth, errors, decimals, unit),
         "distribution": {
             name: [
                 {"quantile": share, "value": round(float(value), decimals)}
@@ -127,7 +131,9 @@ def content_of(
     }
 
 
-def _curve(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[dict[str, Any]]:
+def _curve(
+    truth: evaluator.GroundTruth, errors: Errors, decimals: int, unit: str | None
+) -> list[dict[str, Any]]:
     bins = np.digitize(truth.ttc_s, CURVE_EDGES_S)
     n_bins = len(CURVE_EDGES_S) + 1
     shape = (truth.manifest.n_recordings, n_bins)
@@ -136,7 +142,9 @@ def _curve(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[
     per_metric = [np.bincount(cells, weights=each, minlength=counts.size) for each in errors.values()]
     sums: Floats = np.stack([each.reshape(shape) for each in per_metric]).astype(float)
     # The weights of an open split are no secret: these are those of `tsttc score`.
-    low, high = uncertainty.bootstrap_of(truth.digest, counts).intervals(sums)
+    units = truth.manifest.units_by(unit)
+    of_units = [uncertainty.by_units(each, units) for each in (counts, sums)]
+    low, high = uncertainty.bootstrap_of(truth.digest, of_units[0]).intervals(of_units[1])
     totals, n = sums.sum(axis=1), counts.sum(axis=0)
     return [
         {

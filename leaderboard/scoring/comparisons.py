@@ -273,7 +273,7 @@ def _told(kept: Mapping[str, Any]) -> Difference:
 
 
 def compute(row: Comparison, *, now: datetime) -> None:
-    """Compare the two entries of a row, recording by recording, and write what came of it, once.
+    """Compare the two entries of a row, unit by unit, and write what came of it, once.
 
     Raises what `bags.sums_of` raises; the row waits on then.
     """
@@ -297,20 +297,21 @@ def _differences(
     """What is told of each column between these published values, with its interval and p."""
     edition = row.edition
     sent = (row.first.submission.sent_file, row.second.submission.sent_file)
-    first, second = (recording_sums.sums_of(edition, file=file) for file in sent)
+    first, second = (recording_sums.unit_sums_of(edition, file=file) for file in sent)
     found = differences.difference(
         first,
         second,
-        recording_sums.counts_of(edition),
+        recording_sums.unit_counts_of(edition),
         names=edition.rules.score_names,
         signs=confidence.generator_of(edition, purpose="signs"),
+        unit=edition.unit,
     )
     if not disclosure.is_hidden(edition):
         # Each count would tell more of hidden labels, and of the recordings that a file was made to favour.
         found = differences.with_influence(
             found,
             differences=first - second,
-            counts=recording_sums.counts_of(edition),
+            counts=recording_sums.unit_counts_of(edition),
             names=edition.rules.score_names,
             rng=confidence.generator_of(edition, purpose="influence"),
         )

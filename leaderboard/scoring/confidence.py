@@ -1,10 +1,10 @@
 """Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
 
-Workers make them from sums per recording, which never leave the workers' private directory, and write them
-beside the scores. An interval belongs to one evaluation and stays; ranges belong to all entries of a board
-and are made anew when those change. Which entries an edition's ranges were made of is kept as a digest, so
-that anybody can see whether they still hold: the database is the truth, and messages only make it quick.
-`docs/uncertainty.md` says how and why.
+Workers make them from sums per unit (day or recording), which never leave the workers' private directory,
+and write them beside the scores. An interval belongs to one evaluation and stays; ranges belong to all
+entries of a board and are made anew when those change. Which entries an edition's ranges were made of is
+kept as a digest, so that anybody can see whether they still hold: the database is the truth, and messages
+only make it quick. `docs/uncertainty.md` says how and why.
 """
 
 import hashlib
@@ -259,7 +259,7 @@ def _alone(edition: Edition) -> Iterator[bool]:
 def _intervals(entries: Entries, *, between: Callable[[], None]) -> Ends:
     """What is new of the intervals beside the scores."""
     edition = entries.edition
-    usable = uncertainty.usable_columns(recording_sums.counts_of(edition))
+    usable = uncertainty.usable_columns(recording_sums.unit_counts_of(edition))
     names = edition.rules.score_names
     column_of = {name: j for j, name in enumerate(names)}
     scores = Score.objects.filter(evaluation__edition=edition)
@@ -280,7 +280,7 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> Ends:
     for start in range(0, len(missing), uncertainty.BATCH):
         between()
         some = missing[start : start + uncertainty.BATCH]
-        sums = np.stack([recording_sums.sums_of(edition, file=row.file) for row in some])
+        sums = np.stack([recording_sums.unit_sums_of(edition, file=row.file) for row in some])
         # As they are kept: ranges must not depend on which of them were made before.
         lows, highs = disclosure.published_ends(*bootstrap_of(edition).intervals(sums), edition=edition)
         for i, row in enumerate(some):
@@ -299,7 +299,7 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
     found = kept_ranges.ranges_of(
         edition,
         {row.evaluation_id: row.file for row in rivals},
-        quoted=_quoted(edition, recording_sums.counts_of(edition)),
+        quoted=_quoted(edition, recording_sums.unit_counts_of(edition)),
         between=between,
     )
     ends = np.stack([found.low, found.high], axis=2).tolist()
@@ -310,8 +310,8 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
 
 
 def _n_effective(edition: Edition) -> dict[str, float]:
-    """The effective number of recordings of each column, as it is published."""
-    degrees = uncertainty.degrees_of(recording_sums.counts_of(edition))
+    """The effective number of units of each column, as it is published."""
+    degrees = uncertainty.degrees_of(recording_sums.unit_counts_of(edition))
     return {name: cut_off(n) for name, n in zip(edition.rules.score_names, degrees.tolist(), strict=True)}
 
 
@@ -331,7 +331,7 @@ def _published(value: float, decimals: int) -> float | None:
 
 def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
     """The weights of the edition's ground truth. Raises `OSError` without access to its values."""
-    counts = recording_sums.counts_of(edition)
+    counts = recording_sums.unit_counts_of(edition)
     return _bootstrap(seed_of(edition), counts.tobytes(), counts.shape)
 
 

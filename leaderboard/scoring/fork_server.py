@@ -45,6 +45,10 @@ class Interrupted(Exception):
     """The heartbeat said no; the reader has been ended."""
 
 
+class TooMuch(Exception):
+    """The reader wrote more than any answer has; it has been ended."""
+
+
 @dataclass(frozen=True)
 class Answer:
     """What a reader wrote until it ended; `returncode` is negative for a signal."""
@@ -96,15 +100,16 @@ class ForkServer:
         source: IO[bytes],
         *,
         request: dict[str, object],
+        max_bytes: int,
         heartbeat: Callable[[], bool],
         heartbeat_s: float,
     ) -> Answer:
         """Have one file read by a process of its own, with a heartbeat every `heartbeat_s` seconds.
 
-        Raises `NotStarted`, `ServerEnded` or `Interrupted`. This server is closed after the latter two, and
-        after whatever the heartbeat raises.
+        Raises `NotStarted`, `ServerEnded`, `Interrupted`, or `TooMuch` for more than `max_bytes` of output or
+        errors. This server is closed after the latter three, and after whatever the heartbeat raises.
         """
-        reading = _Reading()
+        reading = _Reading(max_bytes=max_bytes)
         try:
             with ExitStack() as stack:
                 self._begin(source, request, reading, stack=stack)
@@ -149,9 +154,10 @@ class _Reading:
     As a context it ends the reader that has not ended by itself.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, max_bytes: int) -> None:
         self.output = bytearray()
         self.complaint = bytearray()
+        self._max_bytes = max_bytes
         self._returncode: int | None = None
         self._process: int | None = None
         self._selector = selectors.DefaultSelector()
@@ -192,7 +198,7 @@ class _Reading:
         return Answer(self._returncode, bytes(self.output), bytes(self.complaint))
 
     def receive(self, *, timeout_s: float) -> None:
-        """What there is within that time. Raises `NotStarted` or `ServerEnded`."""
+        """What there is within that time. Raises `NotStarted`, `ServerEnded` or `TooMuch`."""
         for key, _ in self._selector.select(timeout_s):
             if isinstance(key.data, bytearray):
                 self._read(key.fd, key.data)
@@ -202,6 +208,8 @@ class _Reading:
     def _read(self, pipe: int, into: bytearray) -> None:
         chunk = os.read(pipe, _CHUNK_BYTES)
         into += chunk
+        if len(into) > self._max_bytes:
+            raise TooMuch
         if not chunk:
             self._selector.unregister(pipe)
             os.close(pipe)

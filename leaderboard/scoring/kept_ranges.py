@@ -49,7 +49,7 @@ def ranges_of(
 
     `between` is called every fraction of a second. Raises what `recording_sums.sums_of` raises.
     """
-    counts = recording_sums.counts_of(edition)
+    counts = recording_sums.unit_counts_of(edition)
     usable = uncertainty.usable_columns(counts)
     signs = uncertainty.generator_of(seed_of(edition), purpose="signs")
     wanted = list(files)
@@ -85,7 +85,7 @@ def ranges_of(
 
 def is_kept(edition: Edition, *, n_entries: int) -> bool:
     """Whether the pairs of so many entries are few enough to be kept."""
-    shape = edition.ground_truth.n_recordings, len(edition.rules.score_names)
+    shape = edition.unit_count, len(edition.rules.score_names)
     return KeptRanges.nbytes_of(n_entries, n_recordings=shape[0], n_columns=shape[1]) <= _budget()
 
 
@@ -118,13 +118,13 @@ def _made_of(edition: Edition, quoted: Quoted | None) -> str:
 
 
 def _sums(edition: Edition, files: Sequence[SentFile], between: Callable[[], None]) -> Floats:
-    """The sums of these files, (n, G, columns)."""
-    shape = edition.ground_truth.n_recordings, len(edition.rules.score_names)
+    """The sums of these files, (n, U, columns)."""
+    shape = edition.unit_count, len(edition.rules.score_names)
     sums = np.empty((len(files), *shape))
     for i, file in enumerate(files):
         if i % MANY == MANY - 1:
             between()
-        sums[i] = recording_sums.sums_of(edition, file=file)
+        sums[i] = recording_sums.unit_sums_of(edition, file=file)
     return sums
 
 

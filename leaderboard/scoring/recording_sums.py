@@ -2,7 +2,8 @@
 
 They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. Each file
 is named by what it was made of, so it never changes; whatever is missing, as on another worker, is made anew
-from the submission's values.
+from the submission's values. What is inferred is inferred from the sums of an edition's units, which are days
+or recordings: whole recordings added up.
 """
 
 import math
@@ -18,9 +19,10 @@ from numpy.typing import NDArray
 
 from evaluator import GroundTruth, published
 from evaluator.metrics.protocol import get_protocol
-from evaluator.scoring import scoring
+from evaluator.scoring import scoring, uncertainty
 from evaluator.scoring.report import RecordingSums
 from evaluator.scoring.scoring import Scorer
+from evaluator.units import Units
 from leaderboard.models import Edition, SentFile
 from leaderboard.scoring import sandbox
 from leaderboard.storage import truth_values
@@ -97,6 +99,26 @@ def sums_of(edition: Edition, *, file: SentFile) -> Floats:
 def counts_of(edition: Edition) -> Floats:
     """Sequences per recording in every column, (G, columns). Raises `OSError` without the values."""
     return scorer(edition.ground_truth_id, edition.protocol).recording_counts
+
+
+def unit_sums_of(edition: Edition, *, file: SentFile) -> Floats:
+    """The same added up to the edition's units, (U, columns)."""
+    return uncertainty.by_units(sums_of(edition, file=file), units_of(edition))
+
+
+def unit_counts_of(edition: Edition) -> Floats:
+    """Sequences per unit of the edition in every column, (U, columns). Raises `OSError` as `counts_of`."""
+    return uncertainty.by_units(counts_of(edition), units_of(edition))
+
+
+def units_of(edition: Edition) -> Units:
+    """The units that the edition keeps. Raises `OSError` without the values of its ground truth."""
+    return _units(edition.ground_truth_id, edition.unit)
+
+
+@lru_cache(maxsize=4)
+def _units(truth_digest: str, kind: str) -> Units:
+    return truth_values.load(truth_digest).manifest.units_by(kind)
 
 
 def floor_of(edition: Edition) -> dict[str, float | None]:

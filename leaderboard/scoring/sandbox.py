@@ -2,7 +2,9 @@
 
 Untrusted bytes are parsed in a limited child process. It has no database credentials and cannot open files
 or sockets. If it dies once it has begun to read the file, that is known at once, and known to be the file's
-doing: the worker itself lives on.
+doing: the worker itself lives on. Nothing that the child writes is believed but what a file may say of
+itself: an answer has a bounded length, is of this file, and has a value that a file may have for each
+sequence; any other counts as the child's death.
 
 A file is read with its own manifest, the one that was public when it came. From there its values go sequence
 by sequence, by natural keys, to the manifest of the edition. So a correction that numbers the sequences anew
@@ -13,18 +15,21 @@ import json
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
-from functools import lru_cache
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, lru_cache
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, Final, get_args
 
 import numpy as np
 import structlog
 from django.conf import settings
 from numpy.typing import NDArray
 
-from evaluator import Manifest, Predictions, Problem, Rejected
+from evaluator import Manifest, Predictions, Rejected, system_calls
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY
+from evaluator.predictions.alignment import KeyKind
+from evaluator.predictions.documents import Unit
 from evaluator.predictions.revisions import Rows, absent, realigned, rows_in
 from leaderboard.models import Edition, SentFile
 from leaderboard.scoring import fork_server
@@ -36,6 +41,8 @@ log = structlog.get_logger(__name__)
 # Besides TSTTC_CHILD_CPU_S a reader has a second for so many sequences: three times what the slowest legal
 # file takes, a table of 1,000,000 scale ratios by natural keys, 14 s on a busy machine.
 SEQUENCES_PER_CPU_S = 25_000
+MAX_WORDS_BYTES: Final = 1_000_000
+"""What a child may write beside the values; the longest list of problems has a tenth."""
 
 
 class ChildDied(Exception):
@@ -57,35 +64,54 @@ class LeaseLost(Exception):
 def read_predictions(
     source: IO[bytes],
     *,
+    digest: str,
     manifest: Manifest,
     manifest_path: Path,
     heartbeat: Callable[[], bool],
     heartbeat_s: float,
 ) -> Predictions:
-    """Parse and align a prediction file in a child process.
+    """Parse and align the prediction file with this digest in a child process.
 
     `heartbeat` is called every `heartbeat_s` seconds while the child works; when it says False the child is
-    ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied`, `ChildNotReady`, or `LeaseLost`;
-    `OSError` if no child could be started.
+    ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied` also for an answer that no file
+    gives, `ChildNotReady`, or `LeaseLost`; `OSError` if no child could be started.
     """
+    _say_what_is_missing()
     request = {
         "manifest": str(manifest_path),
         "memory_bytes": settings.CHILD_MEMORY_BYTES,
         "cpu_s": (cpu_s := settings.CHILD_CPU_S + manifest.n_sequences // SEQUENCES_PER_CPU_S),
     }
     read = _forked if fork_server.AVAILABLE else _spawned
-    found = read(source, request, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+    max_bytes = MAX_WORDS_BYTES + 8 * manifest.n_sequences
+    try:
+        found = read(source, request, max_bytes=max_bytes, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+    except fork_server.TooMuch:
+        raise ChildDied(f"reading the file gave an answer of more than {max_bytes:,} bytes") from None
     if not found.output.startswith(READY):
         raise ChildNotReady(f"the reading process did not start: {_cause(found.returncode, found.complaint)}")
     if found.returncode == -signal.SIGXCPU:
         raise ChildOutOfTime(f"reading the file took more than {cpu_s} s of processor time")
     if found.returncode != 0:
         raise ChildDied(f"reading the file {_cause(found.returncode, found.complaint)}")
-    return _decoded(found.output[len(READY) :], manifest=manifest)
+    return _decoded(found.output[len(READY) :], manifest=manifest, digest=digest)
+
+
+@cache
+def _say_what_is_missing() -> None:
+    """Once for each process: a child goes on with its limits alone."""
+    why = system_calls.why_unavailable()
+    if why is not None:
+        log.warning("readers_without_a_filter_of_system_calls", reason=why)
 
 
 def _forked(
-    source: IO[bytes], request: dict[str, object], *, heartbeat: Callable[[], bool], heartbeat_s: float
+    source: IO[bytes],
+    request: dict[str, object],
+    *,
+    max_bytes: int,
+    heartbeat: Callable[[], bool],
+    heartbeat_s: float,
 ) -> Answer:
     """What a child says that is forked for the file.
 
@@ -96,7 +122,13 @@ def _forked(
         server = fork_server.server_of_this_thread(python_path=settings.BASE_DIR)
         is_new = not server.has_served
         try:
-            return server.read(source, request=request, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+            return server.read(
+                source,
+                request=request,
+                max_bytes=max_bytes,
+                heartbeat=heartbeat,
+                heartbeat_s=heartbeat_s,
+            )
         except fork_server.Interrupted:
             raise LeaseLost("the run reached its time limit or was taken away") from None
         except fork_server.NotStarted as fault:
@@ -108,7 +140,12 @@ def _forked(
 
 
 def _spawned(
-    source: IO[bytes], request: dict[str, object], *, heartbeat: Callable[[], bool], heartbeat_s: float
+    source: IO[bytes],
+    request: dict[str, object],
+    *,
+    max_bytes: int,
+    heartbeat: Callable[[], bool],
+    heartbeat_s: float,
 ) -> Answer:
     """What a child says that is started for the file, where there is no `fork` to be trusted."""
     command = [sys.executable, "-m", "evaluator.predictions.sandbox", *map(str, request.values())]
@@ -120,25 +157,38 @@ def _spawned(
         env=fork_server.environment(python_path=settings.BASE_DIR),
         close_fds=True,
     )
-    output, complaint = _answer(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
-    return Answer(child.returncode, output, complaint)
-
-
-def _answer(
-    child: "subprocess.Popen[bytes]", *, heartbeat: Callable[[], bool], heartbeat_s: float
-) -> tuple[bytes, bytes]:
-    """What the child writes to output and error, with a heartbeat while it does. Raises `LeaseLost`."""
-    try:
-        while True:
-            try:
-                return child.communicate(timeout=heartbeat_s)
-            except subprocess.TimeoutExpired:
-                if not heartbeat():
-                    raise LeaseLost("the run reached its time limit or was taken away") from None
-    finally:
-        if child.poll() is None:
+    with child, ThreadPoolExecutor(2) as readers:
+        try:
+            parts = [readers.submit(_at_most, pipe, max_bytes) for pipe in (child.stdout, child.stderr)]
+            _await_end(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+        finally:
             child.kill()
-            child.communicate()
+        return Answer(child.returncode, *(part.result() for part in parts))
+
+
+def _at_most(pipe: IO[bytes] | None, max_bytes: int) -> bytes:
+    """All that comes through the pipe. Raises `TooMuch`; whoever writes on finds the pipe closed."""
+    if pipe is None:
+        raise RuntimeError("the reading process was started without pipes")
+    with pipe:
+        data = pipe.read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise fork_server.TooMuch
+    return data
+
+
+def _await_end(
+    child: "subprocess.Popen[bytes]", *, heartbeat: Callable[[], bool], heartbeat_s: float
+) -> None:
+    """Wait until the child ends, with a heartbeat meanwhile. Raises `LeaseLost`."""
+    while True:
+        try:
+            child.wait(timeout=heartbeat_s)
+        except subprocess.TimeoutExpired:
+            if not heartbeat():
+                raise LeaseLost("the run reached its time limit or was taken away") from None
+        else:
+            return
 
 
 def _cause(returncode: int, complaint: bytes) -> str:
@@ -151,27 +201,49 @@ def _cause(returncode: int, complaint: bytes) -> str:
     return f"ended with exit code {returncode}: {last_line[:200]}"
 
 
-def _decoded(answer: bytes, *, manifest: Manifest) -> Predictions:
+def _decoded(answer: bytes, *, manifest: Manifest, digest: str) -> Predictions:
     """The child's answer as predictions. Raises `evaluator.Rejected`, or `ChildDied` if it makes no sense."""
     line, _, body = answer.partition(b"\n")
-    try:
-        header: dict[str, Any] = json.loads(line)
-    except ValueError as fault:
-        raise ChildDied("reading the file gave no answer") from fault
-    if header["verdict"] == "rejected":
-        problems = tuple(Problem(**problem) for problem in header["problems"])
-        raise Rejected(problems, n_problems=header["n_problems"])
+    header = _header(line)
+    if header.get("verdict") == "rejected":
+        raise _rejection(header)
+    unit: Any = header.get("unit")
+    keys: Any = header.get("keys")
+    if header.get("verdict") != "good" or unit not in get_args(Unit) or keys not in get_args(KeyKind):
+        raise ChildDied("reading the file gave an answer of another form")
+    if header.get("digest") != digest:
+        # The store has other bytes under this name, or the child lies: neither is kept as this file's.
+        raise ChildDied(f"reading the file gave another digest than {digest}")
+    if len(body) != 8 * manifest.n_sequences:
+        raise ChildDied(f"reading the file gave {len(body)} bytes where {manifest.n_sequences} values belong")
     ttc_s = np.frombuffer(body, dtype="<f8")
-    if ttc_s.shape != (manifest.n_sequences,):
-        raise ChildDied(f"reading the file gave {ttc_s.size} values where {manifest.n_sequences} belong")
+    if not np.all(np.abs(ttc_s) > 0):
+        raise ChildDied("reading the file gave 0 or NaN, which no file may have")
     return Predictions(
         manifest=manifest,
         ttc_s=ttc_s,
-        digest=header["digest"],
-        unit=header["unit"],
-        keys=header["keys"],
-        enveloped=header["enveloped"],
+        digest=digest,
+        unit=unit,
+        keys=keys,
+        enveloped=header.get("enveloped") is True,
     )
+
+
+def _header(line: bytes) -> Mapping[str, Any]:
+    try:
+        header = json.loads(line) if len(line) <= MAX_WORDS_BYTES else None
+    except (ValueError, RecursionError):
+        header = None
+    if not isinstance(header, dict):
+        raise ChildDied("reading the file gave no answer")
+    return header
+
+
+def _rejection(header: Mapping[str, Any]) -> Rejected:
+    try:
+        return Rejected.from_dict(header)
+    except ValueError as fault:
+        raise ChildDied(f"reading the file gave a rejection of another form: {fault}") from None
 
 
 # --- in the order of the ground truth ---------------------------------------------------------------------
@@ -224,6 +296,7 @@ def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = la
     with files.opened_predictions(file.digest) as source:
         predictions = read_predictions(
             source,
+            digest=file.digest,
             manifest=own,
             manifest_path=(
                 truth_values.manifest_path(edition.ground_truth_id)

@@ -1,25 +1,10 @@
-"""docs/architecture.md says what is true: its picture, its rooms, its paths, its recipes."""
+"""docs/architecture.md says what is true: its rooms, its paths, its recipes."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 PAGE = (REPOSITORY / "docs" / "architecture.md").read_text(encoding="utf-8")
-
-
-def test_the_picture_is_the_one_that_the_imports_draw() -> None:
-    """In a process of its own: reading the imports must not load the application a second time."""
-    drawn = subprocess.run(
-        [sys.executable, "-c", "from docs._picture import svg; print(svg(), end='')"],
-        cwd=REPOSITORY,
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    picture = (REPOSITORY / "docs" / "figures" / "architecture.svg").read_text(encoding="utf-8")
-    assert drawn.stdout == picture, "draw it anew: python -m docs._picture"
 
 
 def test_every_room_is_listed() -> None:

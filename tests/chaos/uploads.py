@@ -15,7 +15,7 @@ import numpy as np
 import evaluator
 from evaluator import Rejected, published
 from evaluator.limits import READY
-from leaderboard.scoring import fork_server
+from leaderboard.scoring.fork_server import environment
 from tests.chaos.processes import REPOSITORY
 
 BOMB_ENTRIES = 3_150_000
@@ -96,9 +96,12 @@ def reader_memory_bytes(truth: evaluator.GroundTruth, *, directory: Path) -> int
     path = directory / "manifest.npz"
     truth.manifest.save(path)
     command = [sys.executable, "-m", "evaluator.predictions.sandbox", str(path), "4000000000", "60"]
-    own = fork_server.environment(python_path=REPOSITORY)  # threads of numpy are address space, too
     with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, cwd=REPOSITORY, env=own
+        command,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        # With threads of its own, which the reader does not have, it would be larger than the reader.
+        env=environment(python_path=REPOSITORY),
     ) as reader:
         assert reader.stdout is not None
         if reader.stdout.readline() != READY:

@@ -3,9 +3,13 @@
 import io
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 
 import evaluator
@@ -19,6 +23,8 @@ from evaluator import (
     read_predictions,
     read_truth,
 )
+from evaluator.frames import manifest_frame
+from evaluator.metrics.metrics import MID
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY, make_truth
 
 FILE = EXAMPLES / "predictions.json"
@@ -117,6 +123,132 @@ def test_a_scale_ratio_of_nothing_is_named() -> None:
     with pytest.raises(Rejected) as caught:
         Predictions.from_arrays(scale_ratio=[0.9, 0.0], frame_gap=1, manifest=make_truth([4.0, 5.0]).manifest)
     assert [problem.code for problem in caught.value.problems] == ["not-positive"]
+
+
+def shuffled(truth: GroundTruth) -> pd.Series:
+    """The true values as a Series whose rows are in another order than the manifest's."""
+    return pd.Series(truth.ttc_s).sample(frac=1, random_state=1)
+
+
+SERIES = (
+    r"ttc_s is a Series with the index \d+, \d+, \d+, …; expected 0, 1, 2, …, one row for each sequence in "
+    r"the manifest's order, because values are taken by their place\. Sort it and give ttc_s\.to_numpy\(\), "
+    r"or give a frame with anno_id to evaluator\.frames\.predictions_from_frame\."
+)
+
+
+def test_a_series_in_another_order_is_not_taken_by_place(truth: GroundTruth) -> None:
+    values = shuffled(truth)
+    with pytest.raises(ValueError, match=SERIES):
+        Predictions.from_arrays(ttc_s=values, manifest=truth.manifest)
+    with pytest.raises(ValueError, match=SERIES):
+        evaluator.write_predictions(ttc_s=values, manifest=truth.manifest)
+    with pytest.raises(ValueError, match="scale_ratio is a Series with the index"):
+        Predictions.from_arrays(scale_ratio=values, frame_gap=5, manifest=truth.manifest)
+    for given in (values.sort_index(), values.to_numpy()[values.index.argsort()]):
+        found = Predictions.from_arrays(ttc_s=given, manifest=truth.manifest)
+        assert found.ttc_s.tolist() == truth.ttc_s.tolist()
+
+
+def test_a_series_may_be_indexed_by_the_manifest_s_own_anno_ids_alone() -> None:
+    truth = make_truth([4.0, 5.0, 6.0], anno_ids=[2, 0, 1])
+    own = pd.Series(truth.ttc_s, index=manifest_frame(truth.manifest).index)
+    found = Predictions.from_arrays(ttc_s=own, manifest=truth.manifest)
+    assert found.ttc_s.tolist() == [4.0, 5.0, 6.0]
+    with pytest.raises(ValueError, match="with the index 0, 1, 2; expected 2, 0, 1"):
+        Predictions.from_arrays(ttc_s=own.sort_index(), manifest=truth.manifest)
+
+
+def test_an_arrow_array_has_a_method_index_and_no_order_of_its_own(truth: GroundTruth) -> None:
+    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
+    found = Predictions.from_arrays(ttc_s=pyarrow.array(truth.ttc_s), manifest=truth.manifest)
+    assert found.ttc_s.tolist() == truth.ttc_s.tolist()
+
+
+def test_the_series_of_a_frame_are_written_with_their_own_keys(truth: GroundTruth) -> None:
+    frame = manifest_frame(truth.manifest).assign(ttc_s=truth.ttc_s).sample(frac=1, random_state=1)
+    data = evaluator.write_predictions(keys=frame.index, ttc_s=frame["ttc_s"])
+    assert read_predictions(data, manifest=truth.manifest).ttc_s.tolist() == truth.ttc_s.tolist()
+
+
+class FakeTensor:
+    """What torch's tensors do with bfloat16 and with a gradient: `numpy` takes neither."""
+
+    def __init__(self, values: object, *, state: str = "bfloat16, grad, device") -> None:
+        self.values, self.state = np.asarray(values, dtype=np.float64), state
+
+    def __array__(self, dtype: object = None, copy: object = None) -> np.ndarray:
+        if self.state:
+            raise TypeError(f"Got unsupported {self.state}")
+        return self.values
+
+    def detach(self) -> "FakeTensor":
+        return FakeTensor(self.values, state=self.state.replace(", grad", ""))
+
+    def cpu(self) -> "FakeTensor":
+        return FakeTensor(self.values, state=self.state.replace(", device", ""))
+
+    def double(self) -> "FakeTensor":
+        assert "device" not in self.state, "not every device has float64"
+        return FakeTensor(self.values, state=self.state.replace("bfloat16", ""))
+
+
+def tensor_kinds() -> list[object]:
+    """Makers of tensors, with torch those of torch too."""
+    if find_spec("torch") is None:
+        return [FakeTensor]
+    import torch  # noqa: PLC0415 -- of an extra
+
+    kinds = ({"requires_grad": True}, {"dtype": torch.bfloat16}, {"dtype": torch.float16})
+    return [FakeTensor, *(partial(torch.tensor, **kind) for kind in kinds)]
+
+
+@pytest.mark.parametrize("tensor", tensor_kinds())
+def test_tensors_are_taken_in_bfloat16_and_with_a_gradient(tensor: Callable[[object], object]) -> None:
+    manifest, values = make_truth([4.0, 5.0]).manifest, [0.5, 0.75]  # exact in bfloat16
+    ttc_s = [1.0 / (2 * (1 / value - 1)) for value in values]
+    for given in (tensor(values), [tensor(value) for value in values]):
+        assert Predictions.from_arrays(ttc_s=given, manifest=manifest).ttc_s.tolist() == values
+        found = Predictions.from_arrays(scale_ratio=given, frame_gap=5, manifest=manifest)
+        assert found.ttc_s.tolist() == ttc_s
+        assert evaluator.write_predictions(ttc_s=given, manifest=manifest) == b'{"0":0.5,"1":0.75}'
+        assert evaluator.scale_ratio_to_ttc(given, fps_hz=2).tolist() == ttc_s
+        assert evaluator.ttc_to_scale_ratio([4.0, 8.0], fps_hz=given).shape == (2,)
+        assert evaluator.convert_rate(given, from_fps_hz=2, to_fps_hz=2).tolist() == values
+        assert MID.errors(given, given).shape == (2,)
+
+
+def test_a_tensor_s_memory_is_not_the_predictions() -> None:
+    memory = FakeTensor([4.0, 5.0], state="")
+    found = Predictions.from_arrays(ttc_s=memory, manifest=make_truth([4.0, 5.0]).manifest)
+    memory.values[0] = 9.0
+    assert found.ttc_s.tolist() == [4.0, 5.0]
+
+
+def test_a_dict_is_told_the_call_that_takes_one(truth: GroundTruth) -> None:
+    values = dict(zip(truth.manifest.anno_id_keys, truth.ttc_s.tolist(), strict=True))
+    words = (
+        r"ttc_s is of type dict; expected one number for each sequence, in the manifest's order\. For values "
+        r"by key, give write_predictions keys=list\(d\) and ttc_s=list\(d\.values\(\)\), and its bytes to "
+        r"read_predictions\."
+    )
+    with pytest.raises(TypeError, match=words):
+        Predictions.from_arrays(ttc_s=values, manifest=truth.manifest)
+    with pytest.raises(TypeError, match=words):
+        evaluator.write_predictions(ttc_s=values, manifest=truth.manifest)
+    with pytest.raises(TypeError, match=r"scale_ratio is of type dict; .* and scale_ratio=list"):
+        Predictions.from_arrays(scale_ratio=values, frame_gap=5, manifest=truth.manifest)
+    data = evaluator.write_predictions(keys=list(values), ttc_s=list(values.values()))
+    assert read_predictions(data, manifest=truth.manifest).ttc_s.tolist() == truth.ttc_s.tolist()
+
+
+@pytest.mark.parametrize("rate", ["fps_hz", "frame_gap"])
+def test_a_rate_for_each_sequence_is_refused_in_words(rate: str) -> None:
+    for values in ([5, 5], np.array([5, 5])):
+        with pytest.raises(ValueError, match=f"{rate} has 2 values; expected one number for all sequences"):
+            Predictions.from_arrays(
+                scale_ratio=[0.5, 0.6], manifest=make_truth([4.0, 5.0]).manifest, **{rate: values}
+            )
 
 
 def test_things_are_short_in_a_notebook() -> None:

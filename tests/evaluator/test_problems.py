@@ -34,6 +34,20 @@ def test_a_rejection_lists_its_problems_in_words_and_as_json() -> None:
     assert str(Rejected([Problem("zero", "…")])) == "1 problem:\n  1. …"
 
 
+def test_the_longest_rejection_of_a_reader_is_one_that_may_come_from_a_process() -> None:
+    findings = Findings()
+    for code in PROBLEM_CODES:
+        for number in range(30):
+            findings.add(code, f"Message {number}.", "/a")
+    for number in range(30):
+        findings.add("nan", "Message 0.", pointer("predictions", f"{number:02}" + "\U0001f697" * 198))
+    with pytest.raises(Rejected) as made:
+        findings.raise_if_any()
+    given = json.loads(made.value.to_json())
+    assert max(len(problem["message"]) for problem in given["problems"]) > 40_000
+    assert Rejected.from_dict(given).as_dict() == given
+
+
 def test_a_rejection_survives_copying_and_pickling() -> None:
     rejected = Rejected([Problem("nan", "…", "/7")], n_problems=3)
     for twin in (copy.copy(rejected), pickle.loads(pickle.dumps(rejected))):

@@ -34,5 +34,6 @@ class Command(RefusingCommand):
         self.stdout.write(
             f"{edition}: {counted(truth.n_sequences, 'sequence')} in "
             f"{counted(truth.n_recordings, 'recording')}, "
-            f"ground truth {truth.digest}, protocol {edition.protocol}."
+            f"ground truth {truth.digest}, protocol {edition.protocol}. "
+            f"Intervals and ranks: over {edition.units}."
         )

@@ -70,7 +70,8 @@ class Command(RefusingCommand):
         change = history.change_of_truth(published.ground_truth, edition.ground_truth)
         self.stdout.write(
             f"{edition}: ground truth {edition.ground_truth_id}, protocol {edition.protocol}, "
-            f"decimals {edition.decimals}; against edition {published.number}: {counts(change)}."
+            f"decimals {edition.decimals}, unit {edition.unit_noun}; against edition {published.number}: "
+            f"{counts(change)}."
         )
         if options["wait"]:
             self._follow(edition)

@@ -10,9 +10,10 @@ from django.utils.html import format_html
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
 from evaluator.scoring.report import format_published
-from evaluator.scoring.significance import told_apart, too_few_recordings
+from evaluator.scoring.significance import told_apart, too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
+from evaluator.units import in_words
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.scoring.comparisons import Compared, Pair
 from leaderboard.web.boards import profile_chart, svg
@@ -53,7 +54,8 @@ def verdict(compared: Compared) -> str:
         f"{format_published(best.scores[PRIMARY], decimals=best.decimals)}."
     )
     if compared.reason:
-        return f"{head} There are too few recordings for confidence intervals and p-values."
+        few = in_words(compared.edition.unit)
+        return f"{head} There are too few {few} for confidence intervals and p-values."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
     parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
     together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
@@ -141,7 +143,7 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css:
         ),
         "p": p_cell(found.p, found.p_below),
         # why there is neither interval nor p
-        "reason": "" if found.p_below is not None else too_few_recordings(found.n_effective),
+        "reason": "" if found.p_below is not None else too_few_units(found.n_effective, unit=found.unit),
         "is_significant": found.is_significant,
         "drawn": svg.difference(scale, found.difference, found.low, found.high),
     }

@@ -50,8 +50,12 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
 @require_safe
 def find(request: HttpRequest) -> HttpResponse:
     """What the documentation says about some words."""
-    query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
-    context = {"query": query, "hits": search.find(query), "longest": search.MAX_QUERY}
+    query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())
+    context: dict[str, Any] = {"query": query, "hits": []}
+    if len(query) > search.MAX_QUERY:
+        context = {"query": "", "n_typed": len(query), "longest": search.MAX_QUERY}
+    elif query:
+        context["hits"] = search.find(query)
     return render(request, "docs/search.html", {"navigation": guides.navigation(), **context})
 
 

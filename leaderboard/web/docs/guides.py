@@ -1,7 +1,4 @@
-"""The guides of `docs/` as pages: which there are, how they follow each other, and where their links lead.
-
-`mkdocs.yml` has the navigation, so that the site and `make docs` show the same one.
-"""
+"""The guides of `docs/` as pages: which there are, how they follow each other, and where their links lead."""
 
 import re
 from dataclasses import dataclass
@@ -10,7 +7,6 @@ from pathlib import Path
 from typing import Final
 from urllib.parse import urlsplit
 
-import yaml
 from django.conf import settings
 from django.templatetags.static import static
 from django.urls import reverse
@@ -21,12 +17,40 @@ from leaderboard.web.markdown import Document
 _REPOSITORY: Final = Path(settings.BASE_DIR)
 _DOCS: Final = _REPOSITORY / "docs"
 _EXAMPLES: Final = _REPOSITORY / "examples"
-_REFERENCE: Final = _DOCS / "api-reference.md"
-# Its place in the navigation, and where it is.
-_CHANGELOG: Final = "changelog.md"
-_CHANGELOG_FILE: Final = _REPOSITORY / "CHANGELOG.md"
 # By file: the name in the address where the file's own would say nothing, or stand for another page.
 _NAMES: Final = {"index": "overview", "api": "api-guide", "adr/README": "decisions"}
+# The sections of the navigation: titles, and names of guides.
+_SECTIONS: Final[dict[str, dict[str, str]]] = {
+    "For researchers": {
+        "Quick start": "researchers",
+        "Baselines": "baselines",
+        "Deep Scale": "deep-scale",
+        "Annotation": "annotation",
+        "Prediction files": "file-format",
+        "Command line": "cli",
+        "From CI": "ci",
+        "API": "api-guide",
+        "API reference": "",
+        "Exports": "exports",
+        "Questions": "faq",
+        "Beside other leaderboards": "peers",
+    },
+    "The numbers": {
+        "Scoring": "scoring",
+        "Uncertainty": "uncertainty",
+        "Editions": "editions",
+        "Software changelog": "changelog",
+    },
+    "For maintainers": {
+        "Quick start": "maintainers",
+        "Operations": "operations",
+        "How far one machine goes": "capacity",
+        "Who may do what": "access",
+        "Security": "security",
+        "Reliability": "reliability",
+    },
+    "For developers": {"Architecture": "architecture", "Decisions": "decisions"},
+}
 _SCHEMES: Final = {"http", "https", "mailto"}
 _VIEW_BOX: Final = re.compile(r'viewBox="0 0 ([0-9.]+) ([0-9.]+)"')
 
@@ -60,7 +84,7 @@ def files() -> dict[str, Path]:
         for path in (*_DOCS.glob("*.md"), *_DOCS.glob("adr/*.md"))
         for name in [path.relative_to(_DOCS).with_suffix("").as_posix()]
     }
-    return {**found, "examples": _EXAMPLES / "README.md", "changelog": _CHANGELOG_FILE}
+    return {**found, "examples": _EXAMPLES / "README.md", "changelog": _REPOSITORY / "CHANGELOG.md"}
 
 
 @cache
@@ -71,23 +95,20 @@ def _names() -> dict[Path, str]:
 @cache
 def navigation() -> tuple[Section, ...]:
     """The side of every page of the documentation."""
-    listed = yaml.safe_load((_REPOSITORY / "mkdocs.yml").read_text(encoding="utf-8"))["nav"]
-    first = [GuideLink("At a glance", reverse("docs")), GuideLink("Install", reverse("dist"))]
-    sections = []
-    for item in listed:
-        ((title, inside),) = item.items()
-        if isinstance(inside, str):
-            first.append(_entry(title, inside))
-        else:
-            sections.append(Section(title, tuple(_entry(*next(iter(each.items()))) for each in inside)))
-    return (Section("", tuple(first)), *sections)
+    first = (
+        GuideLink("At a glance", reverse("docs")),
+        GuideLink("Install", reverse("dist")),
+        _entry("Overview", "overview"),
+    )
+    sections = (
+        Section(title, tuple(_entry(*each) for each in inside.items())) for title, inside in _SECTIONS.items()
+    )
+    return (Section("", first), *sections)
 
 
-def _entry(title: str, file: str) -> GuideLink:
-    if _DOCS / file == _REFERENCE:
-        return GuideLink(title, reverse("api_reference"))
-    name = _names()[_CHANGELOG_FILE if file == _CHANGELOG else _DOCS / file]
-    return GuideLink(title, reverse("guide", args=[name]), name)
+def _entry(title: str, name: str) -> GuideLink:
+    address = reverse("guide", args=[name]) if name else reverse("api_reference")
+    return GuideLink(title, address, name)
 
 
 def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
@@ -119,8 +140,6 @@ def _link(address: str, *, source: Path) -> str:
     place = f"#{parts.fragment}" if parts.fragment else ""
     if target in _names():
         return reverse("guide", args=[_names()[target]]) + place
-    if target == _REFERENCE:
-        return reverse("api_reference") + place
     if target.is_relative_to(_EXAMPLES) and target.is_file():
         return static(f"examples/{target.relative_to(_EXAMPLES).as_posix()}")
     raise DeadLink(f"{source.relative_to(_REPOSITORY)} links to {address}; expected a guide or an example")

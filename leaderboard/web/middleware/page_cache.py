@@ -2,7 +2,7 @@
 
 Whoever brings neither a session nor a token is anybody. What such a reader is shown changes only with the
 version of some split's boards (`leaderboard/versions.py`) and with the day, so one statement tells whether an
-answer still holds: none is old but a late one, which says so (ADR 76). A view says with `http.cacheable` that
+answer still holds: none is old but a late one, which says so. A view says with `http.cacheable` that
 this is so of its answer. The middleware stands before sessions and accounts, so that anybody's question costs
 neither.
 
@@ -12,7 +12,7 @@ can make up any number of (a search, a limit, a time) are answered and not remem
 have a shelf of their own: however many are asked for, they push out no plain page.
 
 Most answers need no other layer at all: once one has been out through all of them, with the headers that each
-adds, `ReadyAnswerMiddleware`, which stands before them, repeats it (see ADR 53).
+adds, `ReadyAnswerMiddleware`, which stands before them, repeats it.
 
 Answers carry a strong ETag, the digest of their bytes, and are compressed for whoever takes gzip. There is no
 secret of the reader in them, so that their compressed length betrays none.

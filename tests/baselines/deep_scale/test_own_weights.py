@@ -7,16 +7,14 @@ import pytest
 
 from baselines.deep_scale.estimator import DeepScale
 from baselines.deep_scale.weights import read_weights
-from baselines.drawing import Line, Picture, Text
 from baselines.folders import read_folder
 from baselines.images import ImageCache
 from baselines.methods import OWN_WEIGHTS
 from baselines.pixel_mse import PixelMse
 from baselines.rendering.clips import render
 from baselines.simulation import split
-from docs._confidence_figure import confidence_figure
 from evaluator import read_truth
-from tests.baselines.scenes import mean_mid, planted
+from tests.baselines.scenes import mean_mid
 
 SEED, N = 7, 20
 """The first of the rendered sequences of docs/deep-scale.md, from which nothing was learned."""
@@ -48,12 +46,3 @@ def test_on_real_frames_they_reach_the_errors_of_the_toolkits(kitti_clip: Path, 
     rows = range(0, folder.n_sequences, 2)
     found = [method(folder.clip(row, cache=cache), frame_gap=5).scale_ratio for row in rows]
     assert mean_mid(found, read_truth(kitti_clip / "truth.csv").ttc_s[::2]) <= 12
-
-
-def test_the_figure_shows_both_crops_and_all_confidences() -> None:
-    figure = confidence_figure(planted(0.8), estimator=DeepScale(), frame_gap=5, true_ttc_s=2.0)
-    words = "\n".join(shape.text for shape in figure.shapes if isinstance(shape, Text))
-    assert "truth 0.800" in words
-    assert sum(isinstance(shape, Picture) for shape in figure.shapes) == 2
-    bars = [shape for shape in figure.shapes if isinstance(shape, Line) and shape.width == 8]
-    assert len(bars) == 20

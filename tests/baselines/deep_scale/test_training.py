@@ -1,21 +1,22 @@
 """Training: its labels and rates, that it learns, and that an ended one goes on."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from baselines.clips import Clip
 from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.samples import FolderSequences, RenderedSequences, Sample, batches, usable_pair
-from baselines.deep_scale.weights import Use, read_weights
+from baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
 from baselines.folders import read_folder
 from baselines.methods import OWN_WEIGHTS
 from baselines.simulation import split
-from evaluator import read_truth, ttc_to_scale_ratio
+from evaluator import GroundTruth, read_truth, ttc_to_scale_ratio
 from evaluator.problems import Rejected
 from tests.baselines.made_folders import made_folder, stamp
 
@@ -147,6 +148,79 @@ def test_an_ended_training_goes_on_as_if_nothing_had_been(
         np.testing.assert_allclose(values, other.tensors[name], atol=1e-5)
     assert one.card["recipe"]["optimizer"] == "adam"
     assert {path.name for path in tmp_path.iterdir()} == {"whole.npz", "ended.npz"}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """The first sequences of a source, for learning and for scores."""
+
+    whole: RenderedSequences
+    n_rows: int = 4
+
+    @property
+    def truth(self) -> GroundTruth:
+        return read_truth(b"\n".join(self.whole.truth.to_csv().splitlines()[: 1 + self.n_rows]))
+
+    @property
+    def scale_ratios(self) -> NDArray[np.float64]:
+        return self.whole.scale_ratios[: self.n_rows]
+
+    def clip(self, row: int) -> Clip:
+        return self.whole.clip(row)
+
+
+@pytest.mark.parametrize("decoding", ["head", "fit"])
+def test_with_a_start_the_score_before_epoch_1_comes_first_and_no_rate_keeps_it(
+    training: Any,
+    source: RenderedSequences,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    decoding: Decoding,
+) -> None:
+    # Batches move the running means whatever the rate is.
+    monkeypatch.setattr("baselines.deep_scale.torch_layers.BN_MOMENTUM", 0.0)
+    start = Weights(read_weights(OWN_WEIGHTS).tensors, replace(SMALL, decoding=decoding))
+    recipe = training.Recipe(epochs=1, batch=2, lr_per_pair=1e-12, use=start.use)
+    rows = Rows(source)
+    known = {"source": rows, "validation": training.Validation(rows), "recipe": recipe, "start": start}
+    told: list[Any] = []
+    epochs = training.train(**known, out=tmp_path / "w.npz", after_epoch=told.append)
+    assert told == epochs
+    assert [epoch.number for epoch in epochs] == [0, 1]
+    before, after = epochs
+    assert (before.loss, before.n_left_out) == (None, 0)
+    scored = training.Validation(rows).scores(
+        training.Network(as_torch(training, start), recipe=recipe, device="cpu").operations(), use=start.use
+    )
+    assert before.mid == pytest.approx(scored["overall"]["mid"])
+    assert after.mid == pytest.approx(before.mid, rel=1e-4)
+    card = read_weights(tmp_path / "w.npz").card
+    assert [epoch["number"] for epoch in card["epochs"]] == [0, 1]
+
+
+def as_torch(training: Any, weights: Weights) -> dict[str, Any]:
+    return {name: training.torch.from_numpy(each.copy()) for name, each in weights.tensors.items()}
+
+
+def test_a_training_that_was_ended_before_its_second_epoch_keeps_the_score_of_its_start(
+    training: Any, source: RenderedSequences, tmp_path: Path
+) -> None:
+    start = Weights(read_weights(OWN_WEIGHTS).tensors, SMALL)
+    mids = iter([5.0, 7.0, 6.0])
+    validation = SimpleNamespace(scores=lambda *_, **__: {"overall": {"mid": next(mids), "rte": 1.0}})
+    recipe = training.Recipe(epochs=2, batch=4, use=SMALL)
+    known = {"source": Rows(source), "validation": validation, "recipe": recipe, "start": start}
+
+    def end_after_1(epoch: Any) -> None:
+        if epoch.number == 1:
+            raise Ended
+
+    with pytest.raises(Ended):
+        training.train(**known, out=tmp_path / "w.npz", after_epoch=end_after_1)
+    epochs = training.train(**known, out=tmp_path / "w.npz")
+    assert [(epoch.number, epoch.mid) for epoch in epochs] == [(0, 5.0), (1, 7.0), (2, 6.0)]
+    card = read_weights(tmp_path / "w.npz").card
+    assert card["epochs"][-1]["number"] == 2, "the better of both epochs, though the start was better still"
 
 
 def test_a_source_without_a_usable_sequence_is_a_problem(

@@ -42,7 +42,7 @@ def test_the_fewest_recordings_are_those_of_trying_everything(seed: int) -> None
     gaps = counts * rng.normal(0.9 if seed % 2 else -0.9, 1.0, 11)
     found = influence(gaps, counts, rng=np.random.default_rng(seed), n_flips=N_FLIPS)
     undecided, turned = fewest(gaps, counts, seed=seed)
-    assert found.n_recordings == 11
+    assert found.n_units == 11
     assert found.n_to_turn == turned, "for the sign, no other choice needs fewer"
     if found.n_to_undecided is None:
         assert sign_flips(gaps[:, None], counts[:, None], rng=np.random.default_rng(1)).p[0] > 0.04
@@ -74,7 +74,7 @@ def test_recordings_that_all_favour_one_cannot_turn_the_sign() -> None:
 def test_what_is_not_significant_has_a_sign_alone() -> None:
     gaps = np.array([3.0, -1, -1, -0.5] + [0.1, -0.1] * 8)
     found = influence(gaps, np.ones(20), rng=np.random.default_rng(0), n_flips=N_FLIPS)
-    assert found == Influence(n_recordings=20, n_to_undecided=None, n_to_turn=1)
+    assert found == Influence(n_units=20, n_to_undecided=None, n_to_turn=1)
 
 
 def test_two_files_are_compared_with_what_their_difference_rests_on() -> None:
@@ -83,7 +83,7 @@ def test_two_files_are_compared_with_what_their_difference_rests_on() -> None:
     found = compare_predictions(near, far, truth)
     (known,) = (gap.influence for name, gap in found.items() if name == "mid")
     assert known is not None
-    assert known.n_recordings == 40
+    assert known.n_units == 40
     assert 0 < (known.n_to_undecided or 0) <= (known.n_to_turn or 41)
     assert all(gap.influence is None for name, gap in found.items() if name != "mid")
     turned = compare_predictions(far, near, truth)["mid"]

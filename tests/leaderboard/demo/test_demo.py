@@ -86,7 +86,7 @@ def test_the_worker_decides_what_the_seed_submits(benchmark: None, tmp_path: Pat
     }
     board = boards.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
     assert [entry.rank for entry in board.entries] == [*range(1, n_scored + 1)]
-    assert board.entries[0].method == "Deep Scale, our weights"
+    assert board.entries[0].method == "Deep Scale features, own fit"
     assert board.split.is_simulated
 
 

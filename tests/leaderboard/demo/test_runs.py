@@ -69,7 +69,7 @@ def test_methods_come_in_the_order_of_the_paper() -> None:
     errors = {
         run.name: float(np.mean(MID.errors(scale_ratio_to_ttc(run.kept(), fps_hz=2), ttc_s))) for run in RUNS
     }
-    assert errors["deep-scale"] < errors["alignment"] < errors["pixel-mse"]
+    assert errors["deep-scale"] < errors["alignment"] < errors["deep-scale-head"] < errors["pixel-mse"]
     assert errors["pixel-mse"] < errors["detection-height"] < errors["detection-area"]
 
 

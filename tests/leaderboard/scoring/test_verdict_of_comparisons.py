@@ -40,7 +40,7 @@ def compared(
         Pair(*both, {"mid": Difference(-2.0, -3.0, -1.0, each, *below[i : i + 1])})
         for i, (both, each) in enumerate(zip(itertools.combinations(entries, 2), p, strict=True))
     )
-    nothing = cast("Any", SimpleNamespace())
+    nothing = cast("Any", SimpleNamespace(unit="recording"))
     return Compared(nothing, nothing, tuple(entries), pairs, is_complete=True, reason=reason)
 
 

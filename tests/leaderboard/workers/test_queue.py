@@ -137,6 +137,23 @@ def test_a_worker_that_lacks_a_library_does_not_start() -> None:
     assert "import of numpy halted" in done.stderr
 
 
+def test_a_worker_keeps_its_memory_private() -> None:
+    """Celery says `worker_init` before it forks the processes that run tasks, which inherit it."""
+    start = "import ctypes, leaderboard.celery; from celery.signals import worker_init; "
+    done = subprocess.run(
+        [
+            sys.executable,
+            "-c",
+            start + "worker_init.send(None); print(ctypes.CDLL(None).prctl(3, 0, 0, 0, 0))",
+        ],
+        env=os.environ,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout == "0\n"
+
+
 def test_a_look_decides_everything_that_waits(edition: Edition, owner: User) -> None:
     for factor in (1.1, 1.2, 1.3):
         builders.submit(owner, builders.predictions(edition, factor=factor))

@@ -1,0 +1,60 @@
+"""Numbers as callers have them: arrays, lists, tensors of torch, Series of pandas.
+
+Neither torch nor pandas is imported: what a value can do says what it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+
+def as_floats(values: Any) -> Floats:
+    """The numbers as float64, of the same shape; a tensor may have bfloat16, a gradient and any device."""
+    if hasattr(values, "detach"):
+        values = values.detach().cpu().double()  # on the CPU first: not every device has float64
+    elif isinstance(values, list | tuple) and values and hasattr(values[0], "detach"):
+        values = [as_floats(value) for value in values]
+    return np.asarray(values, dtype=np.float64)
+
+
+def in_row_order(values: Any, *, name: str, anno_id: NDArray[np.int64] | None) -> Floats:
+    """A copy of one number per sequence, in the order of `anno_id`, the manifest's; None for any order.
+
+    A Series of pandas must have the index 0, 1, 2, … or these anno_ids. Raises `TypeError` for a dict,
+    `ValueError` for a Series in another order.
+    """
+    if isinstance(values, Mapping):
+        raise TypeError(
+            f"{name} is of type {type(values).__name__}; expected one number for each sequence, in the "
+            f"manifest's order. For values by key, give write_predictions keys=list(d) and "
+            f"{name}=list(d.values()), and its bytes to read_predictions."
+        )
+    index: Any = getattr(values, "index", None)
+    is_series = index is not None and not callable(index) and hasattr(values, "to_numpy")
+    if anno_id is not None and is_series and len(index) == len(anno_id):
+        _require_row_order(list(index), names_sequences=index.name == "anno_id", name=name, anno_id=anno_id)
+    return np.array(as_floats(values))
+
+
+def _require_row_order(
+    labels: list[Any], *, names_sequences: bool, name: str, anno_id: NDArray[np.int64]
+) -> None:
+    own, places = anno_id.tolist(), list(range(len(labels)))
+    if labels == own or (labels == places and not names_sequences):
+        return
+    expected = own if names_sequences else places
+    raise ValueError(
+        f"{name} is a Series with the index {_begin(labels)}; expected {_begin(expected)}, one row for each "
+        "sequence in the manifest's order, because values are taken by their place. Sort it and give "
+        f"{name}.to_numpy(), or give a frame with anno_id to evaluator.frames.predictions_from_frame."
+    )
+
+
+def _begin(labels: Sequence[object]) -> str:
+    return ", ".join(map(str, labels[:3])) + (", …" if len(labels) > 3 else "")

@@ -1,0 +1,58 @@
+"""Whether recordings of one unit, such as a day, are alike, and by how much that widens a standard error.
+
+With u_g = S_g − θ n_g, what recording g adds to the error of the mean θ of N sequences,
+
+    SE²_recording = Σ u_g² / N²        SE²_unit = Σ_d (Σ_{g in d} u_g)² / N²        (Liang and Zeger 1986)
+
+The correlation within a unit is the mean product of two different recordings of one unit over the mean square
+of one, each by its sequences: Σ_{g ≠ h, same unit} u_g u_h / Σ n_g n_h ÷ (Σ u_g² / Σ n_g²). Units are
+permuted over the recordings for its p: how often chance alone correlates them as much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from evaluator.metrics.scale import Floats
+from evaluator.scoring.uncertainty import by_units
+from evaluator.units import Units
+
+N_PERMUTATIONS: Final = 1_999
+
+
+@dataclass(frozen=True, slots=True)
+class Dependence:
+    """Standard error by units over that by recordings, correlation within a unit, and its one-sided p."""
+
+    se_factor: float
+    correlation: float
+    p: float
+
+
+def dependence(
+    sums: Floats, counts: Floats, units: Units, *, rng: np.random.Generator, n: int = N_PERMUTATIONS
+) -> Dependence | None:
+    """Of one column: `sums` and `counts` of recordings, (G,) each. `n` permutations are drawn.
+
+    None where no unit has two recordings with sequences, and where nothing differs between recordings.
+    """
+    rests = sums - sums.sum() / counts.sum() * counts if counts.sum() else np.zeros_like(sums)
+    square = float((rests**2).sum())
+    orders = np.stack([np.arange(len(sums)), *(rng.permutation(len(sums)) for _ in range(n))], axis=1)
+    # One column for each order: what stands first is as it was recorded.
+    totals, sizes = by_units(rests[orders], units), by_units(counts[orders], units)
+    products = (totals**2).sum(axis=0) - square
+    pairs = (sizes**2).sum(axis=0) - (counts**2).sum()
+    if not square or not pairs[0]:
+        return None
+    scale = square / float((counts**2).sum())
+    found = np.divide(products, pairs, out=np.zeros_like(pairs), where=pairs > 0) / scale
+    n_as_large = int((found[1:] >= found[0]).sum())
+    return Dependence(
+        se_factor=float(np.sqrt((totals[:, 0] ** 2).sum() / square)),
+        correlation=float(found[0]),
+        p=(1 + n_as_large) / (n + 1),
+    )

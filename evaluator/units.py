@@ -1,0 +1,116 @@
+"""The unit of inference: what is taken as independent of all else, a recording or a day.
+
+Recordings of one day are alike: the same weather, the same road, the same driver. So a bootstrap draws whole
+days, and a test turns the signs of whole days, where the names of all recordings begin with a date and there
+are at least `MIN_DAYS` days; else the unit is the recording. A ground truth may name another unit of each
+recording in its column `unit`, which replaces this rule.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date
+from typing import Final
+
+from evaluator.counting import counted
+
+RECORDING: Final = "recording"
+DAY: Final = "day"
+GIVEN: Final = "given"
+KINDS: Final = (RECORDING, DAY, GIVEN)
+MIN_DAYS: Final = 30
+"""With fewer days the recording is the unit: a day each would leave too few units for the ranges to hold."""
+
+_NOUNS: Final = {GIVEN: "unit"}
+# 2023-04-06…, 2023_04_06… or 20230406…, and no digit behind it: a longer number is no date.
+_DATE: Final = re.compile(r"((?:19|20)\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)", re.ASCII)
+
+
+def noun_of(kind: str) -> str:
+    """What one unit of this kind is called.
+
+    >>> noun_of("day"), noun_of("given")
+    ('day', 'unit')
+    """
+    return _NOUNS.get(kind, kind)
+
+
+def in_words(kind: str, n: int | None = None) -> str:
+    """So many units of a kind, or all of them where their number is not known.
+
+    >>> in_words("day", 42), in_words("recording", 1), in_words("given", 12), in_words("day")
+    ('42 days', '1 recording', '12 units', 'days')
+    """
+    noun = noun_of(kind)
+    return f"{noun}s" if n is None else counted(n, noun)
+
+
+def day_of(recording: str) -> date | None:
+    """The date that a recording's name begins with; None where it begins with none.
+
+    >>> day_of("2023-04-06-13-00-46-797143"), day_of("20230314-081502"), day_of("2023_04_06_a")
+    (datetime.date(2023, 4, 6), datetime.date(2023, 3, 14), datetime.date(2023, 4, 6))
+    >>> day_of("2023-02-30-08"), day_of("1680757246797143"), day_of("sim-20240506-080000")
+    (None, None, None)
+    """
+    found = _DATE.match(recording)
+    if found is None:
+        return None
+    try:
+        return date(int(found[1]), int(found[3]), int(found[4]))
+    except ValueError:
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class Units:
+    """The units of some recordings: their `names`, and for every recording the `index` of its unit."""
+
+    kind: str
+    names: tuple[str, ...]
+    index: tuple[int, ...]
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __str__(self) -> str:
+        return in_words(self.kind, len(self))
+
+
+def units_of(recordings: Sequence[str], *, given: Mapping[str, str], kind: str | None = None) -> Units:
+    """The units of these recordings, by the rule or of the `kind` that is asked for.
+
+    `given` is the unit of every recording where the ground truth names units, else empty. Raises `ValueError`
+    for a kind that these recordings do not have.
+    """
+    days = None if kind in {RECORDING, GIVEN} or (given and kind is None) else _days(recordings)
+    if kind is None:
+        kind = GIVEN if given else DAY if days and len(set(days)) >= MIN_DAYS else RECORDING
+    if kind == RECORDING:
+        return Units(kind, tuple(recordings), tuple(range(len(recordings))))
+    if kind == GIVEN and given:
+        return _grouped(kind, [given[name] for name in recordings])
+    if kind == DAY and days:
+        return _grouped(kind, days)
+    raise ValueError(
+        "The ground truth has no column unit; expected one to take its units."
+        if kind == GIVEN
+        else "Not every recording's name begins with a date; expected names as 2023-04-06-13-00-46 to take "
+        "days as units."
+        if kind == DAY
+        else f"Unknown unit {kind!r}; expected one of {', '.join(KINDS)}."
+    )
+
+
+def _days(recordings: Sequence[str]) -> list[str] | None:
+    """The day of every recording; None unless each has one."""
+    days = [day.isoformat() for name in recordings if (day := day_of(name))]
+    return days if len(days) == len(recordings) else None
+
+
+def _grouped(kind: str, labels: Sequence[str]) -> Units:
+    names = tuple(sorted(set(labels)))
+    place = {name: i for i, name in enumerate(names)}
+    return Units(kind, names, tuple(place[label] for label in labels))

@@ -1,0 +1,49 @@
+"""`manage.py check_units SPLIT NUMBER`."""
+
+from argparse import ArgumentParser
+from typing import Any
+
+from django.core.management.base import CommandError
+
+from evaluator.counting import counted
+from evaluator.units import MIN_DAYS, RECORDING
+from leaderboard.management.arguments import RefusingCommand, edition_of
+from leaderboard.scoring import unit_checks
+
+
+class Command(RefusingCommand):
+    """Says whether recordings of one day are alike."""
+
+    help = "Say how alike recordings of one day are in an edition, and by how much that widens its intervals."
+
+    def add_arguments(self, parser: ArgumentParser) -> None:
+        """SPLIT and NUMBER."""
+        parser.add_argument("split")
+        parser.add_argument("number", type=int)
+
+    def handle(self, *args: Any, **options: Any) -> None:
+        """Print a line for each of the first methods, and for its difference from the best."""
+        edition = edition_of(options)
+        try:
+            groups = unit_checks.groups_of(edition)
+            rows = list(unit_checks.checks(edition, groups))
+        except OSError as fault:
+            raise CommandError(f"The values of {edition} are not here: {fault}") from fault
+        n_recordings = counted(edition.ground_truth.n_recordings, "recording")
+        self.stdout.write(f"{edition}: {n_recordings} in {groups}; its unit is the {edition.unit_noun}.")
+        if edition.unit == RECORDING and len(groups) < MIN_DAYS:
+            self.stdout.write(
+                f"With fewer than {MIN_DAYS} days the recording stays the unit; a column unit of the ground "
+                "truth can name another one."
+            )
+        self.stdout.write("SE factor  correlation       p  overall MiD of")
+        for row in rows:
+            found = row.found
+            numbers = (
+                f"{found.se_factor:9.2f}  {found.correlation:11.3f}  {found.p:6.4f}"
+                if found
+                else f"{'–':>9}  {'–':>11}  {'–':>6}"
+            )
+            self.stdout.write(f"{numbers}  {row.what}")
+        if not rows:
+            self.stdout.write("No public method has a score in this edition yet.")

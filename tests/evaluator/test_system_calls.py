@@ -1,0 +1,188 @@
+"""`evaluator.system_calls`: what the filter lets through, on both architectures and in this kernel."""
+
+import errno
+import os
+import signal
+import struct
+import subprocess
+import sys
+
+import pytest
+
+from evaluator.system_calls import ALLOWED, OWN_LIMITS, program_for, why_unavailable
+
+ALLOW, REFUSE, KILL = 0x7FFF0000, 0x00050000 | errno.EPERM, 0x80000000
+ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
+I386 = 0x40000003
+
+# The numbers on x86_64 and on aarch64; None where an architecture has only the newer call.
+DANGEROUS = {
+    "open": (2, None),
+    "openat": (257, 56),
+    "openat2": (437, 437),
+    "name_to_handle_at": (303, 264),
+    "newfstatat": (262, 79),
+    "getdents64": (217, 61),
+    "readlinkat": (267, 78),
+    "unlink": (87, None),
+    "unlinkat": (263, 35),
+    "renameat2": (316, 276),
+    "socket": (41, 198),
+    "connect": (42, 203),
+    "sendmsg": (46, 211),
+    "kill": (62, 129),
+    "tkill": (200, 130),
+    "tgkill": (234, 131),
+    "pidfd_open": (434, 434),
+    "pidfd_send_signal": (424, 424),
+    "ptrace": (101, 117),
+    "process_vm_readv": (310, 270),
+    "process_vm_writev": (311, 271),
+    "clone": (56, 220),
+    "clone3": (435, 435),
+    "fork": (57, None),
+    "execve": (59, 221),
+    "execveat": (322, 281),
+    "prctl": (157, 167),
+    "seccomp": (317, 277),
+    "setrlimit": (160, 164),
+    "prlimit64": OWN_LIMITS,
+    "bpf": (321, 280),
+    "io_uring_setup": (425, 425),
+    "memfd_create": (319, 279),
+    "userfaultfd": (323, 282),
+    "perf_event_open": (298, 241),
+    "unshare": (272, 97),
+    "mount": (165, 40),
+}
+
+needs_a_filter = pytest.mark.skipif(
+    why_unavailable() is not None, reason=f"this system filters no system calls: {why_unavailable()}"
+)
+
+
+def verdict(program: bytes, *, architecture: int, number: int, first_argument: int = 0) -> int:
+    """What the kernel's machine makes of the filter for this call."""
+    call = struct.pack("=iIQQ", number, architecture, 0, first_argument)
+    instructions = [struct.unpack_from("=HBBI", program, at) for at in range(0, len(program), 8)]
+    word = place = 0
+    while True:
+        operation, if_equal, if_not, operand = instructions[place]
+        place += 1
+        if operation == 0x20:
+            [word] = struct.unpack_from("=I", call, operand)
+        elif operation == 0x15:
+            place += if_equal if word == operand else if_not
+        else:
+            assert operation == 0x06
+            return int(operand)
+
+
+@pytest.mark.parametrize("own_limits", [False, True])
+@pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
+def test_filter_allows_what_it_names_and_refuses_every_other_number(
+    place: int, machine: str, own_limits: bool
+) -> None:
+    program = program_for(machine, own_limits=own_limits)
+    architecture = ARCHITECTURES[machine]
+    allowed = {numbers[place] for numbers in ALLOWED.values()}
+    if own_limits:
+        allowed.add(OWN_LIMITS[place])
+    # 1 << 30 is the bit of the calls of x32.
+    for number in (*range(600), *(number | 1 << 30 for number in range(600)), -1):
+        expected = ALLOW if number in allowed else REFUSE
+        assert verdict(program, architecture=architecture, number=number) == expected, number
+
+
+@pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
+def test_what_reaches_another_file_or_process_is_refused_by_name(place: int, machine: str) -> None:
+    program = program_for(machine, own_limits=False)
+    for name, numbers in DANGEROUS.items():
+        number = numbers[place]
+        if number is not None:
+            found = verdict(program, architecture=ARCHITECTURES[machine], number=number)
+            assert found == REFUSE, name
+
+
+@pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
+def test_limits_of_other_processes_are_never_changed(place: int, machine: str) -> None:
+    program = program_for(machine, own_limits=True)
+    found = [
+        verdict(program, architecture=ARCHITECTURES[machine], number=OWN_LIMITS[place], first_argument=pid)
+        for pid in (0, 1, 4711, 0xFFFF_FFFF)
+    ]
+    assert found == [ALLOW, REFUSE, REFUSE, REFUSE]
+
+
+@pytest.mark.parametrize("machine", ARCHITECTURES)
+def test_calls_of_another_architecture_end_the_process(machine: str) -> None:
+    program = program_for(machine, own_limits=True)
+    [other] = [number for name, number in ARCHITECTURES.items() if name != machine]
+    for architecture in (I386, other):
+        assert verdict(program, architecture=architecture, number=0) == KILL
+
+
+def in_a_process(code: str) -> "subprocess.CompletedProcess[bytes]":
+    return subprocess.run([sys.executable, "-c", code], capture_output=True, check=False)
+
+
+@needs_a_filter
+def test_kernel_obeys_the_filter_and_takes_none_of_it_back() -> None:
+    code = """
+import ctypes, os, signal
+from evaluator.system_calls import allow_only_reading
+allow_only_reading()
+refused = []
+libc = ctypes.CDLL(None, use_errno=True)
+for deed in (lambda: open("/etc/passwd"), lambda: os.listdir("/"), lambda: os.kill(os.getppid(), 0), os.fork,
+             lambda: os.unlink("/nowhere"), lambda: os.stat("/"), lambda: os.dup(1), lambda: os.pipe()):
+    try:
+        deed()
+    except OSError as fault:
+        refused.append(fault.errno)
+ended = libc.prctl(22, 2, None), ctypes.get_errno()
+os.write(1, repr((refused, ended)).encode())
+"""
+    done = in_a_process(code)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.decode() == repr(([errno.EPERM] * 8, (-1, errno.EPERM)))
+
+
+@needs_a_filter
+@pytest.mark.skipif(os.uname().machine != "x86_64", reason="only x86_64 has a second set of numbers here")
+def test_calls_by_the_door_of_the_32_bit_kernel_end_the_process() -> None:
+    """`int 0x80` with the number of `getpid`: 20, which is another call on x86_64."""
+    code = """
+import ctypes, mmap
+from evaluator.system_calls import allow_only_reading
+page = mmap.mmap(-1, mmap.PAGESIZE, prot=mmap.PROT_READ | mmap.PROT_WRITE | mmap.PROT_EXEC)
+page.write(bytes.fromhex("b814000000cd80c3"))
+call = ctypes.CFUNCTYPE(ctypes.c_int)(ctypes.addressof(ctypes.c_char.from_buffer(page)))
+allow_only_reading()
+call()
+print("went on")
+"""
+    done = in_a_process(code)
+    assert b"went on" not in done.stdout
+    # A kernel without the 32-bit door ends it as well, by another signal.
+    assert done.returncode in {-signal.SIGSYS, -signal.SIGSEGV}
+
+
+def test_unknown_machine_is_named_and_gets_no_filter(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = os.uname()
+    monkeypatch.setattr(os, "uname", lambda: os.uname_result([*known[:4], "riscv64"]))
+    assert why_unavailable() == "the numbers of the system calls of riscv64 are not known here"
+
+
+@needs_a_filter
+def test_kernel_that_takes_no_filter_is_named() -> None:
+    """As a container whose own filter refuses `prctl`, which a first filter stands in for here."""
+    code = """
+import os
+from evaluator.system_calls import allow_only_reading, why_unavailable
+machine = os.uname()
+os.uname = lambda: machine
+allow_only_reading()
+print(why_unavailable())
+"""
+    assert in_a_process(code).stdout == b"the kernel takes no filter: Operation not permitted\n"
