@@ -46,7 +46,7 @@ chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says wha
 sabotage: $(DEV_STAMP) ## break one line of the code at a time; a named test must notice each
 	@$(PY) -m tests.sabotage
 
-bench: $(DEV_STAMP) ## measure; one line per figure, `name = value unit`
+bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md, and say which hold
 	@$(PY) -m benchmarks
 
 lint: $(DEV_STAMP) ## style, types and the direction of imports

@@ -1,5 +1,5 @@
-// The form of a submission: the size of the chosen file, a check of it before it is sent (see check.js), a drop
-// zone, and how far the upload is. Without any of this the form works as well; then the server alone checks.
+// The form of a submission: a quick check of the chosen file before it is sent, a drop zone, and how far the upload
+// is. Without any of this the form works as well; then the server alone checks.
 "use strict";
 
 const form = document.getElementById("submit");
@@ -8,6 +8,7 @@ const button = form.querySelector(".actions button");
 const byId = (id) => document.getElementById(id);
 const maxBytes = Number(form.dataset.maxBytes);
 const grouped = (n) => n.toLocaleString("en-GB");
+const counted = (n, noun) => `${grouped(n)} ${noun}${n === 1 ? "" : "s"}`;
 
 function element(tag, text = "", css = "") {
   const made = document.createElement(tag);
@@ -16,97 +17,81 @@ function element(tag, text = "", css = "") {
   return made;
 }
 
-// --- the check -----------------------------------------------------------------------------------------------
+// --- the check: what can be seen here at once; the server names every problem -----------------------------------
 
-const MAX_SHOWN = 20;
-let worker = null;
-let asked = 0;
-// What is known of the chosen file: "" nothing, "checking", "good", "doubtful", "bad"; `settled` calls whoever waits
-// for it.
+const ENVELOPE = ["unit", "fps", "frame_gap", "meta", "predictions"];
+const LEFT_TO_THE_SERVER = ["", "The server checks this file once it is sent."];
+let nChecks = 0;
+// What is known of the chosen file: "" nothing, "checking", "good", "bad" or "too large"; `settled` calls whoever
+// waits for it.
 let verdict = "";
 let settled = () => {};
 
-function say(...parts) {
-  byId("checked").replaceChildren(...parts);
-}
-
-const isDoubted = () => verdict === "bad" || verdict === "doubtful";
-
-function conclude(state, ...parts) {
+function conclude(state, sentence = "") {
   verdict = state;
-  button.textContent = isDoubted() ? "Submit anyway" : "Submit";
-  say(...parts);
+  button.textContent = state === "bad" ? "Submit anyway" : "Submit";
+  const css = { good: "good", bad: "bad", "too large": "bad" }[state] ?? "quiet";
+  byId("checked").replaceChildren(...(sentence ? [element("p", sentence, css)] : []));
   if (state !== "checking") settled();
 }
 
-function answered({ data }) {
-  if (data.id !== asked) return;
-  if (data.failed) conclude("", element("p", "The file could not be checked here. The server checks it.", "quiet"));
-  else if (data.n_problems === 0) {
-    const found = `${grouped(data.n_found)} of ${grouped(data.n_sequences)} sequences found.`;
-    const told = element("p", `Checked: ${found} No problems.`, "good");
-    conclude(data.warnings.length ? "doubtful" : "good", told, ...data.warnings.map(warning));
-  } else conclude("bad", ...problems(data));
-}
-
-function warning({ message, code }) {
-  const told = element("p", "", "notice doubtful");
-  told.append(element("strong", "Warning."), ` ${message} `, element("span", code, "quiet code"));
-  return told;
-}
-
-function problems({ n_problems: n, problems: all }) {
-  const told = `${grouped(n)} problem${n === 1 ? "" : "s"} in the file. The server would reject it.`;
-  const head = element("p", all.length < n ? `${told} Equal problems share a point.` : told, "bad");
-  const list = element("ol", "", "problems");
-  for (const { where, message, code } of all.slice(0, MAX_SHOWN)) {
-    const item = element("li");
-    if (where) item.append(element("code", where, "where"), " ");
-    item.append(`${message} `, element("span", code, "quiet code"));
-    list.append(item);
-  }
-  return [head, list];
-}
-
-function check() {
-  asked++;
-  const file = input.files[0];
-  const split = form.querySelector("input[name=split]:checked");
-  if (!file || file.size > maxBytes || !window.Worker) return conclude("");
-  if (file.size === 0) {
-    const message = "The file is empty; expected JSON text with a number for every sequence.";
-    return conclude("bad", ...problems({ n_problems: 1, problems: [{ where: "", message, code: "not-json" }] }));
-  }
-  if (!split) return conclude("", element("p", "Choose a split: then the file is checked here before it is sent.", "quiet"));
-  if (!worker) {
-    worker = new Worker(form.dataset.checker);
-    worker.addEventListener("message", answered);
-    worker.addEventListener("error", () => answered({ data: { id: asked, failed: true } }));
-  }
-  conclude("checking", element("p", "Checking the file…", "quiet"));
-  worker.postMessage({ id: asked, manifest: split.dataset.manifest, file });
-}
-
-function judge() {
+async function check() {
+  const number = ++nChecks;
   const file = input.files[0];
   input.setCustomValidity("");
-  byId("chosen").textContent = "";
-  if (file) {
-    const found = grouped(file.size);
-    if (file.size > maxBytes) {
-      input.setCustomValidity(
-        `The file has ${found} bytes; expected at most ${grouped(maxBytes)} (${maxBytes / 1e6} MB).`,
-      );
-      input.reportValidity();
-    }
-    byId("chosen").textContent = `${found} bytes`;
+  byId("chosen").textContent = file ? `${grouped(file.size)} bytes` : "";
+  if (!file) return conclude("");
+  if (file.size > maxBytes) {
+    const most = `${grouped(maxBytes)} (${maxBytes / 1e6} MB)`;
+    const sentence = `The file has ${grouped(file.size)} bytes; expected at most ${most}.`;
+    input.setCustomValidity(sentence);
+    return conclude("too large", sentence);
   }
-  check();
+  conclude("checking", "Checking the file…");
+  const found = await verdictOn(file).catch(() => LEFT_TO_THE_SERVER);
+  if (number === nChecks) conclude(...found);
 }
 
-input.addEventListener("change", judge);
+async function verdictOn(file) {
+  const text = await file.text();
+  const isGzip = text.startsWith("\x1f\ufffd");
+  const isTable = /^\s*"?\w+"?\s*,/.test(text);
+  if (isGzip || isTable) return LEFT_TO_THE_SERVER;
+  if (!text.trim()) return bad("The file is empty; expected JSON text with a number for every sequence.");
+  let value;
+  try {
+    value = JSON.parse(text);
+  } catch (fault) {
+    // Python writes these; the server says of each where it stands.
+    if (/\b(NaN|Infinity)\b/.test(text)) return LEFT_TO_THE_SERVER;
+    const at = /line (\d+),? column (\d+)/.exec(fault.message);
+    return bad(at ? `The text is not JSON: line ${at[1]}, column ${at[2]}.` : "The text is not JSON.");
+  }
+  return verdictOnValue(value);
+}
+
+function verdictOnValue(value) {
+  const isObject = (each) => each !== null && typeof each === "object" && !Array.isArray(each);
+  const isEnvelope = isObject(value) && ENVELOPE.some((name) => Object.hasOwn(value, name));
+  const predictions = isEnvelope ? value.predictions : value;
+  const values = isObject(predictions) ? Object.values(predictions) : [];
+  const n = counted(values.length, "prediction");
+  if (values.length && values.every((each) => each === null)) {
+    return bad(`This is the empty template: ${counted(values.length, "value")} to be filled in.`);
+  }
+  const split = form.querySelector("input[name=split]:checked");
+  const expected = Number(split?.dataset.nSequences ?? 0);
+  if (expected && values.length !== expected) {
+    return bad(`The file has ${n}; ${split.value} expects ${grouped(expected)}, one for each sequence.`);
+  }
+  return ["good", `${n}${expected ? ", one for each sequence" : ""}. The server checks them once the file is sent.`];
+}
+
+const bad = (sentence) => ["bad", `${sentence} The server would reject the file.`];
+
+input.addEventListener("change", check);
 for (const split of form.querySelectorAll("input[name=split]")) split.addEventListener("change", check);
-judge();
+check();
 
 // --- who sees the result: of a method that others see, its own sentence alone; of a new one none -----------------
 
@@ -252,17 +237,16 @@ function complain(words) {
   byId("form-errors").replaceChildren(alert);
 }
 
-// A file is sent once its check has ended; one with problems or warnings only if that is asked for once they are in
-// sight.
+// A file is sent once its check has ended; a bad one only if that is asked for once the reason is in sight.
 form.addEventListener("submit", async (event) => {
   event.preventDefault();
   if (isBusy) return;
   busy(true);
   if (verdict === "checking") {
     await new Promise((resolve) => (settled = resolve));
-    if (isDoubted()) {
+    if (verdict === "bad") {
       busy(false);
-      button.focus();
+      byId("checked").focus();
       return;
     }
   }

@@ -2,33 +2,27 @@
 
 Files that machines write are monotonous: keys of a few digits, one separator, one number each. For these the
 keys are compared with the manifest's as 64-bit words, then overwritten with spaces, so that what remains of
-the object is a JSON list of numbers for a fast parser, which reads some thousands of them at a time. Natural
-keys in the manifest's order, and the numbers behind them, are copied into rows of words instead, some
-thousands at a time, and compared with the manifest's row by row. Files with other keys, or another layout,
-are parsed into a dictionary.
+the object is a JSON list of numbers for a fast parser. Files with other keys, or another layout, are parsed
+into a dictionary.
 
-All ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
-result, and answer None for everything else: finding words for a fault is the strict reading's business.
+Both ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
+result, and answer None for everything else: to name a fault is the strict reading's task.
 
 Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has n colons,
-(2) what stands before each is, byte for byte, the key of another sequence of the manifest with its quotation
-marks, (3) each key but the first is preceded by a comma and the same white space, the first by `{` and white
-space, and (4) the text with all these keys blanked, and the outer braces turned into brackets, is a JSON list
-of n numbers: it is cut at commas that precede a key, and each piece is a list of as many numbers as it had
-keys. By (4) there are n - 1 commas, by (3) each stands directly before a key; so every part between commas
+(2) the bytes before each are the key of another sequence of the manifest with its quotation marks, (3) each
+key but the first is preceded by a comma and the same white space, the first by `{` and white space, and
+(4) the text with all these keys blanked, and the outer braces turned into brackets, is a JSON list of n
+numbers. By (4) there are n - 1 commas, by (3) each stands directly before a key; so every part between commas
 holds one key, at its front, and one number.
-
-The second way is exact for the same reasons: a key's row is what stands from an odd quotation mark to one
-byte behind the next one, and is, byte for byte, the next key of the manifest; a number's row is all that
-stands from there to the next odd quotation mark, and spaces.
 """
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Iterator
-from typing import Final
+from functools import lru_cache
+from itertools import repeat
+from typing import Final, NamedTuple
 
 import msgspec
 import numpy as np
@@ -38,42 +32,22 @@ from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
 from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
 from evaluator.problems import Findings, Rejected
-from evaluator.truth.packed_keys import (
-    MAX_CELL_BYTES,
-    MAX_DIGITS,
-    WORD_BYTES,
-    KeyWords,
-    Rows,
-    Words,
-    cells_of,
-)
 from evaluator.truth.truth import Manifest
 
-Octets = NDArray[np.uint8]
+Words = NDArray[np.uint64]
+Rows = NDArray[np.intp]
 
 _WHITE_SPACE: Final = b" \t\r\n"
-_PAD: Final = b" " * WORD_BYTES
-_CELL_PAD: Final = b" " * MAX_CELL_BYTES
-_SPACE, _QUOTE, _COLON, _BRACKETS = ord(" "), ord('"'), ord(":"), b"[]"
+_WORD_BYTES: Final = 8
+_MAX_DIGITS: Final = 5
+"""A longer key with its two quotation marks and its colon does not fit into a word."""
+_SPACES: Final = np.frombuffer(b" " * _WORD_BYTES, dtype="<u8")[0]
 
 _MAX_AROUND: Final = 64 * 1024
 """At most so much text may stand around the predictions of an envelope that is read by columns."""
 
 _PREDICTIONS: Final = re.compile(rb'"predictions"[ \t\r\n]*:[ \t\r\n]*\{')
-_FIRST_DIGIT: Final = re.compile(rb'\{[ \t\r\n]*"[0-9]{1,%d}"' % MAX_DIGITS)
-_BLOCK: Final = 1 << 19
-"""So many bytes of a file with natural keys are read at once: they stay in the processor's cache."""
-
-_STRETCH: Final = 1 << 17
-"""So many bytes of other files are searched for colons at once, ..."""
-_KEYS: Final = 1 << 14
-"""... so many keys are compared, ..."""
-_NUMBERS: Final = 1 << 11
-"""... and so many numbers exist as Python objects."""
-
-_MAX_BETWEEN: Final = 64
-"""At most so many bytes may a comma and the white space behind it have."""
-
+_FIRST_DIGIT: Final = re.compile(rb'\{[ \t\r\n]*"[0-9]{1,%d}"' % _MAX_DIGITS)
 _PLACEHOLDER: Final = "predictions, read by columns"
 
 _FLAT: Final = Document(Members(), "ttc", None, None, None, enveloped=False)
@@ -87,7 +61,7 @@ def read_column(data: bytes, manifest: Manifest) -> Aligned | None:
     if parts is None:
         return None
     members, document = parts
-    column = _by_words(members, manifest) or _by_spelling(members, manifest) or _by_object(members, manifest)
+    column = _by_words(members, manifest) or _by_object(members, manifest)
     if column is None:
         return None
     values, keys = column
@@ -140,169 +114,95 @@ def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
     return text[start:stop], document
 
 
+class KeyWords(NamedTuple):
+    """The keys of a manifest as they stand in a file, each with its punctuation, `"123":`.
+
+    `words` (n,) have a key in their last bytes, `masks` (n,) select these bytes, `lengths` (n,) count them;
+    `row_of_number` is the row of each anno_id.
+    """
+
+    words: Words
+    masks: Words
+    lengths: Rows
+    row_of_number: Rows
+
+
+@lru_cache(maxsize=4)
+def key_words(manifest: Manifest) -> KeyWords | None:
+    """The keys as words, made once for a manifest, or None when one has more than five digits."""
+    if int(manifest.anno_id.max()) >= 10**_MAX_DIGITS:
+        return None
+    texts = np.char.add(np.char.add(b'"', manifest.anno_id.astype(f"S{_MAX_DIGITS}")), b'":')
+    lengths = np.char.str_len(texts)
+    shifts = (8 * (_WORD_BYTES - lengths)).astype(np.uint64)
+    row_of_number = np.zeros(int(manifest.anno_id.max()) + 1, dtype=np.intp)
+    row_of_number[manifest.anno_id] = np.arange(manifest.n_sequences)
+    return KeyWords(texts.view("<u8") << shifts, np.uint64(2**64 - 1) << shifts, lengths, row_of_number)
+
+
 def _by_words(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
-    """Read keys of up to six digits as words; the module's docstring says why this is exact."""
-    keys, n = manifest.key_words, manifest.n_sequences
+    """Read keys of up to five digits as words; the module's docstring says why this is exact."""
+    keys, n = key_words(manifest), manifest.n_sequences
     if keys is None or not _FIRST_DIGIT.match(text):
         return None
-    buffer = bytearray(_PAD)
+    buffer = bytearray(_WORD_BYTES)
     buffer += text
-    colons = _colons(buffer, n)
-    if colons is None:
+    octets = np.frombuffer(buffer, dtype=np.uint8)
+    colons = np.flatnonzero(octets == ord(":"))
+    if len(colons) != n:
         return None
-    rows = _blank_keys(buffer, keys, colons)
-    values = None if rows is None else _numbers_by_part(buffer, colons)
-    if values is None:
+    # The eight bytes from each position of the buffer on, as one word.
+    windows: Words = np.ndarray((len(buffer) - 7,), dtype="<u8", buffer=buffer, strides=(1,))
+    words = windows[colons - 7]
+    rows: Rows | slice = slice(None)
+    if ((words ^ keys.words) & keys.masks).any():
+        # The keys stand in another order than the manifest's: the only rows that they may be are these.
+        rows = keys.row_of_number[np.minimum(_numbers_in(words), len(keys.row_of_number) - 1)]
+        if ((words ^ keys.words[rows]) & keys.masks[rows]).any() or np.bincount(rows).max() > 1:
+            return None
+    opens = colons + 1 - keys.lengths[rows]
+    if not _are_separated(buffer, octets, opens, first_colon=int(colons[0])):
         return None
-    if isinstance(rows, slice):
-        return values, "anno_id"
+    # Where values are so short that windows overlap, a window brings back the end of the key before it: its
+    # colon is no JSON then, and the dictionary takes over.
+    masks = keys.masks[rows]
+    windows[colons - 7] = (words & ~masks) | (masks & _SPACES)
+    buffer[colons[0]], buffer[-1] = b"[]"
+    try:
+        # Packing is the fastest way into an array; it also counts.
+        values = np.frombuffer(struct.pack(f"{n}d", *_LIST.decode(memoryview(buffer)[int(colons[0]) :])))
+    except (msgspec.MsgspecError, ValueError, RecursionError, struct.error):
+        return None
     aligned = np.empty_like(values)
     aligned[rows] = values
     return aligned, "anno_id"
 
 
-def _colons(buffer: bytearray, n: int) -> Rows | None:
-    """The places of the colons, or None unless there are n."""
-    octets = np.frombuffer(buffer, dtype=np.uint8)
-    colons, n_found = np.empty(n, dtype=np.intp), 0
-    for start in range(0, len(octets), _STRETCH):
-        part = np.flatnonzero(octets[start : start + _STRETCH] == _COLON)
-        stop = n_found + len(part)
-        if stop > n:
-            return None
-        np.add(part, start, out=colons[n_found:stop])
-        n_found = stop
-    return colons if n_found == n else None
-
-
-def _blank_keys(buffer: bytearray, keys: KeyWords, colons: Rows) -> Rows | slice | None:
-    """Turn the keys before these colons into spaces; the row of each, or None if any is odd."""
-    octets = np.frombuffer(buffer, dtype=np.uint8)
-    # The eight bytes from each position of the buffer on, as one word.
-    windows: Words = np.ndarray((len(buffer) - 7,), dtype="<u8", buffer=buffer, strides=(1,))
-    n, rows, between = len(colons), None, None
-    for part in _parts(n, _KEYS):
-        starts = colons[part] - 7
-        words = windows[starts]
-        blank = keys.blank(words, part) if rows is None else None
-        if blank is None:
-            # From here on the keys stand in another order than the manifest's.
-            rows = np.arange(n) if rows is None else rows
-            rows[part] = keys.likely_rows(words)
-            blank = keys.blank(words, rows[part])
-        if blank is None:
-            return None
-        opens = starts + 5
-        opens -= blank.n_digits
-        following = opens if part.start else opens[1:]
-        if between is None and len(following):
-            between = _between(bytes(buffer[colons[0] : following[0]]))
-        if not (octets[opens] == _QUOTE).all() or not _follow(octets, following, between):
-            return None
-        if part.start == 0 and buffer[len(_PAD) : opens[0]].strip(_WHITE_SPACE) != b"{":
-            return None
-        if not keys.fits:
-            octets[opens] = _SPACE
-        # Where values are so short that windows overlap, a window brings back the end of the key before it:
-        # its colon is no JSON then, and the dictionary takes over.
-        windows[starts] = blank.words
-    if rows is None:
-        return slice(None)
-    return rows if int(np.bincount(rows, minlength=n).max()) == 1 else None
-
-
-def _parts(n: int, size: int) -> Iterator[slice]:
-    """All of n keys, `size` at once: what is computed of them stays small."""
-    return (slice(first, min(first + size, n)) for first in range(0, n, size))
-
-
-def _numbers_by_part(buffer: bytearray, colons: Rows) -> Floats | None:
-    """The numbers behind keys that are blank and ended at `colons`; a comma precedes each but the first."""
-    n = len(colons)
-    values, text = np.empty(n), memoryview(buffer)
-    for part in _parts(n, _NUMBERS):
-        first, last = int(colons[part.start]), len(buffer) - 1
-        if part.stop < n:
-            last = buffer.rindex(b",", first, int(colons[part.stop]))
-        buffer[first], buffer[last] = _BRACKETS
-        numbers = _numbers(text[first : last + 1], part.stop - part.start)
-        if numbers is None:
-            return None
-        values[part] = numbers
-    return values
-
-
-def _numbers(text: bytes | memoryview, n: int) -> Floats | None:
-    """The float64 values of a JSON list of n numbers, or None for anything else."""
-    try:
-        # Packing is the fastest way into an array; it also counts.
-        return np.frombuffer(struct.pack(f"{n}d", *_LIST.decode(text)))
-    except (msgspec.MsgspecError, ValueError, RecursionError, struct.error):
-        return None
-
-
-def _by_spelling(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
-    """Read natural keys in the manifest's order, block by block; see the module's docstring."""
-    keys, n = manifest.natural_key_text, manifest.n_sequences
-    start, row = text.find(b'"'), 0
-    if keys is None or text[:start].strip(_WHITE_SPACE) != b"{":
-        return None
-    values = np.empty(n)
-    between: bytes | None = None
-    while start < len(text):
-        size = len(text) - start
-        is_last = size <= _BLOCK + MAX_CELL_BYTES
-        if is_last:
-            octets = np.frombuffer(text[start:] + _CELL_PAD, dtype=np.uint8)
-        else:
-            size = _BLOCK
-            octets = np.frombuffer(text, dtype=np.uint8, count=size + MAX_CELL_BYTES, offset=start)
-        quotes = np.flatnonzero(octets[:size] == _QUOTE)
-        # All but the last block end before the key that the next one begins with.
-        n_members = (len(quotes) - (0 if is_last else 1)) // 2
-        if n_members < 1 or row + n_members > n:
-            return None
-        opens, closes = quotes[: 2 * n_members : 2], quotes[1 : 2 * n_members : 2]
-        following = quotes[2 : 2 * n_members + (not is_last) : 2]
-        if between is None and len(following):
-            between = _between(octets[: following[0]].tobytes())
-        if not _follow(octets, following, between) or not keys.is_at(octets, opens, closes, row=row):
-            return None
-        ends = np.append(following, size - 1) if is_last else following
-        part = _numbers_between(octets, closes + 2, ends, is_last=is_last)
-        if part is None:
-            return None
-        values[row : row + n_members] = part
-        start, row = start + (size if is_last else int(ends[-1])), row + n_members
-    return (values, "natural_key") if row == n else None
-
-
-def _between(first: bytes) -> bytes | None:
-    """The comma and the white space at the end of the first member, or None for anything else."""
-    number = first.rstrip(_WHITE_SPACE)
-    between = first[len(number) - 1 :]
-    return between if number[-1:] == b"," and len(between) <= _MAX_BETWEEN else None
-
-
-def _follow(block: Octets, opens: Rows, between: bytes | None) -> bool:
-    """Whether each of these marks follows this comma and white space."""
-    if not len(opens):
-        return True
-    if between is None:
+def _are_separated(buffer: bytearray, octets: NDArray[np.uint8], opens: Rows, *, first_colon: int) -> bool:
+    """Whether the first key follows `{`, and each other one a comma and the same white space."""
+    if buffer[_WORD_BYTES : opens[0]].strip(_WHITE_SPACE) != b"{":
         return False
-    before = enumerate(reversed(between), 1)
-    return all(bool((block[opens - back] == octet).all()) for back, octet in before)
+    if len(opens) == 1:
+        return True
+    number = buffer[first_colon : opens[1]].rstrip(_WHITE_SPACE)
+    between = buffer[first_colon + len(number) - 1 : opens[1]]
+    if not between.startswith(b",") or len(between) > 64:
+        return False
+    return all((octets[opens[1:] - back] == octet).all() for back, octet in enumerate(reversed(between), 1))
 
 
-def _numbers_between(octets: Octets, starts: Rows, ends: Rows, *, is_last: bool) -> Floats | None:
-    """The numbers of members, from behind their colons on; a comma follows each but the last of all."""
-    cells = cells_of(octets, starts, ends - starts, filling=_SPACE)
-    if cells is None:
-        return None
-    last: bytes = cells[-1].tobytes()
-    if not is_last:
-        last = last.rstrip(_WHITE_SPACE).removesuffix(b",")
-    return _numbers(b"".join((b"[", cells[:-1].data, last, b"]")), len(starts))
+def _numbers_in(words: Words) -> Words:
+    """The decimal numbers before the last two bytes of words; words without a number give any number."""
+    other = (words ^ np.uint64(0x303030303030)) & np.uint64(0xF0F0F0F0F0F0)
+    # The last byte that is no digit sets all bits before it.
+    for n_bits in (1, 2, 4, 8, 16, 32):
+        other |= other >> np.uint64(n_bits)
+    x = (words & ~other & np.uint64(0x0F0F0F0F0F0F)) << np.uint64(16)
+    # All digits at once: pairs, then pairs of two digits, then of four. Each product puts high · base + low
+    # into the upper half.
+    x = (x * np.uint64(10 * 2**8 + 1)) >> np.uint64(8)
+    x = ((x & np.uint64(0x00FF00FF00FF00FF)) * np.uint64(100 * 2**16 + 1)) >> np.uint64(16)
+    return ((x & np.uint64(0x0000FFFF0000FFFF)) * np.uint64(10_000 * 2**32 + 1)) >> np.uint64(32)
 
 
 def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None:
@@ -320,15 +220,15 @@ def _by_object(text: bytes, manifest: Manifest) -> tuple[Floats, KeyKind] | None
     if len(members) != n:
         return None
     values = np.fromiter(members.values(), dtype=np.float64, count=n)
-    kinds: tuple[tuple[KeyKind, tuple[str, ...], dict[str, int]], ...] = (
-        ("anno_id", manifest.anno_id_keys, manifest.row_of_id),
-        ("natural_key", manifest.natural_keys, manifest.row_of_natural_key),
-    )
-    for kind, in_order, row_of in kinds:
-        if tuple(members) == in_order:
-            return values, kind
-        if members.keys() == row_of.keys():
-            aligned = np.empty_like(values)
-            aligned[np.fromiter(map(row_of.__getitem__, members), dtype=np.intp, count=n)] = values
-            return aligned, kind
-    return None
+    # A natural key has slashes, an anno_id has none.
+    is_natural = "/" in next(iter(members))
+    kind: KeyKind = "natural_key" if is_natural else "anno_id"
+    if tuple(members) == (manifest.natural_keys if is_natural else manifest.anno_id_keys):
+        return values, kind
+    row_of = manifest.row_of_natural_key if is_natural else manifest.row_of_id
+    rows = np.fromiter(map(row_of.get, members, repeat(-1)), dtype=np.intp, count=n)
+    if rows.min() < 0:
+        return None
+    aligned = np.empty_like(values)
+    aligned[rows] = values
+    return aligned, kind

@@ -51,10 +51,7 @@ Pairs = NDArray[np.intp]
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
-    """What the file and its manifest tell, without any true value.
-
-    `static/check.js` repeats this in the browser, with the same words.
-    """
+    """What the file and its manifest tell, without any true value."""
     manifest, ttc_s = predictions.manifest, predictions.ttc_s
     return [*unit_warnings(ttc_s), *_sign_warnings(manifest, ttc_s), *_order_warnings(manifest, ttc_s)]
 

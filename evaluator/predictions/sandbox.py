@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, forbid_calls, limit, obey_the_parent_alone
+from evaluator.predictions.columns import key_words
 from evaluator.predictions.predictions import read_sent
 from evaluator.problems import Rejected
 from evaluator.truth.truth import Manifest
@@ -24,7 +25,7 @@ def warm_up(manifest: Manifest) -> None:
 
     What the manifest makes of its keys when they are first needed is made, too, once for all files.
     """
-    _ = manifest.key_words, manifest.natural_key_text
+    _ = key_words(manifest), manifest.row_of_natural_key
     for sample in (
         b"{",
         b"[]",

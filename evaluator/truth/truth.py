@@ -13,7 +13,7 @@ change the digest. A column `unit`, where there is one, stands in the manifest, 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -29,7 +29,6 @@ from evaluator.problems import Findings, quoted, reject
 from evaluator.truth.annotation_folders import read_annotations
 from evaluator.truth.csv_tables import UNIT, Table, load_store, read_csv, save_store
 from evaluator.truth.objects import OBJECT_COLUMNS, Objects
-from evaluator.truth.packed_keys import KeyText, KeyWords
 from evaluator.units import Units, units_of
 
 Integers = NDArray[np.int64]
@@ -96,12 +95,9 @@ class Manifest:
     @cached_property
     def natural_keys(self) -> tuple[str, ...]:
         """`bag_stamp/cam_id/ts/track_id` of every target frame."""
-        return tuple(self._each_natural_key())
-
-    def _each_natural_key(self) -> Iterator[str]:
         # A memory view gives one integer after the other, where a list would hold them all.
         columns = zip(self.bag_stamp, self.cam_id, map(str, self.ts_ns.data), self.track_id, strict=True)
-        return map("/".join, columns)
+        return tuple(map("/".join, columns))
 
     @cached_property
     def anno_id_keys(self) -> tuple[str, ...]:
@@ -124,16 +120,6 @@ class Manifest:
     def row_of_natural_key(self) -> dict[str, int]:
         """The row of every natural key."""
         return {key: row for row, key in enumerate(self.natural_keys)}
-
-    @cached_property
-    def key_words(self) -> KeyWords | None:
-        """The anno_ids as the words of a file, where they are short enough."""
-        return KeyWords.of(self.anno_id)
-
-    @cached_property
-    def natural_key_text(self) -> KeyText | None:
-        """The natural keys as the text of a file, where JSON writes them as they are."""
-        return KeyText.of(self._each_natural_key(), n=self.n_sequences)
 
     @cached_property
     def recordings(self) -> tuple[str, ...]:

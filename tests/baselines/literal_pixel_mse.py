@@ -1,7 +1,4 @@
-"""Pixel MSE as the paper words it, one cut box after the other: slow, and plain enough to be believed.
-
-`benchmarks/baselines.py` measures the other searches against these.
-"""
+"""Pixel MSE as the paper words it, one cut box after the other: slow, and plain enough to be believed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pixel MSE on rendered frames; `benchmarks/baselines.py` prints more of this, for 320 sequences."""
+"""Pixel MSE on rendered frames."""
 
 import itertools
 

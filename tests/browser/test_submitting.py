@@ -1,27 +1,19 @@
 """From signing up to the board, in a real browser with a real worker."""
 
-import base64
+import gzip
 import json
 import re
 import sqlite3
 from contextlib import closing
-from dataclasses import asdict
 from pathlib import Path
 
-import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import evaluator
-from evaluator.metrics.scale import Floats
-from evaluator.predictions.plausibility import warnings_of
-from evaluator.predictions.predictions import read_sent
 from tests.browser.chromium import NARROW, tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
 from tests.browser.site import DATABASE, predictions, worker
-from tests.evaluator import faulty_files
-from tests.evaluator.toolkit_folders import driving_folder
-from tests.evaluator.worlds import flat
 from tests.journeys.production import Site, await_that, get
 
 pytestmark = pytest.mark.browser
@@ -157,7 +149,7 @@ def test_a_file_dropped_on_the_form_is_chosen_and_beside_it_is_not_opened(
     expect(page.locator("#chosen")).to_have_text("2 bytes")
     assert page.evaluate("document.querySelector('input[type=file]').files[0].name") == "mine.json"
     expect(page.locator("form.dropping")).to_have_count(0)
-    expect(page.locator("#checked")).to_contain_text("1,200 problems in the file")
+    expect(page.locator("#checked")).to_contain_text("The file has 0 predictions; test expects 1,200")
 
 
 def test_a_file_is_checked_before_it_is_sent_and_what_was_filled_in_stays(
@@ -178,13 +170,15 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
     with page.expect_download() as taken:
         page.get_by_role("link", name="Template of test").click()
     field.set_input_files(taken.value.path())
-    expect(page.locator("#checked li")).to_have_count(1)
-    expect(page.locator("#checked")).to_contain_text("1,200 problems in the file.")
-    expect(page.locator("#checked")).to_contain_text("1,199 more places have this problem: /")
+    expect(page.locator("#checked .bad")).to_have_text(
+        "This is the empty template: 1,200 values to be filled in. The server would reject the file."
+    )
     expect(page.get_by_role("button", name="Submit anyway")).to_be_visible()
     good = {"name": "p.json", "mimeType": "application/json", "buffer": predictions(truth, factor=1.7)}
     field.set_input_files(good)
-    expect(page.locator("#checked")).to_have_text("Checked: 1,200 of 1,200 sequences found. No problems.")
+    expect(page.locator("#checked")).to_have_text(
+        "1,200 predictions, one for each sequence. The server checks them once the file is sent."
+    )
     page.get_by_label("Parameters").fill("25 apples")
     assert "POST" not in sent
     page.get_by_role("button", name="Submit").click()
@@ -197,80 +191,72 @@ def check_and_correct(page: Page, truth: evaluator.GroundTruth) -> None:
     page.wait_for_url("**/submissions/*/")
 
 
-CHECK = """async ([checker, manifest, files]) => {
-  const worker = new Worker(checker);
-  const answers = {};
-  for (const [name, encoded] of Object.entries(files)) {
-    const file = new File([Uint8Array.from(atob(encoded), (c) => c.charCodeAt(0))], "p.json");
-    const answer = new Promise((resolve) => worker.addEventListener("message", resolve, {once: true}));
-    worker.postMessage({id: 1, manifest, file});
-    const {data} = await answer;
-    const {n_problems, problems, warnings} = data;
-    answers[name] = data.failed ?? {n_problems, problems, warnings};
-  }
-  worker.terminate();
-  return answers;
+LEFT_TO_THE_SERVER = "The server checks this file once it is sent."
+REJECTED = "The server would reject the file."
+ANOTHER_NUMBER = "test expects 1,200, one for each sequence. The server would reject the file."
+ONE_LESS = json.dumps({str(row): 2.5 for row in range(1_199)}).encode()
+SENTENCES: dict[str, tuple[bytes, str]] = {
+    "nothing": (b" ", f"The file is empty; expected JSON text with a number for every sequence. {REJECTED}"),
+    "a cut text": (b'{"0": 1,\n"1": ', f"The text is not JSON. {REJECTED}"),
+    "a text with a fault in it": (b'{"0": 1,\n"1" 2}', f"The text is not JSON: line 2, column 5. {REJECTED}"),
+    "a picture": (b"\x89PNG\r\n\x1a\n", f"The text is not JSON. {REJECTED}"),
+    "a list": (
+        b"[1, 2]",
+        f"The file has 0 predictions; {ANOTHER_NUMBER}",
+    ),
+    "an envelope": (
+        b'{"unit": "ttc", "predictions": {"0": 1}}',
+        f"The file has 1 prediction; {ANOTHER_NUMBER}",
+    ),
+    "one too few": (
+        ONE_LESS,
+        f"The file has 1,199 predictions; {ANOTHER_NUMBER}",
+    ),
+    "not a number": (ONE_LESS.replace(b"2.5", b"NaN"), LEFT_TO_THE_SERVER),
+    "a table": (b"anno_id,ttc\n0,2.5\n", LEFT_TO_THE_SERVER),
+    "an archive": (gzip.compress(ONE_LESS), LEFT_TO_THE_SERVER),
+}
+
+
+def test_a_file_that_cannot_be_good_is_named_before_it_is_sent(
+    page: Page, site: Site, truth: evaluator.GroundTruth
+) -> None:
+    sign_up(page, email="sentences@example.org", name="Sentences")
+    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    for data, sentence in SENTENCES.values():
+        chosen = {"name": "p.json", "mimeType": "application/json", "buffer": data}
+        page.get_by_label("Prediction file").set_input_files(chosen)
+        expect(page.locator("#checked")).to_have_text(sentence)
+        label = "Submit" if sentence == LEFT_TO_THE_SERVER else "Submit anyway"
+        expect(page.locator(".actions button")).to_have_text(label)
+
+
+SLOW_READING = """() => {
+  const read = Blob.prototype.text;
+  const allowed = new Promise((resolve) => (window.readOn = resolve));
+  Blob.prototype.text = async function () { await allowed; return read.call(this); };
 }"""
 
 
-def answer_of(data: bytes, manifest: evaluator.Manifest) -> dict[str, object]:
-    try:
-        found = read_sent(data, manifest=manifest)  # as the server, which reads no Parquet
-    except evaluator.Rejected as rejected:
-        return {**rejected.as_dict(), "warnings": []}
-    return {"n_problems": 0, "problems": [], "warnings": [asdict(each) for each in warnings_of(found)]}
-
-
-def told_in_the_browser(
-    page: Page, site: Site, files: dict[str, bytes], manifest: evaluator.Manifest
-) -> dict[str, object]:
-    """What the browser says of these files."""
-    page.route("**/manifest-of-the-test", lambda route: route.fulfill(body=manifest.to_csv()))
-    static = Path(site.environment["TSTTC_STATIC_ROOT"])
-    checker = json.loads((static / "staticfiles.json").read_text())["paths"]["check.js"]
-    encoded = {name: base64.b64encode(data).decode() for name, data in files.items()}
-    told = page.evaluate(CHECK, [f"/static/{checker}", "/manifest-of-the-test", encoded])
-    page.unroute("**/manifest-of-the-test")
-    return dict(told)
-
-
-def test_the_check_in_the_browser_has_the_codes_and_words_of_the_server(page: Page, site: Site) -> None:
-    files = {name: case[0] for name, case in faulty_files.CASES.items()} | faulty_files.FURTHER
-    page.goto("/docs/")
-    told = told_in_the_browser(page, site, files, faulty_files.MANIFEST)
-    assert told == {name: answer_of(data, faulty_files.MANIFEST) for name, data in files.items()}
-
-
-def test_the_check_in_the_browser_warns_as_the_server_does(page: Page, site: Site, tmp_path: Path) -> None:
-    truth = evaluator.read_truth(driving_folder(tmp_path / "annotations"))
-    keys, ttc_s = truth.manifest.anno_id_keys, truth.ttc_s
-    shuffled = np.random.default_rng(3).permutation(ttc_s)
-
-    def envelope(values: Floats) -> bytes:
-        ratios = dict(zip(keys, (1 / (1 + 1 / (10 * values))).tolist(), strict=True))
-        return json.dumps({"unit": "scale_ratio", "fps": 10, "predictions": ratios}).encode()
-
-    files = {
-        "good": flat(dict(zip(keys, ttc_s.tolist(), strict=True))),
-        "all the same": flat(dict.fromkeys(keys, 5.0)),
-        "few values": flat(dict(zip(keys, np.sign(shuffled).tolist(), strict=True))),
-        "shuffled": flat(dict(zip(keys, shuffled.tolist(), strict=True))),
-        "shuffled, by natural key": flat(
-            dict(zip(truth.manifest.natural_keys, shuffled.tolist(), strict=True))
-        ),
-        "milliseconds": flat(dict(zip(keys, (1000 * ttc_s).tolist(), strict=True))),
-        "no unit": flat(dict(zip(keys, np.clip(np.abs(ttc_s) / 4, 0.5, 1.5).tolist(), strict=True))),
-        "flipped": flat(dict(zip(keys, (truth.manifest.ts_ns % 10**10 / 1.1e9).tolist(), strict=True))),
-        "ratios": envelope(ttc_s),
-        "shuffled ratios": envelope(shuffled),
-    }
-    page.goto("/docs/")
-    expected = {name: answer_of(data, truth.manifest) for name, data in files.items()}
-    assert [name for name, answer in expected.items() if answer["warnings"]] == [
-        *("few values", "shuffled", "shuffled, by natural key", "milliseconds", "no unit", "flipped"),
-        "shuffled ratios",
-    ]
-    assert told_in_the_browser(page, site, files, truth.manifest) == expected
+def test_a_warning_that_comes_after_submit_was_pressed_gets_the_focus(
+    page: Page, site: Site, truth: evaluator.GroundTruth
+) -> None:
+    sign_up(page, email="focus@example.org", name="Focus")
+    sent: list[str] = []
+    page.on("request", lambda request: sent.append(request.method))
+    page.get_by_role("radio", name=re.compile(r"^test\b")).check()
+    page.get_by_label("Method", exact=True).fill("Pressed early")
+    page.evaluate(SLOW_READING)
+    chosen = {"name": "p.json", "mimeType": "application/json", "buffer": ONE_LESS}
+    page.get_by_label("Prediction file").set_input_files(chosen)
+    page.get_by_role("button", name="Submit").click()
+    expect(page.locator("#checked")).to_have_text("Checking the file…")
+    page.evaluate("window.readOn()")
+    expect(page.locator("#checked")).to_be_focused()
+    expect(page.locator("#checked .bad")).to_contain_text("1,199 predictions")
+    assert "POST" not in sent
+    page.get_by_role("button", name="Submit anyway").click()
+    page.wait_for_url("**/submissions/*/")
 
 
 def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
@@ -342,9 +328,11 @@ def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: eva
     field = page.get_by_label("Prediction file")
     page.get_by_label("Method", exact=True).fill("Large")
     field.set_input_files({"name": "p.json", "mimeType": "application/json", "buffer": b"1" * 250_000})
+    sentence = f"The file has 250,000 bytes; expected at most {MAX_PREDICTIONS_BYTES:,} (0.2 MB)."
+    expect(page.locator("#checked .bad")).to_have_text(sentence)
     page.get_by_role("button", name="Submit").click()
-    said = field.evaluate("e => e.validationMessage")
-    assert said == f"The file has 250,000 bytes; expected at most {MAX_PREDICTIONS_BYTES:,} (0.2 MB)."
+    assert field.evaluate("e => e.validationMessage") == sentence
+    expect(page.locator("#checked .bad")).to_be_visible()
     assert "POST" not in sent
 
 

@@ -358,4 +358,4 @@ FURTHER: dict[str, bytes] = {
     "an endless rate": b'{"unit": "scale_ratio", "fps": 1e999, "predictions": {}}',
     "a unit as number": b'{"unit": 1.50, "predictions": {}}',
 }
-"""More files, good and bad: what reads prediction files elsewhere says of each what the evaluator says."""
+"""More files, good and bad; the fast and the strict reading agree on each."""

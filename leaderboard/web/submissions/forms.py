@@ -37,7 +37,7 @@ def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
     team = teams.current_team_of(user=user)
     return [
         _offer(split, team=team, user=user, now=now)
-        for split in Split.objects.shown().select_related("published_edition")
+        for split in Split.objects.shown().select_related("published_edition__ground_truth")
     ]
 
 

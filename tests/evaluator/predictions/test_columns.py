@@ -14,12 +14,14 @@ from evaluator.metrics.scale import Floats
 from evaluator.predictions import columns
 from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
+from tests.evaluator.faulty_files import CASES, FURTHER, MANIFEST
 from tests.evaluator.worlds import envelope, flat, make_truth
 
 SMALL = make_truth([4.0, -10.0, 1.0]).manifest
 WIDE = make_truth([4.0] * 7, anno_ids=[5, 42, 999, 1_000, 65_536, 999_999, 100_000]).manifest
+FIVE_DIGITS = make_truth([4.0] * 5, anno_ids=[0, 7, 10_000, 99_999, 65_536]).manifest
 HUGE = make_truth([4.0] * 3, anno_ids=[0, 1_000_000, 2**63 - 1]).manifest
-MANIFESTS = [SMALL, WIDE, HUGE]
+MANIFESTS = [SMALL, FIVE_DIGITS, WIDE, HUGE]
 
 
 def reading(data: bytes, manifest: Manifest) -> object:
@@ -199,22 +201,9 @@ def natural_files(draw: st.DrawFn) -> bytes:
 
 @pytest.mark.slow
 @settings(max_examples=200)
-@given(data=natural_files(), block=st.sampled_from([40, 64, 100, 250, 1_000, 1 << 19]))
-def test_natural_keys_read_the_same_both_ways_in_blocks_of_any_size(data: bytes, block: int) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(columns, "_BLOCK", block)
-        assert_equivalent(data, LONG)
-
-
-def test_natural_keys_in_order_need_no_dictionary(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(columns, "_OBJECT", None)
-    for separators in ((",", ":"), (", ", ": "), (",\n", ": ")):
-        data = json.dumps(dict.fromkeys(LONG.natural_keys, 2.5), separators=separators).encode()
-        for block in (128, 1 << 19):
-            monkeypatch.setattr(columns, "_BLOCK", block)
-            assert_equivalent(data, LONG, by_columns=True)
-    data = json.dumps({"unit": "ttc", "predictions": dict.fromkeys(LONG.natural_keys, 2.5)}).encode()
-    assert_equivalent(data, LONG, by_columns=True)
+@given(data=natural_files())
+def test_natural_keys_in_order_read_the_same_both_ways(data: bytes) -> None:
+    assert_equivalent(data, LONG)
 
 
 @pytest.mark.parametrize("n_characters", [113, 114, 200])
@@ -308,6 +297,11 @@ def test_no_bytes_raise_anything_but_a_rejection(data: bytes) -> None:
         assert np.abs(outcome).min() > 0
 
 
+@pytest.mark.parametrize("name", [*CASES, *FURTHER])
+def test_the_known_files_read_the_same_both_ways(name: str) -> None:
+    assert_equivalent(FURTHER[name] if name in FURTHER else CASES[name][0], MANIFEST)
+
+
 # --- which way is taken ----------------------------------------------------------------------------------
 
 
@@ -338,31 +332,40 @@ def test_many_sequences_in_any_order_read_the_same_both_ways() -> None:
         assert read_predictions(data, manifest=manifest).ttc_s[order].tolist() == values.tolist()
 
 
-@pytest.mark.parametrize("size", [1, 2, 7, 64])
-def test_keys_read_part_by_part_read_the_same_both_ways(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(columns, "_STRETCH", 11 * size)
-    monkeypatch.setattr(columns, "_KEYS", size)
-    monkeypatch.setattr(columns, "_NUMBERS", size)
-    for manifest in (LONG, WIDE):
-        n = manifest.n_sequences
-        last_two_swapped = [*range(n - 2), n - 1, n - 2]
-        for order in (range(n), last_two_swapped, [*range(n)[::-1]]):
-            members = {manifest.anno_id_keys[row]: row + 0.25 for row in order}
-            for separators in ((",", ":"), (", ", ": "), (",\n    ", ": ")):
-                data = json.dumps(members, separators=separators)
-                assert_equivalent(data.encode(), manifest, by_columns=True)
-                assert_equivalent(data.replace(".25,", ".25 ,").encode(), manifest)
-                for key in manifest.anno_id_keys[-3:]:
-                    doubled = data.replace(f'"{key}"', f'"{manifest.anno_id_keys[0]}"')
-                    assert_equivalent(doubled.encode(), manifest)
-                    assert read_column(doubled.encode(), manifest) is None
+@pytest.mark.parametrize("manifest", [LONG, WIDE])
+@pytest.mark.parametrize("separators", [(",", ":"), (", ", ": "), (",\n    ", ": ")])
+def test_a_doubled_key_is_seen_in_any_order(manifest: Manifest, separators: tuple[str, str]) -> None:
+    n = manifest.n_sequences
+    last_two_swapped = [*range(n - 2), n - 1, n - 2]
+    for order in (range(n), last_two_swapped, [*range(n)[::-1]]):
+        members = {manifest.anno_id_keys[row]: row + 0.25 for row in order}
+        data = json.dumps(members, separators=separators)
+        assert_equivalent(data.encode(), manifest, by_columns=True)
+        assert_equivalent(data.replace(".25,", ".25 ,").encode(), manifest)
+        for key in manifest.anno_id_keys[-3:]:
+            doubled = data.replace(f'"{key}"', f'"{manifest.anno_id_keys[0]}"')
+            assert_equivalent(doubled.encode(), manifest)
+            assert read_column(doubled.encode(), manifest) is None
 
 
-def test_a_key_of_six_digits_needs_its_first_quotation_mark() -> None:
-    data = json.dumps(dict.fromkeys(WIDE.anno_id_keys, 2.5))
-    assert_equivalent(data.encode(), WIDE, by_columns=True)
-    for faulty in (data.replace('"999999"', '5999999"'), data.replace('"999999"', ' 999999"')):
-        assert read_column(faulty.encode(), WIDE) is None
+def test_short_anno_ids_need_no_dictionary(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(columns, "_OBJECT", None)
+    for manifest in (LONG, FIVE_DIGITS):
+        for keys in (manifest.anno_id_keys, manifest.anno_id_keys[::-1]):
+            for separators in ((",", ":"), (", ", ": "), (",\n", ": ")):
+                data = json.dumps(dict.fromkeys(keys, 2.5), separators=separators).encode()
+                assert_equivalent(data, manifest, by_columns=True)
+            data = json.dumps({"unit": "ttc", "predictions": dict.fromkeys(keys, 2.5)}).encode()
+            assert_equivalent(data, manifest, by_columns=True)
+
+
+@pytest.mark.parametrize("manifest", [WIDE, FIVE_DIGITS])
+def test_a_key_needs_its_first_quotation_mark(manifest: Manifest) -> None:
+    data = json.dumps(dict.fromkeys(manifest.anno_id_keys, 2.5))
+    assert_equivalent(data.encode(), manifest, by_columns=True)
+    key = manifest.anno_id_keys[-1]
+    for faulty in (data.replace(f'"{key}"', f'5{key}"'), data.replace(f'"{key}"', f' {key}"')):
+        assert read_column(faulty.encode(), manifest) is None
 
 
 @pytest.mark.parametrize("n_spaces", [0, 63, 64, 10_000])

@@ -3,6 +3,7 @@
 import json
 import math
 import sys
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -179,3 +180,17 @@ def test_a_place_in_the_file_is_a_json_pointer(manifest: Manifest, name: str, tm
     data = envelope(members, unit="ttc") if name == "envelope" else flat(json.loads(json.dumps(members)))
     expected = {"flat": "/1", "envelope": "/predictions/1", "natural": "/0000~11~1600000000~11"}
     assert read_predictions(data, manifest=manifest).where(1) == expected[name]
+
+
+@pytest.mark.parametrize("natural", [False, True])
+def test_a_file_is_read_in_at_most_ten_times_its_size(natural: bool) -> None:
+    manifest = make_truth([4.0] * 5_000).manifest
+    keys = manifest.natural_keys if natural else manifest.anno_id_keys
+    data = flat(dict(zip(keys, np.random.default_rng(1).normal(0, 10, len(keys)).tolist(), strict=True)))
+    tracemalloc.start()
+    try:
+        read_predictions(data, manifest=manifest)
+        _, peak_bytes = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak_bytes < 10 * len(data)

@@ -2,4 +2,4 @@
 
 from leaderboard.settings import *  # noqa: F403
 
-ROOT_URLCONF = "benchmarks._board_urls"
+ROOT_URLCONF = "benchmarks._urls"
