@@ -24,6 +24,7 @@ GROUND_TRUTH_CODES: Final = frozenset(
         "duplicate-natural-keys",
         "truth-not-finite",
         "truth-near-zero",
+        "two-units",
         "bad-digest",
         "forbidden-pickle",
         "bad-annotations",

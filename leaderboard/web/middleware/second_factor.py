@@ -47,7 +47,8 @@ class SecondFactorMiddleware:
         self, request: HttpRequest, view: Callable[..., Any], args: tuple[Any, ...], kwargs: dict[str, Any]
     ) -> HttpResponseBase | None:
         """Redirect, or let the view answer."""
-        if not request.user.is_authenticated or not _is_guarded(request):
+        # The user is asked for last: a probe with a session cookie must not need the database.
+        if not _is_guarded(request) or not request.user.is_authenticated:
             return None
         step = _missing_step(request, request.user)
         if not step:

@@ -316,5 +316,5 @@ def test_two_files_are_compared_with_what_their_difference_rests_on(tsttc: Tsttc
     )
     assert words in said.stdout.splitlines(), "of five recordings no p is below 0.05"
     told = json.loads(tsttc("compare", near, far, "--truth", truth, "--json").stdout)["differences"]
-    assert told["mid"]["influence"] == {"n_recordings": 20, "n_to_undecided": 15, "n_to_turn": None}
+    assert told["mid"]["influence"] == {"n_units": 20, "n_to_undecided": 15, "n_to_turn": None}
     assert told["rte"]["influence"] is None

@@ -142,7 +142,7 @@ def test_a_team_of_one_comes_along_with_its_methods(
     edition: Edition, owner: User, stranger: User, team: Team
 ) -> None:
     builders.submit(owner, builders.predictions(edition, factor=1.2), method="Foo")
-    sent = builders.submit(stranger, builders.predictions(edition), method="fοo")
+    sent = builders.submit(stranger, builders.predictions(edition), method="fοo", visibility="ANONYMOUS")
     hidden = builders.submit(
         stranger, builders.predictions(edition, factor=1.3), method="Bar", visibility="PRIVATE"
     )

@@ -38,7 +38,8 @@ def test_withdrawn_bytes_may_be_sent_again(edition: Edition, owner: User) -> Non
 
 def test_strangers_may_use_the_same_method_name(edition: Edition, owner: User, stranger: User) -> None:
     data = builders.predictions(edition)
-    assert builders.submit(owner, data).method != builders.submit(stranger, data).method
+    theirs = builders.submit(stranger, data, visibility="PRIVATE").method
+    assert builders.submit(owner, data).method != theirs
 
 
 def test_somebody_without_a_name_gets_a_team_that_reveals_no_address(edition: Edition, db: None) -> None:
@@ -50,8 +51,8 @@ def test_somebody_without_a_name_gets_a_team_that_reveals_no_address(edition: Ed
 def test_two_people_of_one_name_are_two_teams(edition: Edition, owner: User) -> None:
     namesake = User.objects.create_user("other@example.org", "correct horse", name=owner.name)
     data = builders.predictions(edition)
-    teams = {builders.submit(owner, data).method.team.name, builders.submit(namesake, data).method.team.name}
-    assert teams == {"Owls", "Owls 2"}
+    sent = [builders.submit(owner, data), builders.submit(namesake, data, visibility="PRIVATE")]
+    assert {each.method.team.name for each in sent} == {"Owls", "Owls 2"}
 
 
 def test_what_is_said_of_a_method_later_replaces_what_was_said(edition: Edition, owner: User) -> None:
