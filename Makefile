@@ -23,7 +23,7 @@ SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-runs test test-fast chaos sabotage bench lint format screenshots lock echarts clean
+.PHONY: help demo demo-runs test test-fast chaos bench lint format screenshots lock echarts clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -34,7 +34,7 @@ demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (
 demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew from rendered frames (RUNS="tracking pixel-mse" for some)
 	nice -n 10 $(PY) -m leaderboard.demo.make_runs --jobs 2 $(if $(RUNS),--only $(RUNS))
 
-test: $(DEV_STAMP) ## the whole test suite; parts that lack a service say so
+test: lint ## lint, then the whole test suite; parts that lack a service say so
 	@$(PY) -m tests.everything
 
 test-fast: $(DEV_STAMP) ## what takes about a minute: no services, no browser, nothing slow
@@ -43,17 +43,15 @@ test-fast: $(DEV_STAMP) ## what takes about a minute: no services, no browser, n
 chaos: $(DEV_STAMP) ## 200 uploads while everything that can fail does; says what was lost, doubled or stuck
 	@$(PY) -m tests.chaos
 
-sabotage: $(DEV_STAMP) ## break one line of the code at a time; a named test must notice each
-	@$(PY) -m tests.sabotage
-
 bench: $(DEV_STAMP) ## measure the figures of docs/capacity.md, and say which hold
 	@$(PY) -m benchmarks
 
-lint: $(DEV_STAMP) ## style, types and the direction of imports
+lint: $(DEV_STAMP) ## style, types, the direction of imports, and a migration for every change of a table
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy .
 	$(VENV)/bin/lint-imports
+	$(PY) manage.py makemigrations --check --dry-run
 
 format: $(DEV_STAMP) ## put the code into the house's format
 	$(PY) -m ruff check --fix .

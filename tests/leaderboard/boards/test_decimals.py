@@ -1,7 +1,6 @@
 """Published decimals: a policy of the split, frozen in each edition, the same in every form."""
 
 import csv
-import importlib
 import io
 import json
 import re
@@ -9,7 +8,6 @@ from pathlib import Path
 
 import jwt
 import pytest
-from django.apps import apps
 from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
@@ -30,14 +28,6 @@ def open_again(*, decimals: int) -> Edition:
 
 
 def test_hidden_splits_publish_one_decimal_and_open_ones_two(benchmark: None) -> None:
-    assert dict(Split.objects.values_list("name", "decimals")) == {"test": 1, "val": 2, "demo": 2}
-
-
-def test_what_was_published_before_keeps_its_two_decimals(edition: Edition) -> None:
-    migration = importlib.import_module("leaderboard.migrations.0016_decimals_of_editions")
-    Split.objects.update(decimals=1)
-    migration.keep_what_was_published(apps, None)
-    assert Edition.objects.get().decimals == 2
     assert dict(Split.objects.values_list("name", "decimals")) == {"test": 1, "val": 2, "demo": 2}
 
 
