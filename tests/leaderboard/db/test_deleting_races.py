@@ -20,6 +20,8 @@ N_ROUNDS = 12
 def signed_in(user: User) -> Client:
     client = Client(raise_request_exception=False)
     client.force_login(user)
+    # An open session alone deletes no account.
+    client.post("/accounts/reauthenticate/", {"password": "correct horse", "next": "/account/data/"})
     return client
 
 

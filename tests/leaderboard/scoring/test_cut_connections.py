@@ -117,8 +117,11 @@ def test_first_submission_of_a_newcomer_survives_every_cut(proxy: CuttingProxy, 
         number = next(numbers)
         newcomers.append(User.objects.create(email=f"n{number}@example.org", name=f"Newcomer {number}"))
 
-    for _ in every_cut(proxy, lambda: builders.submit(newcomers[-1], data), prepare=prepare):
-        again = builders.submit(newcomers[-1], data)
+    def send() -> Submission:
+        return builders.submit(newcomers[-1], data, visibility="PRIVATE")
+
+    for _ in every_cut(proxy, send, prepare=prepare):
+        again = send()
         assert list(Submission.objects.filter(submitted_by=newcomers[-1])) == [again]
         assert list(again.method.team.members.all()) == [newcomers[-1]]
 
