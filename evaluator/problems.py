@@ -62,7 +62,7 @@ PROBLEM_CODES: Final[dict[str, str]] = {
     "truth-not-finite": "A true time to contact is NaN or infinite.",
     "two-units": "A recording has two units; a unit, as a day, holds whole recordings.",
     "truth-near-zero": "A true time to contact lies where the errors are undefined (−0.1 ≤ τ ≤ 0, or "
-    "|τ| < 1e-200).",
+    "closer to 0 than 1e-200).",
     "no-overlap": "A correction has no sequence of the ground truth that it is to correct.",
     "bad-digest": "The content of a saved file does not match the digest stored in it.",
     "forbidden-pickle": "A pickle asks for something other than plain containers, numbers and arrays.",
