@@ -111,9 +111,10 @@ def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User 
             field="announcement_ends_at",
         )
     with transaction.atomic():
-        SiteAnnouncement.objects.all().delete()
-        if ends_at is not None:
-            SiteAnnouncement.objects.create(text=text, ends_at=ends_at)
+        if ends_at is None:
+            SiteAnnouncement.objects.all().delete()
+        else:
+            SiteAnnouncement.objects.update_or_create(pk=1, defaults={"text": text, "ends_at": ends_at})
         audit.record(
             verb="announced",
             noun="SiteAnnouncement",

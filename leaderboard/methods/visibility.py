@@ -154,9 +154,14 @@ def _require_name_of_its_own(method: Method) -> None:
 
 
 def _number_taken_name(method: Method) -> None:
-    """Add a number to the name of a method that becomes public by itself, where the name is taken."""
+    """Add a number to the name of a method that becomes public by itself, where the name is taken.
+
+    The new name is not that of another method of the team either: nobody is there to choose one.
+    """
     before, number = method.name, 1
-    while _public_twin(method.name, but=method):
+    own = Method.objects.existing().filter(team=method.team_id).exclude(pk=method.pk)
+    names_of_team = list(own.values_list("name", flat=True))
+    while _public_twin(method.name, but=method) or confusable_with(method.name, names_of_team):
         number += 1
         method.name = f"{before[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
     if number > 1:

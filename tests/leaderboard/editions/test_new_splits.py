@@ -133,9 +133,7 @@ def test_new_split_on_hidden_values_starts_off_the_pages_with_the_quota_of_the_t
     assert quota == (3, timedelta(days=30), timedelta(hours=24), 20)
     assert winter.listing == "OFF"
     for address in ("/", "/board/test/", "/docs/", "/compare/", "/api/v1/splits", "/sitemap.xml"):
-        assert b"inter" not in Client().get(address).content.replace(b"interval", b"").replace(
-            b"Winterthur", b""
-        )
+        assert b"winter" not in Client().get(address).content.lower(), address
 
 
 def test_an_empty_limit_of_a_new_split_is_no_limit(keeper: Client, benchmark: None) -> None:

@@ -377,9 +377,11 @@ def test_taken_name_gets_a_number_where_a_method_becomes_public_by_itself(
     now = timezone.now()
     change(method, Visibility.ANONYMOUS, owner, reveal_at=now + timedelta(days=1))
     Method.objects.filter(pk=method.pk).update(name="Deep Scale")
+    # The team has the next name itself: a second one would stop every later sweep.
+    Method.objects.create(team=method.team, name="Deep Scale 2")
     assert visibility.reveal_due(now=now + timedelta(days=2)) == 1
     method.refresh_from_db()
-    assert (method.name, method.visibility) == ("Deep Scale 2", Visibility.PUBLIC)
+    assert (method.name, method.visibility) == ("Deep Scale 3", Visibility.PUBLIC)
     renamed = AuditEvent.objects.get(verb="renamed", noun_id=str(method.pk))
     assert renamed.details["reason"] == "another method used this name on the boards first"
 
