@@ -23,7 +23,7 @@ SPREAD := -n auto --dist loadfile --no-loadscope-reorder
 # So numpy has no threads of its own, which would only wait for each other. It reads this when it is imported.
 export OPENBLAS_NUM_THREADS := 1
 
-.PHONY: help demo demo-runs test test-fast chaos bench lint format screenshots lock echarts clean
+.PHONY: help demo demo-runs test test-fast chaos bench lint format screenshots release lock echarts clean
 
 help: ## list what can be made
 	@awk -F ' ## ' '/^[a-z-]+:.* ## / { sub(/:.*/, "", $$1); printf "make %-12s %s\n", $$1, $$2 }' $(MAKEFILE_LIST)
@@ -59,6 +59,9 @@ format: $(DEV_STAMP) ## put the code into the house's format
 
 screenshots: $(DEV_STAMP) ## photograph every page (INTO=build/screenshots), and renew docs/screenshots/
 	$(PY) -m tests.browser.screenshots --keep $(if $(INTO),--into $(INTO))
+
+release: ## build wheel and sdist of REF (default HEAD), check them as their users will, print the digests
+	@deploy/release.sh $(REF)
 
 # Universal: one file for every platform and Python; hashes, and no index host. Existing pins stay unless
 # `make lock UPGRADE=--upgrade` asks for newer ones.

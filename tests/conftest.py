@@ -46,13 +46,9 @@ def pytest_configure() -> None:
     prepared.begin()
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """See `tests/spread.py`; `python -m tests.on_postgresql` repeats only what asks a database."""
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """See `tests/spread.py`."""
     spread.sort(items)
-    if os.environ.get("TSTTC_DATABASE_ALONE") == "1":
-        others = spread.without_database(items)
-        config.hook.pytest_deselected(items=others)
-        items[:] = [item for item in items if item not in set(others)]
 
 
 def pytest_collection_finish() -> None:

@@ -38,7 +38,7 @@ ON_POSTGRESQL = [
     pytest.mark.services,
     pytest.mark.django_db(transaction=True),
     pytest.mark.skipif(
-        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
+        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.everything"
     ),
 ]
 

@@ -4,7 +4,6 @@ Otherwise a file of one test that takes a minute is begun last, and the other pr
 """
 
 from collections import Counter
-from collections.abc import Sequence
 
 import pytest
 
@@ -38,11 +37,6 @@ def asks_database(item: pytest.Item) -> bool:
     """Whether the test may ask a database."""
     names = {"db", "transactional_db", "live_server"} & set(getattr(item, "fixturenames", ()))
     return bool(names) or item.get_closest_marker("django_db") is not None
-
-
-def without_database(items: Sequence[pytest.Item]) -> list[pytest.Item]:
-    """Tests that ask no database, so another one changes nothing for them."""
-    return [item for item in items if not asks_database(item)]
 
 
 def _file_of(item: pytest.Item) -> str:

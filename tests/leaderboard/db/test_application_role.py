@@ -20,7 +20,7 @@ from tests import builders
 from tests.editions import corrected, open_edition, publish
 
 POSTGRESQL_ONLY = pytest.mark.skipif(
-    "connection.vendor != 'postgresql'", reason="runs with: python -m tests.on_postgresql"
+    "connection.vendor != 'postgresql'", reason="runs with: python -m tests.everything"
 )
 
 

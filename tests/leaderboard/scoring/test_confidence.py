@@ -311,7 +311,7 @@ def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submissio
 
 def test_only_one_worker_at_a_time_is_at_an_edition(entries: list[Submission], edition: Edition) -> None:
     if connection.vendor != "postgresql":
-        pytest.skip("SQLite's workers are one; `python -m tests.on_postgresql` runs this")
+        pytest.skip("SQLite's workers are one; `python -m tests.everything` runs this")
     edition.refresh_from_db()
     other = connection.copy()
     try:

@@ -23,7 +23,7 @@ pytestmark = [
     pytest.mark.django_db(transaction=True),
     pytest.mark.skipif(
         connection.vendor != "postgresql",
-        reason="SQLite has no connection to cut; `python -m tests.on_postgresql` runs this",
+        reason="SQLite has no connection to cut; `python -m tests.everything` runs this",
     ),
 ]
 

@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.django_db(transaction=True),
     pytest.mark.skipif(
         connection.vendor != "postgresql",
-        reason="SQLite in memory has one connection for all; `python -m tests.on_postgresql` runs this",
+        reason="SQLite in memory has one connection for all; `python -m tests.everything` runs this",
     ),
 ]
 
