@@ -55,7 +55,7 @@ note "the demo of $ref"
 (cd "$work/source" && exec make demo PORT="$port") >"$work/demo.log" 2>&1 &
 demo=$!
 for ((tries = 0; tries < 300; tries++)); do
-    curl --silent --fail --output "$work/page.html" "http://127.0.0.1:$port/boards/demo/" && break
+    curl --silent --fail --output "$work/page.html" "http://127.0.0.1:$port/board/demo/" && break
     kill -0 "$demo" 2>/dev/null || { cat "$work/demo.log" >&2; fail "the demo ended"; }
     sleep 1
 done
