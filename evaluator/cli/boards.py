@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import exports, suggestions
+from evaluator.cli import exports
 from evaluator.cli.connection import connect
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
 from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
@@ -23,11 +23,10 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Show the ranked results of a split.")
-@click.argument("split", default="test", callback=slug, shell_complete=suggestions.splits)
+@click.argument("split", default="test", callback=slug)
 @default_option(
     "--sort",
     callback=sendable,
-    shell_complete=suggestions.columns,
     default="rank",
     metavar="COLUMN",
     help=f"Sort by rank, method, team, date, {', '.join(known_names())}; -COLUMN for the reverse.",

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
@@ -271,6 +270,5 @@ def worse_than_options(command: Command) -> Command:
         "--fail-if-worse-than",
         "worse_than",
         metavar="METHOD",
-        shell_complete=suggestions.rows,
         help=f"Exit with code 6 if {short_name(PRIMARY)} is higher than that of this method on the board.",
     )(command)

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -117,13 +116,11 @@ def _standing(board: Board, method_id: str) -> str:
 @click.option(
     "--split",
     callback=lambda c, p, value: value and slug(c, p, value),
-    shell_complete=suggestions.splits,
     help="Only this split.",
 )
 @click.option(
     "--method",
     callback=sendable,
-    shell_complete=suggestions.methods,
     help="Only this method, by name or id.",
 )
 @default_option(

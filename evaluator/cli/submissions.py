@@ -11,7 +11,7 @@ from urllib.parse import urljoin
 
 import click
 
-from evaluator.cli import gates, suggestions
+from evaluator.cli import gates
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
@@ -43,13 +43,11 @@ if TYPE_CHECKING:
     "--split",
     required=True,
     callback=slug,
-    shell_complete=suggestions.splits,
     help="The split: val, test, …",
 )
 @click.option(
     "--method",
     callback=sendable,
-    shell_complete=suggestions.methods,
     required=True,
     help="Name or id of the method; a new name creates a new method.",
 )

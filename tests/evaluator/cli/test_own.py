@@ -9,10 +9,8 @@ import sys
 from pathlib import Path
 
 import pytest
-from click.shell_completion import ShellComplete
 
 from evaluator import read_manifest, read_truth
-from evaluator.cli import main
 from evaluator.cli.following import signs_of_life
 from tests.evaluator.cli.console import ID, METHOD_ID, REJECTED_ID
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
@@ -144,29 +142,6 @@ def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> Non
     site.put(f"GET /api/v1/submissions/{ID}", Reply(gone))
     assert "SCORED, withdrawn" in tsttc("submissions").stdout
     assert tsttc("status", ID).stdout.startswith("SCORED, withdrawn: Foo++ on val\n")
-
-
-def suggested(*words: str) -> list[str]:
-    """What a shell would offer for the last of these words."""
-    found = ShellComplete(main, {}, "tsttc", "_TSTTC_COMPLETE").get_completions(list(words[:-1]), words[-1])
-    return [item.value for item in found]
-
-
-def test_a_shell_completes_splits_and_one_s_own_methods(site: RecordedSite) -> None:
-    site.put("GET /api/v1/methods", Reply([{"id": METHOD_ID, "name": "Foo++"}, {"id": ID, "name": "Bar"}]))
-    assert suggested("submit", "x.json", "--split", "") == ["val"]
-    assert suggested("submit", "x.json", "--split", "t") == []
-    assert suggested("submit", "x.json", "--method", "F") == ["Foo++"]
-    assert suggested("publish", "") == ["Foo++", "Bar"]
-    assert suggested("quota", "v") == ["val"]
-    assert suggested("board", "--sort", "rte_c") == ["rte_crucial"]
-    entry = {"method": "Deep Scale", "scores": {}}
-    site.put("GET /api/v1/splits/val/board", Reply({"split": "val", "entries": [entry]}))
-    assert suggested("submit", "x.json", "--split", "val", "--fail-if-worse-than", "D") == ["Deep Scale"]
-    assert suggested("compare", "--split", "val", "") == ["Deep Scale"]
-    files = ShellComplete(main, {}, "tsttc", "").get_completions(["compare", "--truth", str(MANIFEST)], "x")
-    assert [item.type for item in files] == ["file"]
-    assert suggested("publish", "--server", "http://127.0.0.1:9", "") == []
 
 
 def test_a_pipe_hears_of_every_wait(monkeypatch: pytest.MonkeyPatch) -> None:
