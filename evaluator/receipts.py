@@ -29,8 +29,6 @@ TYPE: Final = "tsttc-receipt+jwt"
 KEYS_PATH: Final = "/.well-known/tsttc-receipt-keys.json"
 KEY_BYTES: Final = 32
 MAX_BYTES: Final = 65_536
-# Version 1 signed this line and the canonical form (RFC 8785) of one JSON object without its signature.
-_FIRST_PREFIX: Final = b"tsttc-score-receipt/1\n"
 
 Document = dict[str, Any]
 
@@ -157,9 +155,8 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
     """What the receipt says, if one of these keys (see `read_keys`) signed it so. Raises `NotVerified`."""
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
-    read = _read_first if receipt.lstrip().startswith(b"{") else _read
     try:
-        named, document = read(receipt, keys)
+        named, document = _read(receipt, keys)
         if document["version"] > VERSION:
             raise NotVerified(
                 "receipt-version",
@@ -183,31 +180,13 @@ def _read(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Do
         key = _key(header["kid"], keys)
         return header["kid"], jwt.decode(text, key, algorithms=["EdDSA"])
     except jwt.InvalidSignatureError:
-        raise _altered() from None
+        raise NotVerified(
+            "receipt-altered",
+            "The signature does not fit what the receipt says; expected it unchanged, as the leaderboard "
+            "gave it.",
+        ) from None
     except jwt.PyJWTError as fault:
         raise _malformed(f"{fault}; expected the token that the leaderboard wrote") from None
-
-
-def _read_first(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Document]:
-    """The same of a receipt of version 1."""
-    from cryptography.exceptions import InvalidSignature  # noqa: PLC0415 - slow to import
-
-    document = json.loads(receipt.decode(), object_pairs_hook=_once)
-    signature, named = document.pop("signature"), document["key_id"]
-    key = _key(named, keys)
-    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    try:
-        key.verify(decode(signature), _FIRST_PREFIX + text.encode())
-    except (InvalidSignature, ValueError):
-        raise _altered() from None
-    return named, document
-
-
-def _once(pairs: list[tuple[str, Any]]) -> Document:
-    members = dict(pairs)
-    if len(members) != len(pairs):
-        raise ValueError("a field appears more than once; expected each once")
-    return members
 
 
 def _key(named: str, keys: Mapping[str, Ed25519PublicKey]) -> Ed25519PublicKey:
@@ -222,14 +201,6 @@ def _key(named: str, keys: Mapping[str, Ed25519PublicKey]) -> Ed25519PublicKey:
 
 def _malformed(what: str) -> NotVerified:
     return NotVerified("receipt-malformed", f"This is not a receipt: {what}.")
-
-
-def _altered() -> NotVerified:
-    return NotVerified(
-        "receipt-altered",
-        "The signature does not fit what the receipt says; expected it unchanged, as the leaderboard gave "
-        "it.",
-    )
 
 
 def _said(document: Document, named: str) -> Verified:
