@@ -12,7 +12,6 @@ import click
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.following import signs_of_life
 from evaluator.cli.layout import printable
 from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.tokens import token_for
@@ -54,10 +53,7 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     patience = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
     agent = f"tsttc/{version()}"
     try:
-        with (
-            signs_of_life(url),
-            Client(url=url, token=bearer, user_agent=agent, patience=patience) as client,
-        ):
+        with Client(url=url, token=bearer, user_agent=agent, patience=patience) as client:
             if bearer:
                 client.require_leaderboard()
             try:

@@ -1,9 +1,8 @@
-"""Paths of the configuration file and of the cache."""
+"""The configuration file of the command."""
 
 from __future__ import annotations
 
 import json
-import os
 import shlex
 import subprocess
 import sys
@@ -18,16 +17,6 @@ APPLICATION = "tsttc"
 def settings_file() -> Path:
     """The file of settings: of the user's configuration, as each system has it."""
     return Path(click.get_app_dir(APPLICATION)) / "settings.json"
-
-
-def cache_folder() -> Path:
-    """The folder of copies that can be fetched again."""
-    if sys.platform == "win32":
-        home = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-        return Path(home) / APPLICATION / "cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / APPLICATION
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / APPLICATION
 
 
 def command_line(words: Sequence[str], *, platform: str = sys.platform) -> str:

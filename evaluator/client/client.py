@@ -1,7 +1,7 @@
 """The leaderboard's API from a laptop or a CI job: the only module that speaks HTTP for the command line.
 
     with Client(url="https://example.org", token=token) as client:
-        submission = client.submit(file, filename="predictions.json", split="val", method="Foo++")
+        submission = client.submit(data, filename="predictions.json", split="val", method="Foo++")
         for submission in client.watch(submission.id, timeout_s=600):
             print(submission.state)
 
@@ -12,7 +12,6 @@ line words them. Sending is safe to repeat: bytes that the server has get their 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import BinaryIO
 from urllib.parse import quote, urlencode
 
 import httpx
@@ -70,7 +69,7 @@ class Client(Connection):
 
     def submit(
         self,
-        file: BinaryIO,
+        data: bytes,
         *,
         filename: str,
         split: str,
@@ -79,8 +78,8 @@ class Client(Connection):
     ) -> Submission:
         """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
 
-        `file` must be seekable; it is streamed, never read whole. `details` are the form's optional fields
-        (description, paper_url, code_url, note, commit). Raises ClientError.
+        `details` are the form's optional fields (description, paper_url, code_url, note, commit). Raises
+        ClientError.
         """
         fields = {"split": split, "method": method, **(details or {})}
         n_sent = 0
@@ -88,11 +87,10 @@ class Client(Connection):
         def send() -> httpx.Response:
             nonlocal n_sent
             n_sent += 1
-            file.seek(0)
             return self._http.post(
                 self._address("submissions"),
                 data=fields,
-                files={"file": (filename, file, "application/json")},
+                files={"file": (filename, data, "application/json")},
             )
 
         response = self._retry(send)
@@ -140,15 +138,6 @@ class Client(Connection):
         """The manifest of a split, or of an edition of it: all columns but the values. Raises ClientError."""
         query = {} if edition is None else {"edition": edition}
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
-
-    def manifest_digest(self, split: str) -> str | None:
-        """The digest of that manifest; None for a split that has none yet. Raises ClientError."""
-        response = self._asked_by_anybody("splits", split, "editions", accept="application/json")
-        for edition in rows(response, JSON):
-            if edition.get("is_board"):
-                digest = edition.get("manifest")
-                return digest if isinstance(digest, str) else None
-        return None
 
     def quota(self) -> list[Quota]:
         """What one's own team has left, split by split. Raises ClientError."""

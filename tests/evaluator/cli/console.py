@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from evaluator import read_manifest, receipts
+from evaluator import receipts
 from evaluator.metrics.protocol import SCORE_NAMES
 from evaluator.papers.tables import published_tables
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
@@ -118,7 +118,6 @@ def documented_shell() -> Iterator[Run]:
             "PYTHONPATH": str(REPOSITORY),
             "PYTHON_KEYRING_BACKEND": "keyring.backends.fail.Keyring",
             "XDG_CONFIG_HOME": home,
-            "XDG_CACHE_HOME": home,
         }
         with shell([sys.executable, "-m", "evaluator"], environment) as run:
             yield run
@@ -192,10 +191,6 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         },
     ]
     site.put("GET /api/v1/quota", Reply(quotas))
-    digest = read_manifest(EXAMPLES / "manifest.csv").digest
-    site.put(
-        "GET /api/v1/splits/demo/editions", Reply([{"edition": 1, "is_board": True, "manifest": digest}])
-    )
     table = (EXAMPLES / "manifest.csv").read_bytes()
     site.put("GET /api/v1/splits/demo/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
     found = {"difference": -1.18, "low": -1.73, "high": -0.62, "p": 0.0004}

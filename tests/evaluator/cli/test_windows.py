@@ -1,7 +1,6 @@
 """What Windows does otherwise: paths, line ends, byte order marks, the place of settings."""
 
 import json
-import sys
 from pathlib import Path, PureWindowsPath
 
 import pytest
@@ -70,10 +69,3 @@ def test_settings_and_tokens_edited_by_hand_are_still_read(
     (tmp_path / "tokens.json").write_bytes(MARK + json.dumps({"https://a.example": "tsttc_a"}).encode())
     assert paths.server_of_login() == "https://a.example"
     assert tokens._kept_in_file() == {"https://a.example": "tsttc_a"}
-
-
-def test_copies_stand_where_windows_keeps_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "platform", "win32")
-    monkeypatch.setenv("LOCALAPPDATA", r"C:\Users\ada\AppData\Local")
-    assert str(paths.cache_folder()).startswith(r"C:\Users\ada\AppData\Local")
-    assert paths.cache_folder().parts[-2:] == ("tsttc", "cache")

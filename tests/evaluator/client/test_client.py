@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import io
 import random
 from datetime import UTC, datetime, timedelta
 from email.utils import format_datetime
-from pathlib import Path
 
 import pytest
 
@@ -28,29 +26,7 @@ SCORED = QUEUED | {
 
 
 def send(client: Client, data: bytes = b'{"0": 5.3}') -> object:
-    return client.submit(io.BytesIO(data), filename="p.json", split="val", method="Foo++")
-
-
-def test_file_is_streamed_in_blocks_with_its_length_told_first(
-    client: Client, site: RecordedSite, tmp_path: Path
-) -> None:
-    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
-    path = tmp_path / "large.json"
-    path.write_bytes(b" " * 5_000_000)
-
-    class Watched(io.FileIO):
-        largest_read = 0
-
-        def read(self, size: int | None = -1, /) -> bytes:
-            data = super().read(size)
-            self.largest_read = max(self.largest_read, len(data or b""))
-            return data or b""
-
-    with Watched(path) as file:
-        client.submit(file, filename="large.json", split="val", method="Foo++")
-    assert 0 < file.largest_read <= 1 << 20
-    assert int(site.requests[0].headers["Content-Length"]) > 5_000_000
-    assert site.requests[0].headers["Transfer-Encoding"] is None
+    return client.submit(data, filename="p.json", split="val", method="Foo++")
 
 
 @pytest.mark.parametrize("fault", [CUT, CUT_SHORT])
