@@ -94,7 +94,7 @@ def version() -> str:
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
     """What happened, whose fault it is and what to do next; of a refusal `hint` says it."""
-    from evaluator.client.answers import BadAnswer, NotReady, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import BadAnswer, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
     refused_hint = hint
     hint = "Check --server (or TSTTC_URL), your network, and whether the server runs."
@@ -115,11 +115,10 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
             exit_code, code, words = Exit.TIMEOUT, "timeout", f"{_sentence(str(error))}{last}"
-            more = {"submission": error.submission.document if error.submission else None}
-            hint = f"The evaluation continues; follow it with: tsttc status {error.submission_id} --watch"
-        case NotReady():
-            exit_code, code, words = Exit.TIMEOUT, "timeout", _sentence(str(error))
             hint = "The workers are busy; ask again later."
+            if error.submission_id:
+                more = {"submission": error.submission.document if error.submission else None}
+                hint = f"The evaluation continues; follow it with: tsttc status {error.submission_id} --watch"
         case _:
             code, words = "client", _sentence(str(error))
     return Failure(words, exit_code=exit_code, code=code, hint=hint, more=more)

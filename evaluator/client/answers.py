@@ -257,16 +257,14 @@ class ClientError(Exception):
 class Unreachable(ClientError):
     """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out.
 
-    `was_connected` says whether the server had been reached at all; `was_refused` whether the machine was,
-    and nothing listened on it, as before a server has started.
+    `was_connected` says whether the server had been reached at all.
     """
 
-    def __init__(self, *, url: str, reason: str, was_connected: bool, was_refused: bool = False) -> None:
+    def __init__(self, *, url: str, reason: str, was_connected: bool) -> None:
         super().__init__(f"no answer from {url}: {reason}")
         self.url = url
         self.reason = reason
         self.was_connected = was_connected
-        self.was_refused = was_refused
 
 
 class Refused(ClientError):
@@ -314,19 +312,11 @@ class BadAnswer(ClientError):
 
 
 class TimedOut(ClientError):
-    """A submission was not final within the time allowed; `submission` is the last that was seen of it."""
+    """What workers compute was not there in time; `submission` is the last that was seen of a submission."""
 
-    def __init__(self, *, submission_id: str, timeout_s: float, submission: Submission | None) -> None:
-        super().__init__(f"submission {submission_id} is not final after {timeout_s:g} s")
+    def __init__(
+        self, *, what: str, timeout_s: float, submission_id: str = "", submission: Submission | None = None
+    ) -> None:
+        super().__init__(f"{what} after {timeout_s:g} s")
         self.submission_id = submission_id
-        self.timeout_s = timeout_s
         self.submission = submission
-
-
-class NotReady(ClientError):
-    """What workers compute was not there within the time allowed; asked again later it may be."""
-
-    def __init__(self, *, what: str, timeout_s: float) -> None:
-        super().__init__(f"{what} is not ready after {timeout_s:g} s")
-        self.what = what
-        self.timeout_s = timeout_s

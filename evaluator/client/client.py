@@ -24,7 +24,6 @@ from evaluator.client.answers import (
     Compared,
     Foreseen,
     Method,
-    NotReady,
     Quota,
     Refused,
     Submission,
@@ -39,8 +38,7 @@ from evaluator.client.exchange import (
     rows,
 )
 
-# Where nothing else is to do, intervals follow the scores within some tenths of a second: asked for soon.
-N_EAGER, EAGERNESS = 3, 0.4
+INTERVALS_WITHIN_S = 10.0
 
 
 class Client(Connection):
@@ -160,7 +158,7 @@ class Client(Connection):
             asked_s = retry_after_s(response.headers)
             delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=asked_s, rng=self.rng)
             if self.monotonic_s() + delay_s >= until_s:
-                raise NotReady(what="The comparison", timeout_s=timeout_s)
+                raise TimedOut(what="the comparison is not ready", timeout_s=timeout_s)
             self.sleep(delay_s)
 
     def own_method(self, name_or_id: str) -> Method | None:
@@ -214,69 +212,40 @@ class Client(Connection):
         address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
         return self._retry(lambda: self._http.get(address)).content
 
-    def watch(
-        self, submission_id: str, *, timeout_s: float, seen: Submission | None = None
-    ) -> Iterator[Submission]:
-        """Ask until the submission is final, giving every state seen, the final one last.
+    def watch(self, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
+        """Ask until the submission is final and has its intervals, giving every answer.
 
-        `seen` is the answer of a moment ago, such as that to the file; else the present state is asked for.
-
+        For the intervals it waits `INTERVALS_WITHIN_S` at most: workers make them when no submission waits.
         The server says when to ask again; one that is away or busy is asked less and less often. Raises
         TimedOut after `timeout_s` seconds; of the other errors only those that waiting cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
-        last, tag, n_same = seen, "", 0
-        again_s: float | None = None
-        if last is not None:
-            yield last
-            n_same = 1
-        while last is None or not last.is_final:
-            if n_same:
-                delay_s = again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
-                if self.monotonic_s() + delay_s >= until_s:
-                    raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
-                self.sleep(delay_s)
-            before = last
-            response, again_s = self._look(submission_id, known=tag)
-            if response is not None and response.status_code != httpx.codes.NOT_MODIFIED:
-                last, tag = one(response, Submission), response.headers.get("ETag", "")
+        last: Submission | None = None
+        n_same = 0
+        address = self._address("submissions", submission_id)
+        while True:
+            before, again_s = last, None
+            try:
+                response = self._checked(lambda: self._http.get(address))
+            except Unreachable:
+                pass
+            except Refused as refused:
+                if refused.status not in PASSING_STATUSES:
+                    raise
+                again_s = refused.retry_after_s
+            else:
+                last, again_s = one(response, Submission), retry_after_s(response.headers)
                 yield last
+                if last.is_final and not last.awaits_intervals:
+                    return
+                if last.is_final and not (before and before.is_final):
+                    until_s = min(until_s, self.monotonic_s() + INTERVALS_WITHIN_S)
             is_same = (before and before.state) == (last and last.state)
             n_same = n_same + 1 if is_same else 1  # a change: ask often again
-
-    def settled(self, submission: Submission, *, timeout_s: float) -> Submission:
-        """A scored submission with its intervals, once they are computed; after `timeout_s` as it is then.
-
-        Of errors only those that waiting cannot cure are raised.
-        """
-        until_s = self.monotonic_s() + timeout_s
-        n_asked = 0
-        while submission.awaits_intervals:
-            n_asked += 1
-            delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=None, rng=self.rng)
-            if n_asked <= N_EAGER:
-                delay_s *= EAGERNESS
+            delay_s = again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
             if self.monotonic_s() + delay_s >= until_s:
-                break
+                if last is not None and last.is_final:
+                    return
+                what = f"submission {submission_id} is not final"
+                raise TimedOut(what=what, timeout_s=timeout_s, submission_id=submission_id, submission=last)
             self.sleep(delay_s)
-            response, _ = self._look(submission.id)
-            submission = one(response, Submission) if response is not None else submission
-        return submission
-
-    def _look(self, submission_id: str, *, known: str = "") -> tuple[httpx.Response | None, float | None]:
-        """One answer about a submission, and after how many seconds to ask again where the server said it.
-
-        It is 304 where nothing has changed since the ETag `known`. A fault that passes by itself is no
-        answer, not an error.
-        """
-        address = self._address("submissions", submission_id)
-        headers = {"If-None-Match": known} if known else {}
-        try:
-            response = self._checked(lambda: self._http.get(address, headers=headers))
-        except Unreachable:
-            return None, None
-        except Refused as refused:
-            if refused.status not in PASSING_STATUSES:
-                raise
-            return None, refused.retry_after_s
-        return response, retry_after_s(response.headers)

@@ -68,10 +68,9 @@ class Connection:
         while True:
             response = self._retry(partial(self._http.get, self._address(*path), params=params))
             yield from rows(response, kind)
-            following = next_page(response)
-            if not following or following == params:
+            params = next_page(response)
+            if not params:
                 return
-            params = following
 
     def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
         return one(self._asked(*path, params=params), kind)
@@ -111,14 +110,8 @@ class Connection:
             except (Unreachable, Refused) as fault:
                 n_failed += 1
                 n_tries = self.patience.n_tries if self._was_answered else self.patience.n_first_tries
-                if n_failed >= n_tries or not self._may_pass(fault):
+                is_lasting = isinstance(fault, Refused) and not self.patience.may_pass(fault)
+                if n_failed >= n_tries or is_lasting:
                     raise
                 delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
             self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng))
-
-    def _may_pass(self, fault: Unreachable | Refused) -> bool:
-        if isinstance(fault, Unreachable):
-            # Where nothing ever answered, a machine that turns connections away may be starting its server;
-            # any other fault is a mistake in the address more often than a pause.
-            return self._was_answered or fault.was_refused
-        return self.patience.may_pass(fault)

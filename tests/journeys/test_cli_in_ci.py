@@ -249,9 +249,7 @@ def test_server_that_is_never_there_is_told_after_a_few_tries(job: Job) -> None:
     url = f"http://127.0.0.1:{free_port()}"
     done = job.submit(job.predictions(1.02), tsttc=job.at(url))
     assert done.returncode == 3
-    *waited, said, _ = done.stderr.splitlines()
-    assert said.startswith(f"Error: Nothing answers at {url} (")
-    assert all(line.startswith(f"Waiting for {url} (") for line in waited), "so that no pipe is silent"
+    assert done.stderr.startswith(f"Error: Nothing answers at {url} (")
 
 
 def test_token_that_has_expired_is_told_with_what_to_do(job: Job) -> None:

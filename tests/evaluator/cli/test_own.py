@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
-import queue
-import sys
 from pathlib import Path
 
 import pytest
 
 from evaluator import read_manifest, read_truth
-from evaluator.cli.following import signs_of_life
 from tests.evaluator.cli.console import ID, METHOD_ID, REJECTED_ID
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.toolkit_folders import camera, write_folder
@@ -142,16 +138,3 @@ def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> Non
     site.put(f"GET /api/v1/submissions/{ID}", Reply(gone))
     assert "SCORED, withdrawn" in tsttc("submissions").stdout
     assert tsttc("status", ID).stdout.startswith("SCORED, withdrawn: Foo++ on val\n")
-
-
-def test_a_pipe_hears_of_every_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: queue.Queue[str] = queue.Queue()
-
-    class Pipe(io.StringIO):
-        def write(self, text: str) -> int:
-            told.put(text)
-            return len(text)
-
-    monkeypatch.setattr(sys, "stderr", Pipe())
-    with signs_of_life("https://example.org", every_s=0.001):
-        assert told.get(timeout=60).startswith("Waiting for https://example.org (0 s) …")
