@@ -120,7 +120,6 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     kind: str = "submission"
     visibility: str = "PUBLIC"
     pseudonym: str | None = None
-    withdrawn_at: str | None = None
     intervals: dict[str, Interval] = {}
 
     @property
@@ -148,15 +147,10 @@ class Board(msgspec.Struct, frozen=True, kw_only=True):
     entries: list[BoardEntry]
     document: JSON
     edition: Any = None
-    protocol: str | None = None
     decimals: int | None = None
-    ground_truth: str | None = None
-    n_sequences: int | None = None
-    n_recordings: int | None = None
     unit: str = RECORDING
     n_units: int | None = None
     floor: dict[str, float | None] | None = None
-    at: str | None = None
     updated_at: str | None = None
 
     @property

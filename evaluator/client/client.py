@@ -12,7 +12,7 @@ line words them. Sending is safe to repeat: bytes that the server has get their 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from urllib.parse import quote, urlencode
+from urllib.parse import quote
 
 import httpx
 
@@ -119,18 +119,21 @@ class Client(Connection):
         params = {name: value for name, value in asked.items() if value}
         return self._get(Board, "splits", split, *place, "board", params=params)
 
-    def board_page(self, board: Board, *, sort: str = "rank", at: str | None = None) -> str:
-        """The address at which this very board stays: its edition's page, or the board as of that time."""
+    def export(
+        self,
+        board: Board,
+        suffix: str,
+        *,
+        sort: str = "rank",
+        at: str | None = None,
+        has_intervals: bool = False,
+    ) -> str:
+        """This very board as the site exports it, for everybody, as "csv" or "bib". Raises ClientError."""
         is_of_edition = board.edition is not None and not at
-        path = f"{quote(board.split, safe='')}/{f'editions/{board.edition}/' if is_of_edition else ''}"
-        asked = {"at": at, "sort": sort if sort != "rank" else None}
-        query = urlencode({name: value for name, value in asked.items() if value})
-        return f"{self.url}/board/{path}{'?' if query else ''}{query}"
-
-    def bibliography(self, board: Board, *, at: str | None = None) -> str:
-        """BibTeX of the benchmark's paper, of the board and of the papers of its rows. Raises ClientError."""
-        page, mark, query = self.board_page(board, at=at).partition("?")
-        return self._retry(lambda: self._http.get(f"{page.rstrip('/')}.bib{mark}{query}")).text
+        path = f"{quote(board.split, safe='')}{f'/editions/{board.edition}' if is_of_edition else ''}"
+        asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
+        params = {name: value for name, value in asked.items() if value and value != "rank"}
+        return self._retry(lambda: self._http.get(f"{self.url}/board/{path}.{suffix}", params=params)).text
 
     def manifest(self, split: str, *, edition: int | None = None) -> bytes:
         """The manifest of a split, or of an edition of it: all columns but the values. Raises ClientError."""

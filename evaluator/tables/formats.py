@@ -6,7 +6,6 @@ To add one, write a function that makes a text of an `Export`, and its row below
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -17,10 +16,7 @@ from evaluator.tables.layouts import Export, as_latex, as_markdown
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """One way to export a board.
-
-    The site leads to the API where a format is the API's own document, which holds the rows of whoever asks.
-    """
+    """One way to export a board."""
 
     name: str
     """What the command calls it."""
@@ -29,14 +25,12 @@ class Format:
     suffix: str
     """The end of its address and of its file."""
     media_type: str
-    write: Callable[[Export], str]
+    write: Callable[[Export], str] | None
+    """None where it is the API's own document, which holds the rows of whoever asks."""
     has_values: bool = True
     """Whether it can have confidence intervals."""
-    is_api_document: bool = False
     is_pasted: bool = False
     """Whether people paste it into a text of theirs: then a page offers to copy it as well."""
-    on_site: bool = True
-    on_command_line: bool = True
 
 
 def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
@@ -49,20 +43,14 @@ def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -
         yield csv_line(row.get(name) for name in columns)
 
 
-def _csv(export: Export) -> str:
+def as_csv(export: Export) -> str:
+    """All rows of a board."""
     return "".join(csv_lines(export.records, columns=export.columns))
 
 
 FORMATS: Final = (
-    Format(name="csv", title="CSV", suffix="csv", media_type="text/csv", write=_csv),
-    Format(
-        name="json",
-        title="JSON",
-        suffix="json",
-        media_type="application/json",
-        write=lambda export: json.dumps(export.document, ensure_ascii=False, indent=2) + "\n",
-        is_api_document=True,
-    ),
+    Format(name="csv", title="CSV", suffix="csv", media_type="text/csv", write=as_csv),
+    Format(name="json", title="JSON", suffix="json", media_type="application/json", write=None),
     Format(
         name="latex",
         title="LaTeX",

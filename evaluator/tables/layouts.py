@@ -1,7 +1,4 @@
-"""A board as a table for papers and notes: LaTeX and Markdown, from texts that are formatted already.
-
-The site's exports and the command line print their boards by this, so that the same board is the same table.
-"""
+"""A board as a table for papers and notes: LaTeX and Markdown, from texts that are formatted already."""
 
 from __future__ import annotations
 
@@ -59,11 +56,11 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Export:
-    """A board as writers take it; each reads once what it needs. The site and the command make it.
+    """A board as writers take it; each reads once what it needs.
 
     `rows` are those of a table, without what was withdrawn, `records` all rows by the names of `columns`:
     numbers as they are published, None where nothing is known. `references` are BibTeX entries of the papers
-    that rows name, `document` is the API's.
+    that rows name.
     """
 
     origin: Origin
@@ -72,7 +69,6 @@ class Export:
     records: Iterable[Mapping[str, object]]
     scores: Sequence[str] = ()  # of its tables
     references: Iterable[str] = ()
-    document: Mapping[str, object] | None = None
 
 
 def about(origin: Origin) -> tuple[str, ...]:
