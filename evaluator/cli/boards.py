@@ -181,6 +181,6 @@ def _interval_text(entry: BoardEntry, name: str) -> str:
 
     found = entry.interval(name)
     low, high = (
-        format_published(end, decimals=entry.n_decimals, missing="") for end in (found.low, found.high)
+        format_published(end, decimals=entry.decimals, missing="") for end in (found.low, found.high)
     )
     return f" [{low}, {high}]" if low and high else ""

@@ -201,5 +201,5 @@ def judge_against(found: BoardEntry, *, mid: float | None, decimals: int = 2) ->
         raise undecided("there is no value for mid")
     if mid > other:
         name = printable(found.method)
-        words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.n_decimals}f}"
+        words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.decimals}f}"
         raise Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")

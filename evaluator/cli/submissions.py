@@ -131,8 +131,12 @@ def submit(
                 gates.judge_against(rival, mid=mid, decimals=submission.decimals)
 
         conclude(submission, as_json=as_json, judge=judge, warned=warned)
-        if not as_json:
-            _say_if_private(client, submission)
+        if submission.is_new and submission.visibility == "PRIVATE" and not as_json:
+            name = printable(submission.method)
+            click.echo(
+                f"\n{name} is private: only your team sees its results. "
+                f'Publish it with: tsttc publish "{name}"'
+            )
 
 
 @click.command(short_help="Show the state, the scores or the problems of a submission.")
@@ -297,23 +301,3 @@ def _show(submission: Submission, named: str, warned: frozenset[str]) -> None:
         ):
             click.echo(line)
         echo_warnings(warning for warning in submission.warnings if warning.code not in warned)
-
-
-def _say_if_private(client: Client, submission: Submission) -> None:
-    """Who sends for the first time may wonder why the board does not show it."""
-    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
-
-    if not (submission.is_new and submission.method_id):
-        return
-    visibility, name = submission.visibility, submission.method
-    if not visibility:  # a server that does not say it with the submission
-        try:
-            method = client.method(submission.method_id)
-        except ClientError:  # a token that may only submit; the file is there all the same
-            return
-        visibility, name = method.visibility, method.name
-    if visibility == "PRIVATE":
-        name = printable(name)
-        click.echo(
-            f'\n{name} is private: only your team sees its results. Publish it with: tsttc publish "{name}"'
-        )

@@ -31,7 +31,7 @@ def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[
     """A submission's scores as its edition publishes them, a published row's as they were printed."""
     from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    decimals = entry.n_decimals
+    decimals = entry.decimals
     return [format_published(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
 
 

@@ -102,17 +102,15 @@ class Interval(msgspec.Struct, frozen=True, kw_only=True):
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One row of a board: scores by their names, None where a TTC range has no value.
 
-    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`.
-
-    `decimals` are those that its values are printed with; None from a server that does not say.
-
-    `pseudonym` is that of an anonymous row of one's own team, which others see under it; else None.
+    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`. `decimals` are
+    those that its values are printed with. `pseudonym` is that of an anonymous row of one's own team, which
+    others see under it; else None.
     """
 
     method: str
     scores: dict[str, float | None]
     id: str | None = None
-    decimals: int | None = None
+    decimals: int = 2
     method_id: str | None = None
     rank: int | None = None
     team: str | None = None
@@ -121,15 +119,6 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     visibility: str = "PUBLIC"
     pseudonym: str | None = None
     intervals: dict[str, Interval] = {}
-
-    @property
-    def n_decimals(self) -> int:
-        """Those that it is printed with: of a paper's row as many as were printed, else two."""
-        if self.decimals is not None:
-            return self.decimals
-        known = [value for value in self.scores.values() if value is not None]
-        is_short = self.kind == "published" and all(round(value, 1) == value for value in known)
-        return 1 if is_short else 2
 
     def interval(self, score: str) -> Interval:
         """That of one score; without ends where it was not asked for, or is not known."""

@@ -130,6 +130,7 @@ def put_documented_answers(site: RecordedSite) -> None:
         "state": "QUEUED",
         "split": "val",
         "method": "Foo++",
+        "visibility": "PRIVATE",
         "method_id": METHOD_ID,
         "url": f"https://leaderboard.example.org/submissions/{ID}/",
         "queue": {"ahead": 2},
@@ -152,7 +153,6 @@ def put_documented_answers(site: RecordedSite) -> None:
         },
         "awaits_intervals": False,
         "rank": 1,
-        "visibility": "PRIVATE",
         "counts": COUNTS,
         "n_out_of_range": 458,
         "truncated": {"-20": 171, "-0.15": 0, "0.05": 0, "20": 302},
@@ -256,6 +256,7 @@ def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object
             "team": ", ".join(paper["source"]["authors"].split(", ")),
             "date": str(paper["source"]["year"]),
             "kind": "published",
+            "decimals": 1,
             "scores": dict(zip(table.columns, row.values, strict=True)),
         }
         for row in table.rows

@@ -35,6 +35,7 @@ def published(method: str, values: list[float], *, rank: int) -> dict[str, objec
         "team": "Yuheng Shi, Zehao Huang, Naiyan Wang",
         "date": "2023",
         "kind": "published",
+        "decimals": 1,
         "scores": scores,
     }
 

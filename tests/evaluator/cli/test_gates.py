@@ -31,6 +31,7 @@ def entry(name: str, mid: float | None, *, method_id: str | None, kind: str = "s
         "method_id": method_id,
         "team": "T",
         "kind": kind,
+        "decimals": 1 if kind == "published" else 2,
         "scores": SCORES | {"mid": mid},
     }
 

@@ -49,28 +49,6 @@ def test_methods_are_listed_with_who_sees_them(tsttc: Tsttc, site: RecordedSite)
     assert [row["name"] for row in json.loads(tsttc("methods", "--json").stdout)] == ["Foo++", "Bar"]
 
 
-def test_methods_are_listed_with_their_ranks_on_every_split(tsttc: Tsttc, site: RecordedSite) -> None:
-    methods = [
-        {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE"},
-        {"id": ID, "name": "Bar", "visibility": "PUBLIC"},
-    ]
-    foo = {"method": "Foo++", "method_id": METHOD_ID, "scores": {"mid": 13.92}, "visibility": "PRIVATE"}
-    bar = {"method": "Bar", "method_id": ID, "rank": 2, "scores": {"mid": 14.5}, "decimals": 1}
-    others = {"method": "Other", "method_id": "another", "rank": 1, "scores": {"mid": 1.0}}
-    site.put("GET /api/v1/methods", Reply(methods))
-    site.put("GET /api/v1/splits", Reply([{"split": "val"}, {"split": "test"}, {"split": "demo"}]))
-    site.put("GET /api/v1/splits/val/board", Reply({"split": "val", "entries": [others, bar, foo]}))
-    site.put("GET /api/v1/splits/test/board", Reply({"split": "test", "entries": [others, bar]}))
-    site.put("GET /api/v1/splits/demo/board", Reply({"split": "demo", "entries": [others]}))
-    lines = tsttc("methods", "--ranks").stdout.splitlines()
-    assert lines[0].split() == ["id", "method", "visibility", "val", "test"], "nothing of ours is on demo"
-    assert lines[1].split()[2:] == ["private", "no", "rank,", "MiD", "13.92", "–"]
-    assert lines[2].split()[2:] == ["public", "rank", "2,", "MiD", "14.5", "rank", "2,", "MiD", "14.5"]
-    found = json.loads(tsttc("methods", "--ranks", "--json").stdout)
-    assert found[0]["ranks"] == {"val": {"rank": None, "mid": 13.92}}
-    assert found[1]["ranks"]["test"] == {"rank": 2, "mid": 14.5}
-
-
 def test_submissions_are_listed_page_after_page_and_filtered(tsttc: Tsttc, site: RecordedSite) -> None:
     link = {"Link": f'<{site.url}/api/v1/submissions?after={ID}>; rel="next"'}
     site.put("GET /api/v1/submissions", *[Reply(SUBMISSIONS[:1], headers=link), Reply(SUBMISSIONS[1:])] * 2)

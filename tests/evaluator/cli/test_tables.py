@@ -122,11 +122,8 @@ def test_times_without_a_scale_ratio_are_named_with_a_gap_that_has_one(tsttc: Ts
 @pytest.mark.parametrize(
     "options",
     [
-        ["--frame-gap", "1", "--fps", "2"],
         ["--to-frame-gap", "1"],
-        ["--to", "scale_ratio", "--to-frame-gap", "1", "--to-fps", "2"],
         ["--frame-gap", "6"],
-        ["--fps", "0"],
     ],
 )
 def test_rates_that_do_not_fit_together_are_wrong_usage(tsttc: Tsttc, options: list[str]) -> None:

@@ -7,7 +7,6 @@ import pytest
 
 from evaluator import read_manifest, read_predictions, read_truth
 from evaluator.cli import paths, tokens
-from evaluator.cli.paths import command_line
 from evaluator.cli.submissions import _name_to_send
 from tests.evaluator.worlds import EXAMPLES, Tsttc
 
@@ -30,12 +29,6 @@ def windows_text(name: str) -> bytes:
 )
 def test_a_file_is_sent_under_its_name_without_its_folder(path: str, name: str) -> None:
     assert _name_to_send(PureWindowsPath(path)) == name  # type: ignore[arg-type]
-
-
-def test_a_command_that_is_told_can_be_typed_in_either_shell() -> None:
-    words = ["tsttc", "convert", r"\\server\my share\a.json", "-o", "b.json"]
-    assert command_line(words, platform="win32") == r'tsttc convert "\\server\my share\a.json" -o b.json'
-    assert command_line(words, platform="linux") == r"tsttc convert '\\server\my share\a.json' -o b.json"
 
 
 def test_files_saved_by_windows_editors_mean_the_same(tsttc: Tsttc, tmp_path: Path) -> None:
