@@ -1,14 +1,12 @@
 """Commands of other packages are found by their entry points; a broken one breaks nothing else."""
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from evaluator.cli import plugins
-from tests.evaluator.worlds import REPOSITORY, Tsttc
+from tests.evaluator.worlds import Tsttc
 
 MODULE = """
 import click
@@ -71,19 +69,3 @@ def test_a_broken_command_says_what_is_broken(tsttc: Tsttc, package: Path, name:
     expected = f"Error: The command {name} of the package foreign cannot be loaded ({cause}).\n"
     assert result.stderr == expected
     assert tsttc("--help").exit_code == 0
-
-
-@pytest.mark.slow
-def test_an_own_command_looks_for_no_others() -> None:
-    program = (
-        "import sys; from evaluator.cli import main; main(['check', '--help'], standalone_mode=False);"
-        "print('importlib.metadata' in sys.modules, file=sys.stderr)"
-    )
-    done = subprocess.run(
-        [sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}; {program}"],
-        capture_output=True,
-        text=True,
-        check=True,
-        cwd=REPOSITORY,
-    )
-    assert done.stderr == "False\n"

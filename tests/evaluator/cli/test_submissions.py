@@ -91,19 +91,6 @@ def test_submit_takes_standard_input(tsttc: Tsttc, site: RecordedSite) -> None:
     assert sent == [("predictions.json", b'{"0": 1.5}')] * 2
 
 
-def test_submit_takes_a_pipe(site: RecordedSite) -> None:
-    site.put(POST, Reply(fault=CUT), Reply(QUEUED, status=201))
-    done = subprocess.run(
-        ["bash", "-c", f"{sys.executable} -m evaluator submit <(echo '{{}}') --split val --method Foo"],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=REPOSITORY,
-    )
-    assert done.returncode == 0, done.stderr
-    assert [request.parts()["file"][1] for request in site.posts] == [b"{}\n"] * 2
-
-
 def test_file_whose_name_is_no_text_is_sent_under_another(
     tsttc: Tsttc, site: RecordedSite, tmp_path: Path
 ) -> None:
@@ -120,14 +107,6 @@ def test_words_that_are_no_text_are_wrong_usage(tsttc: Tsttc, site: RecordedSite
     assert result.exit_code == 2
     assert "expected UTF-8 text" in result.stderr
     assert site.requests == []
-
-
-def test_file_sent_before_is_said_to_be(tsttc: Tsttc, site: RecordedSite) -> None:
-    site.put(POST, Reply(SCORED, status=200))
-    result = submit(tsttc, "--wait")
-    assert result.exit_code == 0
-    assert "You already submitted this file; this is its first submission." in result.stdout
-    assert len(site.posts) == 1
 
 
 def test_wait_ends_with_the_scores(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -161,19 +140,16 @@ def test_status_asks_once_and_watch_asks_until_the_end(tsttc: Tsttc, site: Recor
     assert watched.stdout.startswith("SCORED: Foo++ on val\n")
 
 
-@pytest.mark.parametrize("arguments", [["status", ID], ["status", ID, "--watch"]])
-def test_rejected_file_is_the_file_s_fault_with_numbered_problems(
-    tsttc: Tsttc, site: RecordedSite, arguments: list[str]
-) -> None:
+def test_rejected_file_is_the_file_s_fault_with_numbered_problems(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put(GET, Reply(REJECTED))
-    result = tsttc(*arguments)
+    result = tsttc("status", ID, "--watch")
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr.splitlines()[:3] == [
         "Error: The file is rejected: 2 problems.",
         "  1. /8: The value is 0; expected another.",
         "  2. The text is not JSON.",
     ]
-    as_json = tsttc(*arguments, "--json")
+    as_json = tsttc("status", ID, "--json")
     assert as_json.exit_code == 1
     assert json.loads(as_json.stdout) == REJECTED
 

@@ -1,12 +1,11 @@
 """What Windows does otherwise: paths, line ends, byte order marks, the place of settings."""
 
-import json
 from pathlib import Path, PureWindowsPath
 
 import pytest
 
 from evaluator import read_manifest, read_predictions, read_truth
-from evaluator.cli import paths, tokens
+from evaluator.cli import tokens
 from evaluator.cli.submissions import _name_to_send
 from tests.evaluator.worlds import EXAMPLES, Tsttc
 
@@ -51,14 +50,3 @@ def test_a_token_file_may_begin_with_a_mark_and_end_with_any_line_end(
     monkeypatch.delenv("TSTTC_TOKEN", raising=False)
     monkeypatch.setenv("TSTTC_TOKEN_FILE", str(path))
     assert tokens.token_for("https://example.org") == "tsttc_abc"
-
-
-def test_settings_and_tokens_edited_by_hand_are_still_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(paths, "settings_file", lambda: tmp_path / "settings.json")
-    monkeypatch.setattr(tokens, "settings_file", lambda: tmp_path / "settings.json")
-    (tmp_path / "settings.json").write_bytes(MARK + b'{\r\n"server": "https://a.example"\r\n}\r\n')
-    (tmp_path / "tokens.json").write_bytes(MARK + json.dumps({"https://a.example": "tsttc_a"}).encode())
-    assert paths.server_of_login() == "https://a.example"
-    assert tokens._kept_in_file() == {"https://a.example": "tsttc_a"}

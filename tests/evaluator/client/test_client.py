@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import random
-
 import pytest
 
 from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
@@ -179,11 +177,3 @@ def test_proxy_of_the_environment_is_not_asked_for_this_machine(
     site.put(ONE, Reply(SCORED))
     with Client(url=site.url) as client:
         assert client.submission("abc").is_final
-
-
-def test_delay_is_never_shorter_than_the_server_asked_for() -> None:
-    patience = RetryPolicy()
-    rng = random.Random(1)
-    delays_s = [patience.delay_s(n_failed=n, retry_after_s=4.0, rng=rng) for n in range(1, 30)]
-    assert min(delays_s) == 4.0
-    assert max(delays_s) <= patience.longest_delay_s
