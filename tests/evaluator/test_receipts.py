@@ -175,11 +175,3 @@ def test_key_set_that_cannot_be_relied_on_is_refused(keys: bytes) -> None:
     with pytest.raises(receipts.NotVerified) as caught:
         receipts.read_keys(keys)
     assert caught.value.code == "receipt-keys"
-
-
-def test_every_published_decimal_is_written_and_read_back() -> None:
-    for value in (0.0, 0.01, 15.03, 123456.78, 99999999.99):
-        text = receipts.decimal(value, decimals=2)
-        assert text is not None
-        signed = receipts.sign(fields(scores=dict.fromkeys(SCORE_NAMES, text)), private_key=SEED)
-        assert receipts.verify(signed.encode(), KEYS).scores["rte"] == value

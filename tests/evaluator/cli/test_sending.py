@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +13,7 @@ from click.testing import Result
 from evaluator.predictions import plausibility
 from evaluator.tables.formats import parquet_of
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
-from tests.evaluator.worlds import EXAMPLES, Tsttc, process
+from tests.evaluator.worlds import EXAMPLES, Tsttc
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
 
@@ -113,18 +113,18 @@ def test_public_method_is_told_to_be_so_before_the_file_is_sent(tsttc: Tsttc, si
     assert asked.index(METHODS) < asked.index(POST)
 
 
-def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(site: RecordedSite) -> None:
+def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(
+    tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
     put_manifest(site)
     site.put(METHODS, Reply([PUBLIC]))
+    terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("evaluator.cli.submissions.sys", terminal)
     words = ("submit", EXAMPLES / "predictions.json", "--split", "val", "--method", "Foo++")
-    keyboard, end = os.openpty()
-    os.write(keyboard, b"n\n")
-    done = process(*words, stdin=end)
-    assert (done.returncode, done.stdout, site.posts) == (2, f"{NOTICE}\n", [])
-    assert done.stderr.endswith("Submit? [y/N]: Error: Nothing was submitted.\n")
-    assert process(*words, "--yes", stdin=end).returncode == 0
-    os.close(end)
-    os.close(keyboard)
+    refused = tsttc(*words, stdin=b"n\n")
+    assert (refused.exit_code, refused.stdout, site.posts) == (2, f"{NOTICE}\n", [])
+    assert "Submit? [y/N]: " in refused.stderr
+    assert tsttc(*words, "--yes").exit_code == 0
     assert len(site.posts) == 1
 
 

@@ -7,7 +7,6 @@ import pytest
 from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
 from evaluator.client.client import Client
 from evaluator.client.exchange import RetryPolicy
-from evaluator.problems import Problem
 from tests.evaluator.cli.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
 from tests.evaluator.fake_time import FakeTime
 
@@ -94,24 +93,6 @@ def test_what_waiting_does_not_cure_is_not_tried_again(
         client.submission("abc")
     assert caught.value.status == reply.status
     assert (len(site.requests), clock.slept_s) == (1, [])
-
-
-def test_problem_document_is_read_whole(client: Client, site: RecordedSite) -> None:
-    document = {
-        "type": "about:blank",
-        "title": "Unprocessable",
-        "status": 422,
-        "detail": "The form has a fault.",
-        "code": "invalid",
-        "problems": [{"code": "bad-url", "message": "paper_url is no address.", "where": "paper_url"}],
-    }
-    site.put(SUBMISSIONS, Reply(document, status=422, headers={"Content-Type": "application/problem+json"}))
-    with pytest.raises(Refused) as caught:
-        send(client)
-    fault = caught.value
-    assert (fault.title, fault.detail, fault.code) == ("Unprocessable", "The form has a fault.", "invalid")
-    assert fault.problems == (Problem("bad-url", "paper_url is no address.", "paper_url"),)
-    assert fault.document == document
 
 
 @pytest.mark.parametrize(

@@ -129,18 +129,3 @@ def test_server_that_starts_seconds_after_the_job_is_waited_for(clock: FakeTime)
         with Client(url=url, sleep=sleep, rng=random.Random(0)) as client:
             assert client.submission("abc").is_final
     assert 5 <= clock.now_s < 10
-
-
-def test_address_where_nothing_ever_listens_is_reported_within_a_quarter_of_a_minute(
-    clock: FakeTime,
-) -> None:
-    url = f"http://127.0.0.1:{free_port()}"
-    with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
-        client.board("test")
-    assert (caught.value.url, caught.value.was_connected) == (url, False)
-    assert clock.slept_s == sorted(clock.slept_s)
-    assert 7 < clock.now_s < 15
-    patience = RetryPolicy(n_first_tries=1)
-    with Client(url=url, sleep=clock.sleep, patience=patience) as client, pytest.raises(Unreachable):
-        client.board("test")
-    assert clock.now_s < 15, "one try is one try"
