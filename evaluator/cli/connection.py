@@ -42,8 +42,7 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
 
     # httpx brings a command line of its own, with rich and pygments: a third of the time of its import.
     sys.modules.setdefault("httpx._main", None)  # type: ignore[arg-type]  # None: as if it were not there
-    from evaluator.client.client import Client  # noqa: PLC0415 -- loads httpx, which --help can do without
-    from evaluator.client.connection import LOOPBACK_HOSTS  # noqa: PLC0415 -- the same
+    from evaluator.client.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)
@@ -94,7 +93,7 @@ def version() -> str:
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
     """What happened, whose fault it is and what to do next; of a refusal `hint` says it."""
-    from evaluator.client.answers import BadAnswer, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import BadAnswer, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
     refused_hint = hint
     hint = "Check --server (or TSTTC_URL), your network, and whether the server runs."
@@ -108,8 +107,6 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
         case Unreachable():
             code, words = "cut-off", f"{error.url} gave an incomplete answer ({error.reason})."
             hint = "Run the command again: the same file never counts twice."
-        case Redirected():
-            code, words = "redirected", f"{error.url} redirects to {error.location}, which is not followed."
         case BadAnswer():
             code, words = "bad-answer", f"{error.url} did not answer like a leaderboard: {error.found}."
         case TimedOut():

@@ -13,10 +13,10 @@ import click
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
-from evaluator.cli.following import state_in_words
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
 from evaluator.cli.options import default_option, json_option, output_option, sendable, slug, url_option
 from evaluator.cli.reading import write_bytes
+from evaluator.cli.values import state_in_words
 from evaluator.metrics.protocol import PRIMARY
 
 if TYPE_CHECKING:

@@ -15,7 +15,6 @@ from evaluator.cli import gates
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, rejected
-from evaluator.cli.following import followed, state_in_words
 from evaluator.cli.layout import printable, result_in_words
 from evaluator.cli.options import (
     is_utf8,
@@ -27,7 +26,7 @@ from evaluator.cli.options import (
     url_option,
 )
 from evaluator.cli.reading import name_of, predictions_of
-from evaluator.cli.values import in_short
+from evaluator.cli.values import in_short, state_in_words
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.problems import Rejected, n_problems_in_words
@@ -122,7 +121,7 @@ def submit(
         if submission.notice != notice:  # a token that may only submit learns it now
             _warn(submission.notice, err=as_json)
         if is_waiting and not submission.is_final:
-            submission = followed(client, submission.id, timeout_s=timeout_s)
+            submission = _followed(client, submission.id, timeout_s=timeout_s)
 
         def judge() -> None:
             gates.judge(fail_if, submission.scores, decimals=submission.decimals)
@@ -164,7 +163,7 @@ def status(
     """
     with connect(url, with_token=True) as client:
         submission = (
-            followed(client, submission_id, timeout_s=timeout_s)
+            _followed(client, submission_id, timeout_s=timeout_s)
             if watch
             else client.submission(submission_id)
         )
@@ -202,6 +201,16 @@ def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> fro
     warnings = warnings_of(found)
     echo_warnings(warnings)
     return frozenset(warning.code for warning in warnings)
+
+
+def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
+    """The submission when it is final; until then standard error tells each state."""
+    told = ""
+    for submission in client.watch(submission_id, timeout_s=timeout_s):
+        if submission.state != told and not submission.is_final:
+            click.echo(state_in_words(submission), err=True)
+            told = submission.state
+    return submission
 
 
 def _notice_of(client: Client, method: str) -> str:

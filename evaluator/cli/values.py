@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from evaluator.cli.layout import printable
 from evaluator.metrics.protocol import OVERALL, PRIMARY, metric_of, split_name
 from evaluator.tables import layouts
 
@@ -33,6 +34,16 @@ def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[
 
     decimals = entry.decimals
     return [format_published(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
+
+
+def state_in_words(submission: Submission) -> str:
+    """One line: the state, and for a waiting one how many are ahead."""
+    words = printable(submission.state)
+    if submission.withdrawn_at:
+        words += ", withdrawn"
+    if submission.queue is not None and submission.state == "QUEUED":
+        words += f", {submission.queue.ahead:,} ahead"
+    return words
 
 
 def in_short(submission: Submission) -> Iterator[str]:

@@ -10,7 +10,7 @@ from typing import TypeVar
 import httpx
 import msgspec
 
-from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
+from evaluator.client.answers import BadAnswer, Refused, Unreachable
 from evaluator.problems import Problem
 
 T = TypeVar("T")
@@ -50,7 +50,7 @@ class RetryPolicy:
 
 
 def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """The response, if it is one of success; raises Unreachable, Redirected or Refused."""
+    """The response, if it is one of success; raises ClientError."""
     try:
         response = send()
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
@@ -62,7 +62,7 @@ def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
     if response.is_success:
         return response
     if response.is_redirect:
-        raise Redirected(url=url, location=response.headers["location"])
+        raise BadAnswer(url=url, found=f"a redirect to {response.headers['location']}, which is not followed")
     raise _refused(response)
 
 

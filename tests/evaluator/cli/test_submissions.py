@@ -235,7 +235,11 @@ def test_token_is_no_option(tsttc: Tsttc) -> None:
         (Reply(b"<html>gateway</html>", 500), 7, "The server failed (500: Internal Server Error)."),
         (Reply(b"<html>", 401), 4, "The server does not accept the token (401: Unauthorized)."),
         (Reply(status=418), 8, "The server refused (418"),
-        (Reply(status=301, headers={"Location": "https://e.example/"}), 3, "redirects to https://e.example/"),
+        (
+            Reply(status=301, headers={"Location": "https://e.example/"}),
+            3,
+            "a redirect to https://e.example/",
+        ),
         (Reply(b"<html>hello</html>", 200), 3, "did not answer like a leaderboard: not JSON"),
         (Reply({"hello": "world"}, 200), 3, "Object missing required field"),
     ],
