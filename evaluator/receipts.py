@@ -1,10 +1,7 @@
-"""Score receipts: a score, signed by the leaderboard that gave it, for anybody to check offline.
+"""Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, for anybody to check offline.
 
-A receipt is a JSON Web Token (RFC 7519), signed by EdDSA with Ed25519, so any JOSE library reads it. Scores
-are decimal texts with the edition's decimals (`"15.03"`): no two programs print one number differently.
-
-The site's keys are a JSON Web Key Set (RFC 7517, RFC 8037) at `/.well-known/tsttc-receipt-keys.json`, each
-named by its RFC 7638 thumbprint. Retired keys stay in the set: what they signed still verifies.
+Scores are decimal texts with the edition's decimals (`"15.03"`): programs print numbers differently. The
+keys are a JSON Web Key Set (RFC 7517, RFC 8037), each named by its RFC 7638 thumbprint.
 
     verified = verify(receipt_bytes, read_keys(keys_bytes))    # raises NotVerified
     verified.scores["mid"], verified.edition, verified.site
@@ -48,11 +45,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What a receipt says, its signature checked. `scores` has the protocol's names; None for no value.
-
-    `edition` is the edition in which the score stands, whether or not a later one has taken its place.
-    `method_id` stays for ever; `method` is the name that it had when the receipt was signed.
-    """
+    """What a receipt says, its signature checked. `method` is the name that it had when it was signed."""
 
     site: str
     key_id: str
@@ -71,11 +64,7 @@ class Verified:
 
 
 def decimal(value: float | None, *, decimals: int) -> str | None:
-    """A score as a receipt has it.
-
-    >>> decimal(15.0, decimals=2), decimal(None, decimals=2)
-    ('15.00', None)
-    """
+    """A score as a receipt has it."""
     return None if value is None else f"{value:.{decimals}f}"
 
 
@@ -122,11 +111,7 @@ def _no_keys() -> dict[str, Ed25519PublicKey]:
 
 
 def encode(data: bytes) -> str:
-    """Bytes as base64url without padding.
-
-    >>> encode(b"tsttc?>")
-    'dHN0dGM_Pg'
-    """
+    """Bytes as base64url without padding."""
     return base64.urlsafe_b64encode(data).rstrip(b"=").decode()
 
 

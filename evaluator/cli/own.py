@@ -40,18 +40,10 @@ def whoami(*, url: str, as_json: bool) -> None:
         return
     team = f"team {found.team}" if found.team else "no team yet"
     limit = f", for {found.split} only" if found.split else ""
+    moment = found.expires_at
+    end = f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
     click.echo(printable(f"{team} at {url.rstrip('/')}"))
-    click.echo(
-        printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, {_end_of(found.expires_at)}')
-    )
-
-
-def _end_of(moment: str | None) -> str:
-    """
-    >>> _end_of("2027-02-20T20:16:57.601932Z"), _end_of(None)
-    ('until 2027-02-20 20:16 UTC', 'without an end')
-    """
-    return f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
+    click.echo(printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, {end}'))
 
 
 @click.command(short_help="List the methods of your team.")

@@ -62,17 +62,12 @@ def predictions_of(path: Path) -> bytes:
         try:
             return parquet.as_sent(bytes_of(path))
         except ModuleNotFoundError:
-            raise without_pyarrow(f"Reading {name_of(path)}, a Parquet table,") from None
-
-
-def without_pyarrow(what: str) -> Failure:
-    """The failure for a table that this machine cannot read or write."""
-    return Failure(
-        f"{what} needs pyarrow, which is not installed.",
-        exit_code=Exit.USAGE,
-        code="not-installed",
-        hint="Install it with: pip install pyarrow",
-    )
+            raise Failure(
+                f"Reading {name_of(path)}, a Parquet table, needs pyarrow, which is not installed.",
+                exit_code=Exit.USAGE,
+                code="not-installed",
+                hint="Install it with: pip install pyarrow",
+            ) from None
 
 
 def write_bytes(path: Path, data: bytes, *, option: str = "-o") -> None:

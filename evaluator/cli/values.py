@@ -47,11 +47,7 @@ def state_in_words(submission: Submission) -> str:
 
 
 def in_short(submission: Submission) -> Iterator[str]:
-    """Where a scored submission stands, and the intervals of its overall errors, where the server knows them.
-
-    "rank 2 (1–3)", and "MiD 14.21 (13.60–14.90), RTE 11.90 (11.20–12.60), in brackets the 95 % confidence
-    intervals".
-    """
+    """Where a scored submission stands, and the intervals of its overall errors, if known."""
     if submission.rank is not None:
         found = submission.intervals.get(PRIMARY)
         low, high = (found.rank_low, found.rank_high) if found else (None, None)

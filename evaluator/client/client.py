@@ -1,12 +1,12 @@
-"""The leaderboard's API from a laptop or a CI job: the only module that speaks HTTP for the command line.
+"""The leaderboard's API from a laptop or a CI job.
 
     with Client(url="https://example.org", token=token) as client:
         submission = client.submit(data, filename="predictions.json", split="val", method="Foo++")
         for submission in client.watch(submission.id, timeout_s=600):
             print(submission.state)
 
-Every failure is an `answers.ClientError` that states facts (address, status, code, problems); the command
-line words them. Sending is safe to repeat: bytes that the server has get their first submission as answer.
+Every failure is an `answers.ClientError` that states facts. Sending is safe to repeat: bytes that the server
+has get their first submission as answer.
 """
 
 from __future__ import annotations
@@ -59,10 +59,7 @@ def _certificates(url: str) -> ssl.SSLContext | bool:
 
 @dataclass(kw_only=True)
 class Client:
-    """A connection to one leaderboard. `url` is the site's address; `token` is sent as a bearer token.
-
-    `timeout_s` bounds each wait for the network, not the whole; sleep, clock and generator can be replaced.
-    """
+    """A connection to one leaderboard. `timeout_s` bounds each wait for the network, not the whole."""
 
     url: str
     token: str | None = field(default=None, repr=False)
@@ -98,7 +95,7 @@ class Client:
         self.splits()
 
     def splits(self) -> list[str]:
-        """The names of the splits, asked without the token. Raises ClientError."""
+        """The names of the splits, asked without the token."""
         try:
             response = self._asked_by_anybody("splits", accept="application/json")
         except Refused as refused:
@@ -111,7 +108,7 @@ class Client:
         return [str(name) for name in names]
 
     def account(self) -> Account:
-        """Whose token this is. Raises ClientError."""
+        """Whose token this is."""
         return self._get(Account, "account")
 
     def submit(
@@ -123,11 +120,7 @@ class Client:
         method: str,
         details: Mapping[str, str] | None = None,
     ) -> Submission:
-        """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
-
-        `details` are the form's optional fields (description, paper_url, code_url, note, commit). Raises
-        ClientError.
-        """
+        """Send a prediction file; gives the new submission, or the first one of the same bytes."""
         fields = {"split": split, "method": method, **(details or {})}
         n_sent = 0
 
@@ -146,7 +139,7 @@ class Client:
         return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
-        """The present state of a submission. Raises ClientError."""
+        """The present state of a submission."""
         return self._get(Submission, "submissions", submission_id)
 
     def board(
@@ -158,11 +151,7 @@ class Client:
         at: str | None = None,
         has_intervals: bool = False,
     ) -> Board:
-        """The board of a split, in the order of column `sort`: the present one, or that of an `edition`.
-
-        With `at` (a date, or an ISO time) as it stood then; of an edition there is no other time. With
-        `has_intervals` each value comes with where it may lie. Raises ClientError.
-        """
+        """The board of a split: the present one, of an `edition`, or as of `at` (a date or an ISO time)."""
         place = [] if edition is None else ["editions", str(edition)]
         asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
         params = {name: value for name, value in asked.items() if value}
@@ -177,7 +166,7 @@ class Client:
         at: str | None = None,
         has_intervals: bool = False,
     ) -> str:
-        """This very board as the site exports it, for everybody, as "csv" or "bib". Raises ClientError."""
+        """This very board as the site exports it, for everybody, as "csv" or "bib"."""
         is_of_edition = board.edition is not None and not at
         path = f"{quote(board.split, safe='')}{f'/editions/{board.edition}' if is_of_edition else ''}"
         asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
@@ -185,19 +174,16 @@ class Client:
         return self._retry(lambda: self._http.get(f"{self.url}/board/{path}.{suffix}", params=params)).text
 
     def manifest(self, split: str, *, edition: int | None = None) -> bytes:
-        """The manifest of a split, or of an edition of it: all columns but the values. Raises ClientError."""
+        """The manifest of a split, or of an edition of it: all columns but the values."""
         query = {} if edition is None else {"edition": edition}
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
     def quota(self) -> list[Quota]:
-        """What one's own team has left, split by split. Raises ClientError."""
+        """What one's own team has left, split by split."""
         return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
-        """Methods of a split's board, by id, side by side. Raises ClientError.
-
-        Workers compare what nobody has compared before; it is asked for until they have, at most `timeout_s`.
-        """
+        """Methods of a split's board, by id; asked for until workers have compared them."""
         until_s = self.monotonic_s() + timeout_s
         params = {"split": split, "m": list(methods)}
         address, n_asked = self._address("compare"), 0
@@ -214,49 +200,42 @@ class Client:
             self.sleep(delay_s)
 
     def own_method(self, name_or_id: str) -> Method | None:
-        """The method of one's own team of that name or id. Raises ClientError."""
+        """The method of one's own team of that name or id."""
         return next((row for row in self.methods() if name_or_id in {row.id, row.name}), None)
 
     def methods(self) -> Iterator[Method]:
-        """The methods of one's own team by name. Raises ClientError."""
+        """The methods of one's own team by name."""
         return self._listed(Method, "methods")
 
     def submissions(self) -> Iterator[Submission]:
-        """The submissions of one's own team, newest first. Raises ClientError."""
+        """The submissions of one's own team, newest first."""
         return self._listed(Submission, "submissions")
 
     def file(self, submission_id: str) -> bytes:
-        """The file of a submission of one's own team, as it was sent. Raises ClientError."""
+        """The file of a submission of one's own team, as it was sent."""
         return self._asked("submissions", submission_id, "file").content
 
     def withdraw(self, submission_id: str) -> Submission:
-        """Withdraw a submission of one's own team, or cancel it; there is no way back. Raises ClientError."""
+        """Withdraw a submission of one's own team, or cancel it; there is no way back."""
         address = self._address("submissions", submission_id, "withdraw")
         return one(self._retry(lambda: self._http.post(address)), Submission)
 
     def foreseen(self, method_id: str, visibility: str) -> Foreseen:
-        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS".
-
-        Raises ClientError.
-        """
+        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS"."""
         return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
-        """Show a method of one's own to everybody, "PUBLIC" or "ANONYMOUS"; there is no way back.
-
-        An anonymous one turns public by itself at `reveal_at` (ISO 8601), if that is given. Raises
-        ClientError.
-        """
+        """Show a method to everybody, "PUBLIC" or, until `reveal_at`, "ANONYMOUS"; there is no way back."""
         address = self._address("methods", method_id, "visibility")
         body = {"visibility": visibility, "confirm": True, "reveal_at": reveal_at}
         return one(self._retry(lambda: self._http.post(address, json=body)), Method)
 
     def receipt(self, submission_id: str) -> bytes:
-        """The signed receipt of a scored submission, a JSON Web Token as it came. Raises ClientError."""
+        """The signed receipt of a scored submission, a JSON Web Token as it came."""
         return self._asked("submissions", submission_id, "receipt").content
 
     def receipt_keys(self) -> bytes:
-        """The keys that sign the site's receipts, or once did: a JSON Web Key Set. Raises ClientError."""
+        """The keys that sign the site's receipts, or once did: a JSON Web Key Set."""
         address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
         return self._retry(lambda: self._http.get(address)).content
 

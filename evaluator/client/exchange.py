@@ -20,11 +20,7 @@ QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """How often and how long to try again: delays grow by `factor`, each shortened by up to `jitter`.
-
-    As it stands it bears with a server that is away for a quarter of a minute, as for a restart, and for ten
-    seconds with one that has not answered yet, as where it and a job start together.
-    """
+    """How often and how long to try again: a quarter of a minute, as for a restart of the server."""
 
     n_tries: int = 9
     n_first_tries: int = 8  # where nothing has ever answered
@@ -132,10 +128,7 @@ def rows(response: httpx.Response, kind: type[T]) -> list[T]:
 
 
 def next_page(response: httpx.Response) -> Mapping[str, str]:
-    """What to ask the same address for to get the next page of a list; empty on the last.
-
-    Of the header `Link` only the question is taken: a token goes to no other address, whatever it says.
-    """
+    """The query of the next page, empty on the last; of `Link` nothing else, so that the token stays here."""
     link = response.links.get("next", {}).get("url", "")
     try:
         return dict(httpx.URL(link).params)

@@ -1,7 +1,4 @@
-"""The formats in which a board is exported: the site and `tsttc board` offer what `FORMATS` has.
-
-To add one, write a function that makes a text of an `Export`, and its row below.
-"""
+"""The formats in which a board is exported: the site and `tsttc board` offer what `FORMATS` has."""
 
 from __future__ import annotations
 
@@ -34,10 +31,7 @@ class Format:
 
 
 def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
-    """Rows as CSV with a header (RFC 4180), for tables that are too long to be held.
-
-    Texts are guarded and quoted, numbers stay, None is empty.
-    """
+    """Rows as CSV with a header (RFC 4180): texts guarded and quoted, numbers as they are, None empty."""
     yield ",".join(columns) + "\r\n"
     for row in rows:
         yield csv_line(row.get(name) for name in columns)
@@ -81,10 +75,7 @@ FORMATS: Final = (
 
 
 def parquet_of(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> bytes:
-    """Rows as a Parquet table with these columns; None where there is no value.
-
-    Raises `ModuleNotFoundError` where pyarrow is not installed.
-    """
+    """Rows as a Parquet table with these columns. Raises `ModuleNotFoundError` without pyarrow."""
     try:
         import pyarrow as pa  # noqa: PLC0415 -- of an extra
         from pyarrow import parquet  # noqa: PLC0415 -- of an extra

@@ -96,22 +96,12 @@ def about(origin: Origin) -> tuple[str, ...]:
 
 
 def mark_of(*, visibility: str, pseudonym: str | None) -> str:
-    """What is said of a row of one's own that others do not see as it is; nothing of any other row.
-
-    >>> mark_of(visibility="PRIVATE", pseudonym=None), mark_of(visibility="ANONYMOUS", pseudonym="Anon 3f")
-    ('private', 'anonymous')
-    >>> mark_of(visibility="ANONYMOUS", pseudonym=None), mark_of(visibility="PUBLIC", pseudonym=None)
-    ('', '')
-    """
+    """What is said of a row of one's own that others do not see as it is; nothing of any other row."""
     return "private" if visibility == "PRIVATE" else "anonymous" if pseudonym else ""
 
 
 def marked(name: str, mark: str) -> str:
-    """A name with the note of its row.
-
-    >>> marked("Owl", "private"), marked("Owl", "")
-    ('Owl (private)', 'Owl')
-    """
+    """A name with the note of its row, as "Owl (private)"."""
     return f"{name} ({mark})" if mark else name
 
 
@@ -143,11 +133,7 @@ def rank_text(rank: int | None, *, low: int | None = None, high: int | None = No
 
 
 def as_latex(export: Export) -> str:
-    r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined.
-
-    Comments above it say what it was taken from. With intervals, they stand small behind their values, and a
-    comment says what the brackets are.
-    """
+    r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined."""
     rows, columns = list(export.rows), export.scores
     groups, rules, last = [], [], 3
     for metric, names in grouped_names(columns).items():
@@ -180,11 +166,7 @@ def _caption(rows: Sequence[Row], origin: Origin) -> tuple[str, ...]:
 
 
 def brackets(unit: str, n_units: int | None) -> str:
-    """What the brackets of a table with intervals are.
-
-    >>> brackets("day", 42)  # doctest: +ELLIPSIS
-    'In square brackets: 95 % confidence interval, bootstrap over 42 days. In round brackets behind ...
-    """
+    """What the brackets of a table with intervals are."""
     return (
         f"In square brackets: 95 % confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
         "brackets behind a rank: rank range at 95 %."
