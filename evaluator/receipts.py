@@ -1,10 +1,7 @@
-"""Score receipts: a score, signed by the leaderboard that gave it, for anybody to check offline.
+"""Score receipts: JSON Web Tokens (RFC 7519) signed by EdDSA, for anybody to check offline.
 
-A receipt is a JSON Web Token (RFC 7519), signed by EdDSA with Ed25519, so any JOSE library reads it. Scores
-are decimal texts with the edition's decimals (`"15.03"`): no two programs print one number differently.
-
-The site's keys are a JSON Web Key Set (RFC 7517, RFC 8037) at `/.well-known/tsttc-receipt-keys.json`, each
-named by its RFC 7638 thumbprint. Retired keys stay in the set: what they signed still verifies.
+Scores are decimal texts with the edition's decimals (`"15.03"`): programs print numbers differently. The
+keys are a JSON Web Key Set (RFC 7517, RFC 8037), each named by its RFC 7638 thumbprint.
 
     verified = verify(receipt_bytes, read_keys(keys_bytes))    # raises NotVerified
     verified.scores["mid"], verified.edition, verified.site
@@ -29,8 +26,6 @@ TYPE: Final = "tsttc-receipt+jwt"
 KEYS_PATH: Final = "/.well-known/tsttc-receipt-keys.json"
 KEY_BYTES: Final = 32
 MAX_BYTES: Final = 65_536
-# Version 1 signed this line and the canonical form (RFC 8785) of one JSON object without its signature.
-_FIRST_PREFIX: Final = b"tsttc-score-receipt/1\n"
 
 Document = dict[str, Any]
 
@@ -50,11 +45,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What a receipt says, its signature checked. `scores` has the protocol's names; None for no value.
-
-    `edition` is the edition in which the score stands, whether or not a later one has taken its place.
-    `method_id` stays for ever; `method` is the name that it had when the receipt was signed.
-    """
+    """What a receipt says, its signature checked. `method` is the name that it had when it was signed."""
 
     site: str
     key_id: str
@@ -73,11 +64,7 @@ class Verified:
 
 
 def decimal(value: float | None, *, decimals: int) -> str | None:
-    """A score as a receipt has it.
-
-    >>> decimal(15.0, decimals=2), decimal(None, decimals=2)
-    ('15.00', None)
-    """
+    """A score as a receipt has it."""
     return None if value is None else f"{value:.{decimals}f}"
 
 
@@ -124,11 +111,7 @@ def _no_keys() -> dict[str, Ed25519PublicKey]:
 
 
 def encode(data: bytes) -> str:
-    """Bytes as base64url without padding.
-
-    >>> encode(b"tsttc?>")
-    'dHN0dGM_Pg'
-    """
+    """Bytes as base64url without padding."""
     return base64.urlsafe_b64encode(data).rstrip(b"=").decode()
 
 
@@ -157,9 +140,8 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
     """What the receipt says, if one of these keys (see `read_keys`) signed it so. Raises `NotVerified`."""
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
-    read = _read_first if receipt.lstrip().startswith(b"{") else _read
     try:
-        named, document = read(receipt, keys)
+        named, document = _read(receipt, keys)
         if document["version"] > VERSION:
             raise NotVerified(
                 "receipt-version",
@@ -183,31 +165,13 @@ def _read(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Do
         key = _key(header["kid"], keys)
         return header["kid"], jwt.decode(text, key, algorithms=["EdDSA"])
     except jwt.InvalidSignatureError:
-        raise _altered() from None
+        raise NotVerified(
+            "receipt-altered",
+            "The signature does not fit what the receipt says; expected it unchanged, as the leaderboard "
+            "gave it.",
+        ) from None
     except jwt.PyJWTError as fault:
         raise _malformed(f"{fault}; expected the token that the leaderboard wrote") from None
-
-
-def _read_first(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> tuple[str, Document]:
-    """The same of a receipt of version 1."""
-    from cryptography.exceptions import InvalidSignature  # noqa: PLC0415 - slow to import
-
-    document = json.loads(receipt.decode(), object_pairs_hook=_once)
-    signature, named = document.pop("signature"), document["key_id"]
-    key = _key(named, keys)
-    text = json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
-    try:
-        key.verify(decode(signature), _FIRST_PREFIX + text.encode())
-    except (InvalidSignature, ValueError):
-        raise _altered() from None
-    return named, document
-
-
-def _once(pairs: list[tuple[str, Any]]) -> Document:
-    members = dict(pairs)
-    if len(members) != len(pairs):
-        raise ValueError("a field appears more than once; expected each once")
-    return members
 
 
 def _key(named: str, keys: Mapping[str, Ed25519PublicKey]) -> Ed25519PublicKey:
@@ -222,14 +186,6 @@ def _key(named: str, keys: Mapping[str, Ed25519PublicKey]) -> Ed25519PublicKey:
 
 def _malformed(what: str) -> NotVerified:
     return NotVerified("receipt-malformed", f"This is not a receipt: {what}.")
-
-
-def _altered() -> NotVerified:
-    return NotVerified(
-        "receipt-altered",
-        "The signature does not fit what the receipt says; expected it unchanged, as the leaderboard gave "
-        "it.",
-    )
 
 
 def _said(document: Document, named: str) -> Verified:

@@ -1,7 +1,4 @@
-"""The `tsttc` command: one small module per kind of subcommand, nothing heavy imported before it is needed.
-
-The exit codes are in `exits`.
-"""
+"""The `tsttc` command: one module per kind of subcommand, nothing heavy imported before it is needed."""
 
 from __future__ import annotations
 

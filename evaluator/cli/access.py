@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -83,7 +82,6 @@ def logout(*, url: str, as_json: bool) -> None:
     "split",
     required=False,
     callback=lambda c, p, value: value and slug(c, p, value),
-    shell_complete=suggestions.splits,
 )
 @url_option
 @json_option
@@ -114,7 +112,7 @@ def quota(*, split: str | None, url: str, as_json: bool) -> None:
 
 
 @click.command(short_help="Publish one of your methods.")
-@click.argument("method", callback=sendable, shell_complete=suggestions.methods)
+@click.argument("method", callback=sendable)
 @default_option(
     "--as",
     "visibility",

@@ -9,25 +9,24 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import exports, suggestions
 from evaluator.cli.connection import connect
+from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name, units, width_of
 from evaluator.cli.options import default_option, json_option, sendable, slug, url_option
 from evaluator.cli.values import authors_or_team, overall_of, texts_of
-from evaluator.metrics.protocol import known_names
+from evaluator.metrics.protocol import PRIMARY, known_names
 from evaluator.tables import layouts
 from evaluator.tables.formats import FORMATS
 
 if TYPE_CHECKING:
-    from evaluator.client.answers import Board
+    from evaluator.client.answers import Board, BoardEntry
 
 
 @click.command(short_help="Show the ranked results of a split.")
-@click.argument("split", default="test", callback=slug, shell_complete=suggestions.splits)
+@click.argument("split", default="test", callback=slug)
 @default_option(
     "--sort",
     callback=sendable,
-    shell_complete=suggestions.columns,
     default="rank",
     metavar="COLUMN",
     help=f"Sort by rank, method, team, date, {', '.join(known_names())}; -COLUMN for the reverse.",
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
 @default_option(
     "--format",
     "as_format",
-    type=click.Choice(["table", *(each.name for each in FORMATS if each.on_command_line)]),
+    type=click.Choice(["table", *(each.name for each in FORMATS)]),
     default="table",
     help="What to print.",
 )
@@ -84,21 +83,23 @@ def board(
     """
     if edition is not None and at:
         raise click.UsageError("--edition and --at exclude each other; give one of them.")
-    is_bibtex = as_format == "bibtex" and not as_json
-    if is_bibtex and mine:
-        raise click.UsageError("BibTeX has what everyone sees: --mine does not go with --format bibtex.")
+    form = "json" if as_json else as_format
+    if mine and form not in {"table", "json"}:
+        raise click.UsageError(
+            f"--mine does not go with --format {form}. The page of the board has this format with your own "
+            "rows, when you are signed in."
+        )
     with connect(url, with_token=mine) as client:
         found = client.board(split, sort=sort, edition=edition, at=at, has_intervals=has_intervals)
-        address = client.board_page(found, sort=sort, at=at)
-        if is_bibtex:
-            click.echo(client.bibliography(found, at=at), nl=False)
+        if form not in {"table", "json"}:
+            suffix = next(each.suffix for each in FORMATS if each.name == form)
+            text = client.export(found, suffix, sort=sort, at=at, has_intervals=has_intervals)
+            click.echo(text.replace("\r\n", "\n"), nl=False)  # as lines end here
             return
-    chosen = next((each for each in FORMATS if each.name == ("json" if as_json else as_format)), None)
-    if chosen is None:
-        _show(found, is_mine=mine)
+    if form == "json":
+        echo_json(found.document)
     else:
-        text = chosen.write(exports.export(found, address=address, has_intervals=has_intervals))
-        click.echo(text.replace("\r\n", "\n"), nl=False)  # as lines end here
+        _show(found, is_mine=mine)
 
 
 def _show(found: Board, *, is_mine: bool) -> None:
@@ -143,11 +144,13 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
 def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list[str]:
     headings = ["rank", "method", *texts, *map(short_name, scores)]
     rows = [[Cell(text, is_bold=True) for text in headings]]
-    marks = {name: exports.marks_of(found, name) for name in scores}
+    marks = {name: _marks_of(found, name) for name in scores}
     for i, entry in enumerate(found.entries):
+        ranks = entry.interval(PRIMARY)
+        mark = layouts.mark_of(visibility=entry.visibility, pseudonym=entry.pseudonym)
         row = [
-            Cell(exports.rank_text(entry)),
-            Cell(layouts.marked(printable(entry.method), exports.mark_of(entry))),
+            Cell(layouts.rank_text(entry.rank, low=ranks.rank_low, high=ranks.rank_high)),
+            Cell(layouts.marked(printable(entry.method), mark)),
         ]
         row += [
             Cell(printable(authors_or_team(entry)) if name == "team" else printable(entry.date or ""))
@@ -156,7 +159,28 @@ def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
         values = texts_of(entry, missing=NO_VALUE, scores=tuple(scores))
         for name, value in zip(scores, values, strict=True):
             best, second = marks[name]
-            text = value + exports.interval_text(entry, name)
-            row.append(Cell(text, is_bold=i in best, is_underlined=i in second))
+            row.append(
+                Cell(value + _interval_text(entry, name), is_bold=i in best, is_underlined=i in second)
+            )
         rows.append(row)
     return aligned(rows, align="><" + "<" * len(texts) + "." * len(scores))
+
+
+def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
+    """The places of the best and the second of a column, among the rows that everybody sees."""
+    from evaluator.metrics.metrics import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
+
+    return best_and_second(
+        [None if entry.visibility == "PRIVATE" else entry.scores.get(name) for entry in board.entries]
+    )
+
+
+def _interval_text(entry: BoardEntry, name: str) -> str:
+    """Where a value may lie, to stand behind it; empty where that is not known."""
+    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
+
+    found = entry.interval(name)
+    low, high = (
+        format_published(end, decimals=entry.decimals, missing="") for end in (found.low, found.high)
+    )
+    return f" [{low}, {high}]" if low and high else ""

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
@@ -30,13 +29,12 @@ Scores = Mapping[str, float | None]
 
 
 @click.command(short_help="Compare two methods or two files, with confidence intervals and p-values.")
-@click.argument("first", callback=sendable, shell_complete=suggestions.rows_or_files)
-@click.argument("second", callback=sendable, shell_complete=suggestions.rows_or_files)
+@click.argument("first", callback=sendable)
+@click.argument("second", callback=sendable)
 @default_option(
     "--split",
     default="test",
     callback=slug,
-    shell_complete=suggestions.splits,
     help="The board of the methods.",
 )
 @click.option(

@@ -12,7 +12,6 @@ import click
 
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure
-from evaluator.cli.following import signs_of_life
 from evaluator.cli.layout import printable
 from evaluator.cli.options import TOKEN_VARIABLE
 from evaluator.cli.tokens import token_for
@@ -33,18 +32,16 @@ WORDS_OF_403 = frozenset({"token-scope", "token-split", "not-admitted"})
 
 @contextmanager
 def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator[Client]:
-    """A client for the site at `url`, with `token` or the one that is kept for it.
+    """A client for the site at `url`, with `token` or the one that is kept for it; raises Failure.
 
     Before the token or a file goes anywhere, the site has to answer as a leaderboard.
-    Its errors leave as failures worded for a person.
     """
     bearer = token or (token_for(url) if with_token else None)
     from evaluator.client.answers import ClientError, Refused  # noqa: PLC0415 -- loads msgspec
 
     # httpx brings a command line of its own, with rich and pygments: a third of the time of its import.
     sys.modules.setdefault("httpx._main", None)  # type: ignore[arg-type]  # None: as if it were not there
-    from evaluator.client.client import Client  # noqa: PLC0415 -- loads httpx, which --help can do without
-    from evaluator.client.connection import LOOPBACK_HOSTS  # noqa: PLC0415 -- the same
+    from evaluator.client.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)
@@ -54,10 +51,7 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
     patience = RetryPolicy(n_first_tries=1) if sys.stderr.isatty() else RetryPolicy()
     agent = f"tsttc/{version()}"
     try:
-        with (
-            signs_of_life(url),
-            Client(url=url, token=bearer, user_agent=agent, patience=patience) as client,
-        ):
+        with Client(url=url, token=bearer, user_agent=agent, patience=patience) as client:
             if bearer:
                 client.require_leaderboard()
             try:
@@ -98,7 +92,7 @@ def version() -> str:
 
 def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
     """What happened, whose fault it is and what to do next; of a refusal `hint` says it."""
-    from evaluator.client.answers import BadAnswer, NotReady, Redirected, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
+    from evaluator.client.answers import BadAnswer, Refused, TimedOut, Unreachable  # noqa: PLC0415 -- loads msgspec
 
     refused_hint = hint
     hint = "Check --server (or TSTTC_URL), your network, and whether the server runs."
@@ -112,18 +106,15 @@ def in_words(error: ClientError, *, url: str, hint: str = "") -> Failure:
         case Unreachable():
             code, words = "cut-off", f"{error.url} gave an incomplete answer ({error.reason})."
             hint = "Run the command again: the same file never counts twice."
-        case Redirected():
-            code, words = "redirected", f"{error.url} redirects to {error.location}, which is not followed."
         case BadAnswer():
             code, words = "bad-answer", f"{error.url} did not answer like a leaderboard: {error.found}."
         case TimedOut():
             last = f" It was {error.submission.state} last." if error.submission else ""
             exit_code, code, words = Exit.TIMEOUT, "timeout", f"{_sentence(str(error))}{last}"
-            more = {"submission": error.submission.document if error.submission else None}
-            hint = f"The evaluation continues; follow it with: tsttc status {error.submission_id} --watch"
-        case NotReady():
-            exit_code, code, words = Exit.TIMEOUT, "timeout", _sentence(str(error))
             hint = "The workers are busy; ask again later."
+            if error.submission_id:
+                more = {"submission": error.submission.document if error.submission else None}
+                hint = f"The evaluation continues; follow it with: tsttc status {error.submission_id} --watch"
         case _:
             code, words = "client", _sentence(str(error))
     return Failure(words, exit_code=exit_code, code=code, hint=hint, more=more)

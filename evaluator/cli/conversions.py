@@ -11,7 +11,6 @@ from evaluator.cli.options import default_option, output_option, predictions_arg
 from evaluator.cli.reading import FOLDER, naming, predictions_of, write_bytes
 
 GAP = click.IntRange(1, 5)
-RATE = click.FloatRange(min=0, min_open=True)
 
 
 @click.command(short_help="Convert scale ratios to seconds and back, and anno_ids to natural keys.")
@@ -19,12 +18,10 @@ RATE = click.FloatRange(min=0, min_open=True)
 @click.option(
     "--frame-gap", type=GAP, metavar="G", help="PREDICTIONS contains scale ratios of frames with this gap."
 )
-@click.option("--fps", "fps_hz", type=RATE, metavar="HZ", help="The same as a rate: 10 Hz / frame gap.")
 @default_option(
     "--to", type=click.Choice(["ttc", "scale_ratio"]), default="ttc", help="Output: seconds or scale ratios."
 )
 @click.option("--to-frame-gap", type=GAP, metavar="G", help="With --to scale_ratio: the frame gap (5).")
-@click.option("--to-fps", "to_fps_hz", type=RATE, metavar="HZ", help="The same as a rate.")
 @click.option(
     "--annotations",
     type=FOLDER,
@@ -36,17 +33,15 @@ def convert(
     *,
     predictions: Path,
     frame_gap: int | None,
-    fps_hz: float | None,
     to: Literal["ttc", "scale_ratio"],
     to_frame_gap: int | None,
-    to_fps_hz: float | None,
     annotations: Path | None,
     output: Path | None,
 ) -> None:
     """Convert PREDICTIONS, a prediction file or - for standard input, to another unit, rate, or kind of keys.
 
     An envelope states the kind of its values. A flat file, from key to number, contains scale ratios if
-    --frame-gap or --fps is given, and seconds otherwise.
+    --frame-gap is given, and seconds otherwise.
 
     The toolkit numbers the sequences in the order in which the file system lists the annotation files, which
     differs between machines. --annotations gives a result file of the toolkit natural keys, which mean the
@@ -60,14 +55,8 @@ def convert(
     """
     from evaluator.predictions.conversion import convert as converted  # noqa: PLC0415 -- loads numpy
 
-    if frame_gap is not None and fps_hz is not None:
-        raise click.UsageError("--frame-gap and --fps mean the same; give one of them.")
-    if to_frame_gap is not None and to_fps_hz is not None:
-        raise click.UsageError("--to-frame-gap and --to-fps mean the same; give one of them.")
-    if to == "ttc" and (to_frame_gap is not None or to_fps_hz is not None):
-        raise click.UsageError(
-            "Seconds have no rate: --to-frame-gap and --to-fps belong to --to scale_ratio."
-        )
+    if to == "ttc" and to_frame_gap is not None:
+        raise click.UsageError("Seconds have no rate: --to-frame-gap belongs to --to scale_ratio.")
     natural_keys = None
     if annotations is not None:
         from evaluator.truth.numbering import read_numbering  # noqa: PLC0415 -- loads numpy
@@ -80,9 +69,7 @@ def convert(
             found = converted(
                 data,
                 to=to,
-                fps_hz=fps_hz,
                 frame_gap=frame_gap,
-                to_fps_hz=to_fps_hz,
                 to_frame_gap=to_frame_gap,
                 natural_keys=natural_keys,
             )

@@ -1,7 +1,4 @@
-"""How the command line fails: one exception with an exit code, in words and, with --json, as a document.
-
-The sentences about a file are the library's and the server's own; here they are only numbered.
-"""
+"""How the command line fails: one exception with an exit code, in words and, with --json, as a document."""
 
 from __future__ import annotations
 
@@ -19,8 +16,7 @@ from evaluator.problems import Problem, Rejected, n_problems_in_words
 class Failure(Exception):
     """Ends the command: a sentence, what is wrong in the file where that is known, and what to do next.
 
-    `document` is what --json prints on standard output, by default in the shape of the API's own errors,
-    with the members of `more` added.
+    `document` is what --json prints: by default in the shape of the API's errors, with the members of `more`.
     """
 
     def __init__(

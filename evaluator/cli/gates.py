@@ -1,8 +1,4 @@
-"""Gates: conditions on scores that set the exit code, so that a CI job can stop on them.
-
-The grammar is `NAME OPERATOR NUMBER`, joined by `or`: names of scores, operators > >= < <= == !=. Nothing is
-evaluated but that. The numbers compared are the published ones, with two decimals.
-"""
+"""Gates: conditions on published scores, `NAME OPERATOR NUMBER` joined by `or`, that set the exit code."""
 
 from __future__ import annotations
 
@@ -14,13 +10,10 @@ from typing import TYPE_CHECKING, Any, Final, TypeVar
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
 from evaluator.cli.layout import printable, short_name
 from evaluator.metrics.protocol import PRIMARY, known_names
-from evaluator.scoring.significance import SIGNIFICANT, Difference, too_few_units
-from evaluator.tables.sentences import p_text
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Board, BoardEntry
@@ -64,8 +57,6 @@ class Condition:
 def parse(text: str) -> list[Condition]:
     """The conditions of which one is enough; raises `ValueError` that says what was expected where.
 
-    >>> [str(condition) for condition in parse("mid > 15.0 or rte_crucial>=7")]
-    ['mid > 15', 'rte_crucial >= 7']
     >>> [str(condition) for condition in parse("MiD > 15 or RTE_n > 7")]
     ['mid > 15', 'rte_negative > 7']
     >>> parse("mid")
@@ -141,11 +132,9 @@ def told(
         raise failure
 
 
-def undecided(why: str, *, hint: str = "") -> Failure:
+def undecided(why: str) -> Failure:
     """The failure of a gate for which something is missing."""
-    return Failure(
-        f"The gate cannot be evaluated: {why}.", exit_code=Exit.GATE, code="gate-undecided", hint=hint
-    )
+    return Failure(f"The gate cannot be evaluated: {why}.", exit_code=Exit.GATE, code="gate-undecided")
 
 
 # --- worse than another method ---------------------------------------------------------------------------
@@ -183,13 +172,8 @@ def rows_named(board: Board, name: str) -> list[BoardEntry]:
     return by_id or [entry for entry in by_name if entry.kind == "published"] or by_name
 
 
-def rival(
-    client: Client, *, split: str, method: str, own: str, is_significant_only: bool
-) -> BoardEntry | None:
-    """Look the other method up; raises Failure where there can be no comparison, before anything is sent.
-
-    None where it is the file's `own` method, and nothing of it is on the board yet.
-    """
+def rival(client: Client, *, split: str, method: str, own: str) -> BoardEntry | None:
+    """The other method's row, None for the file's `own` method before it has one; raises Failure."""
     board = client.board(split)
     if method == own and not rows_named(board, method):
         words = f"{printable(method)} is not on the board of {split} yet; nothing to compare with."
@@ -198,79 +182,15 @@ def rival(
     entry = named(board, method)
     if entry.scores.get(PRIMARY) is None:
         raise undecided(f"{printable(entry.method)} has no MiD on {split}")
-    if is_significant_only and entry.method_id is None:
-        raise undecided(
-            f"{printable(entry.method)} is quoted from a paper, which does not report values per recording",
-            hint="Compare with it without --significant.",
-        )
     return entry
 
 
-def judge_against(
-    client: Client,
-    found: BoardEntry,
-    *,
-    is_significant_only: bool,
-    split: str,
-    method_id: str | None,
-    mid: float | None,
-    decimals: int = 2,
-) -> None:
-    """Raise Failure if MiD is worse than the other method's; by more than chance, if only that counts."""
-    other, name = found.scores[PRIMARY], printable(found.method)
+def judge_against(found: BoardEntry, *, mid: float | None, decimals: int = 2) -> None:
+    """Raise Failure if MiD is worse than the other method's."""
+    other = found.scores[PRIMARY]
     if mid is None or other is None:
         raise undecided("there is no value for mid")
-    if mid <= other:
-        return
-    words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.n_decimals}f}"
-    if not is_significant_only:
-        raise _worse(words)
-    if method_id is None or found.method_id is None:
-        raise undecided("the server does not name the method")
-    row = named(client.board(split), method_id)
-    if method_id == found.method_id or row.scores.get(PRIMARY) != mid:
-        raise undecided(
-            f"{words}, but the board shows a better submission of {printable(row.method)}",
-            hint="Submit under another method name, or compare files: tsttc compare A B --truth TRUTH",
-        )
-    compared = client.compare(split, [method_id, found.method_id])
-    difference = compared.differences().get(PRIMARY)
-    if compared.withheld:
-        raise undecided(f"{words}. {compared.withheld.rstrip('.')}", hint="Compare without --significant.")
-    if difference is None or difference.p_below is None:
-        few = too_few_units(None if difference is None else difference.n_effective, unit=compared.unit)
-        raise undecided(f"there are {few} for a p-value")
-    if difference.is_significant:
-        raise _worse(f"{words}; {in_numbers(difference, decimals=decimals)}")
-
-
-def in_numbers(found: Difference, *, decimals: int = 2) -> str:
-    """`+1.20 [+0.40, +2.00], p = 0.0030`: a difference, its 95 % interval, and p.
-
-    >>> in_numbers(Difference(1.2, 0.4, 2.0, 0.003))
-    '+1.20 [+0.40, +2.00], p = 0.0030'
-    """
-    if found.low is None or found.high is None or found.p_below is None:
-        return f"{found.difference:+.{decimals}f}"
-    value, low, high = (f"{each:+.{decimals}f}" for each in (found.difference, found.low, found.high))
-    return f"{value} [{low}, {high}], {p_text(found.p, found.p_below)}"
-
-
-def _worse(words: str) -> Failure:
-    return Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")
-
-
-def worse_than_options(command: Command) -> Command:
-    """--fail-if-worse-than METHOD, --significant."""
-    command = click.option(
-        "--significant",
-        is_flag=True,
-        help=f"With --fail-if-worse-than: only for a significant difference (p < {SIGNIFICANT:g}).",
-    )(command)
-    return click.option(
-        "--fail-if-worse-than",
-        "worse_than",
-        metavar="METHOD",
-        shell_complete=suggestions.rows,
-        help=f"Exit with code 6 if {short_name(PRIMARY)} is higher than that of this method on the board.",
-    )(command)
+    if mid > other:
+        name = printable(found.method)
+        words = f"MiD is {mid:.{decimals}f}, and {name} has {other:.{found.decimals}f}"
+        raise Failure(f"The gate fails: {words}.", exit_code=Exit.GATE, code="gate-failed")

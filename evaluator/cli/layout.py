@@ -1,7 +1,4 @@
-"""Text tables: columns that line up on the decimal point, plain wherever the output goes.
-
-Bold and underline are ANSI codes, which click leaves out when the output is no terminal.
-"""
+"""Text tables: columns that line up on the decimal point."""
 
 from __future__ import annotations
 

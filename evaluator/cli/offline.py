@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.failures import echo_json
 from evaluator.cli.options import json_option, output_option, predictions_argument, slug, url_option
@@ -105,7 +104,6 @@ def _sequences(manifest_path: Path | None, annotations: Path | None) -> tuple[Ma
 @click.option(
     "--split",
     callback=lambda c, p, value: value and slug(c, p, value),
-    shell_complete=suggestions.splits,
     help="Get the manifest of this split from the leaderboard.",
 )
 @click.option("--edition", type=int, metavar="N", help="With --split: of a former edition, by its number.")

@@ -10,18 +10,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from evaluator.cli import suggestions
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
 from evaluator.cli.failures import Failure, echo_json
-from evaluator.cli.following import state_in_words
 from evaluator.cli.layout import NO_VALUE, Cell, aligned, printable, short_name
 from evaluator.cli.options import default_option, json_option, output_option, sendable, slug, url_option
 from evaluator.cli.reading import write_bytes
+from evaluator.cli.values import state_in_words
 from evaluator.metrics.protocol import PRIMARY
 
 if TYPE_CHECKING:
-    from evaluator.client.answers import Board, BoardEntry, Submission
+    from evaluator.client.answers import Submission
 
 
 @click.command(short_help="Show whose token this is, and what it may do.")
@@ -41,89 +40,48 @@ def whoami(*, url: str, as_json: bool) -> None:
         return
     team = f"team {found.team}" if found.team else "no team yet"
     limit = f", for {found.split} only" if found.split else ""
+    moment = found.expires_at
+    end = f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
     click.echo(printable(f"{team} at {url.rstrip('/')}"))
-    click.echo(
-        printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, {_end_of(found.expires_at)}')
-    )
-
-
-def _end_of(moment: str | None) -> str:
-    """
-    >>> _end_of("2027-02-20T20:16:57.601932Z"), _end_of(None)
-    ('until 2027-02-20 20:16 UTC', 'without an end')
-    """
-    return f"until {moment[:16].replace('T', ' ')} UTC" if moment else "without an end"
+    click.echo(printable(f'token "{found.token}": {" and ".join(found.scopes)}{limit}, {end}'))
 
 
 @click.command(short_help="List the methods of your team.")
-@click.option(
-    "--ranks", "with_ranks", is_flag=True, help="Show rank and MiD of each method on every split as well."
-)
 @url_option
 @json_option
-def methods(*, with_ranks: bool, url: str, as_json: bool) -> None:
+def methods(*, url: str, as_json: bool) -> None:
     """List the methods of your team: id, name and who sees them.
 
     \b
-    Examples:
+    Example:
       tsttc methods
-      tsttc methods --ranks
     """
     with connect(url, with_token=True) as client:
         found = list(client.methods())
-        boards = [client.board(split) for split in client.splits()] if with_ranks and found else []
     if as_json:
-        documents = [dict(method.document) for method in found]
-        for document, method in zip(documents, found, strict=True):
-            if with_ranks:
-                document["ranks"] = {
-                    board.split: {"rank": entry.rank, PRIMARY: entry.scores.get(PRIMARY)}
-                    for board in boards
-                    for entry in _entries(board, method.id)
-                }
-        echo_json(documents)
+        echo_json([method.document for method in found])
         return
     if not found:
         click.echo("Your team has no methods yet; tsttc submit creates one.")
         return
-    boards = [board for board in boards if any(_entries(board, method.id) for method in found)]
-    heads = ("id", "method", "visibility", *(board.split for board in boards))
-    table = [[Cell(text, is_bold=True) for text in heads]]
+    table = [[Cell(text, is_bold=True) for text in ("id", "method", "visibility")]]
     for method in found:
         called = f" as {method.pseudonym}" if method.visibility == "ANONYMOUS" and method.pseudonym else ""
         seen = f"{method.visibility.lower()}{called}"
-        standings = (_standing(board, method.id) for board in boards)
-        table.append([Cell(printable(text)) for text in (method.id, method.name, seen, *standings)])
-    for line in aligned(table, align="<" * len(heads)):
+        table.append([Cell(printable(text)) for text in (method.id, method.name, seen)])
+    for line in aligned(table, align="<<<"):
         click.echo(line)
-
-
-def _entries(board: Board, method_id: str) -> list[BoardEntry]:
-    return [entry for entry in board.entries if entry.method_id == method_id]
-
-
-def _standing(board: Board, method_id: str) -> str:
-    """Rank and MiD of a method on a board, of which everybody sees those with a rank."""
-    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
-
-    for entry in _entries(board, method_id):
-        mid = format_published(entry.scores.get(PRIMARY), decimals=entry.n_decimals, missing=NO_VALUE)
-        rank = "no rank" if entry.rank is None else f"rank {entry.rank}"
-        return f"{rank}, {short_name(PRIMARY)} {mid}"
-    return NO_VALUE
 
 
 @click.command("submissions", short_help="List the submissions of your team, newest first.")
 @click.option(
     "--split",
     callback=lambda c, p, value: value and slug(c, p, value),
-    shell_complete=suggestions.splits,
     help="Only this split.",
 )
 @click.option(
     "--method",
     callback=sendable,
-    shell_complete=suggestions.methods,
     help="Only this method, by name or id.",
 )
 @default_option(

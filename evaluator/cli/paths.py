@@ -1,13 +1,8 @@
-"""Paths of the configuration file and of the cache."""
+"""The configuration file of the command."""
 
 from __future__ import annotations
 
 import json
-import os
-import shlex
-import subprocess
-import sys
-from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -18,27 +13,6 @@ APPLICATION = "tsttc"
 def settings_file() -> Path:
     """The file of settings: of the user's configuration, as each system has it."""
     return Path(click.get_app_dir(APPLICATION)) / "settings.json"
-
-
-def cache_folder() -> Path:
-    """The folder of copies that can be fetched again."""
-    if sys.platform == "win32":
-        home = os.environ.get("LOCALAPPDATA") or str(Path.home() / "AppData" / "Local")
-        return Path(home) / APPLICATION / "cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / APPLICATION
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / APPLICATION
-
-
-def command_line(words: Sequence[str], *, platform: str = sys.platform) -> str:
-    """These words as one would type them in the shell of this system.
-
-    >>> command_line(["tsttc", "check", "a b.json"], platform="linux")
-    "tsttc check 'a b.json'"
-    >>> print(command_line(["tsttc", "check", r"C:\\my files\\a.json"], platform="win32"))
-    tsttc check "C:\\my files\\a.json"
-    """
-    return subprocess.list2cmdline(words) if platform == "win32" else shlex.join(words)
 
 
 def server_of_login() -> str | None:

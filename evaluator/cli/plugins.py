@@ -1,12 +1,4 @@
-"""Commands of other packages: the entry points of the group `tsttc.commands`, found when they are asked for.
-
-A package adds a command in its pyproject.toml:
-
-    [project.entry-points."tsttc.commands"]
-    name = "module:command"
-
-A broken one is shown as such, and breaks no other.
-"""
+"""Commands of other packages: the entry points of `tsttc.commands`. A broken one breaks no other."""
 
 from __future__ import annotations
 
@@ -27,27 +19,20 @@ GROUP: Final = "tsttc.commands"
 
 @cache
 def found() -> dict[str, EntryPoint]:
-    """The entry points by name; of two with one name the first."""
+    """The entry points by name."""
     from importlib.metadata import entry_points  # noqa: PLC0415 -- takes as long as the rest of --help
 
-    points: dict[str, EntryPoint] = {}
-    for point in entry_points(group=GROUP):
-        points.setdefault(point.name, point)
-    return points
+    return {point.name: point for point in entry_points(group=GROUP)}
 
 
 def loaded(point: EntryPoint) -> click.Command:
     """The command of an entry point; for one that cannot be had, a command that says why."""
     try:
-        command = point.load()
+        command: click.Command = point.load()
     except Exception as error:  # noqa: BLE001 -- a foreign package may fail at anything
-        return _broken(point, f"{type(error).__name__}: {error}")
-    if not isinstance(command, click.Command):
-        return _broken(point, f"{point.value} is a {type(command).__name__}")
-    return command
-
-
-def _broken(point: EntryPoint, cause: str) -> click.Command:
+        cause = f"{type(error).__name__}: {error}"
+    else:
+        return command
     package = point.dist.name if point.dist is not None else point.value
     sentence = printable(f"The command {point.name} of the package {package} cannot be loaded ({cause}).")
 

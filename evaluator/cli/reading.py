@@ -55,29 +55,19 @@ def bytes_of(path: Path) -> bytes:
 
 
 def predictions_of(path: Path) -> bytes:
-    """A prediction file, or standard input, in a form that the leaderboard takes."""
-    return as_sent(bytes_of(path), path)
-
-
-def as_sent(data: bytes, path: Path) -> bytes:
-    """The same predictions as the leaderboard takes them: a Parquet table becomes JSON."""
+    """A prediction file, or standard input, as the leaderboard takes it: a Parquet table becomes JSON."""
     from evaluator.predictions import parquet  # noqa: PLC0415 -- few files need it
 
     with naming(path):
         try:
-            return parquet.as_sent(data)
+            return parquet.as_sent(bytes_of(path))
         except ModuleNotFoundError:
-            raise without_pyarrow(f"Reading {name_of(path)}, a Parquet table,") from None
-
-
-def without_pyarrow(what: str) -> Failure:
-    """The failure for a table that this machine cannot read or write."""
-    return Failure(
-        f"{what} needs pyarrow, which is not installed.",
-        exit_code=Exit.USAGE,
-        code="not-installed",
-        hint="Install it with: pip install pyarrow",
-    )
+            raise Failure(
+                f"Reading {name_of(path)}, a Parquet table, needs pyarrow, which is not installed.",
+                exit_code=Exit.USAGE,
+                code="not-installed",
+                hint="Install it with: pip install pyarrow",
+            ) from None
 
 
 def write_bytes(path: Path, data: bytes, *, option: str = "-o") -> None:

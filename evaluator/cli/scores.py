@@ -20,7 +20,6 @@ from evaluator.cli.reading import (
     naming,
     predictions_of,
     units_asked,
-    without_pyarrow,
     write_bytes,
 )
 from evaluator.cli.warnings_in_words import echo_warnings
@@ -89,7 +88,7 @@ class _Scored:
     "per_sequence",
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Write the errors of every sequence to this file: CSV, or Parquet if its name ends so.",
+    help="Write the errors of every sequence to this CSV file.",
 )
 @default_option(
     "--format",
@@ -139,7 +138,7 @@ def score(
         for one in found:
             _warn(one, alone=len(found) == 1)
     if per_sequence is not None:
-        write_bytes(per_sequence, _per_sequence(found, per_sequence), option="--per-sequence")
+        write_bytes(per_sequence, _per_sequence(found), option="--per-sequence")
     if taken and not as_json and not any(any(row.intervals.values()) for row in rows):
         few = f"one needs 8 {in_words(taken.kind)} of equal size, or more of unequal size"
         click.echo(f"There are no confidence intervals: {few}.", err=True)
@@ -369,8 +368,8 @@ def _counts_in_words(report: Report) -> str:
     )
 
 
-def _per_sequence(found: Sequence[_Scored], path: Path) -> bytes:
-    from evaluator.tables.formats import csv_lines, parquet_of  # noqa: PLC0415 -- needed here alone
+def _per_sequence(found: Sequence[_Scored]) -> bytes:
+    from evaluator.tables.formats import csv_lines  # noqa: PLC0415 -- needed here alone
 
     tables = [one.report.records() for one in found]
     columns = ["file", *tables[0]]
@@ -379,12 +378,7 @@ def _per_sequence(found: Sequence[_Scored], path: Path) -> bytes:
         for one, table in zip(found, tables, strict=True)
         for values in zip(*table.values(), strict=True)
     )
-    if path.suffix.lower() != ".parquet":
-        return "".join(csv_lines(records, columns=columns)).encode()
-    try:
-        return parquet_of(records, columns=columns)
-    except ModuleNotFoundError:
-        raise without_pyarrow("Writing a Parquet table") from None
+    return "".join(csv_lines(records, columns=columns)).encode()
 
 
 def _judge(conditions: list[gates.Condition], found: Sequence[_Scored]) -> None:

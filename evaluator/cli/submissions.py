@@ -11,11 +11,10 @@ from urllib.parse import urljoin
 
 import click
 
-from evaluator.cli import gates, suggestions
+from evaluator.cli import gates
 from evaluator.cli.connection import connect
 from evaluator.cli.exits import Exit
-from evaluator.cli.failures import Failure
-from evaluator.cli.following import followed, state_in_words
+from evaluator.cli.failures import Failure, rejected
 from evaluator.cli.layout import printable, result_in_words
 from evaluator.cli.options import (
     is_utf8,
@@ -26,11 +25,11 @@ from evaluator.cli.options import (
     timeout_option,
     url_option,
 )
-from evaluator.cli.sending import opened, progress, require_good
-from evaluator.cli.values import in_short
+from evaluator.cli.reading import name_of, predictions_of
+from evaluator.cli.values import in_short, state_in_words
 from evaluator.cli.warnings_in_words import echo_warnings
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.problems import n_problems_in_words
+from evaluator.problems import Rejected, n_problems_in_words
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Submission
@@ -43,13 +42,11 @@ if TYPE_CHECKING:
     "--split",
     required=True,
     callback=slug,
-    shell_complete=suggestions.splits,
     help="The split: val, test, …",
 )
 @click.option(
     "--method",
     callback=sendable,
-    shell_complete=suggestions.methods,
     required=True,
     help="Name or id of the method; a new name creates a new method.",
 )
@@ -61,7 +58,12 @@ if TYPE_CHECKING:
 @click.option("--wait", is_flag=True, help="Wait for the scores.")
 @timeout_option
 @gates.fail_if_option
-@gates.worse_than_options
+@click.option(
+    "--fail-if-worse-than",
+    "worse_than",
+    metavar="METHOD",
+    help="Exit with code 6 if MiD is higher than that of this method on the board.",
+)
 @click.option("--yes", is_flag=True, help="Do not ask before the results of a public method go public.")
 @click.option("--no-check", is_flag=True, help="Submit without checking the file first.")
 @url_option
@@ -75,7 +77,6 @@ def submit(
     timeout_s: float,
     fail_if: list[gates.Condition],
     worse_than: str | None,
-    significant: bool,
     yes: bool,
     no_check: bool,
     url: str,
@@ -93,57 +94,48 @@ def submit(
       tsttc submit predictions.json --split val --method "Foo++" --wait
       tsttc submit predictions.json --split test --method "Foo++" --wait --json > scores.json
       tsttc submit predictions.json --split val --method "Foo++" --fail-if "mid > 15.0 or rte > 13"
-      tsttc submit predictions.json --split val --method "Bar" --fail-if-worse-than "Foo++" --significant
+      tsttc submit predictions.json --split val --method "Foo++" --fail-if-worse-than published:deep-scale
     """
-    _require_rival(worse_than, significant)
+    data = predictions_of(predictions)
     with connect(url, with_token=True) as client:
-        with opened(predictions) as file:
-            warned = frozenset[str]()
-            if not no_check:
-                warned = require_good(client, file, split=split, name=str(predictions))
-            rival = None
-            if worse_than:
-                rival = gates.rival(
-                    client, split=split, method=worse_than, own=method, is_significant_only=significant
-                )
-            notice = _notice_of(client, method)
-            _warn(notice, err=as_json)
-            if notice and not yes:
-                _require_consent()
-            filename = _name_to_send(predictions)
-            with progress(file, filename) as watched:
-                submission = client.submit(
-                    watched,
-                    filename=filename,
-                    split=split,
-                    method=method,
-                    details={field: value for field, value in details.items() if value},
-                )
+        warned = frozenset[str]()
+        if not no_check:
+            warned = _require_good(client, data, split=split, path=predictions)
+        rival = None
+        if worse_than:
+            rival = gates.rival(client, split=split, method=worse_than, own=method)
+        notice = _notice_of(client, method)
+        _warn(notice, err=as_json)
+        if notice and not yes:
+            _require_consent()
+        submission = client.submit(
+            data,
+            filename=_name_to_send(predictions),
+            split=split,
+            method=method,
+            details={field: value for field, value in details.items() if value},
+        )
         is_waiting = wait or bool(fail_if) or bool(worse_than)
         if is_waiting or not as_json:
             _announce(submission, site=url, err=as_json)
         if submission.notice != notice:  # a token that may only submit learns it now
             _warn(submission.notice, err=as_json)
         if is_waiting and not submission.is_final:
-            submission = followed(client, submission.id, timeout_s=timeout_s, seen=submission)
+            submission = _followed(client, submission.id, timeout_s=timeout_s)
 
         def judge() -> None:
             gates.judge(fail_if, submission.scores, decimals=submission.decimals)
             if rival is not None:
                 mid = (submission.scores or {}).get(PRIMARY)
-                gates.judge_against(
-                    client,
-                    rival,
-                    is_significant_only=significant,
-                    split=split,
-                    method_id=submission.method_id,
-                    mid=mid,
-                    decimals=submission.decimals,
-                )
+                gates.judge_against(rival, mid=mid, decimals=submission.decimals)
 
         conclude(submission, as_json=as_json, judge=judge, warned=warned)
-        if not as_json:
-            _say_if_private(client, submission)
+        if submission.is_new and submission.visibility == "PRIVATE" and not as_json:
+            name = printable(submission.method)
+            click.echo(
+                f"\n{name} is private: only your team sees its results. "
+                f'Publish it with: tsttc publish "{name}"'
+            )
 
 
 @click.command(short_help="Show the state, the scores or the problems of a submission.")
@@ -171,7 +163,7 @@ def status(
     """
     with connect(url, with_token=True) as client:
         submission = (
-            followed(client, submission_id, timeout_s=timeout_s)
+            _followed(client, submission_id, timeout_s=timeout_s)
             if watch
             else client.submission(submission_id)
         )
@@ -182,9 +174,43 @@ def status(
     )
 
 
-def _require_rival(worse_than: str | None, significant: bool) -> None:
-    if significant and not worse_than:
-        raise click.UsageError("--significant needs --fail-if-worse-than METHOD, which is missing.")
+def _require_good(client: Client, data: bytes, *, split: str, path: Path) -> frozenset[str]:
+    """Warn of a doubtful file, and give the codes of the warnings; raises Failure for one at fault.
+
+    A split without a manifest is left to the server, which says what is the matter with it.
+    """
+    from evaluator import read_manifest, read_predictions  # noqa: PLC0415 -- loads numpy
+    from evaluator.client.answers import Refused  # noqa: PLC0415 -- loads msgspec
+    from evaluator.predictions.plausibility import warnings_of  # noqa: PLC0415 -- loads numpy
+
+    try:
+        table = client.manifest(split)
+    except Refused as refused:
+        if refused.status != 404:
+            raise
+        return frozenset()
+    try:
+        manifest = read_manifest(table)
+    except Rejected as fault:
+        raise rejected(f"the server's manifest of {split}", fault) from None
+    try:
+        found = read_predictions(data, manifest=manifest)
+    except Rejected as fault:
+        hint = "Nothing was submitted; your quota is not used."
+        raise rejected(name_of(path), fault, hint=hint) from None
+    warnings = warnings_of(found)
+    echo_warnings(warnings)
+    return frozenset(warning.code for warning in warnings)
+
+
+def _followed(client: Client, submission_id: str, *, timeout_s: float) -> Submission:
+    """The submission when it is final; until then standard error tells each state."""
+    told = ""
+    for submission in client.watch(submission_id, timeout_s=timeout_s):
+        if submission.state != told and not submission.is_final:
+            click.echo(state_in_words(submission), err=True)
+            told = submission.state
+    return submission
 
 
 def _notice_of(client: Client, method: str) -> str:
@@ -284,23 +310,3 @@ def _show(submission: Submission, named: str, warned: frozenset[str]) -> None:
         ):
             click.echo(line)
         echo_warnings(warning for warning in submission.warnings if warning.code not in warned)
-
-
-def _say_if_private(client: Client, submission: Submission) -> None:
-    """Who sends for the first time may wonder why the board does not show it."""
-    from evaluator.client.answers import ClientError  # noqa: PLC0415 -- loads msgspec
-
-    if not (submission.is_new and submission.method_id):
-        return
-    visibility, name = submission.visibility, submission.method
-    if not visibility:  # a server that does not say it with the submission
-        try:
-            method = client.method(submission.method_id)
-        except ClientError:  # a token that may only submit; the file is there all the same
-            return
-        visibility, name = method.visibility, method.name
-    if visibility == "PRIVATE":
-        name = printable(name)
-        click.echo(
-            f'\n{name} is private: only your team sees its results. Publish it with: tsttc publish "{name}"'
-        )

@@ -1,6 +1,4 @@
-"""The token: from the environment, the operating system's keyring, or a file. Never shown, never an option.
-
-The file is for machines without a keyring, as most servers are: nobody but its owner may read it.
+"""The token: from the environment, the keyring, or without a keyring a file that only its owner can read.
 
 `keyring` is imported where it is needed: it costs more time than the rest of a command.
 """

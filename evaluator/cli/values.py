@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
+from evaluator.cli.layout import printable
 from evaluator.metrics.protocol import OVERALL, PRIMARY, metric_of, split_name
 from evaluator.tables import layouts
 
@@ -31,16 +32,22 @@ def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[
     """A submission's scores as its edition publishes them, a published row's as they were printed."""
     from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
 
-    decimals = entry.n_decimals
+    decimals = entry.decimals
     return [format_published(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
 
 
-def in_short(submission: Submission) -> Iterator[str]:
-    """Where a scored submission stands, and the intervals of its overall errors, where the server knows them.
+def state_in_words(submission: Submission) -> str:
+    """One line: the state, and for a waiting one how many are ahead."""
+    words = printable(submission.state)
+    if submission.withdrawn_at:
+        words += ", withdrawn"
+    if submission.queue is not None and submission.state == "QUEUED":
+        words += f", {submission.queue.ahead:,} ahead"
+    return words
 
-    "rank 2 (1–3)", and "MiD 14.21 (13.60–14.90), RTE 11.90 (11.20–12.60), in brackets the 95 % confidence
-    intervals".
-    """
+
+def in_short(submission: Submission) -> Iterator[str]:
+    """Where a scored submission stands, and the intervals of its overall errors, if known."""
     if submission.rank is not None:
         found = submission.intervals.get(PRIMARY)
         low, high = (found.rank_low, found.rank_high) if found else (None, None)

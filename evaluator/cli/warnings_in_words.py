@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -9,7 +10,6 @@ from typing import TYPE_CHECKING
 import click
 
 from evaluator.cli.layout import printable
-from evaluator.cli.paths import command_line
 from evaluator.problems import FileWarning
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def numbering_warnings(
         if as_toolkit <= MAX_ROUGHNESS < as_manifest:
             origin = "The values are smooth in the toolkit's numbering only, so the toolkit wrote the file"
     words = ("tsttc", "convert", str(predictions), "--annotations", str(annotations), "-o", "natural.json")
-    command = command_line(words)
+    command = shlex.join(words)
     return [
         FileWarning(
             "other-numbering",

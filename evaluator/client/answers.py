@@ -1,11 +1,9 @@
-"""Answers of the leaderboard's API as values, and its failures as exceptions that state facts.
-
-The shapes are lenient about what they do not use: a newer server may say more, and `document` keeps it all.
-"""
+"""Answers of the leaderboard's API: the fields that the command reads, and the whole as `document`."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -26,11 +24,10 @@ class Queue(msgspec.Struct, frozen=True):
 
 
 class Submission(msgspec.Struct, frozen=True, kw_only=True):
-    """A submission as the server shows it; `document` is its answer unabridged.
+    """A submission. `is_new` is False for the answer to a file that was sent before.
 
-    `is_new` is False for the answer to a file that was sent before. `rank` is that of its method, where this
-    submission stands on the board for it; of a private method the one that it would have. `awaits_intervals`:
-    they follow the scores within seconds.
+    `rank` is that of its method, if the board shows this submission for it; of a private method the one that
+    it would have. With `awaits_intervals` they follow the scores within seconds.
     """
 
     id: str
@@ -64,10 +61,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Method(msgspec.Struct, frozen=True, kw_only=True):
-    """A method as one may see it; `document` is the server's answer unabridged.
-
-    `notice` says who sees its results, where others than its team do.
-    """
+    """A method; `notice` says who sees its results, where others than its team do."""
 
     id: str
     name: str
@@ -80,7 +74,7 @@ class Method(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Account(msgspec.Struct, frozen=True, kw_only=True):
-    """Whose token it is; `document` is the server's answer unabridged. Without a `split` it is for all."""
+    """Whose token it is; without a `split` it is for all."""
 
     team: str | None
     token: str
@@ -102,17 +96,15 @@ class Interval(msgspec.Struct, frozen=True, kw_only=True):
 class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     """One row of a board: scores by their names, None where a TTC range has no value.
 
-    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`.
-
-    `decimals` are those that its values are printed with; None from a server that does not say.
-
-    `pseudonym` is that of an anonymous row of one's own team, which others see under it; else None.
+    `id` names the row, also after a change of names: a method's id, or `published:deep-scale`. `decimals` are
+    those that its values are printed with. `pseudonym` is that of an anonymous row of one's own team, which
+    others see under it; else None.
     """
 
     method: str
     scores: dict[str, float | None]
     id: str | None = None
-    decimals: int | None = None
+    decimals: int = 2
     method_id: str | None = None
     rank: int | None = None
     team: str | None = None
@@ -120,17 +112,7 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     kind: str = "submission"
     visibility: str = "PUBLIC"
     pseudonym: str | None = None
-    withdrawn_at: str | None = None
     intervals: dict[str, Interval] = {}
-
-    @property
-    def n_decimals(self) -> int:
-        """Those that it is printed with: of a paper's row as many as were printed, else two."""
-        if self.decimals is not None:
-            return self.decimals
-        known = [value for value in self.scores.values() if value is not None]
-        is_short = self.kind == "published" and all(round(value, 1) == value for value in known)
-        return 1 if is_short else 2
 
     def interval(self, score: str) -> Interval:
         """That of one score; without ends where it was not asked for, or is not known."""
@@ -138,25 +120,20 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Board(msgspec.Struct, frozen=True, kw_only=True):
-    """The ranked entries of a split in an edition; `document` is the server's answer unabridged.
+    """The ranked entries of a split in an edition.
 
-    `floor` are the scores of the ground truth itself; None where the server does not say them. `unit` is what
-    its intervals and ranks take as independent, `n_units` how many there are; None is not known.
+    `floor` are the scores of the ground truth itself. `unit` is what its intervals and ranks take as
+    independent, `n_units` how many there are.
     """
 
     split: str
     entries: list[BoardEntry]
     document: JSON
     edition: Any = None
-    protocol: str | None = None
     decimals: int | None = None
-    ground_truth: str | None = None
-    n_sequences: int | None = None
-    n_recordings: int | None = None
     unit: str = RECORDING
     n_units: int | None = None
     floor: dict[str, float | None] | None = None
-    at: str | None = None
     updated_at: str | None = None
 
     @property
@@ -184,13 +161,12 @@ class BoardPreview(msgspec.Struct, frozen=True, kw_only=True):
     split: str
     after: BoardEntry
     before: BoardEntry | None = None
-    edition: Any = None
     n_ranked: int | None = None
     moved: list[RankChange] = []
 
 
 class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
-    """What everybody would see of a method; `document` is the server's answer unabridged."""
+    """What everybody would see of a method."""
 
     name: str
     document: JSON
@@ -199,37 +175,24 @@ class Foreseen(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Pair(msgspec.Struct, frozen=True, kw_only=True):
-    """Two methods and their differences by score name; None until a worker has computed them.
-
-    `withheld` says why they have neither interval nor p where nobody is told those.
-    """
+    """Two methods and their differences by score name; None until a worker has computed them."""
 
     differences: dict[str, Difference | None] | None = None
     sentence: str = ""
-    withheld: str = ""
 
 
 class Compared(msgspec.Struct, frozen=True, kw_only=True):
-    """Methods of a board side by side; `document` is the server's answer unabridged.
-
-    `reason` says why there are no intervals where there are none.
-    """
+    """Methods of a board side by side; `reason` says why there are no intervals where there are none."""
 
     document: JSON
     split: str = ""
     edition: Any = None
-    entries: list[BoardEntry] = []
     pairs: list[Pair] = []
     decimals: int = 2
     is_complete: bool = True
     reason: str = ""
     unit: str = RECORDING
     n_units: int | None = None
-
-    @property
-    def withheld(self) -> str:
-        """Why nothing but the difference is told of the first pair; else empty."""
-        return self.pairs[0].withheld if self.pairs else ""
 
     def differences(self) -> dict[str, Difference]:
         """Those of the first pair that there are, by score name."""
@@ -238,12 +201,11 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class Quota(msgspec.Struct, frozen=True, kw_only=True):
-    """What one's own team has left on a split; None is without limit. `document` is the server's answer."""
+    """What one's own team has left on a split; None is without limit."""
 
     split: str
     document: JSON
     limit: int | None = None
-    used: int = 0
     left: int | None = None
     next_slot_at: str | None = None
     is_open: bool = True
@@ -254,79 +216,57 @@ class ClientError(Exception):
     """The leaderboard did not give what was asked for."""
 
 
+@dataclass(kw_only=True, eq=False)
 class Unreachable(ClientError):
-    """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out.
+    """No whole answer came: nothing listens, the name is unknown, the connection was cut, time ran out."""
 
-    `was_connected` says whether the server had been reached at all; `was_refused` whether the machine was,
-    and nothing listened on it, as before a server has started.
-    """
+    url: str
+    reason: str
+    was_connected: bool  # whether the server had been reached at all
 
-    def __init__(self, *, url: str, reason: str, was_connected: bool, was_refused: bool = False) -> None:
-        super().__init__(f"no answer from {url}: {reason}")
-        self.url = url
-        self.reason = reason
-        self.was_connected = was_connected
-        self.was_refused = was_refused
+    def __str__(self) -> str:
+        return f"no answer from {self.url}: {self.reason}"
 
 
+@dataclass(kw_only=True, eq=False)
 class Refused(ClientError):
     """The server answered with an error status. `problems` are listed where the server gave any."""
 
-    def __init__(
-        self,
-        *,
-        url: str,
-        status: int,
-        title: str = "",
-        detail: str = "",
-        code: str = "",
-        problems: tuple[Problem, ...] = (),
-        retry_after_s: float | None = None,
-        document: JSON | None = None,
-    ) -> None:
-        super().__init__(f"{url} answered {status}: {detail or title}")
-        self.url = url
-        self.status = status
-        self.title = title
-        self.detail = detail
-        self.code = code
-        self.problems = problems
-        self.retry_after_s = retry_after_s
-        self.document = document
+    url: str
+    status: int
+    title: str = ""
+    detail: str = ""
+    code: str = ""
+    problems: tuple[Problem, ...] = ()
+    retry_after_s: float | None = None
+    document: JSON | None = None
+
+    def __str__(self) -> str:
+        return f"{self.url} answered {self.status}: {self.detail or self.title}"
 
 
-class Redirected(ClientError):
-    """The server points elsewhere. Not followed: a token goes only where its owner sends it."""
-
-    def __init__(self, *, url: str, location: str) -> None:
-        super().__init__(f"{url} redirects to {location}")
-        self.url = url
-        self.location = location
-
-
+@dataclass(kw_only=True, eq=False)
 class BadAnswer(ClientError):
-    """An answer that is no leaderboard's: not JSON, or not of the documented shape."""
+    """An answer that is no leaderboard's: not JSON, not of the documented shape, or a redirect.
 
-    def __init__(self, *, url: str, found: str) -> None:
-        super().__init__(f"{url} gave an unexpected answer: {found}")
-        self.url = url
-        self.found = found
+    A redirect is not followed: a token goes only where its owner sends it.
+    """
+
+    url: str
+    found: str
+
+    def __str__(self) -> str:
+        return f"{self.url} gave an unexpected answer: {self.found}"
 
 
+@dataclass(kw_only=True, eq=False)
 class TimedOut(ClientError):
-    """A submission was not final within the time allowed; `submission` is the last that was seen of it."""
+    """What workers compute was not there in time; `submission` is the last that was seen of a submission."""
 
-    def __init__(self, *, submission_id: str, timeout_s: float, submission: Submission | None) -> None:
-        super().__init__(f"submission {submission_id} is not final after {timeout_s:g} s")
-        self.submission_id = submission_id
-        self.timeout_s = timeout_s
-        self.submission = submission
+    what: str
+    timeout_s: float
+    submission_id: str = ""
+    submission: Submission | None = None
 
-
-class NotReady(ClientError):
-    """What workers compute was not there within the time allowed; asked again later it may be."""
-
-    def __init__(self, *, what: str, timeout_s: float) -> None:
-        super().__init__(f"{what} is not ready after {timeout_s:g} s")
-        self.what = what
-        self.timeout_s = timeout_s
+    def __str__(self) -> str:
+        return f"{self.what} after {self.timeout_s:g} s"

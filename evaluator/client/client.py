@@ -1,19 +1,24 @@
-"""The leaderboard's API from a laptop or a CI job: the only module that speaks HTTP for the command line.
+"""The leaderboard's API from a laptop or a CI job.
 
     with Client(url="https://example.org", token=token) as client:
-        submission = client.submit(file, filename="predictions.json", split="val", method="Foo++")
+        submission = client.submit(data, filename="predictions.json", split="val", method="Foo++")
         for submission in client.watch(submission.id, timeout_s=600):
             print(submission.state)
 
-Every failure is an `answers.ClientError` that states facts (address, status, code, problems); the command
-line words them. Sending is safe to repeat: bytes that the server has get their first submission as answer.
+Every failure is an `answers.ClientError` that states facts. Sending is safe to repeat: bytes that the server
+has get their first submission as answer.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import BinaryIO
-from urllib.parse import quote, urlencode
+import random
+import ssl
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Self, TypeVar
+from urllib.parse import quote, urlsplit
 
 import httpx
 
@@ -25,34 +30,72 @@ from evaluator.client.answers import (
     Compared,
     Foreseen,
     Method,
-    NotReady,
     Quota,
     Refused,
     Submission,
     TimedOut,
     Unreachable,
 )
-from evaluator.client.connection import Connection
 from evaluator.client.exchange import (
     PASSING_STATUSES,
+    RetryPolicy,
+    checked,
+    next_page,
     one,
     retry_after_s,
     rows,
 )
 
-# Where nothing else is to do, intervals follow the scores within some tenths of a second: asked for soon.
-N_EAGER, EAGERNESS = 3, 0.4
+LOOPBACK_HOSTS = frozenset({"127.0.0.1", "::1", "localhost"})
+T = TypeVar("T")
+
+INTERVALS_WITHIN_S = 10.0
 
 
-class Client(Connection):
-    """The API of one leaderboard, method by method; the arguments are those of `Connection`."""
+def _certificates(url: str) -> ssl.SSLContext | bool:
+    """What a connection trusts: nothing where there is no TLS, since reading all certificates takes 40 ms."""
+    return ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT) if urlsplit(url).scheme == "http" else True
+
+
+@dataclass(kw_only=True)
+class Client:
+    """A connection to one leaderboard. `timeout_s` bounds each wait for the network, not the whole."""
+
+    url: str
+    token: str | None = field(default=None, repr=False)
+    timeout_s: float = 30.0
+    patience: RetryPolicy = field(default_factory=RetryPolicy)
+    user_agent: str = "tsttc"
+    sleep: Callable[[float], None] = time.sleep
+    monotonic_s: Callable[[], float] = time.monotonic
+    rng: random.Random = field(default_factory=random.Random)
+
+    def __post_init__(self) -> None:
+        self.url = self.url.rstrip("/")
+        headers = {"User-Agent": self.user_agent, "Accept": "application/json"}
+        if self.token:
+            headers["Authorization"] = f"Bearer {self.token}"
+        self._http = httpx.Client(
+            headers=headers,
+            timeout=self.timeout_s,
+            verify=_certificates(self.url),
+            # A proxy from the environment never leads to this very machine.
+            trust_env=urlsplit(self.url).hostname not in LOOPBACK_HOSTS,
+        )
+        self._was_answered = False
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self._http.close()
 
     def require_leaderboard(self) -> None:
         """Raise ClientError for what is no leaderboard; the token is not sent."""
         self.splits()
 
     def splits(self) -> list[str]:
-        """The names of the splits, asked without the token. Raises ClientError."""
+        """The names of the splits, asked without the token."""
         try:
             response = self._asked_by_anybody("splits", accept="application/json")
         except Refused as refused:
@@ -65,34 +108,29 @@ class Client(Connection):
         return [str(name) for name in names]
 
     def account(self) -> Account:
-        """Whose token this is. Raises ClientError."""
+        """Whose token this is."""
         return self._get(Account, "account")
 
     def submit(
         self,
-        file: BinaryIO,
+        data: bytes,
         *,
         filename: str,
         split: str,
         method: str,
         details: Mapping[str, str] | None = None,
     ) -> Submission:
-        """Send a prediction file for a split; gives the new submission, or the first one of the same bytes.
-
-        `file` must be seekable; it is streamed, never read whole. `details` are the form's optional fields
-        (description, paper_url, code_url, note, commit). Raises ClientError.
-        """
+        """Send a prediction file; gives the new submission, or the first one of the same bytes."""
         fields = {"split": split, "method": method, **(details or {})}
         n_sent = 0
 
         def send() -> httpx.Response:
             nonlocal n_sent
             n_sent += 1
-            file.seek(0)
             return self._http.post(
                 self._address("submissions"),
                 data=fields,
-                files={"file": (filename, file, "application/json")},
+                files={"file": (filename, data, "application/json")},
             )
 
         response = self._retry(send)
@@ -101,7 +139,7 @@ class Client(Connection):
         return one(response, Submission, is_new=is_new)
 
     def submission(self, submission_id: str) -> Submission:
-        """The present state of a submission. Raises ClientError."""
+        """The present state of a submission."""
         return self._get(Submission, "submissions", submission_id)
 
     def board(
@@ -113,52 +151,39 @@ class Client(Connection):
         at: str | None = None,
         has_intervals: bool = False,
     ) -> Board:
-        """The board of a split, in the order of column `sort`: the present one, or that of an `edition`.
-
-        With `at` (a date, or an ISO time) as it stood then; of an edition there is no other time. With
-        `has_intervals` each value comes with where it may lie. Raises ClientError.
-        """
+        """The board of a split: the present one, of an `edition`, or as of `at` (a date or an ISO time)."""
         place = [] if edition is None else ["editions", str(edition)]
         asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
         params = {name: value for name, value in asked.items() if value}
         return self._get(Board, "splits", split, *place, "board", params=params)
 
-    def board_page(self, board: Board, *, sort: str = "rank", at: str | None = None) -> str:
-        """The address at which this very board stays: its edition's page, or the board as of that time."""
+    def export(
+        self,
+        board: Board,
+        suffix: str,
+        *,
+        sort: str = "rank",
+        at: str | None = None,
+        has_intervals: bool = False,
+    ) -> str:
+        """This very board as the site exports it, for everybody, as "csv" or "bib"."""
         is_of_edition = board.edition is not None and not at
-        path = f"{quote(board.split, safe='')}/{f'editions/{board.edition}/' if is_of_edition else ''}"
-        asked = {"at": at, "sort": sort if sort != "rank" else None}
-        query = urlencode({name: value for name, value in asked.items() if value})
-        return f"{self.url}/board/{path}{'?' if query else ''}{query}"
-
-    def bibliography(self, board: Board, *, at: str | None = None) -> str:
-        """BibTeX of the benchmark's paper, of the board and of the papers of its rows. Raises ClientError."""
-        page, mark, query = self.board_page(board, at=at).partition("?")
-        return self._retry(lambda: self._http.get(f"{page.rstrip('/')}.bib{mark}{query}")).text
+        path = f"{quote(board.split, safe='')}{f'/editions/{board.edition}' if is_of_edition else ''}"
+        asked = {"sort": sort, "at": at, "intervals": "1" if has_intervals else None}
+        params = {name: value for name, value in asked.items() if value and value != "rank"}
+        return self._retry(lambda: self._http.get(f"{self.url}/board/{path}.{suffix}", params=params)).text
 
     def manifest(self, split: str, *, edition: int | None = None) -> bytes:
-        """The manifest of a split, or of an edition of it: all columns but the values. Raises ClientError."""
+        """The manifest of a split, or of an edition of it: all columns but the values."""
         query = {} if edition is None else {"edition": edition}
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
-    def manifest_digest(self, split: str) -> str | None:
-        """The digest of that manifest; None for a split that has none yet. Raises ClientError."""
-        response = self._asked_by_anybody("splits", split, "editions", accept="application/json")
-        for edition in rows(response, JSON):
-            if edition.get("is_board"):
-                digest = edition.get("manifest")
-                return digest if isinstance(digest, str) else None
-        return None
-
     def quota(self) -> list[Quota]:
-        """What one's own team has left, split by split. Raises ClientError."""
+        """What one's own team has left, split by split."""
         return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
-        """Methods of a split's board, by id, side by side. Raises ClientError.
-
-        Workers compare what nobody has compared before; it is asked for until they have, at most `timeout_s`.
-        """
+        """Methods of a split's board, by id; asked for until workers have compared them."""
         until_s = self.monotonic_s() + timeout_s
         params = {"split": split, "m": list(methods)}
         address, n_asked = self._address("compare"), 0
@@ -171,123 +196,137 @@ class Client(Connection):
             asked_s = retry_after_s(response.headers)
             delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=asked_s, rng=self.rng)
             if self.monotonic_s() + delay_s >= until_s:
-                raise NotReady(what="The comparison", timeout_s=timeout_s)
+                raise TimedOut(what="the comparison is not ready", timeout_s=timeout_s)
             self.sleep(delay_s)
 
     def own_method(self, name_or_id: str) -> Method | None:
-        """The method of one's own team of that name or id. Raises ClientError."""
+        """The method of one's own team of that name or id."""
         return next((row for row in self.methods() if name_or_id in {row.id, row.name}), None)
 
     def methods(self) -> Iterator[Method]:
-        """The methods of one's own team by name. Raises ClientError."""
+        """The methods of one's own team by name."""
         return self._listed(Method, "methods")
 
     def submissions(self) -> Iterator[Submission]:
-        """The submissions of one's own team, newest first. Raises ClientError."""
+        """The submissions of one's own team, newest first."""
         return self._listed(Submission, "submissions")
 
     def file(self, submission_id: str) -> bytes:
-        """The file of a submission of one's own team, as it was sent. Raises ClientError."""
+        """The file of a submission of one's own team, as it was sent."""
         return self._asked("submissions", submission_id, "file").content
 
     def withdraw(self, submission_id: str) -> Submission:
-        """Withdraw a submission of one's own team, or cancel it; there is no way back. Raises ClientError."""
+        """Withdraw a submission of one's own team, or cancel it; there is no way back."""
         address = self._address("submissions", submission_id, "withdraw")
         return one(self._retry(lambda: self._http.post(address)), Submission)
 
-    def method(self, method_id: str) -> Method:
-        """A method, as one may see it. Raises ClientError."""
-        return self._get(Method, "methods", method_id)
-
     def foreseen(self, method_id: str, visibility: str) -> Foreseen:
-        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS".
-
-        Raises ClientError.
-        """
+        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS"."""
         return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
-        """Show a method of one's own to everybody, "PUBLIC" or "ANONYMOUS"; there is no way back.
-
-        An anonymous one turns public by itself at `reveal_at` (ISO 8601), if that is given. Raises
-        ClientError.
-        """
+        """Show a method to everybody, "PUBLIC" or, until `reveal_at`, "ANONYMOUS"; there is no way back."""
         address = self._address("methods", method_id, "visibility")
         body = {"visibility": visibility, "confirm": True, "reveal_at": reveal_at}
         return one(self._retry(lambda: self._http.post(address, json=body)), Method)
 
     def receipt(self, submission_id: str) -> bytes:
-        """The signed receipt of a scored submission, a JSON Web Token as it came. Raises ClientError."""
+        """The signed receipt of a scored submission, a JSON Web Token as it came."""
         return self._asked("submissions", submission_id, "receipt").content
 
     def receipt_keys(self) -> bytes:
-        """The keys that sign the site's receipts, or once did: a JSON Web Key Set. Raises ClientError."""
+        """The keys that sign the site's receipts, or once did: a JSON Web Key Set."""
         address = f"{self.url}/.well-known/tsttc-receipt-keys.json"
         return self._retry(lambda: self._http.get(address)).content
 
-    def watch(
-        self, submission_id: str, *, timeout_s: float, seen: Submission | None = None
-    ) -> Iterator[Submission]:
-        """Ask until the submission is final, giving every state seen, the final one last.
+    def watch(self, submission_id: str, *, timeout_s: float) -> Iterator[Submission]:
+        """Ask until the submission is final and has its intervals, giving every answer.
 
-        `seen` is the answer of a moment ago, such as that to the file; else the present state is asked for.
-
+        For the intervals it waits `INTERVALS_WITHIN_S` at most: workers make them when no submission waits.
         The server says when to ask again; one that is away or busy is asked less and less often. Raises
         TimedOut after `timeout_s` seconds; of the other errors only those that waiting cannot cure.
         """
         until_s = self.monotonic_s() + timeout_s
-        last, tag, n_same = seen, "", 0
-        again_s: float | None = None
-        if last is not None:
-            yield last
-            n_same = 1
-        while last is None or not last.is_final:
-            if n_same:
-                delay_s = again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
-                if self.monotonic_s() + delay_s >= until_s:
-                    raise TimedOut(submission_id=submission_id, timeout_s=timeout_s, submission=last)
-                self.sleep(delay_s)
-            before = last
-            response, again_s = self._look(submission_id, known=tag)
-            if response is not None and response.status_code != httpx.codes.NOT_MODIFIED:
-                last, tag = one(response, Submission), response.headers.get("ETag", "")
+        last: Submission | None = None
+        n_same = 0
+        address = self._address("submissions", submission_id)
+        while True:
+            before, again_s = last, None
+            try:
+                response = self._checked(lambda: self._http.get(address))
+            except Unreachable:
+                pass
+            except Refused as refused:
+                if refused.status not in PASSING_STATUSES:
+                    raise
+                again_s = refused.retry_after_s
+            else:
+                last, again_s = one(response, Submission), retry_after_s(response.headers)
                 yield last
+                if last.is_final and not last.awaits_intervals:
+                    return
+                if last.is_final and not (before and before.is_final):
+                    until_s = min(until_s, self.monotonic_s() + INTERVALS_WITHIN_S)
             is_same = (before and before.state) == (last and last.state)
             n_same = n_same + 1 if is_same else 1  # a change: ask often again
-
-    def settled(self, submission: Submission, *, timeout_s: float) -> Submission:
-        """A scored submission with its intervals, once they are computed; after `timeout_s` as it is then.
-
-        Of errors only those that waiting cannot cure are raised.
-        """
-        until_s = self.monotonic_s() + timeout_s
-        n_asked = 0
-        while submission.awaits_intervals:
-            n_asked += 1
-            delay_s = self.patience.delay_s(n_failed=n_asked, retry_after_s=None, rng=self.rng)
-            if n_asked <= N_EAGER:
-                delay_s *= EAGERNESS
+            delay_s = again_s or self.patience.delay_s(n_failed=n_same, retry_after_s=None, rng=self.rng)
             if self.monotonic_s() + delay_s >= until_s:
-                break
+                if last is not None and last.is_final:
+                    return
+                what = f"submission {submission_id} is not final"
+                raise TimedOut(what=what, timeout_s=timeout_s, submission_id=submission_id, submission=last)
             self.sleep(delay_s)
-            response, _ = self._look(submission.id)
-            submission = one(response, Submission) if response is not None else submission
-        return submission
 
-    def _look(self, submission_id: str, *, known: str = "") -> tuple[httpx.Response | None, float | None]:
-        """One answer about a submission, and after how many seconds to ask again where the server said it.
+    def _listed(self, kind: type[T], *path: str) -> Iterator[T]:
+        """The rows of a list, page after page."""
+        params: Mapping[str, str] = {}
+        while True:
+            response = self._retry(partial(self._http.get, self._address(*path), params=params))
+            yield from rows(response, kind)
+            params = next_page(response)
+            if not params:
+                return
 
-        It is 304 where nothing has changed since the ETag `known`. A fault that passes by itself is no
-        answer, not an error.
-        """
-        address = self._address("submissions", submission_id)
-        headers = {"If-None-Match": known} if known else {}
+    def _get(self, kind: type[T], *path: str, params: Mapping[str, str] | None = None) -> T:
+        return one(self._asked(*path, params=params), kind)
+
+    def _asked(self, *path: str, params: Mapping[str, str] | None = None) -> httpx.Response:
+        return self._retry(lambda: self._http.get(self._address(*path), params=params))
+
+    def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
+        """What everybody may read is read without the token, which may not be good for reading."""
+        headers = {"Accept": accept}
+        request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
+        request.headers.pop("Authorization", None)
+        return self._retry(lambda: self._http.send(request))
+
+    def _address(self, *path: str) -> str:
+        return "/".join([self.url, "api/v1", *(quote(part, safe="") for part in path)])
+
+    def _checked(self, send: Callable[[], httpx.Response]) -> httpx.Response:
+        """As `checked`; remembers that the server is one that answers."""
         try:
-            response = self._checked(lambda: self._http.get(address, headers=headers))
-        except Unreachable:
-            return None, None
-        except Refused as refused:
-            if refused.status not in PASSING_STATUSES:
-                raise
-            return None, refused.retry_after_s
-        return response, retry_after_s(response.headers)
+            response = checked(send, url=self.url)
+        except Unreachable as fault:
+            self._was_answered = self._was_answered or fault.was_connected
+            raise
+        except Refused:
+            self._was_answered = True
+            raise
+        self._was_answered = True
+        return response
+
+    def _retry(self, send: Callable[[], httpx.Response]) -> httpx.Response:
+        """Send until answered, as often as the patience goes, as long as trying again makes sense."""
+        n_failed = 0
+        while True:
+            try:
+                return self._checked(send)
+            except (Unreachable, Refused) as fault:
+                n_failed += 1
+                n_tries = self.patience.n_tries if self._was_answered else self.patience.n_first_tries
+                is_lasting = isinstance(fault, Refused) and not self.patience.may_pass(fault)
+                if n_failed >= n_tries or is_lasting:
+                    raise
+                delay_after_s = fault.retry_after_s if isinstance(fault, Refused) else None
+            self.sleep(self.patience.delay_s(n_failed=n_failed, retry_after_s=delay_after_s, rng=self.rng))

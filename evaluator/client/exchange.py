@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import email.utils
 import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import TypeVar
 
 import httpx
 import msgspec
 
-from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
+from evaluator.client.answers import BadAnswer, Refused, Unreachable
 from evaluator.problems import Problem
 
 T = TypeVar("T")
@@ -22,14 +20,10 @@ QUOTA_EXCEEDED = "quota-exceeded"  # when to come back is for a person to decide
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RetryPolicy:
-    """How often and how long to try again: delays grow by `factor`, each shortened by up to `jitter`.
-
-    As it stands it bears with a server that is away for a quarter of a minute, as for a restart, and for ten
-    seconds with one that has not answered yet, as where it and a job start together.
-    """
+    """How often and how long to try again: a quarter of a minute, as for a restart of the server."""
 
     n_tries: int = 9
-    n_first_tries: int = 8  # where nothing has ever answered, and connections are refused
+    n_first_tries: int = 8  # where nothing has ever answered
     first_delay_s: float = 0.25
     longest_delay_s: float = 10.0
     longest_retry_after_s: float = 60.0  # who asks for more than this gets their answer reported instead
@@ -45,59 +39,39 @@ class RetryPolicy:
         """Whether the same request may be answered otherwise within a bearable time."""
         if fault.code == QUOTA_EXCEEDED:
             return False
-        if fault.status in {409, 429} and fault.retry_after_s is None:
+        if fault.status == httpx.codes.TOO_MANY_REQUESTS and fault.retry_after_s is None:
             return False
-        is_passing = fault.status in PASSING_STATUSES or fault.status == httpx.codes.CONFLICT
+        is_passing = fault.status in PASSING_STATUSES
         return is_passing and (fault.retry_after_s or 0.0) <= self.longest_retry_after_s
 
 
 def checked(send: Callable[[], httpx.Response], *, url: str) -> httpx.Response:
-    """The response, if it is one of success or 304; raises Unreachable, Redirected or Refused."""
+    """The response, if it is one of success; raises ClientError."""
     try:
         response = send()
     except (httpx.InvalidURL, UnicodeError) as error:  # a host that no name system could know
         raise Unreachable(url=url, reason=str(error), was_connected=False) from error
     except (httpx.ConnectError, httpx.ConnectTimeout, httpx.ProxyError) as error:
-        raise Unreachable(
-            url=url, reason=_reason(error), was_connected=False, was_refused=_was_refused(error)
-        ) from error
+        raise Unreachable(url=url, reason=_reason(error), was_connected=False) from error
     except (httpx.TransportError, httpx.DecodingError) as error:
         raise Unreachable(url=url, reason=_reason(error), was_connected=True) from error
-    if response.is_success or response.status_code == httpx.codes.NOT_MODIFIED:
+    if response.is_success:
         return response
     if response.is_redirect:
-        raise Redirected(url=url, location=response.headers["location"])
+        raise BadAnswer(url=url, found=f"a redirect to {response.headers['location']}, which is not followed")
     raise _refused(response)
 
 
 def retry_after_s(headers: Mapping[str, str]) -> float | None:
-    """Seconds from a Retry-After header (a number, or an HTTP date), None where it is absent or senseless."""
+    """Seconds from a Retry-After header, None where it is absent or no number."""
     value = headers.get("retry-after", "").strip()
-    if value.isascii() and value.isdigit():
-        return float(value)
-    try:
-        until = email.utils.parsedate_to_datetime(value)
-    except ValueError:
-        return None
-    if until.tzinfo is None:
-        return None
-    # The one place that reads the calendar: the header names a time of day instead of a duration.
-    seconds = (until - datetime.now(UTC)).total_seconds()
-    return max(0.0, seconds)
+    return float(value) if value.isascii() and value.isdigit() else None
 
 
 def _reason(error: httpx.TransportError | httpx.DecodingError) -> str:
     if isinstance(error, httpx.TimeoutException):
         return "it took too long"
     return str(error).strip() or type(error).__name__
-
-
-def _was_refused(error: BaseException) -> bool:
-    """Whether the machine was found, and turned the connection away: no wrong name, no bad certificate."""
-    cause: BaseException | None = error
-    while cause is not None and not isinstance(cause, ConnectionError):
-        cause = cause.__cause__ or cause.__context__
-    return cause is not None
 
 
 def _refused(response: httpx.Response) -> Refused:
@@ -154,10 +128,7 @@ def rows(response: httpx.Response, kind: type[T]) -> list[T]:
 
 
 def next_page(response: httpx.Response) -> Mapping[str, str]:
-    """What to ask the same address for to get the next page of a list; empty on the last.
-
-    Of the header `Link` only the question is taken: a token goes to no other address, whatever it says.
-    """
+    """The query of the next page, empty on the last; of `Link` nothing else, so that the token stays here."""
     link = response.links.get("next", {}).get("url", "")
     try:
         return dict(httpx.URL(link).params)

@@ -1,7 +1,4 @@
-"""Escaping of foreign texts in LaTeX, BibTeX, Markdown and CSV: shown as they are, without effect.
-
-LaTeX comes out as ASCII that every engine takes, with no package but booktabs.
-"""
+"""Escaping of foreign texts in LaTeX (ASCII), BibTeX, Markdown and CSV: shown as they are, without effect."""
 
 from __future__ import annotations
 
@@ -127,11 +124,7 @@ def _latex_character(character: str) -> str:
 
 
 def latex_comment(text: str) -> str:
-    """A line that LaTeX does not read.
-
-    >>> latex_comment("edition 2\\n\\\\input{x}")
-    '% edition 2 \\\\input{x}'
-    """
+    """A line that LaTeX does not read."""
     return f"% {one_line(text)}".rstrip()
 
 

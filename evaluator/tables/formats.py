@@ -1,12 +1,8 @@
-"""The formats in which a board is exported: the site and `tsttc board` offer what `FORMATS` has.
-
-To add one, write a function that makes a text of an `Export`, and its row below.
-"""
+"""The formats in which a board is exported: the site and `tsttc board` offer what `FORMATS` has."""
 
 from __future__ import annotations
 
 import io
-import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
@@ -17,10 +13,7 @@ from evaluator.tables.layouts import Export, as_latex, as_markdown
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Format:
-    """One way to export a board.
-
-    The site leads to the API where a format is the API's own document, which holds the rows of whoever asks.
-    """
+    """One way to export a board."""
 
     name: str
     """What the command calls it."""
@@ -29,40 +22,29 @@ class Format:
     suffix: str
     """The end of its address and of its file."""
     media_type: str
-    write: Callable[[Export], str]
+    write: Callable[[Export], str] | None
+    """None where it is the API's own document, which holds the rows of whoever asks."""
     has_values: bool = True
     """Whether it can have confidence intervals."""
-    is_api_document: bool = False
     is_pasted: bool = False
     """Whether people paste it into a text of theirs: then a page offers to copy it as well."""
-    on_site: bool = True
-    on_command_line: bool = True
 
 
 def csv_lines(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> Iterator[str]:
-    """Rows as CSV with a header (RFC 4180), for tables that are too long to be held.
-
-    Texts are guarded and quoted, numbers stay, None is empty.
-    """
+    """Rows as CSV with a header (RFC 4180): texts guarded and quoted, numbers as they are, None empty."""
     yield ",".join(columns) + "\r\n"
     for row in rows:
         yield csv_line(row.get(name) for name in columns)
 
 
-def _csv(export: Export) -> str:
+def as_csv(export: Export) -> str:
+    """All rows of a board."""
     return "".join(csv_lines(export.records, columns=export.columns))
 
 
 FORMATS: Final = (
-    Format(name="csv", title="CSV", suffix="csv", media_type="text/csv", write=_csv),
-    Format(
-        name="json",
-        title="JSON",
-        suffix="json",
-        media_type="application/json",
-        write=lambda export: json.dumps(export.document, ensure_ascii=False, indent=2) + "\n",
-        is_api_document=True,
-    ),
+    Format(name="csv", title="CSV", suffix="csv", media_type="text/csv", write=as_csv),
+    Format(name="json", title="JSON", suffix="json", media_type="application/json", write=None),
     Format(
         name="latex",
         title="LaTeX",
@@ -93,10 +75,7 @@ FORMATS: Final = (
 
 
 def parquet_of(rows: Iterable[Mapping[str, object]], *, columns: Sequence[str]) -> bytes:
-    """Rows as a Parquet table with these columns; None where there is no value.
-
-    Raises `ModuleNotFoundError` where pyarrow is not installed.
-    """
+    """Rows as a Parquet table with these columns. Raises `ModuleNotFoundError` without pyarrow."""
     try:
         import pyarrow as pa  # noqa: PLC0415 -- of an extra
         from pyarrow import parquet  # noqa: PLC0415 -- of an extra

@@ -1,7 +1,4 @@
-"""A board as a table for papers and notes: LaTeX and Markdown, from texts that are formatted already.
-
-The site's exports and the command line print their boards by this, so that the same board is the same table.
-"""
+"""A board as a table for papers and notes: LaTeX and Markdown, from texts that are formatted already."""
 
 from __future__ import annotations
 
@@ -59,11 +56,11 @@ class Origin:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Export:
-    """A board as writers take it; each reads once what it needs. The site and the command make it.
+    """A board as writers take it; each reads once what it needs.
 
     `rows` are those of a table, without what was withdrawn, `records` all rows by the names of `columns`:
     numbers as they are published, None where nothing is known. `references` are BibTeX entries of the papers
-    that rows name, `document` is the API's.
+    that rows name.
     """
 
     origin: Origin
@@ -72,7 +69,6 @@ class Export:
     records: Iterable[Mapping[str, object]]
     scores: Sequence[str] = ()  # of its tables
     references: Iterable[str] = ()
-    document: Mapping[str, object] | None = None
 
 
 def about(origin: Origin) -> tuple[str, ...]:
@@ -100,22 +96,12 @@ def about(origin: Origin) -> tuple[str, ...]:
 
 
 def mark_of(*, visibility: str, pseudonym: str | None) -> str:
-    """What is said of a row of one's own that others do not see as it is; nothing of any other row.
-
-    >>> mark_of(visibility="PRIVATE", pseudonym=None), mark_of(visibility="ANONYMOUS", pseudonym="Anon 3f")
-    ('private', 'anonymous')
-    >>> mark_of(visibility="ANONYMOUS", pseudonym=None), mark_of(visibility="PUBLIC", pseudonym=None)
-    ('', '')
-    """
+    """What is said of a row of one's own that others do not see as it is; nothing of any other row."""
     return "private" if visibility == "PRIVATE" else "anonymous" if pseudonym else ""
 
 
 def marked(name: str, mark: str) -> str:
-    """A name with the note of its row.
-
-    >>> marked("Owl", "private"), marked("Owl", "")
-    ('Owl (private)', 'Owl')
-    """
+    """A name with the note of its row, as "Owl (private)"."""
     return f"{name} ({mark})" if mark else name
 
 
@@ -147,11 +133,7 @@ def rank_text(rank: int | None, *, low: int | None = None, high: int | None = No
 
 
 def as_latex(export: Export) -> str:
-    r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined.
-
-    Comments above it say what it was taken from. With intervals, they stand small behind their values, and a
-    comment says what the brackets are.
-    """
+    r"""A `tabular` of the package booktabs. The best of a column is bold, the second underlined."""
     rows, columns = list(export.rows), export.scores
     groups, rules, last = [], [], 3
     for metric, names in grouped_names(columns).items():
@@ -184,11 +166,7 @@ def _caption(rows: Sequence[Row], origin: Origin) -> tuple[str, ...]:
 
 
 def brackets(unit: str, n_units: int | None) -> str:
-    """What the brackets of a table with intervals are.
-
-    >>> brackets("day", 42)  # doctest: +ELLIPSIS
-    'In square brackets: 95 % confidence interval, bootstrap over 42 days. In round brackets behind ...
-    """
+    """What the brackets of a table with intervals are."""
     return (
         f"In square brackets: 95 % confidence interval, bootstrap over {in_words(unit, n_units)}. In round "
         "brackets behind a rank: rank range at 95 %."

@@ -1,7 +1,4 @@
-"""The tables of the paper as people read them: texts for pages and the command, and other formats.
-
-Values are printed as the paper prints them. The paper's default is marked where a table varies a setting.
-"""
+"""The tables of the paper as people read them: texts for pages and the command, and other formats."""
 
 from __future__ import annotations
 
@@ -130,21 +127,13 @@ def _names(table: PublishedTable) -> list[tuple[str, Callable[[PublishedRow], st
 
 
 def method_name(row: PublishedRow) -> str:
-    """The method of a row, as the paper prints it but without citations.
-
-    >>> method_name(published_tables().table("main-results").rows[1])
-    'SOT'
-    """
+    """The method of a row, as the paper prints it but without citations."""
     name = published_tables().methods.get(row.method or "", row.method or "")
     return name.partition(" [")[0]
 
 
 def setting_text(row: PublishedRow) -> str:
-    """The setting of an ablation's row.
-
-    >>> setting_text(published_tables().table("ablation-nerf-sequences").rows[1])
-    '3,000'
-    """
+    """The setting of an ablation's row."""
     if isinstance(row.setting, bool):
         return "blurred" if row.setting else "not blurred"
     return f"{row.setting:,}" if isinstance(row.setting, int) else str(row.setting)

@@ -1,7 +1,4 @@
-"""One's own results as a table for papers and notes: a row for each file, or for each group of its sequences.
-
-The texts are made once; a spreadsheet gets numbers at full precision.
-"""
+"""One's own results as a table: a row for each file, or for each group of its sequences."""
 
 from __future__ import annotations
 

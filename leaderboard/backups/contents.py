@@ -28,7 +28,6 @@ FORMAT: Final = 2
 _MADE_ANEW: Final = "bags"
 _DIRECTORIES: Final = ("TSTTC_DATA_DIR", "TSTTC_FILES_DIR", "TSTTC_GROUND_TRUTH_DIR")
 _SHOWN: Final = 10
-_CSV: Final = next(each for each in formats.FORMATS if each.name == "csv")
 
 
 class NoBackup(Exception):
@@ -185,7 +184,7 @@ def board_digests() -> dict[str, str]:
     editions = Edition.objects.exclude(published_at=None).select_related("split", "ground_truth")
     for edition in editions.order_by("split", "number"):
         shown = boards.board(split=edition.split, edition=edition, viewer=AnonymousUser())
-        text = _CSV.write(tables.export(shown, address="", has_intervals=True))
+        text = formats.as_csv(tables.export(shown, address="", has_intervals=True))
         found[f"{edition.split_id}/{edition.number}"] = hashlib.sha256(text.encode()).hexdigest()
     return found
 

@@ -19,10 +19,9 @@ from tests.evaluator.fake_time import FakeTime
 
 @pytest.fixture(autouse=True)
 def places(own_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Settings and copies of each test are its own, and there is no keyring, as on a machine for CI."""
+    """Settings of each test are its own, and there is no keyring, as on a machine for CI."""
     home = own_folder / "home"
     monkeypatch.setenv("XDG_CONFIG_HOME", str(home / "config"))
-    monkeypatch.setenv("XDG_CACHE_HOME", str(home / "cache"))
     monkeypatch.setenv("PYTHON_KEYRING_BACKEND", "keyring.backends.fail.Keyring")
     keyring.set_keyring(NoKeyring())
     return home

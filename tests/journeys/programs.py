@@ -22,7 +22,6 @@ def environment(url: str, token: str | Path, *, home: Path) -> dict[str, str]:
         "TSTTC_TOKEN_FILE" if isinstance(token, Path) else "TSTTC_TOKEN": str(token),
         "PYTHONPATH": str(REPOSITORY),
         "XDG_CONFIG_HOME": str(home / "config"),
-        "XDG_CACHE_HOME": str(home / "cache"),
         "PYTHON_KEYRING_BACKEND": "keyring.backends.fail.Keyring",
     }
 

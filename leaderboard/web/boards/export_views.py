@@ -4,7 +4,7 @@ They hold what everybody sees, whoever takes them, since they end up in papers. 
 one's own that others do not see, or not under their name, each marked.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Final, NamedTuple
 from urllib.parse import urlencode
 
@@ -56,7 +56,7 @@ class FormatConverter(StringConverter):
 
     def to_python(self, value: str) -> Format:  # type: ignore[override]  # Django takes any type
         """The format of this suffix; ValueError, for Django, where there is none."""
-        found = next((each for each in formats.FORMATS if each.on_site and each.suffix == value), None)
+        found = next((each for each in formats.FORMATS if each.suffix == value), None)
         if found is None:
             raise ValueError(value)
         return found
@@ -65,18 +65,18 @@ class FormatConverter(StringConverter):
 @require_safe
 def board(request: HttpRequest, split: str, chosen: Format) -> HttpResponse:
     """The board of a split, as its page would show all of its rows."""
-    if chosen.is_api_document:
+    if chosen.write is None:
         return _api_document(request, "api-board", split)
-    return _answer(request, chosen, split=split_or_404(request, split))
+    return _answer(request, chosen, chosen.write, split=split_or_404(request, split))
 
 
 @require_safe
 def edition(request: HttpRequest, split: str, number: int, chosen: Format) -> HttpResponse:
     """The board of an edition, for ever."""
-    if chosen.is_api_document:
+    if chosen.write is None:
         return _api_document(request, "api-edition-board", split, number)
     found = get_object_or_404(snapshots.editions(), split=split, number=number)
-    return _answer(request, chosen, split=found.split, edition=found)
+    return _answer(request, chosen, chosen.write, split=found.split, edition=found)
 
 
 def _api_document(request: HttpRequest, name: str, *of: object) -> HttpResponse:
@@ -85,7 +85,12 @@ def _api_document(request: HttpRequest, name: str, *of: object) -> HttpResponse:
 
 
 def _answer(
-    request: HttpRequest, chosen: Format, *, split: Split, edition: Edition | None = None
+    request: HttpRequest,
+    chosen: Format,
+    write: Callable[[tables.Export], str],
+    *,
+    split: Split,
+    edition: Edition | None = None,
 ) -> HttpResponse:
     try:
         query = board_query.parse(request.GET, now=timezone.now(), has_time=edition is None)
@@ -110,7 +115,7 @@ def _answer(
     name = f"tsttc-{split.pk}{f'-edition-{shown.edition.number}' if shown.edition else ''}"
     name += f"{'-with-own' if is_mine else ''}.{chosen.suffix}"
     return HttpResponse(
-        chosen.write(export),
+        write(export),
         content_type=f"{chosen.media_type}; charset=utf-8",
         headers={"Content-Disposition": f'attachment; filename="{name}"'},
     )
@@ -150,11 +155,10 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
         path = reverse("edition", args=[edition.split_id, edition.number])
     has_intervals = any(entry.intervals for entry in board.entries)
     has_own = any(tables.mark_of(entry) for entry in board.entries)
-    on_site = [each for each in formats.FORMATS if each.on_site]
 
     def asked(form: Format, more: dict[str, str]) -> str:
         # The API's document has the rows of whoever asks, unless it is asked for without.
-        is_public = has_own and form.is_api_document and "mine" not in more
+        is_public = has_own and form.write is None and "mine" not in more
         return _asked(query, **more, **({"mine": "0"} if is_public else {}))
 
     def offered(label: str, about: str, these: Sequence[Format], **more: str) -> LabelledLinks:
@@ -177,6 +181,6 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
         return [plain, offered(label, f"{about}, {label}", with_values, **more, intervals="1")]
 
     return {
-        "public": variants("", on_site),
-        "with_own": variants(" including your private rows", on_site, mine="1") if has_own else [],
+        "public": variants("", formats.FORMATS),
+        "with_own": variants(" including your private rows", formats.FORMATS, mine="1") if has_own else [],
     }

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from evaluator import read_manifest, receipts
+from evaluator import receipts
 from evaluator.metrics.protocol import SCORE_NAMES
 from evaluator.papers.tables import published_tables
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
@@ -118,7 +118,6 @@ def documented_shell() -> Iterator[Run]:
             "PYTHONPATH": str(REPOSITORY),
             "PYTHON_KEYRING_BACKEND": "keyring.backends.fail.Keyring",
             "XDG_CONFIG_HOME": home,
-            "XDG_CACHE_HOME": home,
         }
         with shell([sys.executable, "-m", "evaluator"], environment) as run:
             yield run
@@ -131,6 +130,7 @@ def put_documented_answers(site: RecordedSite) -> None:
         "state": "QUEUED",
         "split": "val",
         "method": "Foo++",
+        "visibility": "PRIVATE",
         "method_id": METHOD_ID,
         "url": f"https://leaderboard.example.org/submissions/{ID}/",
         "queue": {"ahead": 2},
@@ -153,7 +153,6 @@ def put_documented_answers(site: RecordedSite) -> None:
         },
         "awaits_intervals": False,
         "rank": 1,
-        "visibility": "PRIVATE",
         "counts": COUNTS,
         "n_out_of_range": 458,
         "truncated": {"-20": 171, "-0.15": 0, "0.05": 0, "20": 302},
@@ -192,10 +191,6 @@ def put_more_documented_answers(site: RecordedSite) -> None:
         },
     ]
     site.put("GET /api/v1/quota", Reply(quotas))
-    digest = read_manifest(EXAMPLES / "manifest.csv").digest
-    site.put(
-        "GET /api/v1/splits/demo/editions", Reply([{"edition": 1, "is_board": True, "manifest": digest}])
-    )
     table = (EXAMPLES / "manifest.csv").read_bytes()
     site.put("GET /api/v1/splits/demo/manifest", Reply(table, headers={"Content-Type": "text/csv"}))
     found = {"difference": -1.18, "low": -1.73, "high": -0.62, "p": 0.0004}
@@ -261,6 +256,7 @@ def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object
             "team": ", ".join(paper["source"]["authors"].split(", ")),
             "date": str(paper["source"]["year"]),
             "kind": "published",
+            "decimals": 1,
             "scores": dict(zip(table.columns, row.values, strict=True)),
         }
         for row in table.rows

@@ -35,6 +35,7 @@ def published(method: str, values: list[float], *, rank: int) -> dict[str, objec
         "team": "Yuheng Shi, Zehao Huang, Naiyan Wang",
         "date": "2023",
         "kind": "published",
+        "decimals": 1,
         "scores": scores,
     }
 
@@ -115,24 +116,6 @@ def test_name_that_is_no_name_is_wrong_usage(tsttc: Tsttc, site: RecordedSite, a
     result = tsttc(*arguments)
     assert result.exit_code == 2
     assert site.requests == []
-
-
-def test_board_shows_rank_names_and_the_ten_columns(tsttc: Tsttc, site: RecordedSite) -> None:
-    site.put(BOARD, Reply(BOARD_DOCUMENT))
-    result = tsttc("board")
-    assert (result.exit_code, result.stderr) == (0, "")
-    lines = result.stdout.splitlines()
-    assert lines[0] == "test · edition 2 · updated 2026-11-20T12:00:00Z"
-    assert lines[3].split()[:6] == ["rank", "method", "team", "date", "MiD", "MiD_c"]
-    printed = "14.8  27.6   15.6   11.5   13.7  12.3    6.5    8.8   13.1   15.0"
-    assert lines[4].split() == [
-        *("1", "Deep", "Scale", "Shi", "et", "al.", "(published)", "2023"),
-        *printed.split(),
-    ]
-    assert lines[5].split()[:6] == ["2", "Foo++", "TJU-V", "2026-11-20", "20.00", "21.00"]
-    assert lines[6].split() == ["–", "Late", "TJU-V", *["–"] * 10]
-    assert lines[4].index(".8") == lines[5].index(".00"), "decimal points stand below each other"
-    assert "\x1b" not in result.stdout
 
 
 def test_board_needs_no_token_and_sends_none(
@@ -228,13 +211,6 @@ def test_board_says_below_what_the_ground_truth_itself_scores(tsttc: Tsttc, site
 
 def found(document: dict[str, Any]) -> Board:
     return msgspec.convert({**document, "document": document}, Board)
-
-
-def test_board_on_a_terminal_marks_best_and_second() -> None:
-    lines = list(boards.in_words(found(BOARD_DOCUMENT), width=200))
-    assert "\x1b[1m14.8\x1b[0m" in lines[4]
-    assert "\x1b[4m20.00\x1b[0m" in lines[5]
-    assert "\x1b" not in lines[6]
 
 
 def test_board_on_a_narrow_terminal_keeps_the_main_columns() -> None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import pty
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import keyring
 import pytest
 
 from tests.evaluator.cli.keyrings import LockedKeyring, NoKeyring, RememberingKeyring
 from tests.evaluator.cli.recorded_site import IS_LEADERBOARD, RecordedSite, Reply, problem
-from tests.evaluator.worlds import EXAMPLES, REPOSITORY, Tsttc
+from tests.evaluator.worlds import EXAMPLES, Tsttc
 
 GOOD = EXAMPLES / "predictions.json"
 
@@ -175,32 +172,13 @@ def test_logout_forgets_token_and_server(
     )
 
 
-def test_terminal_is_asked_and_does_not_show_the_token(site: RecordedSite, tmp_path: Path) -> None:
-    """A real terminal, and a real process with a keyring that is a class of the tests."""
+def test_person_is_asked_and_the_token_is_not_shown(
+    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("evaluator.cli.access.sys", terminal)
     site.put("GET /api/v1/quota", Reply([]))
-    terminal, end = pty.openpty()
-    running = subprocess.Popen(
-        [sys.executable, "-m", "evaluator", "login", "--server", site.url],
-        stdin=end,
-        stdout=end,
-        stderr=end,
-        cwd=REPOSITORY,
-        start_new_session=True,
-        env=os.environ
-        | {
-            "PYTHON_KEYRING_BACKEND": "tests.evaluator.cli.keyrings.RememberingKeyring",
-            "HOME": str(tmp_path),
-        },
-    )
-    os.close(end)
-    with open(terminal, "r+b", buffering=0) as screen:  # noqa: PTH123 -- a descriptor, not a path
-        shown = b""
-        while b"Token:" not in shown:
-            shown += screen.read(1 << 16)
-        screen.write(TOKEN.encode() + b"\n")
-        while b"is valid" not in shown:
-            shown += screen.read(1 << 16)
-        assert running.wait(180) == 0
-    assert b"the input is hidden" in shown
-    assert TOKEN.encode() not in shown
-    assert site.requests[0].headers["Authorization"] == f"Bearer {TOKEN}"
+    result = tsttc("login", "--server", site.url, stdin=f"{TOKEN}\n".encode())
+    assert "the input is hidden" in result.stderr
+    assert TOKEN not in result.output
+    assert ring.kept == {("tsttc", site.url): TOKEN}

@@ -16,7 +16,6 @@ import pytest
 
 from evaluator import Rejected, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
-from evaluator.metrics.protocol import SCORE_NAMES
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY, Tsttc, process
 
 GOOD = EXAMPLES / "predictions.json"
@@ -49,51 +48,12 @@ def test_score_as_json_is_the_library_s_report_to_the_last_bit(
     assert result.stderr == ""
 
 
-def test_score_shows_the_paper_s_columns_with_two_decimals(tsttc: Tsttc) -> None:
-    lines = tsttc("score", GOOD, "--truth", TRUTH).stdout.splitlines()
-    report = json.loads(tsttc("score", GOOD, "--truth", TRUTH, "--json").stdout)
-    flat = [report["scores"][name][metric] for metric in ("mid", "rte") for name in report["scores"]]
-    counts = [str(report["scores"][name]["count"]) for name in report["scores"]]
-    assert lines[0].split() == (
-        ["MiD", "MiD_c", "MiD_s", "MiD_l", "MiD_n", "RTE", "RTE_c", "RTE_s", "RTE_l", "RTE_n"]
-    )
-    assert len(flat) == len(SCORE_NAMES)
-    assert lines[1].split() == ["error", *(f"{value:.2f}" for value in flat)]
-    assert lines[2].split() == ["count", *counts, *counts]
-
-
-def test_score_says_what_was_truncated_and_what_is_out_of_range(tsttc: Tsttc) -> None:
-    result = tsttc("score", GOOD, "--truth", TRUTH)
-    report = json.loads(tsttc("score", GOOD, "--truth", TRUTH, "--json").stdout)
-    assert report["n_out_of_range"] == 2
-    assert "60 sequences, 2 of them in no TTC range" in result.stdout
-    assert f"{report['truncated']['20']} to 20 s" in result.stdout
-    assert f"{report['truncated']['-20']} to -20 s" in result.stdout
-
-
-def test_empty_interval_is_a_dash_and_not_a_zero(tsttc: Tsttc, tmp_path: Path) -> None:
-    truth = tmp_path / "truth.csv"
-    truth.write_text("anno_id,bag_stamp,cam_id,ts,track_id,ttc\n0,a,1,100,4,10.0\n")
-    shown = tsttc("score", "-", "--truth", truth, stdin=b'{"0": 9.0}').stdout
-    assert shown.splitlines()[1].split()[2] == "–"
-    report = json.loads(tsttc("score", "-", "--truth", truth, "--json", stdin=b'{"0": 9.0}').stdout)
-    assert report["scores"]["crucial"] == {"mid": None, "rte": None, "count": 0}
-
-
 @pytest.mark.parametrize("command", ["check", "score"])
 def test_predictions_may_come_from_standard_input(tsttc: Tsttc, command: str) -> None:
     table = ["--truth", TRUTH] if command == "score" else ["--manifest", MANIFEST]
     piped = tsttc(command, "-", *table, "--json", stdin=GOOD.read_bytes())
     assert piped.exit_code == 0
     assert json.loads(piped.stdout) == json.loads(tsttc(command, GOOD, *table, "--json").stdout)
-
-
-def test_check_accepts_a_good_file(tsttc: Tsttc) -> None:
-    result = tsttc("check", GOOD, "--manifest", MANIFEST)
-    assert (result.exit_code, result.stderr) == (0, "")
-    assert result.stdout == f"{GOOD} is good: 60 sequences, each predicted once.\n"
-    described = json.loads(tsttc("check", GOOD, "--manifest", MANIFEST, "--json").stdout)
-    assert (described["n_sequences"], described["problems"]) == (60, [])
 
 
 @pytest.mark.parametrize(
@@ -108,27 +68,6 @@ def test_problems_are_numbered_in_the_library_s_words(tsttc: Tsttc, arguments: t
     )
     numbered = [f"{number:>3}. {words}" for number, words in enumerate(problems_of(BROKEN), start=1)]
     assert result.stderr.splitlines()[1:] == numbered
-
-
-@pytest.mark.parametrize(
-    "arguments", [("check", BROKEN, "--manifest", MANIFEST), ("score", BROKEN, "--truth", TRUTH)]
-)
-def test_problems_as_json_go_to_standard_output_with_code_and_place(
-    tsttc: Tsttc, arguments: tuple[object, ...]
-) -> None:
-    result = tsttc(*arguments, "--json")
-    document = json.loads(result.stdout)
-    assert result.exit_code == 1
-    assert (document["code"], document["n_problems"]) == ("rejected", 7)
-    assert {problem["code"] for problem in document["problems"]} == {
-        "unknown-keys",
-        "duplicate-keys",
-        "missing-keys",
-        "zero",
-        "not-a-number",
-        "nan",
-    }
-    assert all(set(problem) == {"code", "message", "where"} for problem in document["problems"])
 
 
 def test_rejection_names_the_table_when_the_table_is_at_fault(tsttc: Tsttc, tmp_path: Path) -> None:
@@ -174,11 +113,6 @@ def test_manifest_can_be_written_to_a_file(tsttc: Tsttc, tmp_path: Path) -> None
     assert described["output"] == str(written)
     checked = json.loads(tsttc("check", GOOD, "--manifest", written, "--json").stdout)
     assert described["manifest_digest"] == checked["manifest_digest"]
-
-
-def test_manifest_as_json_carries_the_table_when_no_file_is_named(tsttc: Tsttc) -> None:
-    document = json.loads(tsttc("manifest", TRUTH, "--json").stdout)
-    assert document["csv"].encode() == MANIFEST.read_bytes()
 
 
 def test_manifest_never_overwrites_the_truth(tsttc: Tsttc, tmp_path: Path) -> None:
@@ -266,26 +200,6 @@ def test_help_loads_none_of_the_heavy_libraries() -> None:
     assert heavy & loaded == set()
 
 
-@pytest.mark.slow
-def test_no_module_of_the_command_loads_the_web_application() -> None:
-    names = [
-        ".".join(path.relative_to(REPOSITORY).with_suffix("").parts)
-        for path in sorted((REPOSITORY / "evaluator").rglob("*.py"))
-        if path.name not in {"__main__.py", "frames.py"}
-    ]
-    loaded = modules_of(f"import importlib; [importlib.import_module(name) for name in {names}]")
-    assert {"httpx", "numpy"} <= loaded
-    assert {
-        "django",
-        "rest_framework",
-        "celery",
-        "leaderboard",
-        "pandas",
-        "redis",
-        "psycopg",
-    } & loaded == set()
-
-
 def test_module_runs_as_the_command() -> None:
     done = process("score", GOOD, "--truth", TRUTH, env=os.environ | {"PYTHONIOENCODING": "ascii"})
     assert done.returncode == 0
@@ -299,22 +213,3 @@ def test_public_names_are_there_although_they_load_late() -> None:
     assert [name for name in evaluator.__all__ if getattr(evaluator, name, None) is None] == []
     with pytest.raises(AttributeError, match="no attribute 'absent'"):
         _ = evaluator.absent  # type: ignore[attr-defined]  # the point of the test
-
-
-def test_two_files_are_compared_with_what_their_difference_rests_on(tsttc: Tsttc, tmp_path: Path) -> None:
-    taus = {str(i): (i % 9) + 1.5 for i in range(120)}
-    rows = [f"{key},bag{i % 20},1,{100 + i},{i},{tau}" for i, (key, tau) in enumerate(taus.items())]
-    truth = tmp_path / "truth.csv"
-    truth.write_text("\n".join(["anno_id,bag_stamp,cam_id,ts,track_id,ttc", *rows]) + "\n")
-    near, far = tmp_path / "near.json", tmp_path / "far.json"
-    for path, factor in ((near, 1.05), (far, 1.3)):
-        path.write_text(json.dumps({key: tau * factor for key, tau in taus.items()}))
-    said = tsttc("compare", near, far, "--truth", truth)
-    assert said.exit_code == 0, said.stderr
-    words = (
-        f"Without the 15 of 20 recordings that favour {near} most, the difference would not be significant."
-    )
-    assert words in said.stdout.splitlines(), "of five recordings no p is below 0.05"
-    told = json.loads(tsttc("compare", near, far, "--truth", truth, "--json").stdout)["differences"]
-    assert told["mid"]["influence"] == {"n_units": 20, "n_to_undecided": 15, "n_to_turn": None}
-    assert told["rte"]["influence"] is None

@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
-import queue
-import sys
 from pathlib import Path
 
 import pytest
-from click.shell_completion import ShellComplete
 
 from evaluator import read_manifest, read_truth
-from evaluator.cli import main
-from evaluator.cli.following import signs_of_life
 from tests.evaluator.cli.console import ID, METHOD_ID, REJECTED_ID
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
 from tests.evaluator.toolkit_folders import camera, write_folder
@@ -53,28 +47,6 @@ def test_methods_are_listed_with_who_sees_them(tsttc: Tsttc, site: RecordedSite)
     assert lines[1].split() == [METHOD_ID, "Foo++", "private"]
     assert lines[2].endswith("anonymous as Anonymous 1a2b3c")
     assert [row["name"] for row in json.loads(tsttc("methods", "--json").stdout)] == ["Foo++", "Bar"]
-
-
-def test_methods_are_listed_with_their_ranks_on_every_split(tsttc: Tsttc, site: RecordedSite) -> None:
-    methods = [
-        {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE"},
-        {"id": ID, "name": "Bar", "visibility": "PUBLIC"},
-    ]
-    foo = {"method": "Foo++", "method_id": METHOD_ID, "scores": {"mid": 13.92}, "visibility": "PRIVATE"}
-    bar = {"method": "Bar", "method_id": ID, "rank": 2, "scores": {"mid": 14.5}, "decimals": 1}
-    others = {"method": "Other", "method_id": "another", "rank": 1, "scores": {"mid": 1.0}}
-    site.put("GET /api/v1/methods", Reply(methods))
-    site.put("GET /api/v1/splits", Reply([{"split": "val"}, {"split": "test"}, {"split": "demo"}]))
-    site.put("GET /api/v1/splits/val/board", Reply({"split": "val", "entries": [others, bar, foo]}))
-    site.put("GET /api/v1/splits/test/board", Reply({"split": "test", "entries": [others, bar]}))
-    site.put("GET /api/v1/splits/demo/board", Reply({"split": "demo", "entries": [others]}))
-    lines = tsttc("methods", "--ranks").stdout.splitlines()
-    assert lines[0].split() == ["id", "method", "visibility", "val", "test"], "nothing of ours is on demo"
-    assert lines[1].split()[2:] == ["private", "no", "rank,", "MiD", "13.92", "–"]
-    assert lines[2].split()[2:] == ["public", "rank", "2,", "MiD", "14.5", "rank", "2,", "MiD", "14.5"]
-    found = json.loads(tsttc("methods", "--ranks", "--json").stdout)
-    assert found[0]["ranks"] == {"val": {"rank": None, "mid": 13.92}}
-    assert found[1]["ranks"]["test"] == {"rank": 2, "mid": 14.5}
 
 
 def test_submissions_are_listed_page_after_page_and_filtered(tsttc: Tsttc, site: RecordedSite) -> None:
@@ -144,39 +116,3 @@ def test_a_withdrawn_submission_says_so(tsttc: Tsttc, site: RecordedSite) -> Non
     site.put(f"GET /api/v1/submissions/{ID}", Reply(gone))
     assert "SCORED, withdrawn" in tsttc("submissions").stdout
     assert tsttc("status", ID).stdout.startswith("SCORED, withdrawn: Foo++ on val\n")
-
-
-def suggested(*words: str) -> list[str]:
-    """What a shell would offer for the last of these words."""
-    found = ShellComplete(main, {}, "tsttc", "_TSTTC_COMPLETE").get_completions(list(words[:-1]), words[-1])
-    return [item.value for item in found]
-
-
-def test_a_shell_completes_splits_and_one_s_own_methods(site: RecordedSite) -> None:
-    site.put("GET /api/v1/methods", Reply([{"id": METHOD_ID, "name": "Foo++"}, {"id": ID, "name": "Bar"}]))
-    assert suggested("submit", "x.json", "--split", "") == ["val"]
-    assert suggested("submit", "x.json", "--split", "t") == []
-    assert suggested("submit", "x.json", "--method", "F") == ["Foo++"]
-    assert suggested("publish", "") == ["Foo++", "Bar"]
-    assert suggested("quota", "v") == ["val"]
-    assert suggested("board", "--sort", "rte_c") == ["rte_crucial"]
-    entry = {"method": "Deep Scale", "scores": {}}
-    site.put("GET /api/v1/splits/val/board", Reply({"split": "val", "entries": [entry]}))
-    assert suggested("submit", "x.json", "--split", "val", "--fail-if-worse-than", "D") == ["Deep Scale"]
-    assert suggested("compare", "--split", "val", "") == ["Deep Scale"]
-    files = ShellComplete(main, {}, "tsttc", "").get_completions(["compare", "--truth", str(MANIFEST)], "x")
-    assert [item.type for item in files] == ["file"]
-    assert suggested("publish", "--server", "http://127.0.0.1:9", "") == []
-
-
-def test_a_pipe_hears_of_every_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    told: queue.Queue[str] = queue.Queue()
-
-    class Pipe(io.StringIO):
-        def write(self, text: str) -> int:
-            told.put(text)
-            return len(text)
-
-    monkeypatch.setattr(sys, "stderr", Pipe())
-    with signs_of_life("https://example.org", every_s=0.001):
-        assert told.get(timeout=60).startswith("Waiting for https://example.org (0 s) …")

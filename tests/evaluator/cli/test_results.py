@@ -74,25 +74,8 @@ def test_wait_and_watch_end_with_the_intervals(tsttc: Tsttc, site: RecordedSite)
 
 
 def test_intervals_are_waited_for_only_so_long(client: Client, site: RecordedSite, clock: FakeTime) -> None:
-    site.put(GET, *[Reply(AWAITED)] * 50)
-    scored = client.submission(ID)
-    asked = client.settled(scored, timeout_s=10)
-    assert (asked.is_final, asked.awaits_intervals) == (True, True)
-    assert sum(clock.slept_s) <= 10
-    assert len(site.requests) < 10
-
-
-def test_server_that_is_away_meanwhile_keeps_what_is_known(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(GET, Reply(AWAITED), Reply(status=503), Reply(SURE))
-    assert client.settled(client.submission(ID), timeout_s=10).rank == 2
-    assert len(clock.slept_s) == 2
-
-
-def test_nothing_is_asked_where_no_intervals_will_come(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(GET, Reply(SCORED))
-    client.settled(client.submission(ID), timeout_s=10)
-    assert clock.slept_s == []
+    site.put(GET, Reply(AWAITED), Reply(status=503), Reply(AWAITED))
+    *_, last = client.watch(ID, timeout_s=900)
+    assert (last.is_final, last.awaits_intervals) == (True, True)
+    assert 5 < clock.now_s <= 10
+    assert len(site.requests) < 12

@@ -1,20 +1,19 @@
-"""What happens before and while a file is sent: the check with the split's manifest, the key, the bar."""
+"""What happens before a file is sent: the check with the split's manifest, and who will see the results."""
 
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 from click.testing import Result
 
-from evaluator import read_manifest
 from evaluator.predictions import plausibility
 from evaluator.tables.formats import parquet_of
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply, problem
-from tests.evaluator.worlds import EXAMPLES, Tsttc, on_terminal, process
+from tests.evaluator.worlds import EXAMPLES, Tsttc
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("at_site")]
 
@@ -22,7 +21,6 @@ MANIFEST = EXAMPLES / "manifest.csv"
 ID = "1f0c6a2e-6d0b-4f3e-9c55-0d4f2b8f3a11"
 QUEUED: dict[str, Any] = {"id": ID, "state": "QUEUED", "split": "val", "method": "Foo++"}
 POST = "POST /api/v1/submissions"
-EDITIONS = "GET /api/v1/splits/val/editions"
 METHODS = "GET /api/v1/methods"
 TABLE = "GET /api/v1/splits/val/manifest"
 
@@ -31,14 +29,8 @@ def submit(tsttc: Tsttc, name: str = "predictions.json", *more: object) -> Resul
     return tsttc("submit", EXAMPLES / name, "--split", "val", "--method", "Foo++", *more)
 
 
-def put_manifest(
-    site: RecordedSite, data: bytes = MANIFEST.read_bytes(), *, digest: str | None = None
-) -> None:
-    found = digest or read_manifest(MANIFEST).digest
-    rows = [{"edition": 2, "is_board": False, "manifest": "sha256:old"}]
-    rows.append({"edition": 1, "is_board": True, "manifest": found})
-    site.put(EDITIONS, Reply(rows))
-    site.put(TABLE, Reply(data, headers={"Content-Type": "text/csv"}))
+def put_manifest(site: RecordedSite) -> None:
+    site.put(TABLE, Reply(MANIFEST.read_bytes(), headers={"Content-Type": "text/csv"}))
     site.put(POST, Reply(QUEUED, status=201))
 
 
@@ -52,7 +44,8 @@ def test_bad_file_is_told_in_the_words_of_check_and_nothing_is_sent(tsttc: Tsttc
     result = submit(tsttc, "broken.json")
     assert (result.exit_code, result.stdout) == (1, "")
     assert result.stderr == checked.stderr + "Nothing was submitted; your quota is not used.\n"
-    assert site.posts == []
+    assert paths(site) == [TABLE]
+    assert site.requests[0].headers["Authorization"] is None, "a manifest is for everybody"
     document = json.loads(submit(tsttc, "broken.json", "--json").stdout)
     assert (document["code"], document["n_problems"]) == ("rejected", 7)
     assert submit(tsttc, "broken.json", "--no-check").exit_code == 0
@@ -86,57 +79,7 @@ def test_a_warning_of_the_check_is_not_repeated_with_the_scores(
     assert tsttc(*sent, "--no-check").stderr == f"Warning: {words} scale ratios.\n"
 
 
-def test_manifest_is_fetched_once_as_anybody_and_kept_under_its_digest(
-    tsttc: Tsttc, site: RecordedSite, places: Path
-) -> None:
-    put_manifest(site)
-    assert [submit(tsttc).exit_code for _ in range(2)] == [0, 0]
-    assert paths(site) == [EDITIONS, TABLE, METHODS, POST, EDITIONS, METHODS, POST]
-    public = [request for request in site.requests if "/splits/" in request.path]
-    assert [request.headers["Authorization"] for request in public] == [None] * 3
-    (kept,) = places.rglob("*.npz")
-    assert read_manifest(kept).digest == read_manifest(MANIFEST).digest
-    assert kept.stem in read_manifest(MANIFEST).digest
-
-
-@pytest.mark.parametrize("damage", [b"", b"nonsense", MANIFEST.read_bytes(), b"\xff", "shorter", "other"])
-def test_copy_that_is_damaged_is_fetched_anew(
-    tsttc: Tsttc, site: RecordedSite, places: Path, damage: bytes | str
-) -> None:
-    put_manifest(site)
-    submit(tsttc)
-    (kept,) = places.rglob("*.npz")
-    copy = kept.read_bytes()
-    changed = {"shorter": copy[:-60], "other": copy.replace("sha".encode("utf-32-le"), b"." * 12)}
-    kept.write_bytes(changed[damage] if isinstance(damage, str) else damage)
-    assert submit(tsttc).exit_code == 0
-    assert (paths(site).count(TABLE), kept.read_bytes()) == (2, copy)
-
-
-def test_machine_where_nothing_can_be_kept_does_without(
-    tsttc: Tsttc, site: RecordedSite, places: Path
-) -> None:
-    put_manifest(site)
-    places.parent.mkdir(parents=True, exist_ok=True)
-    places.write_text("a file where the folder would be")
-    assert [submit(tsttc).exit_code for _ in range(2)] == [0, 0]
-    assert paths(site).count(TABLE) == 2
-
-
-def test_new_edition_of_a_split_is_checked_by_its_own_manifest(tsttc: Tsttc, site: RecordedSite) -> None:
-    put_manifest(site)
-    submit(tsttc)
-    shorter = b"".join(MANIFEST.read_bytes().splitlines(keepends=True)[:-1])
-    other = RecordedSite()
-    with other:
-        put_manifest(other, shorter, digest="sha256:" + "0" * 64)
-        result = submit(tsttc, "predictions.json", "--server", other.url)
-    assert result.exit_code == 1
-    assert '1 key names no sequence of the manifest: "59"' in result.stderr
-
-
 def test_split_without_a_manifest_is_left_to_the_server_s_words(tsttc: Tsttc, site: RecordedSite) -> None:
-    site.put(EDITIONS, Reply([]))
     site.put(POST, Reply(problem("The split val takes no submissions yet.", where="split"), 409))
     result = submit(tsttc)
     assert (result.exit_code, result.stderr) == (8, "Error: The split val takes no submissions yet.\n")
@@ -149,18 +92,12 @@ def test_answer_that_was_lost_is_no_file_sent_before(tsttc: Tsttc, site: Recorde
 
 
 def test_first_submission_of_a_private_method_says_how_to_show_it(tsttc: Tsttc, site: RecordedSite) -> None:
-    method = {"id": "m1", "name": "Foo\x1b[2J++", "visibility": "PRIVATE"}
-    site.put(POST, Reply(QUEUED | {"method_id": "m1"}, status=201))
-    site.put(
-        "GET /api/v1/methods/m1", Reply(method), Reply(method | {"visibility": "PUBLIC"}), Reply(status=403)
-    )
-    shown = submit(tsttc).stdout
-    assert shown.endswith(
+    private = QUEUED | {"method": "Foo\x1b[2J++", "visibility": "PRIVATE"}
+    site.put(POST, Reply(private, status=201), Reply(private | {"visibility": "PUBLIC"}, status=201))
+    assert submit(tsttc).stdout.endswith(
         'is private: only your team sees its results. Publish it with: tsttc publish "Foo\\x1b[2J++"\n'
     )
-    for _ in range(2):
-        again = submit(tsttc)
-        assert (again.exit_code, "private" in again.output) == (0, False)
+    assert "private" not in submit(tsttc).output
 
 
 NOTICE = "Foo++ is public: everyone sees its results on every split."
@@ -176,18 +113,18 @@ def test_public_method_is_told_to_be_so_before_the_file_is_sent(tsttc: Tsttc, si
     assert asked.index(METHODS) < asked.index(POST)
 
 
-def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(site: RecordedSite) -> None:
+def test_a_person_is_asked_before_the_results_of_a_public_method_go_public(
+    tsttc: Tsttc, site: RecordedSite, monkeypatch: pytest.MonkeyPatch
+) -> None:
     put_manifest(site)
     site.put(METHODS, Reply([PUBLIC]))
+    terminal = SimpleNamespace(stdin=SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("evaluator.cli.submissions.sys", terminal)
     words = ("submit", EXAMPLES / "predictions.json", "--split", "val", "--method", "Foo++")
-    keyboard, end = os.openpty()
-    os.write(keyboard, b"n\n")
-    done = process(*words, stdin=end)
-    assert (done.returncode, done.stdout, site.posts) == (2, f"{NOTICE}\n", [])
-    assert done.stderr.endswith("Submit? [y/N]: Error: Nothing was submitted.\n")
-    assert process(*words, "--yes", stdin=end).returncode == 0
-    os.close(end)
-    os.close(keyboard)
+    refused = tsttc(*words, stdin=b"n\n")
+    assert (refused.exit_code, refused.stdout, site.posts) == (2, f"{NOTICE}\n", [])
+    assert "Submit? [y/N]: " in refused.stderr
+    assert tsttc(*words, "--yes").exit_code == 0
     assert len(site.posts) == 1
 
 
@@ -204,16 +141,3 @@ def test_token_that_may_only_submit_learns_from_the_answer_who_sees_the_results(
     site.put(POST, Reply(QUEUED | {"notice": NOTICE}, status=201))
     site.put(METHODS, Reply(problem("Not for reading.", code="token-scope"), status=403))
     assert submit(tsttc).stdout.splitlines()[1] == NOTICE
-
-
-def test_terminal_shows_a_bar_and_a_pipe_does_not(site: RecordedSite, tmp_path: Path) -> None:
-    site.put(POST, Reply(QUEUED, status=201))
-    large = tmp_path / "large.json"
-    large.write_bytes(b" " * 3_000_000)
-    command = ["submit", large, "--split", "val", "--method", "Foo"]
-    done, shown = on_terminal(*command)
-    assert "large.json" in shown
-    assert "MB" in shown
-    assert done.stdout.startswith("Submission ")
-    piped = process(*command)
-    assert (piped.returncode, piped.stderr) == (0, "")

@@ -1,22 +1,17 @@
-"""board in the forms that papers, notes and spreadsheets take, convert, and completion."""
+"""board in other formats, convert, and completion."""
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 from evaluator import Rejected, read_manifest, read_predictions, write_predictions
-from evaluator.metrics.protocol import SCORE_NAMES
 from evaluator.metrics.scale import ttc_to_scale_ratio
 from evaluator.predictions.conversion import convert
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply
@@ -26,133 +21,23 @@ MANIFEST = read_manifest(EXAMPLES / "manifest.csv")
 PREDICTIONS = (EXAMPLES / "predictions.json").read_bytes()
 TTC_S = read_predictions(PREDICTIONS, manifest=MANIFEST).ttc_s
 
-HOSTILE = r"\input{x} $a_b$ | *c* <i> =1+1" + "\x1b[31m\n"
-VALUES: dict[str, Any] = dict.fromkeys(SCORE_NAMES, 20.0)
-BOARD: dict[str, Any] = {
-    "split": "test",
-    "edition": 2,
-    "entries": [
-        {"rank": 1, "method": "=cmd", "team": "T", "date": "2026-11-20", "scores": VALUES | {"mid": 14.5}},
-        {"rank": 2, "method": HOSTILE, "team": "A, B", "kind": "published", "scores": VALUES},
-        {"rank": None, "method": "Late", "team": "T", "scores": dict.fromkeys(SCORE_NAMES)}
-        | {"withdrawn_at": "2026-11-20T12:00:00Z"},
-    ],
-}
+BOARD = {"split": "test", "edition": 2, "entries": []}
 
 
-OWN = [
-    {"rank": 1, "method": "Owl", "team": "T", "visibility": "PRIVATE", "scores": VALUES | {"mid": 1.0}},
-    {"rank": 2, "method": "Bat", "team": "T", "visibility": "ANONYMOUS", "pseudonym": "Anonymous 3f9c2a"}
-    | {"scores": VALUES},
-    {"rank": 2, "method": "Anonymous 77aa00", "team": "Anonymous", "visibility": "ANONYMOUS"}
-    | {"scores": VALUES},
-]
-
-
-@pytest.fixture
-def board(tsttc: Tsttc, site: RecordedSite, at_site: None) -> Callable[[str], str]:
+@pytest.mark.usefixtures("at_site")
+def test_board_in_another_format_is_the_text_of_the_site(tsttc: Tsttc, site: RecordedSite) -> None:
     site.put("GET /api/v1/splits/test/board", Reply(BOARD))
-
-    def shown(form: str) -> str:
-        result = tsttc("board", "--format", form)
-        assert (result.exit_code, result.stderr) == (0, "")
-        return result.stdout
-
-    return shown
-
-
-def test_board_as_csv_is_read_back_and_runs_in_no_spreadsheet(board: Callable[[str], str]) -> None:
-    rows = list(csv.DictReader(io.StringIO(board("csv"))))
-    assert [row["method"] for row in rows] == [
-        "'=cmd",
-        HOSTILE.replace("\x1b", " ").rstrip(),
-        "Late",
-    ]
-    assert (rows[0]["mid"], rows[0]["rte"], rows[2]["mid"], rows[2]["rank"]) == ("14.50", "20.00", "", "")
-
-
-def test_board_as_bibtex_is_the_text_of_the_site(
-    board: Callable[[str], str], tsttc: Tsttc, site: RecordedSite
-) -> None:
-    found = Reply("@misc{é,\n}\n".encode(), headers={"Content-Type": "text/x-bibtex; charset=utf-8"})
-    site.put("GET /board/test/editions/2.bib", found)
-    assert board("bibtex") == "@misc{é,\n}\n"
-    assert "--mine does not go with --format bibtex" in tsttc("board", "--mine", "--format", "bibtex").stderr
-
-
-def test_board_as_latex_marks_the_best_and_takes_the_power_from_names(board: Callable[[str], str]) -> None:
-    text = board("latex")
-    assert r"\textbf{14.50}" in text
-    assert r"\begin{tabular}" in text
-    assert r"\input" not in text
-    assert "\x1b" not in text
-
-
-def test_board_as_markdown_is_one_line_for_each_entry(board: Callable[[str], str]) -> None:
-    text = board("markdown")
-    rows = [line for line in text.splitlines() if line.startswith("|")]
-    assert len(rows) == 2 + 2, "what was withdrawn is on the board, not in a table to take along"
-    assert "**14.50**" in rows[2]
-    assert "<i>" not in text
-    assert "\x1b" not in text
-
-
-@pytest.mark.parametrize("form", ["latex", "markdown"])
-def test_rows_that_others_do_not_see_are_marked_and_take_no_mark_of_a_column(
-    tsttc: Tsttc, site: RecordedSite, at_site: None, form: str
-) -> None:
-    site.put("GET /api/v1/splits/test/board", Reply(BOARD | {"entries": [*OWN, *BOARD["entries"]]}))
-    text = tsttc("board", "--mine", "--format", form).stdout.replace("\\", "")
-    assert "Owl (private) " in text
-    assert "Bat (anonymous) " in text
-    assert "Anonymous 77aa00 " in text
-    assert "Not public: only one team sees rows marked (private)" in text
-    best = {"latex": "textbf{{{}}}", "markdown": "**{}**"}[form]
-    assert best.format("14.50") in text
-    assert best.format("1.00") not in text
-
-
-def test_spreadsheet_says_who_sees_each_row(tsttc: Tsttc, site: RecordedSite, at_site: None) -> None:
-    site.put("GET /api/v1/splits/test/board", Reply(BOARD | {"entries": [*OWN, *BOARD["entries"]]}))
-    rows = list(csv.DictReader(io.StringIO(tsttc("board", "--mine", "--format", "csv").stdout)))
-    assert [row["visibility"] for row in rows] == ["PRIVATE", "ANONYMOUS", "ANONYMOUS", *["PUBLIC"] * 3]
-    assert rows[0]["method"] == "Owl", "a program finds the name as it is"
-
-
-def test_tables_say_where_they_were_taken_from(tsttc: Tsttc, site: RecordedSite, at_site: None) -> None:
-    told = {"protocol": "tsttc-1", "ground_truth": "sha256:" + "9f" * 32, "n_sequences": 28600}
-    told |= {"n_recordings": 120, "updated_at": "2026-11-20T12:34:56.789Z"}
-    site.put("GET /api/v1/splits/test/board", Reply(BOARD | told))
-    assert tsttc("board", "--format", "latex").stdout.splitlines()[:5] == [
-        f"% TSTTC leaderboard, test: {site.url}/board/test/editions/2/",
-        "% Edition 2, protocol tsttc-1, 28,600 sequences of 120 recordings",
-        "% Ground truth sha256:" + "9f" * 32,
-        "% As of 2026-11-20 12:34 UTC",
-        r"% It needs \usepackage{booktabs}.",
-    ]
-    asked = ["--at", "2026-11-20", "--sort", "-mid", "--format", "latex"]
-    first = tsttc("board", *asked).stdout.splitlines()[0]
-    assert first == f"% TSTTC leaderboard, test: {site.url}/board/test/?at=2026-11-20&sort=-mid"
-
-
-def test_intervals_stand_in_every_form(tsttc: Tsttc, site: RecordedSite, at_site: None) -> None:
-    known = {"low": 14.1, "high": 15.0, "rank_low": 1, "rank_high": 1}
-    rows = [BOARD["entries"][0] | {"intervals": {"mid": known}}, *BOARD["entries"][1:]]
-    site.put("GET /api/v1/splits/test/board", Reply(BOARD | {"entries": rows}))
-    latex, markdown, text = (
-        tsttc("board", "--intervals", "--format", form).stdout for form in ("latex", "markdown", "csv")
-    )
-    assert r"1 (1) & =cmd & T & \textbf{14.50} {\scriptsize [14.10, 15.00]} & " in latex
-    assert r"| 1 (1) | \=cmd | T | **14.50** [14.10, 15.00] | " in markdown
-    first, second, _ = csv.DictReader(io.StringIO(text))
-    ends = ("rank_low", "rank_high", "mid_low", "mid_high", "rte_negative_high")
-    assert [first[name] for name in ends] == ["1", "1", "14.10", "15.00", ""]
-    assert {second[name] for name in ends} == {""}
-    assert all(request.path.endswith("&intervals=1") for request in site.requests)
-
-
-def test_board_as_json_is_the_same_by_both_names(tsttc: Tsttc, board: Callable[[str], str]) -> None:
-    assert json.loads(board("json")) == json.loads(tsttc("board", "--json").stdout) == BOARD
+    for form, suffix in (("csv", "csv"), ("latex", "tex"), ("markdown", "md"), ("bibtex", "bib")):
+        found = Reply("@misc{é,\r\n}\r\n".encode(), headers={"Content-Type": "text/plain; charset=utf-8"})
+        site.put(f"GET /board/test/editions/2.{suffix}", found)
+        result = tsttc("board", "--format", form, "--sort", "-mid", "--intervals")
+        assert (result.stdout, result.stderr) == ("@misc{é,\n}\n", "")
+        assert site.requests[-1].path == f"/board/test/editions/2.{suffix}?sort=-mid&intervals=1"
+        refused = tsttc("board", "--mine", "--format", form)
+        assert (refused.exit_code, "--mine does not go with" in refused.stderr) == (2, True)
+    site.put("GET /board/test.csv", Reply(b"rank\n"))
+    assert tsttc("board", "--at", "2026-11-20", "--format", "csv").stdout == "rank\n"
+    assert json.loads(tsttc("board", "--format", "json").stdout) == BOARD
 
 
 # --- convert ----------------------------------------------------------------------------------------------
@@ -237,11 +122,8 @@ def test_times_without_a_scale_ratio_are_named_with_a_gap_that_has_one(tsttc: Ts
 @pytest.mark.parametrize(
     "options",
     [
-        ["--frame-gap", "1", "--fps", "2"],
         ["--to-frame-gap", "1"],
-        ["--to", "scale_ratio", "--to-frame-gap", "1", "--to-fps", "2"],
         ["--frame-gap", "6"],
-        ["--fps", "0"],
     ],
 )
 def test_rates_that_do_not_fit_together_are_wrong_usage(tsttc: Tsttc, options: list[str]) -> None:

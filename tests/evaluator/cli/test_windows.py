@@ -1,14 +1,11 @@
 """What Windows does otherwise: paths, line ends, byte order marks, the place of settings."""
 
-import json
-import sys
 from pathlib import Path, PureWindowsPath
 
 import pytest
 
 from evaluator import read_manifest, read_predictions, read_truth
-from evaluator.cli import paths, tokens
-from evaluator.cli.paths import command_line
+from evaluator.cli import tokens
 from evaluator.cli.submissions import _name_to_send
 from tests.evaluator.worlds import EXAMPLES, Tsttc
 
@@ -33,12 +30,6 @@ def test_a_file_is_sent_under_its_name_without_its_folder(path: str, name: str) 
     assert _name_to_send(PureWindowsPath(path)) == name  # type: ignore[arg-type]
 
 
-def test_a_command_that_is_told_can_be_typed_in_either_shell() -> None:
-    words = ["tsttc", "convert", r"\\server\my share\a.json", "-o", "b.json"]
-    assert command_line(words, platform="win32") == r'tsttc convert "\\server\my share\a.json" -o b.json'
-    assert command_line(words, platform="linux") == r"tsttc convert '\\server\my share\a.json' -o b.json"
-
-
 def test_files_saved_by_windows_editors_mean_the_same(tsttc: Tsttc, tmp_path: Path) -> None:
     for name in ("predictions.json", "manifest.csv", "truth.csv"):
         (tmp_path / name).write_bytes(windows_text(name))
@@ -59,21 +50,3 @@ def test_a_token_file_may_begin_with_a_mark_and_end_with_any_line_end(
     monkeypatch.delenv("TSTTC_TOKEN", raising=False)
     monkeypatch.setenv("TSTTC_TOKEN_FILE", str(path))
     assert tokens.token_for("https://example.org") == "tsttc_abc"
-
-
-def test_settings_and_tokens_edited_by_hand_are_still_read(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(paths, "settings_file", lambda: tmp_path / "settings.json")
-    monkeypatch.setattr(tokens, "settings_file", lambda: tmp_path / "settings.json")
-    (tmp_path / "settings.json").write_bytes(MARK + b'{\r\n"server": "https://a.example"\r\n}\r\n')
-    (tmp_path / "tokens.json").write_bytes(MARK + json.dumps({"https://a.example": "tsttc_a"}).encode())
-    assert paths.server_of_login() == "https://a.example"
-    assert tokens._kept_in_file() == {"https://a.example": "tsttc_a"}
-
-
-def test_copies_stand_where_windows_keeps_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "platform", "win32")
-    monkeypatch.setenv("LOCALAPPDATA", r"C:\Users\ada\AppData\Local")
-    assert str(paths.cache_folder()).startswith(r"C:\Users\ada\AppData\Local")
-    assert paths.cache_folder().parts[-2:] == ("tsttc", "cache")

@@ -2,18 +2,11 @@
 
 from __future__ import annotations
 
-import io
-import random
-from datetime import UTC, datetime, timedelta
-from email.utils import format_datetime
-from pathlib import Path
-
 import pytest
 
-from evaluator.client.answers import BadAnswer, Redirected, Refused, Unreachable
+from evaluator.client.answers import BadAnswer, Refused, Unreachable
 from evaluator.client.client import Client
 from evaluator.client.exchange import RetryPolicy
-from evaluator.problems import Problem
 from tests.evaluator.cli.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
 from tests.evaluator.fake_time import FakeTime
 
@@ -28,29 +21,7 @@ SCORED = QUEUED | {
 
 
 def send(client: Client, data: bytes = b'{"0": 5.3}') -> object:
-    return client.submit(io.BytesIO(data), filename="p.json", split="val", method="Foo++")
-
-
-def test_file_is_streamed_in_blocks_with_its_length_told_first(
-    client: Client, site: RecordedSite, tmp_path: Path
-) -> None:
-    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
-    path = tmp_path / "large.json"
-    path.write_bytes(b" " * 5_000_000)
-
-    class Watched(io.FileIO):
-        largest_read = 0
-
-        def read(self, size: int | None = -1, /) -> bytes:
-            data = super().read(size)
-            self.largest_read = max(self.largest_read, len(data or b""))
-            return data or b""
-
-    with Watched(path) as file:
-        client.submit(file, filename="large.json", split="val", method="Foo++")
-    assert 0 < file.largest_read <= 1 << 20
-    assert int(site.requests[0].headers["Content-Length"]) > 5_000_000
-    assert site.requests[0].headers["Transfer-Encoding"] is None
+    return client.submit(data, filename="p.json", split="val", method="Foo++")
 
 
 @pytest.mark.parametrize("fault", [CUT, CUT_SHORT])
@@ -93,21 +64,7 @@ def test_one_s_own_method_is_found_on_any_page_and_the_token_goes_nowhere_else(
     assert client.own_method("nowhere") is None
 
 
-def test_pages_that_lead_to_themselves_end(client: Client, site: RecordedSite) -> None:
-    row = {"id": "id-a", "name": "a", "visibility": "PRIVATE"}
-    site.put("GET /api/v1/methods", Reply([row], headers={"Link": '</m?after=1>; rel="next"'}))
-    assert client.own_method("nowhere") is None
-    assert len(site.requests) == 2
-
-
-def test_retry_after_as_a_date_is_understood(client: Client, site: RecordedSite, clock: FakeTime) -> None:
-    when = format_datetime(datetime.now(UTC) + timedelta(seconds=50), usegmt=True)
-    site.put(ONE, Reply(status=503, headers={"Retry-After": when}), Reply(SCORED))
-    client.submission("abc")
-    assert 10 < clock.slept_s[0] <= 50
-
-
-@pytest.mark.parametrize("value", ["soon", "-5", "²", "Fri, 99 Nov 2026 00:00:00 GMT", "1e5"])
+@pytest.mark.parametrize("value", ["soon", "-5", "²", "1e5"])
 def test_senseless_retry_after_is_ignored(
     client: Client, site: RecordedSite, clock: FakeTime, value: str
 ) -> None:
@@ -136,24 +93,6 @@ def test_what_waiting_does_not_cure_is_not_tried_again(
         client.submission("abc")
     assert caught.value.status == reply.status
     assert (len(site.requests), clock.slept_s) == (1, [])
-
-
-def test_problem_document_is_read_whole(client: Client, site: RecordedSite) -> None:
-    document = {
-        "type": "about:blank",
-        "title": "Unprocessable",
-        "status": 422,
-        "detail": "The form has a fault.",
-        "code": "invalid",
-        "problems": [{"code": "bad-url", "message": "paper_url is no address.", "where": "paper_url"}],
-    }
-    site.put(SUBMISSIONS, Reply(document, status=422, headers={"Content-Type": "application/problem+json"}))
-    with pytest.raises(Refused) as caught:
-        send(client)
-    fault = caught.value
-    assert (fault.title, fault.detail, fault.code) == ("Unprocessable", "The form has a fault.", "invalid")
-    assert fault.problems == (Problem("bad-url", "paper_url is no address.", "paper_url"),)
-    assert fault.document == document
 
 
 @pytest.mark.parametrize(
@@ -187,9 +126,8 @@ def test_answer_of_another_shape_is_named(
 
 def test_redirect_is_reported_and_not_followed(client: Client, site: RecordedSite) -> None:
     site.put(SUBMISSIONS, Reply(status=301, headers={"Location": "https://elsewhere.example/"}))
-    with pytest.raises(Redirected) as caught:
+    with pytest.raises(BadAnswer, match=r"a redirect to https://elsewhere\.example/, which is not followed"):
         send(client)
-    assert caught.value.location == "https://elsewhere.example/"
     assert len(site.requests) == 1
 
 
@@ -219,11 +157,3 @@ def test_proxy_of_the_environment_is_not_asked_for_this_machine(
     site.put(ONE, Reply(SCORED))
     with Client(url=site.url) as client:
         assert client.submission("abc").is_final
-
-
-def test_delay_is_never_shorter_than_the_server_asked_for() -> None:
-    patience = RetryPolicy()
-    rng = random.Random(1)
-    delays_s = [patience.delay_s(n_failed=n, retry_after_s=4.0, rng=rng) for n in range(1, 30)]
-    assert min(delays_s) == 4.0
-    assert max(delays_s) <= patience.longest_delay_s

@@ -82,27 +82,6 @@ def test_state_of_a_newer_server_is_not_taken_for_a_final_one(client: Client, si
     assert [submission.state for submission in client.watch("abc", timeout_s=60)] == ["PAUSED", "SCORED"]
 
 
-def test_watch_looks_soon_after_the_answer_to_the_file_and_then_as_the_server_says(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    site.put(SUBMISSIONS, Reply(QUEUED, status=201))
-    sent = send(client)
-    site.put(ONE, *[Reply(QUEUED, headers={"Retry-After": "1"})] * 2, Reply(SCORED))
-    assert [each.state for each in client.watch("abc", timeout_s=60, seen=sent)][-1] == "SCORED"
-    assert clock.slept_s[0] <= 0.25
-    assert clock.slept_s[1:] == [1.0, 1.0]
-
-
-def test_watch_says_nothing_again_that_has_not_changed(
-    client: Client, site: RecordedSite, clock: FakeTime
-) -> None:
-    again = {"ETag": '"q"', "Retry-After": "1"}
-    site.put(ONE, Reply(QUEUED, headers=again), Reply(status=304, headers=again), Reply(SCORED))
-    assert [each.state for each in client.watch("abc", timeout_s=60)] == ["QUEUED", "SCORED"]
-    assert [request.headers.get("If-None-Match") for request in site.requests] == [None, '"q"', '"q"']
-    assert clock.slept_s == [1.0, 1.0]
-
-
 def test_server_that_has_answered_is_waited_for_when_it_goes_away(clock: FakeTime) -> None:
     with RecordedSite() as site:
         site.put("GET /api/v1/quota", Reply([], headers={"Connection": "close"}))
@@ -127,11 +106,9 @@ def test_busy_server_is_asked_again_within_a_minute(
     client: Client, site: RecordedSite, clock: FakeTime
 ) -> None:
     throttled = Reply({"code": "throttled"}, status=429, headers={"Retry-After": "55"})
-    site.put(
-        SUBMISSIONS, throttled, Reply(status=409, headers={"Retry-After": "2"}), Reply(QUEUED, status=201)
-    )
+    site.put(SUBMISSIONS, throttled, Reply(QUEUED, status=201))
     send(client)
-    assert clock.slept_s == [55.0, 2.0]
+    assert clock.slept_s == [55.0]
 
 
 # --- first contact ----------------------------------------------------------------------------------------
@@ -152,26 +129,3 @@ def test_server_that_starts_seconds_after_the_job_is_waited_for(clock: FakeTime)
         with Client(url=url, sleep=sleep, rng=random.Random(0)) as client:
             assert client.submission("abc").is_final
     assert 5 <= clock.now_s < 10
-
-
-def test_address_where_nothing_ever_listens_is_reported_within_a_quarter_of_a_minute(
-    clock: FakeTime,
-) -> None:
-    url = f"http://127.0.0.1:{free_port()}"
-    with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
-        client.board("test")
-    assert (caught.value.url, caught.value.was_connected, caught.value.was_refused) == (url, False, True)
-    assert clock.slept_s == sorted(clock.slept_s)
-    assert 7 < clock.now_s < 15
-    patience = RetryPolicy(n_first_tries=1)
-    with Client(url=url, sleep=clock.sleep, patience=patience) as client, pytest.raises(Unreachable):
-        client.board("test")
-    assert clock.now_s < 15, "one try is one try"
-
-
-@pytest.mark.parametrize("url", ["http://a..b", "http://no-such-host.invalid", f"http://{'a' * 70}.org"])
-def test_host_that_is_none_is_reported_at_once(clock: FakeTime, url: str) -> None:
-    with Client(url=url, sleep=clock.sleep) as client, pytest.raises(Unreachable) as caught:
-        client.board("test")
-    assert (caught.value.was_connected, caught.value.was_refused, clock.slept_s) == (False, False, [])
-    assert caught.value.reason

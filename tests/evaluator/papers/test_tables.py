@@ -35,7 +35,3 @@ def test_an_ablation_of_one_split_does_not_answer_for_another() -> None:
     blur = published_tables().table("ablation-plate-blur")
     found = [blur.value(method="pixel-mse", setting=True, column="mid", split=s) for s in ("val", "test")]
     assert found == [41.0, 40.3]
-
-
-def test_contradictions_of_the_paper_are_noted() -> None:
-    assert any("15.5" in note for note in published_tables().table("main-results").notes)

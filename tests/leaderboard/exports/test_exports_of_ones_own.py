@@ -4,14 +4,9 @@ import csv
 import io
 import re
 
-import msgspec
 import pytest
 from django.test import Client
-from django.utils import timezone
 
-from evaluator.cli.exports import export
-from evaluator.client import answers
-from evaluator.tables.formats import FORMATS
 from leaderboard.models import Edition, Method, User, Visibility
 from leaderboard.people import teams
 from tests import board_rows, builders, pages
@@ -162,25 +157,3 @@ def test_the_page_offers_one_s_own_rows_to_who_has_some(
     assert told[own[3].pseudonym] == ("ANONYMOUS", None)
     # Where no such row fits the filter there is nothing to add.
     assert links(client, "/board/test/?q=Offenbach").keys() == {"public"}
-
-
-# --- the same from the command line ------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("query", ["", "intervals=1", "sort=-rte_large", "at=NOW&sort=team"])
-@pytest.mark.parametrize("path", ["", "/editions/1"])
-@pytest.mark.parametrize("form", ["tex", "md"])
-def test_command_line_and_site_write_the_same_table(
-    own: list[Method], owner: User, client: Client, form: str, path: str, query: str
-) -> None:
-    (write,) = (each.write for each in FORMATS if each.suffix == form)
-    client.force_login(owner)
-    query = query.replace("NOW", f"{timezone.now():%Y-%m-%dT%H:%M:%S.%fZ}")
-    for reader, mine in ((Client(), ""), (client, "&mine=1")):
-        there = text_of(reader, form, f"?{query}{mine}", split=f"test{path}")
-        document = reader.get(f"/api/v1/splits/test{path}/board?{query}").json()
-        board = msgspec.convert({**document, "document": document}, answers.Board)
-        # In Markdown it is a link, in angle brackets.
-        address = re.search(r"(?<=leaderboard, test: )<?([^\s<>]+)", there.replace("\\", ""))
-        assert address is not None
-        assert write(export(board, address=address[1])) == there

@@ -48,6 +48,7 @@ def test_format_of_one_row_is_on_the_page_at_its_address_and_on_the_command_line
     assert "|names]" in CliRunner().invoke(boards.board, ["--help"]).stdout
     with RecordedSite() as site:
         site.put("GET /api/v1/splits/test/board", Reply(client.get("/api/v1/splits/test/board").json()))
+        site.put("GET /board/test/editions/1.lst", Reply(answer.content))
         asked = CliRunner().invoke(boards.board, ["--format", "names", "--url", site.url])
     assert asked.stdout == text
 

@@ -144,13 +144,6 @@ def test_receipt_is_a_file_on_the_submissions_page(
     assert client.get(link.attributes["href"]).status_code == 404
 
 
-def test_there_is_no_link_and_no_file_before_the_score(edition: Edition, client: Client, owner: User) -> None:
-    waiting = builders.submit(owner, builders.predictions(edition))
-    client.force_login(owner)
-    assert "Signed receipt" not in client.get(f"/submissions/{waiting.pk}/").content.decode()
-    assert client.get(f"/submissions/{waiting.pk}/receipt.jwt").status_code == 409
-
-
 def test_command_makes_a_key_that_signs(settings: Settings) -> None:
     call_command("make_receipt_key", stdout=(out := StringIO()), stderr=(err := StringIO()))
     name, _, key = out.getvalue().strip().partition("=")
