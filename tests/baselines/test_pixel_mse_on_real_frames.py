@@ -66,10 +66,6 @@ def test_the_toolkits_variant_is_worse_as_it_should_be(real: Real, clip_folder: 
     assert 19 <= mid((in_colour, real[1]), PixelMse(variant="toolkit")) <= 30
 
 
-def test_shifts_halve_the_error_where_a_cell_is_a_pixel(real: Real) -> None:
-    assert mid(real, PixelMse(shift=0, cells=256)) >= 2 * mid(real, PixelMse(shift=3, cells=256))
-
-
 def test_shifts_halve_the_error_where_boxes_are_loose(real: Real) -> None:
     loose = with_loose_boxes(real)
     assert mid(loose, PixelMse(shift=0)) >= 2 * mid(loose, PixelMse(shift=3))
