@@ -13,11 +13,9 @@ import pytest
 from evaluator import (
     GroundTruth,
     Manifest,
-    Predictions,
     Rejected,
     compare_predictions,
     confidence_intervals,
-    evaluate,
     read_manifest,
     read_truth,
 )
@@ -180,16 +178,6 @@ def test_intervals_and_comparisons_follow_the_rule_and_another_unit_can_be_asked
     assert compare_predictions(mine, theirs, truth, unit=RECORDING)["mid"].n_effective == 96.0
 
 
-def test_groups_of_a_report_have_the_intervals_of_the_same_units() -> None:
-    truth = truth_of(32)
-    mine = predictions(truth, 1)
-    report = evaluate(mine, truth, keep_sequences=True)
-    (row,) = report.breakdown("camera", with_intervals=True)
-    assert row.intervals["mid"] == pytest.approx(confidence_intervals(mine, truth)["mid"])
-    (row,) = report.breakdown("camera", with_intervals=True, unit=RECORDING)
-    assert row.intervals["mid"] == pytest.approx(confidence_intervals(mine, truth, unit=RECORDING)["mid"])
-
-
 def test_with_seven_units_there_is_no_interval_however_many_recordings_there_are() -> None:
     recordings = names(40)
     unit = [f"trip{i % 7}" for i in range(len(recordings))]
@@ -248,11 +236,3 @@ def test_compare_says_over_which_units_it_tests(tsttc: Tsttc, folder: Path) -> N
     assert "95 % confidence intervals and p-values over 96 recordings\n" in said
     board = tsttc("compare", "A", "B", "--unit", "day")
     assert (board.exit_code, "--unit needs --truth" in board.stderr) == (2, True)
-
-
-def test_predictions_of_a_public_manifest_meet_a_ground_truth_with_units() -> None:
-    recordings = names(2)
-    truth = GroundTruth.from_table(table(recordings, unit=["a", "b", "b", "c", "c", "c"]))
-    manifest = read_manifest(io.BytesIO(truth.manifest.to_csv()))
-    mine = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=manifest)
-    assert evaluate(mine, truth).n_sequences == truth.n_sequences
