@@ -172,17 +172,3 @@ def test_unknown_machine_is_named_and_gets_no_filter(monkeypatch: pytest.MonkeyP
     known = os.uname()
     monkeypatch.setattr(os, "uname", lambda: os.uname_result([*known[:4], "riscv64"]))
     assert why_unavailable() == "the numbers of the system calls of riscv64 are not known here"
-
-
-@needs_a_filter
-def test_kernel_that_takes_no_filter_is_named() -> None:
-    """As a container whose own filter refuses `prctl`, which a first filter stands in for here."""
-    code = """
-import os
-from evaluator.system_calls import allow_only_reading, why_unavailable
-machine = os.uname()
-os.uname = lambda: machine
-allow_only_reading()
-print(why_unavailable())
-"""
-    assert in_a_process(code).stdout == b"the kernel takes no filter: Operation not permitted\n"

@@ -95,12 +95,6 @@ def test_scalars_of_numpy_become_python_numbers(scalar: np.generic, protocol: in
     assert type(found) is type(scalar.item())
 
 
-def test_a_file_cannot_change_the_dtypes_of_the_program() -> None:
-    data = pickle.dumps(np.array([1.0], dtype=">f8"), protocol=2)
-    load(data)
-    assert np.dtype("f8").byteorder in {"=", "|"}
-
-
 @pytest.mark.parametrize("protocol", range(6))
 def test_ordered_and_default_dicts_become_dicts(protocol: int) -> None:
     ordered = collections.OrderedDict(a=1, b=2)
@@ -148,14 +142,6 @@ CALLS = {
 @pytest.mark.parametrize("name", CALLS)
 def test_calls_of_anything_else_are_refused(name: str, protocol: int) -> None:
     assert codes(pickle.dumps([CALLS[name]], protocol=protocol)) == {"forbidden-pickle"}
-
-
-def test_a_refusal_names_what_was_asked_for() -> None:
-    with pytest.raises(Rejected) as rejected:
-        load(b"cos\nsystem\n(S'touch /tmp/x'\ntR.")
-    assert rejected.value.problems[0].message == (
-        'The pickle asks for "os.system"; expected plain containers, numbers and attribute-dicts.'
-    )
 
 
 def proto2(body: bytes) -> bytes:
