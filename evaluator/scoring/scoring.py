@@ -18,7 +18,7 @@ and finite, where the dataset's toolkit crashes. Both refuse 0 and NaN, and trun
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NoReturn
@@ -64,19 +64,6 @@ def evaluate(
     """
     rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
     return Scorer(truth, rules).report(predictions, keep_sequences=keep_sequences, keep_bags=keep_bags)
-
-
-def evaluate_many(
-    batch: Sequence[Predictions],
-    truth: GroundTruth,
-    *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
-    keep_sequences: bool = False,
-) -> list[Report]:
-    """Score many predictions against one truth: `evaluate` for each, with the truth's terms shared."""
-    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
-    scorer = Scorer(truth, rules)
-    return [scorer.report(predictions, keep_sequences=keep_sequences) for predictions in batch]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
