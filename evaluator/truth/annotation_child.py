@@ -1,10 +1,9 @@
 """The child process in which annotation files are read: `python -m evaluator.truth.annotation_child`.
 
 It writes `READY` to its standard output. Its standard input then gives it files, each as a line of JSON
-(`name`, `n_bytes`) and its content; it answers each with an empty line. At the end of its input it writes
-the sequences of all of them as one line of JSON; a file that is at fault ends it with such a line that lists
-the problems. Like the child that reads prediction files it gives up everything else first; memory is bounded
-by the largest file, time by the size of each.
+(`name`, `n_bytes`) and its content; it answers each with an empty line. At the end of its input it writes the
+sequences of all of them as one line of JSON, or the problems of the first file at fault. Like the child that
+reads prediction files it gives up everything else first.
 """
 
 import json

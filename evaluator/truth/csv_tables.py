@@ -29,7 +29,6 @@ MANIFEST_COLUMNS: Final = COLUMNS[:-1]
 UNIT: Final = "unit"
 """The column by which a ground truth names the unit of each recording; most have none."""
 
-_STORE_FORMAT: Final = 1
 _MAX_FIELD: Final = 200
 _MAX_INT64: Final = 2**63 - 1
 _WHOLE: Final = re.compile(r"[0-9]{1,19}", re.ASCII)
@@ -241,7 +240,6 @@ def save_store(
 ) -> None:
     """Write columns and digests as an `.npz` without pickled objects, not compressed for speed."""
     arrays: dict[str, Any] = {
-        "format": np.array(_STORE_FORMAT),
         "manifest_digest": np.array(manifest_digest),
         **columns,
     }
