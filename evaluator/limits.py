@@ -2,9 +2,8 @@
 
 It writes `READY` when that is done: a child that ends before has seen nothing of what it was to read.
 
-`limit` alone leaves to whoever takes the child over: to compute until the processor time ends, to signal and
-to unlink what its user may, and any fault of the kernel. `forbid_calls` takes the second away, and most of
-the kernel with it, where the kernel filters calls.
+`limit` alone leaves to whoever takes the child over to signal and to unlink what its user may, and any fault
+of the kernel; `forbid_calls` takes these away where the kernel filters calls.
 """
 
 import ctypes
@@ -21,11 +20,7 @@ _PR_SET_DUMPABLE = 4
 
 
 def obey_the_parent_alone() -> None:
-    """End with the parent, however it ends, and only then.
-
-    A signal that stops a whole service reaches this process too; were it to die of that, the file would be
-    blamed. The parent finishes what it has in hand, and ends this process if it must.
-    """
+    """End with the parent, and not by a signal to the whole service, for which a file would be blamed."""
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     if sys.platform == "linux":

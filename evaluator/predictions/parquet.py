@@ -1,7 +1,6 @@
 """Predictions in a Parquet table, as the JSON that the leaderboard takes in its place.
 
-For files of one's own, on one's own machine: the leaderboard reads no Parquet (ADR 8). Needs pyarrow,
-`pip install '.[parquet]'`.
+The leaderboard reads no Parquet (ADR 8). Needs pyarrow, `pip install '.[parquet]'`.
 """
 
 from __future__ import annotations

@@ -8,6 +8,7 @@ import pytest
 from evaluator import GroundTruth, Predictions, read_manifest, read_predictions, read_truth, write_predictions
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.plausibility import MAX_ROUGHNESS, roughness, warnings_of, warnings_with_truth
+from evaluator.problems import WARNING_CODES
 from evaluator.truth.csv_tables import Table
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.toolkit_folders import driving_folder
@@ -117,6 +118,13 @@ def test_submit_warns_before_it_sends_and_sends_all_the_same(
     result = tsttc("submit", path, "--split", "val", "--method", "Foo++")
     assert result.stderr.startswith("Warning: The values look shuffled: ")
     assert len(site.posts) == 1
+
+
+def test_every_code_is_described_in_the_docs() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs/file-format.md").read_text()
+    rows = [line for line in page.splitlines() if line.startswith("| `")]
+    for code, meaning in WARNING_CODES.items():
+        assert any(line.startswith(f"| `{code}`") and meaning in line for line in rows)
 
 
 # --- real driving ---------------------------------------------------------------------------------------
