@@ -1,6 +1,5 @@
 """The unit of inference: which it is, where the ground truth names it, and what offline answers say of it."""
 
-import csv
 import hashlib
 import io
 import json
@@ -209,14 +208,6 @@ def test_score_says_over_which_units_its_intervals_are(tsttc: Tsttc, folder: Pat
     own = json.loads(tsttc(*score, "--intervals", "--unit", "recording", "--json").stdout)
     assert (own["unit"], own["n_units"]) == ("recording", 96)
     assert own["intervals"]["mid"] != document["intervals"]["mid"]
-    by = tsttc(*score, "--intervals", "--by", "camera").stdout
-    assert by.endswith("95 % confidence intervals; bootstrap over 32 days\n")
-    for form in ("markdown", "latex"):
-        said = "In square brackets: 95 % confidence interval, bootstrap over 32 days."
-        assert said in tsttc(*score, "--intervals", "--format", form).stdout.replace("\\%", "%")
-    rows = list(csv.DictReader(io.StringIO(tsttc(*score, "--intervals", "--format", "csv").stdout)))
-    assert float(rows[0]["mid_low"]) == document["intervals"]["mid"][0]
-    assert "unit" not in json.loads(tsttc(*score, "--json").stdout)
     alone = tsttc(*score, "--unit", "day")
     assert (alone.exit_code, "add --intervals" in alone.stderr) == (2, True)
     given = tsttc(*score, "--intervals", "--unit", "given")

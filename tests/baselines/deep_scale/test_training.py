@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from baselines.clips import Clip
-from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.samples import FolderSequences, RenderedSequences, Sample, batches, usable_pair
 from baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
 from baselines.folders import read_folder
@@ -67,22 +66,6 @@ def test_thirty_steps_halve_the_loss(training: Any, samples: list[Sample]) -> No
     network = training.Network(training.new_tensors(seed=0), recipe=recipe, device="cpu")
     losses = [network.learn(samples[:3], learning_rate=5e-3) for _ in range(30)]
     assert losses[-1] <= 0.5 * losses[0]
-
-
-@pytest.fixture(scope="module")
-def fit_samples(source: RenderedSequences) -> list[Sample]:
-    """All pairs of the source, with what the fit learns from."""
-    own = NumpyLayers(read_weights(OWN_WEIGHTS).tensors)
-    found = batches(source, use=SMALL, size=4, rng=np.random.default_rng(0), fitting=own)
-    return [sample for _, batch in found for sample in batch]
-
-
-def test_the_network_learns_to_fit(training: Any, fit_samples: list[Sample]) -> None:
-    recipe = training.Recipe(optimizer="adam", fit_weight=1.0, use=SMALL)
-    network = training.Network(training.new_tensors(seed=0), recipe=recipe, device="cpu")
-    few = sorted(fit_samples, key=lambda sample: sample.fit.pixels.size if sample.fit else 0)[:3]
-    losses = [network.learn(few, learning_rate=3e-3) for _ in range(12)]
-    assert min(losses[-3:]) <= 0.5 * losses[0]
 
 
 class Ended(Exception):

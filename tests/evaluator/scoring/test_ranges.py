@@ -171,16 +171,3 @@ def test_ranges_and_p_do_not_depend_on_order_or_scale(
     gaps = sums[0] - sums[1]
     p = sign_flip_p(np.concatenate([gaps, -gaps, gaps * scale], axis=1), rng=np.random.default_rng(1))
     assert p[0] == p[1] == p[2]
-
-
-def test_pauses_are_made_in_every_column() -> None:
-    sums, _ = some_sums(26)
-    pauses: list[int] = []
-    rank_ranges(
-        np.repeat(sums, 3, axis=2),
-        published=np.repeat(sums.sum(axis=1), 3, axis=1),
-        usable=np.array([True, False, True]),
-        rng=np.random.default_rng(0),
-        between=lambda: pauses.append(1),
-    )
-    assert len(pauses) >= 2

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from evaluator import INTERVALS, GroundTruth, Manifest, Problem, Rejected, read_manifest, read_truth
+from evaluator import GroundTruth, Manifest, Problem, Rejected, read_manifest, read_truth
 from evaluator.predictions.revisions import rows_in
 from evaluator.truth.csv_tables import read_csv
 from tests.evaluator.worlds import make_truth
@@ -52,12 +52,6 @@ def test_a_table_is_read_in_file_order(write: Write) -> None:
     assert manifest.track_id == ("3", "3", "11")
     assert manifest.natural_keys[0] == "0007/1/1500000000/3"
     assert (truth.n_sequences, manifest.n_sequences, manifest.n_recordings) == (3, 3, 2)
-
-
-def test_intervals_are_counted() -> None:
-    truth = make_truth([3.0, 1.0, 25.0, -5.0, 6.0, -21.0])
-    assert truth.counts_of(INTERVALS) == {"crucial": 2, "small": 2, "large": 1, "negative": 1}
-    assert truth.n_outside(INTERVALS) == 2
 
 
 def test_columns_are_found_by_name_and_others_ignored(write: Write) -> None:
@@ -267,17 +261,6 @@ def test_what_is_saved_reads_back_exactly(tmp_path: Path, write: Write) -> None:
     assert found.to_csv() == truth.to_csv()
     truth.manifest.save(path)
     assert Manifest.load(path).to_csv() == truth.manifest.to_csv()
-
-
-def test_saved_files_are_read_wherever_tables_are(tmp_path: Path, write: Write) -> None:
-    truth = read_truth(write(*ROWS))
-    path = tmp_path / "kept.npz"
-    truth.save(path)
-    assert read_truth(path).digest == truth.digest
-    assert read_manifest(path).digest == truth.manifest.digest
-    truth.manifest.save(path)
-    assert read_manifest(path).digest == truth.manifest.digest
-    assert rejection(path).problems[0].message == "The file is not a saved ground truth of this version."
 
 
 def repacked(path: Path, **changes: object) -> Path:
