@@ -9,7 +9,7 @@ import pytest
 from baselines.alignment import Alignment
 from baselines.clips import TARGET, Clip, Image
 from baselines.estimates import Unusable
-from tests.baselines.scenes import changed, kitti_clips, mean_mid, planted, swapped
+from tests.baselines.scenes import Floats, changed, mean_mid, planted, swapped
 
 align = Alignment()
 
@@ -78,6 +78,6 @@ def test_a_box_at_the_edge_of_the_image_is_aligned_with_what_is_there() -> None:
     assert alpha(cut) == pytest.approx(0.9, abs=0.03)
 
 
-def test_the_error_on_real_frames_is_at_most_11_5_mid() -> None:
-    clips, ttc_s = kitti_clips()
+def test_the_error_on_real_frames_is_at_most_11_5_mid(real_clips: tuple[list[Clip], Floats]) -> None:
+    clips, ttc_s = real_clips
     assert mean_mid([alpha(clip) for clip in clips], ttc_s) <= 11.5

@@ -10,7 +10,7 @@ import pytest
 from baselines.clips import TARGET, Clip, Image
 from baselines.estimates import Unusable
 from baselines.tracking import TrackerRefused, Tracking, median_flow
-from tests.baselines.scenes import changed, kitti_clips, mean_mid, planted, swapped
+from tests.baselines.scenes import Floats, changed, mean_mid, planted, swapped
 
 track = Tracking()
 
@@ -113,6 +113,6 @@ def test_nano_track_follows_with_the_models_that_are_given(
         assert follow(clip, frame_gap=frame_gap).scale_ratio == pytest.approx(0.5**frame_gap)
 
 
-def test_the_error_on_real_frames_is_at_most_13_mid() -> None:
-    clips, ttc_s = kitti_clips()
+def test_the_error_on_real_frames_is_at_most_13_mid(real_clips: tuple[list[Clip], Floats]) -> None:
+    clips, ttc_s = real_clips
     assert mean_mid([alpha(clip) for clip in clips], ttc_s) <= 13
