@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from evaluator.problems import PROBLEM_CODES, Problem, Rejected
     from evaluator.scoring.differences import compare_predictions
     from evaluator.scoring.report import IntervalScore, Report, format_published, published
-    from evaluator.scoring.scoring import evaluate, evaluate_many
+    from evaluator.scoring.scoring import evaluate
     from evaluator.scoring.significance import Difference
     from evaluator.scoring.uncertainty import confidence_intervals
     from evaluator.truth.csv_tables import Table
@@ -39,7 +39,7 @@ else:
         "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
         "metrics.protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
         "scoring.report": ("IntervalScore", "Report", "format_published", "published"),
-        "scoring.scoring": ("evaluate", "evaluate_many"),
+        "scoring.scoring": ("evaluate",),
         "scoring.significance": ("Difference",),
         "truth.truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
         "scoring.uncertainty": ("confidence_intervals",),
@@ -76,7 +76,6 @@ __all__ = [
     "convert",
     "convert_rate",
     "evaluate",
-    "evaluate_many",
     "format_published",
     "fps_of_gap",
     "get_protocol",

@@ -20,14 +20,14 @@ _HINTS: Final = {
 }
 
 
-def data_of(source: Source, *, name: str = "source") -> bytes:
+def data_of(source: Source) -> bytes:
     """The bytes of a file. Raises `Rejected` where it cannot be read, `TypeError` for what is no file."""
     if isinstance(source, bytes):
         return source
     if isinstance(source, bytearray | memoryview):
         return bytes(source)
     if isinstance(source, str) and source.lstrip().startswith(("{", "[")):
-        raise TypeError(f"{name} is JSON text; {_EXPECTED}. Give its bytes: text.encode().")
+        raise TypeError(f"source is JSON text; {_EXPECTED}. Give its bytes: text.encode().")
     if isinstance(source, str | os.PathLike):
         path = Path(source)
         try:
@@ -36,7 +36,7 @@ def data_of(source: Source, *, name: str = "source") -> bytes:
             raise reject("unreadable", f"The file cannot be read: {error.strerror}.", path.name) from None
     read: Any = getattr(source, "read", None)
     if not callable(read):
-        raise TypeError(f"{name} is {_kind(source)}; {_EXPECTED}.")
+        raise TypeError(f"source is {_kind(source)}; {_EXPECTED}.")
     found = read()
     return found.encode() if isinstance(found, str) else bytes(found)
 

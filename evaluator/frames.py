@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Final
+from typing import Any
 
 import pandas as pd
 
 from evaluator.arguments import require
-from evaluator.predictions.predictions import Predictions, read_predictions
+from evaluator.predictions.predictions import NATURAL_KEY, Predictions, read_predictions
 from evaluator.truth.truth import Manifest
-
-NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
 
 
 def manifest_frame(manifest: Manifest) -> pd.DataFrame:

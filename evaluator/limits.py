@@ -2,9 +2,8 @@
 
 It writes `READY` when that is done: a child that ends before has seen nothing of what it was to read.
 
-`limit` alone leaves to whoever takes the child over: to compute until the processor time ends, to signal and
-to unlink what its user may, and any fault of the kernel. `forbid_calls` takes the second away, and most of
-the kernel with it, where the kernel filters calls.
+`limit` alone leaves to whoever takes the child over to signal and to unlink what its user may, and any fault
+of the kernel; `forbid_calls` takes these away where the kernel filters calls.
 """
 
 import ctypes
@@ -21,11 +20,7 @@ _PR_SET_DUMPABLE = 4
 
 
 def obey_the_parent_alone() -> None:
-    """End with the parent, however it ends, and only then.
-
-    A signal that stops a whole service reaches this process too; were it to die of that, the file would be
-    blamed. The parent finishes what it has in hand, and ends this process if it must.
-    """
+    """End with the parent, and not by a signal to the whole service, for which a file would be blamed."""
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)
     if sys.platform == "linux":
@@ -53,18 +48,10 @@ def limit(*, memory_bytes: int, cpu_s: int) -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
 
 
-def forbid_calls(*, own_limits: bool = False) -> None:
+def forbid_calls() -> None:
     """Allow only the system calls that reading needs, where the kernel can do that. Irrevocable.
 
-    `own_limits` are needed by `allow_cpu`. Raises `OSError` if the kernel takes no filter after all.
+    Raises `OSError` if the kernel takes no filter after all.
     """
     if system_calls.why_unavailable() is None:
-        system_calls.allow_only_reading(own_limits=own_limits)
-
-
-def allow_cpu(seconds: int) -> None:
-    """From now on this process may compute for so long, within what `limit` has left it."""
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    soft = int(used.ru_utime + used.ru_stime) + 1 + seconds
-    resource.setrlimit(resource.RLIMIT_CPU, (min(soft, hard), hard))
+        system_calls.allow_only_reading()

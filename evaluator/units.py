@@ -29,11 +29,7 @@ _DATE: Final = re.compile(r"((?:19|20)\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)", re.ASCI
 
 
 def noun_of(kind: str) -> str:
-    """What one unit of this kind is called.
-
-    >>> noun_of("day"), noun_of("given")
-    ('day', 'unit')
-    """
+    """What one unit of this kind is called."""
     return _NOUNS.get(kind, kind)
 
 

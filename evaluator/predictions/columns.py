@@ -1,12 +1,9 @@
 """The columnar reading of a prediction file: no Python object per key, no dictionary.
 
-Files that machines write are monotonous: keys of a few digits, one separator, one number each. For these the
-keys are compared with the manifest's as 64-bit words, then overwritten with spaces, so that what remains of
-the object is a JSON list of numbers for a fast parser. Files with other keys, or another layout, are parsed
-into a dictionary.
-
-Both ways accept only what the strict reading (`evaluator.predictions.alignment`) accepts, with the same
-result, and answer None for everything else: to name a fault is the strict reading's task.
+Keys of a few digits, as machines write them, are compared with the manifest's as 64-bit words, then
+overwritten with spaces, so that a JSON list of numbers remains for a fast parser. Other files are parsed into
+a dictionary. Both ways give what the strict reading (`evaluator.predictions.alignment`) gives, or None where
+it might refuse.
 
 Why the first way is exact. Let n be the number of sequences. It is taken only if (1) the text has n colons,
 (2) the bytes before each are the key of another sequence of the manifest with its quotation marks, (3) each
@@ -115,10 +112,9 @@ def _split_envelope(text: bytes) -> tuple[bytes, Document] | None:
 
 
 class KeyWords(NamedTuple):
-    """The keys of a manifest as they stand in a file, each with its punctuation, `"123":`.
+    """The keys of a manifest as they stand in a file, `"123":`, each in the last bytes of its word; all (n,).
 
-    `words` (n,) have a key in their last bytes, `masks` (n,) select these bytes, `lengths` (n,) count them;
-    `row_of_number` is the row of each anno_id.
+    `masks` select these bytes, `lengths` count them; `row_of_number` is the row of each anno_id.
     """
 
     words: Words

@@ -66,10 +66,8 @@ class Document:
 def parse(data: bytes, *, max_members: int | None = None) -> object:
     """The JSON value in `data`, objects as `Members`; raises `Rejected` unless it is UTF-8, shallow and JSON.
 
-    Text with more than `max_members` members and items, or with more texts than these can have, is refused
-    before it takes memory.
-    A byte order mark and Python's `NaN`, `Infinity` and `-Infinity` are accepted. Numbers beyond the range of
-    float64 are ±Infinity, as in IEEE 754.
+    Text with more than `max_members` members and items is refused before it takes memory. A byte order mark
+    and Python's `NaN`, `Infinity` and `-Infinity` are accepted; numbers beyond float64 are ±Infinity.
     """
     body = data.removeprefix(BYTE_ORDER_MARK)
     try:
@@ -274,11 +272,8 @@ def _depth(body: bytes) -> int:
 
 
 def _brackets(body: bytes) -> bytearray:
-    """The brackets of a text that stand outside of its strings.
-
-    They are copied from between the strings, match by match: to remove millions of strings at once would take
-    eighty bytes for each piece that is left.
-    """
+    """The brackets of a text that stand outside of its strings."""
+    # Match by match: to remove millions of strings at once would take eighty bytes for each piece left.
     found, end = bytearray(), 0
     for string in _STRING.finditer(body):
         start = string.start()

@@ -1,9 +1,8 @@
 """The process that forks a child for each prediction file: `python -m evaluator.predictions.fork_server`.
 
 A file of 28,600 sequences takes 0.44 s in a new Python, which loads numpy first, and 0.02 s in a forked one.
-The server reads no untrusted byte itself. It has no credentials in its environment and no descriptors but a
-socket and its standard error, loads the manifests that it is told of, and forks a child that gives up its
-rights, reads one file, answers and ends, as `evaluator.predictions.sandbox` does. No child is used twice.
+The server has no credentials and reads no untrusted byte itself: it forks a child for each file, which gives
+up its rights, reads, answers and ends, as `evaluator.predictions.sandbox` does.
 
 Standard input is a socket of packets. A request is JSON (`manifest`, `memory_bytes`, `cpu_s`) with three
 descriptors: the file, and the pipes for the child's output and errors. The first reply is
@@ -18,7 +17,7 @@ import os
 import resource
 import socket
 import traceback
-from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Final, NoReturn
 
@@ -38,51 +37,39 @@ MAX_PACKET_BYTES: Final = 65_536
 N_DESCRIPTORS: Final = 3
 """Of a request: the file, the output, the errors. They become the child's descriptors 0, 1 and 2."""
 
-_MAX_MANIFESTS = 4
+
+def _manifest(path: str) -> Manifest:
+    """The manifest in a file as it is now; raises `OSError` or `Rejected` where there is none."""
+    status = Path(path).stat()
+    return _loaded(path, status.st_ino, status.st_mtime_ns)
 
 
-@dataclass
-class _Manifests:
-    """The manifests that were used last, each as its file is now."""
-
-    _loaded: dict[tuple[str, int, int], Manifest] = field(default_factory=dict)
-
-    def load(self, path: str) -> Manifest:
-        """Raises `OSError` or `Rejected` if the file is not there or is no manifest."""
-        status = Path(path).stat()
-        key = (path, status.st_ino, status.st_mtime_ns)
-        manifest = self._loaded.pop(key, None)
-        if manifest is None:
-            manifest = Manifest.load(Path(path))
-            # What a manifest computes when it is first needed, children then share.
-            warm_up(manifest)
-            gc.freeze()
-        self._loaded[key] = manifest
-        if len(self._loaded) > _MAX_MANIFESTS:
-            self._loaded.pop(next(iter(self._loaded)))
-        return manifest
+@lru_cache(maxsize=4)
+def _loaded(path: str, _inode: int, _mtime_ns: int) -> Manifest:
+    manifest = Manifest.load(Path(path))
+    # What a manifest computes when it is first needed, children then share.
+    warm_up(manifest)
+    gc.freeze()
+    return manifest
 
 
 def serve(connection: socket.socket) -> None:
     """Answer requests until the other end is closed."""
-    manifests = _Manifests()
     while True:
         packet, descriptors, _, _ = socket.recv_fds(connection, MAX_PACKET_BYTES, N_DESCRIPTORS)
         if not packet:
             return
         try:
-            _serve_one(connection, json.loads(packet), descriptors, manifests=manifests)
+            _serve_one(connection, json.loads(packet), descriptors)
         finally:
             for descriptor in descriptors:
                 os.close(descriptor)
 
 
-def _serve_one(
-    connection: socket.socket, request: dict[str, object], descriptors: list[int], *, manifests: _Manifests
-) -> None:
+def _serve_one(connection: socket.socket, request: dict[str, object], descriptors: list[int]) -> None:
     server = os.getpid()
     try:
-        manifest = manifests.load(str(request["manifest"]))
+        manifest = _manifest(str(request["manifest"]))
         child = os.fork()
     except (OSError, Rejected, MemoryError) as fault:
         _send(connection, {"failed": f"{type(fault).__name__}: {fault}"[:500]})

@@ -1,7 +1,6 @@
 """Predictions in a Parquet table, as the JSON that the leaderboard takes in its place.
 
-For files of one's own, on one's own machine: the leaderboard reads no Parquet (ADR 8). Needs pyarrow,
-`pip install '.[parquet]'`.
+The leaderboard reads no Parquet (ADR 8). Needs pyarrow, `pip install '.[parquet]'`.
 """
 
 from __future__ import annotations
@@ -15,8 +14,6 @@ from evaluator.problems import quoted, reject
 
 N_MAGIC_BYTES: Final = 4
 _MAGIC: Final = b"PAR1"
-MAX_ROWS: Final = 1_000_000
-"""Rows of a table, far above what the largest split needs."""
 
 
 def is_parquet(data: bytes) -> bool:
@@ -27,8 +24,8 @@ def is_parquet(data: bytes) -> bool:
 def as_sent(data: bytes) -> bytes:
     """A prediction file as the leaderboard takes it: a Parquet table as JSON, any other file as it is.
 
-    The same table gives the same bytes. Raises `Rejected` for a table that is damaged, too large or has other
-    columns than keys and numbers, `ModuleNotFoundError` where pyarrow is not installed.
+    The same table gives the same bytes. Raises `Rejected` for a table that is damaged or has other columns
+    than keys and numbers, `ModuleNotFoundError` where pyarrow is not installed.
     """
     if not is_parquet(data):
         return data
@@ -44,7 +41,6 @@ def as_sent(data: bytes) -> bytes:
     try:
         table = parquet.ParquetFile(io.BytesIO(data))
         keys, values = _columns(table.schema_arrow)
-        _require_size(table.metadata, keys + values)
         return document_of(keys + values, _rows(table, keys, values))
     except (pa.ArrowException, OSError, ValueError, OverflowError, KeyError) as error:
         reason = (str(error).splitlines() or ["it ends early"])[0].removesuffix(".")
@@ -85,21 +81,6 @@ def _is_fitting(column_type: Any, *, is_key: bool) -> bool:
     if is_text or types.is_floating(column_type):
         return bool(is_text == is_key)
     return bool(types.is_integer(column_type) or types.is_null(column_type))
-
-
-def _require_size(metadata: Any, names: Sequence[str]) -> None:
-    """Raise `Rejected` for a table whose own account is too large, before anything is unpacked."""
-    from evaluator.predictions.predictions import MAX_UNPACKED_BYTES  # noqa: PLC0415 -- which asks this module
-
-    if metadata.num_rows > MAX_ROWS:
-        message = f"The table has {metadata.num_rows:,} rows; expected at most {MAX_ROWS:,}."
-        raise reject("too-many-members", message)
-    groups = map(metadata.row_group, range(metadata.num_row_groups))
-    columns = (group.column(i) for group in groups for i in range(group.num_columns))
-    n_bytes = sum(one.total_uncompressed_size for one in columns if one.path_in_schema in names)
-    if n_bytes > MAX_UNPACKED_BYTES:
-        message = f"The table unpacks to {n_bytes:,} bytes; expected at most {MAX_UNPACKED_BYTES:,}."
-        raise reject("too-large", message)
 
 
 def _rows(table: Any, keys: list[str], values: list[str]) -> Iterator[Sequence[str | None]]:

@@ -1,14 +1,7 @@
 """Warnings about files that are well-formed and probably not meant: another unit, sign or order.
 
-Values alone tell milliseconds and scale ratios. Values in time tell signs: a time to contact shrinks while
-time passes, also below 0, where an object that moves away gets farther.
-
-A file whose anno_ids were numbered in another order holds good values under wrong keys, and no rule of the
-format can see that. Two questions can. With the manifest alone: do the values of one object, from one window
-to the next, differ less than those of two objects that the same camera sees one after the other? With ground
-truth: do the values go with the true ones at all? A warning rejects nothing.
-
-Values are compared by the rank of -1/τ, which orders them by scale ratio, so that no outlier decides.
+A warning rejects nothing. Values are compared by the rank of -1/τ, which orders them by scale ratio, so that
+no outlier decides.
 """
 
 from __future__ import annotations

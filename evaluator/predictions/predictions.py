@@ -1,8 +1,7 @@
 """Prediction files: bytes in, values aligned with a manifest out, or a `Rejected` that says why.
 
-The format is described in docs/file-format.md: JSON as it comes or in gzip, and CSV tables, which become the
-JSON that is read. Nothing but `Rejected` leaves `read_sent`, whatever the bytes; every sequence of the
-manifest ends up with exactly one finite or infinite value that is neither 0 nor NaN.
+docs/file-format.md describes the format. Nothing but `Rejected` leaves `read_sent`, whatever the bytes; every
+sequence of the manifest ends up with exactly one finite or infinite value that is neither 0 nor NaN.
 """
 
 from __future__ import annotations
@@ -64,8 +63,6 @@ class Predictions:
         fps_hz: float | None = None,
         frame_gap: int | None = None,
         digest: str | None = None,
-        unit: Unit = "ttc",
-        meta: Mapping[str, object] | None = None,
     ) -> Predictions:
         """Predictions from values in the manifest's order, without a file.
 
@@ -81,13 +78,14 @@ class Predictions:
         values = in_row_order(given, name=name, anno_id=manifest.anno_id)
         if values.shape != (manifest.n_sequences,):
             raise ValueError(f"{name} has the shape {values.shape}; expected ({manifest.n_sequences},).")
+        unit: Unit = "ttc"
         rate_hz = rate_of(is_ratio=ttc_s is None, fps_hz=fps_hz, frame_gap=frame_gap)
         if rate_hz is not None:
             require_values(values, manifest.anno_id_keys, is_ratio=True)
             values, unit = scale_ratio_to_ttc(values, fps_hz=rate_hz), "scale_ratio"
         values.setflags(write=False)
         found = digest if digest is not None else sha256_digest(values.astype("<f8").tobytes())
-        return cls(manifest=manifest, ttc_s=values, digest=found, unit=unit, meta=meta)
+        return cls(manifest=manifest, ttc_s=values, digest=found, unit=unit)
 
     def where(self, row: int) -> str:
         """The JSON pointer to the value of sequence `row`."""
@@ -289,14 +287,10 @@ def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> 
         members.append(f"{name}:{_number(row[columns[value]])}")
         if rate is not None:
             ratios.append(f"{name}:{_number(row[columns[rate]])}")
+    predictions, rates = (f"{{{','.join(each)}}}" for each in (members, ratios))
     if rate is None:
-        return _object(members)
-    rates = _object(ratios).decode()
-    return f'{{"unit":"scale_ratio","{rate}":{rates},"predictions":{_object(members).decode()}}}'.encode()
-
-
-def _object(members: Sequence[str]) -> bytes:
-    return f"{{{','.join(members)}}}".encode()
+        return predictions.encode()
+    return f'{{"unit":"scale_ratio","{rate}":{rates},"predictions":{predictions}}}'.encode()
 
 
 def _number(text: str | None) -> str:

@@ -21,10 +21,7 @@ from evaluator.truth.truth import Manifest
 
 
 def warm_up(manifest: Manifest) -> None:
-    """Run every branch that imports late, since nothing can be opened afterwards.
-
-    What the manifest makes of its keys when they are first needed is made, too, once for all files.
-    """
+    """Run every branch that imports late, and make the manifest's keys: nothing can be opened afterwards."""
     _ = key_words(manifest), manifest.row_of_natural_key
     for sample in (
         b"{",

@@ -59,11 +59,7 @@ def write_predictions(
 
 
 def template(manifest: Manifest) -> bytes:
-    """A prediction file without values, to be filled in: every anno_id of the manifest, in its order.
-
-    Each value is `null`. That is JSON, which any program reads, and no number: arithmetic on it fails, and a
-    file in which one is left is rejected with its place, where a number would be scored in silence.
-    """
+    """A prediction file to be filled in: `null`, which is refused, for every anno_id of the manifest."""
     members = ",\n".join(f'"{name}": null' for name in manifest.anno_id_keys)
     return f"{{\n{members}\n}}\n".encode()
 

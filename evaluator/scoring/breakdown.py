@@ -1,9 +1,4 @@
-"""Scores of groups of sequences: by recording, camera, TTC range, occlusion, lane and size of the box.
-
-Groups are made from the manifest, the true times and what the annotations say of the object; within a group
-the errors are averaged as the protocol says. Confidence intervals come from the bootstrap over days or
-recordings that the board uses.
-"""
+"""Scores of groups of sequences: by recording, camera, TTC range, occlusion, lane and size of the box."""
 
 from __future__ import annotations
 
@@ -59,10 +54,9 @@ Ends = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Details:
-    """What a report was computed from. `predicted_ttc_s` is (n,), truncated by the protocol, in the truth's
-    order.
+    """What a report was computed from; of a hidden split it never leaves the worker.
 
-    For a hidden split it never leaves the worker.
+    `predicted_ttc_s` is (n,), truncated by the protocol, in the truth's order.
     """
 
     truth: GroundTruth
@@ -84,31 +78,6 @@ class GroupScores:
     n_recordings: int
     scores: Mapping[str, float | None]
     intervals: Mapping[str, Ends | None]
-
-
-def breakdown(
-    details: Details,
-    errors: Mapping[str, Floats],
-    *,
-    by: str,
-    with_intervals: bool = False,
-    unit: str | None = None,
-) -> list[GroupScores]:
-    """The scores of every group of `by`, one of `GROUPS`. `errors` are those of every sequence by metric,
-    (n,) each; `unit` is that of the intervals, as in `confidence_intervals`.
-
-    Raises `ValueError` for an unknown `by`, and where the ground truth lacks the column that it needs.
-    """
-    return scores_of(
-        details,
-        errors,
-        groups=groups_of(details, by=by),
-        # A group that is a TTC range is not cut into ranges once more.
-        has_ranges=by != "range",
-        # One recording has no interval, however many sequences it has.
-        with_intervals=with_intervals and by != "recording",
-        unit=unit,
-    )
 
 
 def scores_of(
@@ -176,7 +145,7 @@ def _intervals(
 
 
 def groups_of(details: Details, *, by: str) -> dict[str, Rows]:
-    """The rows of every group that has some, by its name; raises `ValueError` as `breakdown` does."""
+    """The rows of every group that has some, by its name. Raises `ValueError` as `Report.breakdown` does."""
     if by not in GROUPS:
         raise ValueError(f"Unknown group {by!r}; expected one of {', '.join(GROUPS)}.")
     return {name: rows for name, rows in GROUPS[by](details).items() if len(rows)}
@@ -189,14 +158,6 @@ def curve_of(details: Details) -> dict[Ends, Rows]:
     ends = itertools.pairwise(CURVE_EDGES_S)
     found = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}
     return {pair: rows for pair, rows in found.items() if len(rows)}
-
-
-def _by_recording(details: Details) -> dict[str, Rows]:
-    return _by_name(details.truth.manifest.bag_stamp)
-
-
-def _by_camera(details: Details) -> dict[str, Rows]:
-    return _by_name(details.truth.manifest.cam_id)
 
 
 def _by_name(names: Sequence[str]) -> dict[str, Rows]:
@@ -260,8 +221,8 @@ def _stated(values: Floats | None, column: str) -> Floats:
 
 
 GROUPS: Final[dict[str, Callable[[Details], dict[str, Rows]]]] = {
-    "recording": _by_recording,
-    "camera": _by_camera,
+    "recording": lambda details: _by_name(details.truth.manifest.bag_stamp),
+    "camera": lambda details: _by_name(details.truth.manifest.cam_id),
     "range": _by_range,
     "occlusion": _by_occlusion,
     "lane": _by_lane,

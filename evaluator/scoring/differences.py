@@ -67,8 +67,7 @@ def sign_flips(
     ends at the k-th largest of the upper ones, with k the smallest number for which (1 + k) / (R + 1) ≥ 0.05.
     A half without any sequence says nothing: its vector of signs counts against every δ.
 
-    Where no δ is excluded, as in a column without sequences or with very few units, the ends are −∞
-    and ∞.
+    Where no δ is excluded, as with very few units, the ends are −∞ and ∞.
     """
     n_columns = differences.shape[1]
     both = np.concatenate([differences, counts], axis=1)
@@ -190,10 +189,9 @@ def with_influence(
     names: Sequence[str],
     rng: np.random.Generator,
 ) -> dict[str, Difference]:
-    """Add to `found` on how few units the difference in overall MiD rests.
+    """Add to `found` on how few units the difference in overall MiD rests, where there are enough for a p.
 
-    `differences` and `counts` are (units, columns), `names` those of the columns. Where there are too few
-    units for a p, nothing is added.
+    `differences` and `counts` are (units, columns), `names` those of the columns.
     """
     overall = found.get(PRIMARY)
     if overall is None or overall.p_below is None:

@@ -79,20 +79,20 @@ def rank_ranges(
 ) -> RankRanges:
     """Rank ranges at 95 % of N entries by their `sums` (N, G, columns), of the columns that are `usable`.
 
-    `published` (N, columns) are their values as they are ranked, NaN where an entry has none; `quoted` are
-    rows from papers that are ranked among them. In each column all pairs are compared at once: step-down
-    max-t over the paired differences, from 1 + (how many rows are significantly better) to the number of
-    rows − (how many are significantly worse), after Mogstad, Romano, Shaikh and Wilhelm (Review of Economic
-    Studies 91, 2024). With 95 % probability every range of a column holds its entry's true rank. A difference
-    is studentised by its own recordings, t = ΣD_g / √ΣD_g², and what chance makes of the largest t is read
-    from turning the recordings' signs, as `differences.sign_flips` does for one pair.
+    `published` (N, columns) are their values as they are ranked, NaN where an entry has none. In each column
+    all pairs are compared at once: step-down max-t over the paired differences, from 1 + (how many rows are
+    significantly better) to the number of rows − (how many are significantly worse), after Mogstad, Romano,
+    Shaikh and Wilhelm (Review of Economic Studies 91, 2024). With 95 % probability every range of a column
+    holds its entry's true rank. A difference is studentised by its own recordings, t = ΣD_g / √ΣD_g², and
+    what chance makes of the largest t is read from turning the recordings' signs, as `differences.sign_flips`
+    does for one pair.
 
-    Values that are published alike are never told apart, nor an entry from a quoted row whose value may have
-    been rounded from the entry's: so a range holds the published rank as well, which takes quoted values as
-    exact. `between` is called every fraction of a second.
+    Values that are published alike are never told apart, so a range holds the published rank as well.
+    `between` is called every fraction of a second.
     """
     low, high = np.zeros((2, *published.shape), dtype=np.int64)
-    signs = _signs(rng, n_recordings=sums.shape[1])
+    drawn = rng.integers(0, 2, size=(N_RANK_FLIPS, sums.shape[1]), dtype=np.int8)
+    signs = np.ascontiguousarray(drawn.T, dtype=np.float64) * 2 - 1
     for column in np.flatnonzero(usable).tolist():
         present = np.flatnonzero(np.isfinite(published[:, column]))
         if present.size:
@@ -129,13 +129,7 @@ class _Pairs:
 
     def of(self, chosen: NDArray[np.intp] | slice) -> _Pairs:
         """Those of them."""
-        return _Pairs(
-            self.worse[chosen],
-            self.better[chosen],
-            self.t[chosen],
-            self.inverse[chosen],
-            self.is_two_sided[chosen],
-        )
+        return _Pairs(*(getattr(self, name)[chosen] for name in _Pairs.__slots__))
 
 
 def _rows(sums: Floats, values: Floats, quoted: Quoted | None, column: int) -> _Rows:
@@ -242,9 +236,3 @@ def _largest(turned: Weights, pairs: _Pairs) -> tuple[Weights, Weights]:
 
 def _critical(largest: Weights) -> float:
     return float(np.quantile(largest, CONFIDENCE, method="higher"))
-
-
-def _signs(rng: np.random.Generator, *, n_recordings: int) -> Floats:
-    """The draws by which recordings are turned, −1 or 1: (G, draws)."""
-    drawn = rng.integers(0, 2, size=(N_RANK_FLIPS, n_recordings), dtype=np.int8)
-    return np.ascontiguousarray(drawn.T, dtype=np.float64) * 2 - 1

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from evaluator.counting import counted
 from evaluator.metrics.protocol import OVERALL, interval_of, metric_of, score_name
 from evaluator.metrics.scale import Floats
-from evaluator.scoring.breakdown import Details, GroupScores, breakdown
+from evaluator.scoring.breakdown import Details, GroupScores, groups_of, scores_of
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -59,13 +59,10 @@ class RecordingSums:
 class Report:
     """What the predictions scored: means per TTC range, counts, and what was truncated at which boundary.
 
-    `scores` runs as the protocol's `interval_names`: overall, crucial, …; `n_out_of_range` counts the
-    sequences that lie in no range. Only on request, and no part of the JSON: `sequences`, by metric the
-    errors of every sequence, float64 (n,) in the manifest's order, with `details`, what they were computed
-    from, and `bags`. For a hidden split none of them leaves the worker.
-
-    `print(report)` shows a table, and so does a notebook. `by`, `frame` and `plot` look closer; they need a
-    report made with `keep_sequences=True`.
+    `scores` runs as the protocol's `interval_names`: overall, crucial, …. Only on request, and no part of the
+    JSON: `sequences`, by metric the errors of every sequence, float64 (n,) in the manifest's order, `details`
+    and `bags`. Of a hidden split none of them leaves the worker. `by`, `frame` and `plot` need a report made
+    with `keep_sequences=True`.
     """
 
     protocol: str
@@ -121,12 +118,20 @@ class Report:
     ) -> list[GroupScores]:
         """The scores of each group: `by` is recording, camera, range, occlusion, lane or box-size.
 
-        `unit` is that of the intervals, as in `confidence_intervals`. Raises `ValueError` for another `by`,
-        for a ground truth that does not have what the groups or the units need, and for a report without
-        sequences.
+        `unit` is as in `confidence_intervals`. Raises `ValueError` for another `by`, a ground truth without
+        what the groups need, and a report without sequences.
         """
         errors, details = self._kept()
-        return breakdown(details, errors, by=by, with_intervals=with_intervals, unit=unit)
+        return scores_of(
+            details,
+            errors,
+            groups=groups_of(details, by=by),
+            # A group that is a TTC range is not cut into ranges once more.
+            has_ranges=by != "range",
+            # One recording has no interval, however many sequences it has.
+            with_intervals=with_intervals and by != "recording",
+            unit=unit,
+        )
 
     def by(self, group: str, *, with_intervals: bool = False) -> pd.DataFrame:
         """The same as a frame, indexed by the group: columns `n_sequences`, `n_recordings`, then the scores.

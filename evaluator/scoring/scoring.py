@@ -18,8 +18,7 @@ and finite, where the dataset's toolkit crashes. Both refuse 0 and NaN, and trun
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
 from functools import cached_property
 from typing import NoReturn
 
@@ -41,6 +40,7 @@ from evaluator.metrics.protocol import (
 from evaluator.metrics.scale import Floats, scale_ratio_10hz
 from evaluator.predictions.alignment import ZERO_MESSAGE
 from evaluator.predictions.predictions import Predictions
+from evaluator.predictions.revisions import realigned
 from evaluator.problems import Findings
 from evaluator.scoring.breakdown import Details
 from evaluator.scoring.report import IntervalScore, RecordingSums, Report, format_published
@@ -66,27 +66,6 @@ def evaluate(
     return Scorer(truth, rules).report(predictions, keep_sequences=keep_sequences, keep_bags=keep_bags)
 
 
-def evaluate_many(
-    batch: Sequence[Predictions],
-    truth: GroundTruth,
-    *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
-    keep_sequences: bool = False,
-) -> list[Report]:
-    """Score many predictions against one truth: `evaluate` for each, with the truth's terms shared."""
-    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
-    scorer = Scorer(truth, rules)
-    return [scorer.report(predictions, keep_sequences=keep_sequences) for predictions in batch]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Errors:
-    """Errors by metric in ascending τ, and how many predictions went to each boundary of the protocol."""
-
-    of: dict[str, Floats]
-    n_truncated: tuple[int, ...]
-
-
 class Scorer:
     """One truth under one protocol, ready for many predictions.
 
@@ -99,6 +78,7 @@ class Scorer:
         self._truth = truth
         self._protocol = protocol
         tau = truth.ascending_ttc_s
+        self._n_out_of_range = truth.n_outside(protocol.intervals)
         self._slices = {OVERALL: slice(0, len(tau))} | {
             i.name: slice(
                 int(np.searchsorted(tau, i.low_s, side="left")),
@@ -106,14 +86,6 @@ class Scorer:
             )
             for i in protocol.intervals
         }
-
-    @cached_property
-    def _n_out_of_range(self) -> int:
-        """Sequences that lie in no range of the protocol."""
-        is_inside = np.zeros(self._truth.n_sequences, dtype=bool)
-        for interval in self._protocol.intervals:
-            is_inside[self._slices[interval.name]] = True
-        return len(is_inside) - int(np.count_nonzero(is_inside))
 
     @cached_property
     def _recordings(self) -> NDArray[np.int64]:
@@ -128,11 +100,11 @@ class Scorer:
         counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)
         return counts.astype(np.float64)
 
-    def _recording_sums(self, errors: _Errors) -> RecordingSums:
+    def _recording_sums(self, errors: Mapping[str, Floats]) -> RecordingSums:
         n_bags = self._truth.manifest.n_recordings
         columns = [
             np.bincount(self._recordings[part], weights=values[part], minlength=n_bags)
-            for values in errors.of.values()
+            for values in errors.values()
             for part in self._slices.values()
         ]
         return RecordingSums(sums=np.stack(columns, axis=1), counts=self.recording_counts)
@@ -142,39 +114,46 @@ class Scorer:
     ) -> Report:
         """The report on one set of predictions; raises as `evaluate` does."""
         require(predictions, Predictions, name="predictions")
-        predictions = _in_order_of(self._truth, predictions)
-        errors = self._errors(predictions)
+        if predictions.manifest is not self._truth.manifest:
+            if predictions.manifest.digest != self._truth.manifest.digest:
+                raise ValueError(
+                    "The predictions are aligned with another manifest than that of this ground truth."
+                )
+            # The same sequences, but the rows of the two files may have another order.
+            predictions = realigned(predictions, manifest=self._truth.manifest)
+        errors, n_truncated = self._errors(predictions)
         return Report(
             protocol=self._protocol.name,
             truth_digest=self._truth.digest,
             predictions_digest=predictions.digest,
             n_sequences=self._truth.n_sequences,
             n_out_of_range=self._n_out_of_range,
-            truncated=dict(zip(self._protocol.boundaries, errors.n_truncated, strict=True)),
+            truncated=dict(zip(self._protocol.boundaries, n_truncated, strict=True)),
             scores={name: self._score(errors, part) for name, part in self._slices.items()},
             sequences=self._in_file_order(errors) if keep_sequences else None,
             bags=self._recording_sums(errors) if keep_bags else None,
-            details=self._details(predictions) if keep_sequences else None,
+            details=Details(
+                self._truth, predictions, _truncate(predictions.ttc_s, self._protocol)[0], self._protocol
+            )
+            if keep_sequences
+            else None,
         )
 
-    def _details(self, predictions: Predictions) -> Details:
-        predicted_ttc_s, _ = _truncate(predictions.ttc_s, self._protocol)
-        return Details(self._truth, predictions, predicted_ttc_s, self._protocol)
-
-    def _score(self, errors: _Errors, part: slice) -> IntervalScore:
+    def _score(self, errors: Mapping[str, Floats], part: slice) -> IntervalScore:
         count = part.stop - part.start
         if count == 0:
-            return IntervalScore(dict.fromkeys(errors.of), 0)
-        means = {name: float(np.add.reduce(values[part])) / count for name, values in errors.of.items()}
+            return IntervalScore(dict.fromkeys(errors), 0)
+        means = {name: float(np.add.reduce(values[part])) / count for name, values in errors.items()}
         return IntervalScore(means, count)
 
-    def _in_file_order(self, errors: _Errors) -> dict[str, Floats]:
-        found = {name: np.empty_like(values) for name, values in errors.of.items()}
-        for name, values in errors.of.items():
+    def _in_file_order(self, errors: Mapping[str, Floats]) -> dict[str, Floats]:
+        found = {name: np.empty_like(values) for name, values in errors.items()}
+        for name, values in errors.items():
             found[name][self._truth.ascending_rows] = values
         return found
 
-    def _errors(self, predictions: Predictions) -> _Errors:
+    def _errors(self, predictions: Predictions) -> tuple[dict[str, Floats], tuple[int, ...]]:
+        """Errors by metric in ascending τ, and the number of predictions that went to each boundary."""
         truth = self._truth
         # Made with the first file of a truth, and better before the arrays below need memory too.
         true_log = truth.ascending_log_scale_ratio
@@ -186,7 +165,7 @@ class Scorer:
             _refuse(predictions, self._protocol)
         terms = Terms(predicted, truth.ascending_ttc_s, alpha, true_log)
         errors = {metric.name: metric.function(terms) for metric in self._protocol.metrics}
-        return _Errors(errors, n_truncated)
+        return errors, n_truncated
 
 
 def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:
@@ -201,18 +180,6 @@ def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...
     values = ttc_s[near]
     truncated[near] = np.where(values < 0, low_s, np.where(values > 0, high_s, values))
     return truncated, (n_low, int(np.count_nonzero(values < 0)), int(np.count_nonzero(values > 0)), n_high)
-
-
-def _in_order_of(truth: GroundTruth, predictions: Predictions) -> Predictions:
-    ours, theirs = truth.manifest, predictions.manifest
-    if theirs is ours:
-        return predictions
-    if theirs.digest != ours.digest:
-        raise ValueError("The predictions are aligned with another manifest than that of this ground truth.")
-    # The same sequences, but the rows of the two files may have another order.
-    ttc_s = np.empty_like(predictions.ttc_s)
-    ttc_s[np.argsort(ours.anno_id)] = predictions.ttc_s[np.argsort(theirs.anno_id)]
-    return replace(predictions, manifest=ours, ttc_s=ttc_s)
 
 
 def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:

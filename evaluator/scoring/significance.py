@@ -48,10 +48,9 @@ class Difference:
     """First minus second in one column: below 0 the first is better. Computed here or told by a server.
 
     `low` and `high` are its 95 % interval, `p` is the two-sided cluster sign-flip test's; None where there
-    are too few units. `p_below` is the smallest of `P_CLASSES` that p is below, else 1: it is what judges,
-    alone where p is not told, and follows from p where it is not given. `n_effective` is the effective number
-    of units, `unit` what these are: recording, day or given. `influence` says on how few of them the
-    difference rests, where that is known.
+    are too few units. `p_below`, the smallest of `P_CLASSES` that p is below, else 1, is what judges, and all
+    that is told on hidden splits. `n_effective` is the effective number of units, `unit` what these are:
+    recording, day or given. `influence` says on how few of them the difference rests, where that is known.
     """
 
     difference: float
@@ -75,11 +74,9 @@ class Difference:
 
     @property
     def detectable_difference(self) -> float | None:
-        """The smallest difference that about three to four of five such tests would have found: an estimate.
+        """The smallest difference that such a test finds with a power of about 80 %: 1.43 half widths.
 
-        1.43 half widths of the 95 % confidence interval: (z of 97.5 % + z of 80 %) / z of 97.5 %, a power of
-        80 % were the standard error known. None for a difference that is significant, and where there is no
-        interval.
+        None for a difference that is significant, and where there is no interval.
         """
         return None if self.is_significant else self.resolution
 

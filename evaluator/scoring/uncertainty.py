@@ -1,20 +1,16 @@
 """Confidence intervals of means: a bootstrap over units, which are days or recordings.
 
-Sequences of one recording ("bag") resemble each other, so 28,600 of them know less than 28,600 independent
-ones would, and so do recordings of one day. What is drawn anew here is therefore the unit (`evaluator.units`
-says which it is), never the sequence. With S_g and n_g the sum of an error and the number of sequences of
-unit g, a published mean is θ = ΣS_g / Σn_g, and
+Sequences of one recording ("bag") resemble each other, and so do recordings of one day: units are drawn anew,
+never sequences. With S_g and n_g the sum of an error and the number of sequences of unit g, a published mean
+is θ = ΣS_g / Σn_g, and
 
     θ⁽ᵇ⁾ = Σ w_bg S_g / Σ w_bg n_g        w_bg ~ Exp(1), b = 1 … B
 
 is what it might have been (a Bayesian bootstrap of units). An Exp(1) weight is never 0, so no interval
-of the ground truth runs empty. One matrix of weights belongs to a ground truth and is shared by all that
-is scored against it. `evaluator.scoring.differences` compares two entries, `evaluator.scoring.ranges` all
-of a board.
+of the ground truth runs empty. One matrix of weights is shared by all that is scored against a ground truth.
 
-Everything is a function of the sums and of the seed: the same numbers give the same answer, in whatever order
-they come. Arrays have one row for each unit and one column for each score name; `by_units` makes them from
-those of recordings.
+Arrays have one row for each unit and one column for each score name; `by_units` makes them from those of
+recordings.
 """
 
 from __future__ import annotations
@@ -82,11 +78,7 @@ def usable_columns(counts: Floats) -> Booleans:
 
 
 class Bootstrap:
-    """The shared weights of one ground truth, ready for the sums of many entries.
-
-    `counts` is (G, columns), sequences per unit; all entries have the same, since intervals are made by the
-    truth. A unit without sequences in an interval says nothing of it.
-    """
+    """The shared weights of one ground truth; `counts` is (G, columns), sequences per unit."""
 
     def __init__(self, counts: Floats, *, rng: np.random.Generator, n_resamples: int = N_RESAMPLES) -> None:
         self._counts = counts
@@ -114,13 +106,9 @@ class Bootstrap:
 
     @cached_property
     def _inverse_counts(self) -> Weights:
-        """1 / Σwn in every resample, (columns, B); 0 for a column without sequences."""
+        """1 / Σwn of the usable columns in every resample, (usable, B)."""
         weighted = self._counts.T.astype(np.float32) @ self._weights
-        return np.asarray(np.divide(1, weighted, out=np.zeros_like(weighted), where=weighted > 0))
-
-    @cached_property
-    def _usable_inverse_counts(self) -> Weights:
-        return self._inverse_counts[self.usable]
+        return np.asarray(1 / weighted[self.usable])
 
     def means(self, sums: Floats) -> Floats:
         """θ of every column, for sums (…, G, columns); NaN for a column without sequences."""
@@ -136,7 +124,7 @@ class Bootstrap:
         rows = np.ascontiguousarray(centred.transpose(0, 2, 1), dtype=np.float32)
         weighted = rows.reshape(-1, rows.shape[2]) @ self._weights
         shaped = weighted.reshape(*rows.shape[:2], -1)
-        return np.asarray(np.multiply(shaped, self._usable_inverse_counts, out=shaped))
+        return np.asarray(np.multiply(shaped, self._inverse_counts, out=shaped))
 
     def intervals(self, sums: Floats) -> tuple[Floats, Floats]:
         """The 95 % intervals of N entries by their `sums` (N, G, columns): quantiles of θ⁽ᵇ⁾.

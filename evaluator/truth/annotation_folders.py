@@ -1,14 +1,12 @@
 """Folders of annotation files: which files there are, in which order, and their sequences.
 
-anno_ids are numbered from 0 over the files **sorted by their path** inside the folder. The toolkit numbers
-them in the order in which the file system lists the files, which differs between machines; within a file the
-order is the same.
+anno_ids are numbered from 0 over the files **sorted by their path** inside the folder; the toolkit numbers
+them in the order in which the file system lists the files, which differs between machines.
 
 On Linux the pickles are read by a child process that has little memory and time, and may open nothing
-(`annotation_child`). Its answer is believed no more than the files are: one of another form is the files'
-fault, and one that is longer than the child's memory is not read to its end. Other systems have no such
-limits, and the files are read here. No pickle runs code on either, but there one that was made for it may
-take all memory, or never end.
+(`annotation_child`); its answer is believed no more than the files are. Other systems have no such limits,
+and the files are read here: no pickle runs code, but one that was made for it may take all memory, or never
+end.
 """
 
 from __future__ import annotations
@@ -22,7 +20,7 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from types import NoneType
-from typing import IO, Any, Final
+from typing import Any, Final
 
 from evaluator.problems import Rejected, reject
 from evaluator.truth.annotations import AnnotatedFiles, read_files
@@ -36,6 +34,9 @@ HAS_LIMITS: Final = sys.platform == "linux" and bool(sys.executable)
 
 _BASE_BYTES: Final = 512 * 1024 * 1024
 _BYTES_PER_BYTE: Final = 32
+_BASE_CPU_S: Final = 3
+_BYTES_PER_CPU_S: Final = 2_000_000
+"""A sixth of what a slow core reads."""
 _EXTENSION: Final = ".pkl"
 _KINDS: Final[dict[str, tuple[type, ...]]] = {
     "anno_id": (int,),
@@ -59,8 +60,6 @@ def read_annotations(
     folder: Path, *, with_ttc: bool, with_boxes: bool = False, with_frames: bool = False
 ) -> AnnotatedFiles:
     """Cut the sequences out of every `*.pkl` below `folder`; one row per sequence, from its target frame.
-
-    They stand in the order of the sorted files, numbered so.
 
     Without `with_ttc`, targets may lack `ttc_imu` (the public test set does) and the column stays empty.
     With `with_boxes`, the boxes of all frames are read too; with `with_frames`, their times to contact.
@@ -128,17 +127,15 @@ def _read_apart(
     folder: Path, files: Sequence[Path], *, with_ttc: bool, with_boxes: bool, with_frames: bool
 ) -> AnnotatedFiles:
     """The same by a child process, which gets one file after the other."""
-    largest = max(path.stat().st_size for path in files)
-    memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * min(largest, MAX_FILE_BYTES)
+    sizes = [min(path.stat().st_size, MAX_FILE_BYTES) for path in files]
+    memory_bytes = _BASE_BYTES + _BYTES_PER_BYTE * max(sizes)
+    cpu_s = _BASE_CPU_S + sum(sizes) // _BYTES_PER_CPU_S
     command = [
         sys.executable,
         "-P",
         "-m",
         "evaluator.truth.annotation_child",
-        str(memory_bytes),
-        str(int(with_ttc)),
-        str(int(with_boxes)),
-        str(int(with_frames)),
+        *map(str, (memory_bytes, cpu_s, int(with_ttc), int(with_boxes), int(with_frames))),
     ]
     environment = {
         "PATH": os.defpath,
@@ -168,7 +165,9 @@ def _asked(
 ) -> AnnotatedFiles:
     from evaluator.limits import READY  # noqa: PLC0415 -- nothing of it is on Windows
 
-    asking, answering = _pipes(child)
+    asking, answering = child.stdin, child.stdout
+    assert asking is not None  # noqa: S101 - both are pipes
+    assert answering is not None  # noqa: S101 - the same
     if answering.readline(len(READY)) != READY:
         raise _not_started(folder, _last_words(child))
     for name, data in _contents(folder, files):
@@ -188,12 +187,6 @@ def _asked(
     if not line:
         raise reject(*_end_of(child, memory_bytes=memory_bytes), folder.name)
     return _decoded(line, folder.name)
-
-
-def _pipes(child: subprocess.Popen[bytes]) -> tuple[IO[bytes], IO[bytes]]:
-    if child.stdin is None or child.stdout is None:
-        raise RuntimeError("the reading process was started without pipes")
-    return child.stdin, child.stdout
 
 
 def _not_started(folder: Path, cause: str) -> Rejected:
@@ -224,7 +217,7 @@ def _end_of(child: subprocess.Popen[bytes], *, memory_bytes: int) -> tuple[str, 
     if child.returncode == EXIT_OUT_OF_MEMORY:
         return "too-large", f"Reading the file needs more than {memory_bytes >> 20:,} MiB; {_EXPECTED}."
     if child.returncode == -signal.SIGXCPU:
-        return "too-large", f"Reading the file takes too long for its size; {_EXPECTED}."
+        return "too-large", f"Reading the file takes too long for the size of the files; {_EXPECTED}."
     if child.returncode < 0:
         message = f"Reading the file ended its process with signal {-child.returncode}; {_EXPECTED}."
         return "bad-annotations", message

@@ -29,12 +29,8 @@ MANIFEST_COLUMNS: Final = COLUMNS[:-1]
 UNIT: Final = "unit"
 """The column by which a ground truth names the unit of each recording; most have none."""
 
-_STORE_FORMAT: Final = 1
 _MAX_FIELD: Final = 200
 _MAX_INT64: Final = 2**63 - 1
-_MAX_DIGITS: Final = 19
-_MAX_LINE: Final = 100_000  # less than the longest field that `csv` takes
-_PLAIN_NUMBERS: Final = re.compile(r"[0-9.eE+-]*")
 _WHOLE: Final = re.compile(r"[0-9]{1,19}", re.ASCII)
 _STORE_KINDS: Final = {"anno_id": "i", "bag_stamp": "U", "cam_id": "U", "ts_ns": "i", "track_id": "U"}
 _NOT_A_STORE: Final = (
@@ -159,8 +155,6 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
     """
     text = read_text(source)
     columns = COLUMNS if with_ttc else MANIFEST_COLUMNS
-    if (table := _read_columns(text, columns)) is not None:
-        return table
     rows = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         return _read_rows(rows, columns)
@@ -168,59 +162,9 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
         raise reject("bad-csv", f"This is not a CSV table: {error}.", f"line {rows.line_num}") from None
 
 
-def _read_columns(text: str, columns: tuple[str, ...]) -> Table | None:
-    """Read a table without quotation marks by columns; None unless `_read_rows` would take every row as well.
-
-    It takes a third of the time. Words for a fault are the other way's business.
-    """
-    text = text.replace("\r\n", "\n")
-    lines = text.removesuffix("\n").split("\n")
-    header = [name.strip() for name in lines.pop(0).split(",")]
-    if '"' in text or "\r" in text or not set(columns) <= set(header):
-        return None
-    # Without rows this is the empty set.
-    if {line.count(",") for line in lines} != {len(header) - 1} or max(map(len, lines)) > _MAX_LINE:
-        return None
-    fields = ",".join(lines).split(",")
-    column = {name: fields[header.index(name) :: len(header)] for name in columns}
-    names = [column[name] for name in ("bag_stamp", "cam_id", "track_id")]
-    unit = fields[header.index(UNIT) :: len(header)] if UNIT in header else []
-    anno_id, ts_ns = _whole_numbers(column["anno_id"]), _whole_numbers(column["ts"])
-    ttc_s = _seconds(column.get("ttc", []))
-    if anno_id is None or ts_ns is None or ttc_s is None or any(map(name_fault, set().union(*names, unit))):
-        return None
-    table = Table(anno_id, names[0], names[1], ts_ns, names[2], ttc_s, unit=unit)
-    table.places = list(range(2, len(lines) + 2))
-    for name, position in _of_objects(header, columns).items():
-        try:
-            read = map(FIELDS[name], map(str.strip, fields[position :: len(header)]))
-            setattr(table, name, list(read))
-        except ValueError:
-            return None
-    return table
-
-
 def _of_objects(header: list[str], columns: tuple[str, ...]) -> dict[str, int]:
     """Where the columns of objects are; of a manifest, nobody asks for them."""
     return {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
-
-
-def _whole_numbers(texts: list[str]) -> list[int] | None:
-    digits = "".join(texts)
-    if not (digits.isascii() and digits.isdigit() and all(texts)) or max(map(len, texts)) > _MAX_DIGITS:
-        return None
-    numbers = list(map(int, texts))
-    return numbers if max(numbers) <= _MAX_INT64 else None
-
-
-def _seconds(texts: list[str]) -> list[float] | None:
-    # Of these characters `float` takes what `_NUMBER` does, and nothing else.
-    if not _PLAIN_NUMBERS.fullmatch("".join(texts)):
-        return None
-    try:
-        return list(map(float, texts))
-    except ValueError:
-        return None
 
 
 def _read_rows(rows: Any, columns: tuple[str, ...]) -> Table:
@@ -294,34 +238,19 @@ def save_store(
     manifest_digest: str,
     truth_digest: str | None = None,
 ) -> None:
-    """Write columns and digests as an `.npz` without pickled objects, sealed by a sum of all of them.
-
-    It is not compressed: that took three times as long as everything else, and the files are few.
-    """
+    """Write columns and digests as an `.npz` without pickled objects, not compressed for speed."""
     arrays: dict[str, Any] = {
-        "format": np.array(_STORE_FORMAT),
         "manifest_digest": np.array(manifest_digest),
         **columns,
     }
     if truth_digest is not None:
         arrays["truth_digest"] = np.array(truth_digest)
-    arrays["seal"] = np.array(_seal(arrays))
     with Path(path).open("wb") as file:  # an open file, since numpy would add ".npz" to other names
         np.savez(file, **arrays)
 
 
-@dataclass(frozen=True, slots=True)
-class Stored:
-    """What a store holds. `is_sealed`: it was checked before it was written, and is what was written."""
-
-    table: Table
-    manifest_digest: str
-    truth_digest: str
-    is_sealed: bool
-
-
-def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> Stored:
-    """What `save_store` wrote; raises `Rejected` for anything else."""
+def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> tuple[Table, str, str]:
+    """The table, the manifest's digest and the truth's, if any; raises `Rejected` for other files."""
     path = Path(path)
     try:
         # numpy leaves its own file open when it fails.
@@ -347,27 +276,7 @@ def load_store(path: str | os.PathLike[str], *, with_ttc: bool) -> Stored:
         expected = "ground truth" if with_ttc else "manifest"
         raise reject("unreadable", f"The file is not a saved {expected} of this version.", path.name)
     columns = {name: arrays[name].tolist() for name in kinds}
-    is_sealed = str(arrays.pop("seal", "")) == _seal(arrays)
-    stored = Stored(
-        Table(**columns), str(arrays["manifest_digest"]), str(arrays.get("truth_digest", "")), is_sealed
-    )
-    if is_sealed:
-        return stored
-    names = (*columns["bag_stamp"], *columns["cam_id"], *columns["track_id"], *stored.table.unit)
+    names = (*columns["bag_stamp"], *columns["cam_id"], *columns["track_id"], *columns.get(UNIT, ()))
     if any(map(name_fault, names)) or min((*columns["anno_id"], *columns["ts_ns"], 0)) < 0:
         raise reject("bad-field", "The file holds malformed names or negative numbers.", path.name)
-    return stored
-
-
-def _seal(arrays: Mapping[str, Any]) -> str:
-    """The SHA-256 of these arrays, with their names, types and shapes.
-
-    A file with this sum holds what `save_store` wrote, which was checked then: a worker that loads it need
-    not check each row anew, which takes five times as long. One without it, or with another, is checked.
-    """
-    found = hashlib.sha256()
-    for name in sorted(arrays):
-        array = np.ascontiguousarray(arrays[name])
-        found.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
-        found.update(array.data)
-    return found.hexdigest()
+    return Table(**columns), str(arrays["manifest_digest"]), str(arrays.get("truth_digest", ""))

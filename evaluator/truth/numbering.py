@@ -1,8 +1,7 @@
 """The anno_ids that the toolkit gives the sequences of a folder on this machine, beside those of a manifest.
 
-The toolkit numbers from 0 over the files in the order in which the file system lists them; a manifest made
-from the same folder numbers over the sorted files. Which sequences there are, and their order within a file,
-is the same for both.
+The toolkit numbers over the files in the order in which the file system lists them, a manifest over the
+sorted files; within a file the order is the same.
 """
 
 from __future__ import annotations

@@ -1,9 +1,8 @@
 """What annotations say of the object of a sequence beside its time to contact, in the target frame.
 
 `occ_ratio` (how much of it is occluded, 0 to 1), `same_lane` (whether it drives in the lane of the camera's
-car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score depends on them, no
-digest contains them; offline analyses group by them. A table has a column of them or not, and a value may be
-missing.
+car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score and no digest depends on
+them; offline analyses group by them.
 """
 
 from __future__ import annotations

@@ -1,12 +1,9 @@
 """Reading a pickle that names nothing but data.
 
-Python's own unpickler does the work; what a pickle asks for by name is answered here. It gets containers of
-Python's, whose types nothing can change, and classes of this module in place of attribute-dicts and of
-numpy's types. Nothing is imported for it, no call that it can make has an effect, and nothing that outlives
-it can be changed by it: each class here has a `__setstate__`, so that an unpickler sets no attributes.
-
-What a pickle costs is **not** bounded here. A few bytes may ask for all memory, compute for hours, or nest
-deeper than the interpreter's stack: `annotation_child` reads files within the limits of its process.
+What a pickle asks for by name is answered here: with Python's containers, and with classes of this module in
+place of attribute-dicts and of numpy's types. Nothing is imported, and nothing that outlives it is changed:
+each class here has a `__setstate__`, so that the unpickler sets no attributes. What a pickle costs is **not**
+bounded here: `annotation_child` reads files within the limits of its process.
 """
 
 from __future__ import annotations

@@ -63,21 +63,10 @@ class Manifest:
     def _checked(cls, table: Table, digest: str) -> Manifest:
         if not table.anno_id:
             raise reject("empty", "There are no sequences; expected at least one.")
-        manifest = cls._of(table, digest)
-        findings = Findings()
-        if len(set(table.anno_id)) < len(table.anno_id):
-            _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
-        _find_duplicates(findings, "duplicate-natural-keys", "natural key", manifest.natural_keys, table)
-        _find_two_units(findings, table)
-        findings.raise_if_any()
-        return manifest
-
-    @classmethod
-    def _of(cls, table: Table, digest: str) -> Manifest:
         anno_id, ts_ns = (np.array(column, dtype=np.int64) for column in (table.anno_id, table.ts_ns))
         anno_id.setflags(write=False)
         ts_ns.setflags(write=False)
-        return cls(
+        manifest = cls(
             anno_id=anno_id,
             bag_stamp=tuple(table.bag_stamp),
             cam_id=tuple(table.cam_id),
@@ -86,6 +75,13 @@ class Manifest:
             digest=digest,
             unit=tuple(table.unit),
         )
+        findings = Findings()
+        if len(set(table.anno_id)) < len(table.anno_id):
+            _find_duplicates(findings, "duplicate-ids", "anno_id", manifest.anno_id_keys, table)
+        _find_duplicates(findings, "duplicate-natural-keys", "natural key", manifest.natural_keys, table)
+        _find_two_units(findings, table)
+        findings.raise_if_any()
+        return manifest
 
     @property
     def n_sequences(self) -> int:
@@ -188,11 +184,9 @@ class Manifest:
 
         The file of a `GroundTruth` serves as well; its values are left aside.
         """
-        stored = load_store(path, with_ttc=False)
-        if stored.is_sealed:
-            return cls._of(stored.table, stored.manifest_digest)
-        manifest = cls.from_table(stored.table)
-        _check_digest(stored=stored.manifest_digest, found=manifest.digest, path=path)
+        table, digest, _ = load_store(path, with_ttc=False)
+        manifest = cls.from_table(table)
+        _check_digest(stored=digest, found=manifest.digest, path=path)
         return manifest
 
 
@@ -216,13 +210,9 @@ class GroundTruth:
     def from_table(cls, table: Table) -> GroundTruth:
         """Check rows and values; raises `Rejected` naming the rows at fault."""
         manifest_digest, digest = table.digests()
-        truth = cls._of(table, Manifest._checked(table, manifest_digest), digest)
-        _check_values(truth.ttc_s, table)
-        return truth
-
-    @classmethod
-    def _of(cls, table: Table, manifest: Manifest, digest: str) -> GroundTruth:
+        manifest = Manifest._checked(table, manifest_digest)
         ttc_s = np.array(table.ttc_s, dtype=np.float64)
+        _check_values(ttc_s, table)
         ttc_s.setflags(write=False)
         objects = Objects.of(occ_ratio=table.occ_ratio, same_lane=table.same_lane, box2d=table.box2d)
         return cls(manifest=manifest, ttc_s=ttc_s, digest=digest, objects=objects)
@@ -277,12 +267,9 @@ class GroundTruth:
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> GroundTruth:
         """Read what `save` wrote; raises `Rejected` when it is damaged or does not match its digest."""
-        stored = load_store(path, with_ttc=True)
-        if stored.is_sealed:
-            manifest = Manifest._of(stored.table, stored.manifest_digest)
-            return cls._of(stored.table, manifest, stored.truth_digest)
-        truth = cls.from_table(stored.table)
-        _check_digest(stored=stored.truth_digest, found=truth.digest, path=path)
+        table, _, digest = load_store(path, with_ttc=True)
+        truth = cls.from_table(table)
+        _check_digest(stored=digest, found=truth.digest, path=path)
         return truth
 
 

@@ -3,9 +3,15 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from numpy.typing import NDArray
 
+from baselines.clips import Clip
+from baselines.folders import read_folder
+from baselines.images import ImageCache
+from evaluator import read_truth
 from evaluator.cli import main
 from tests.baselines.real_folders import kitti_clip_folder, kitti_label_folder
 from tests.services import shared_data
@@ -31,9 +37,14 @@ def kitti_clip() -> Path:
 
 
 @pytest.fixture(scope="session")
-def clip_folder(kitti_clip: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The clip as a folder of the convention, its images linked; not to be written to."""
-    return kitti_clip_folder(kitti_clip, tmp_path_factory.mktemp("kitti-clip"))
+def real_clips(
+    kitti_clip: Path, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[list[Clip], NDArray[np.float64]]:
+    """The clips of kitti-clip, and their true times to contact in seconds."""
+    folder = read_folder(kitti_clip_folder(kitti_clip, tmp_path_factory.mktemp("kitti-clip")))
+    cache = ImageCache()
+    clips = [folder.clip(row, cache=cache) for row in range(folder.n_sequences)]
+    return clips, read_truth(kitti_clip / "truth.csv").ttc_s
 
 
 @pytest.fixture(scope="session")

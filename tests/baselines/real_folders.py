@@ -38,13 +38,15 @@ def kitti_label_folder(source: Path, labels: Path, folder: Path) -> Path:
 
 
 def kitti_clip_folder(source: Path, folder: Path) -> Path:
-    """The clip of 27 frames with boxes of reference and target; images are links to where they are."""
+    """The clip of 27 frames with boxes in all frames; images are links to where they are."""
     write_manifest(source, folder)
+    boxes = [
+        ",".join(row[edge] for edge in ("x1", "y1", "x2", "y2")) for row in rows_of(source / "depth.csv")
+    ]
     lines = ["anno_id,frame,x1,y1,x2,y2"]
     for row in rows_of(source / "boxes.csv"):
-        for frame, kind in ((5 - int(row["frame_gap"]), "reference"), (5, "target")):
-            box = ",".join(row[f"{kind}_{edge}"] for edge in ("x1", "y1", "x2", "y2"))
-            lines.append(f"{row['anno_id']},{frame},{box}")
+        first = int(row["target_frame"]) - 5
+        lines += [f"{row['anno_id']},{frame},{boxes[first + frame]}" for frame in range(6)]
     (folder / "boxes.csv").write_text("\n".join([*lines, ""]))
     for row in rows_of(source / "truth.csv"):
         camera = folder / "images" / row["bag_stamp"] / f"cam{row['cam_id']}"

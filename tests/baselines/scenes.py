@@ -1,20 +1,16 @@
-"""Scenes with a planted scale ratio: a textured plane before a textured background, and real clips."""
+"""Scenes with a planted scale ratio: a textured plane before a textured background."""
 
-import csv
 from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 
 import cv2
 import numpy as np
-import pytest
 from numpy.typing import NDArray
 
 from baselines.boxes import box_around
 from baselines.clips import N_FRAMES, TARGET, Clip, Image
 from evaluator.metrics.metrics import MID
 from evaluator.metrics.scale import fps_of_gap, scale_ratio_to_ttc
-from tests.services import shared_data
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]
@@ -90,39 +86,6 @@ def changed(clip: Clip, change: Callable[[int, Image], Image]) -> Clip:
 def swapped(clip: Clip) -> Clip:
     """The clip in the reverse order of time."""
     return Clip(anno_id=clip.anno_id, boxes=clip.boxes[::-1], load=lambda frame, _: clip.grey(TARGET - frame))
-
-
-def kitti_clips() -> tuple[list[Clip], Floats]:
-    """The clips of kitti-clip and their true times to contact in seconds; skips where they are absent."""
-    shared = shared_data()
-    if shared is None or not (shared / "kitti-clip").is_dir():
-        pytest.skip("kitti-clip is not here: TSTTC_SHARED_DATA names no folder that has it")
-    folder = shared / "kitti-clip"
-    images = [_read_grey(path) for path in sorted((folder / "frames").glob("*.png"))]
-    boxes = {
-        int(row["frame"]): [float(row[name]) for name in ("x1", "y1", "x2", "y2")]
-        for row in _rows(folder / "depth.csv")
-    }
-    clips = []
-    for row in _rows(folder / "boxes.csv"):
-        frames = range(int(row["target_frame"]) - TARGET, int(row["target_frame"]) + 1)
-        clips.append(
-            Clip.from_frames(
-                [images[frame] for frame in frames],
-                boxes=np.array([boxes[frame] for frame in frames]),
-                anno_id=int(row["anno_id"]),
-            )
-        )
-    return clips, np.array([float(row["ttc"]) for row in _rows(folder / "truth.csv")])
-
-
-def _read_grey(path: Path) -> Image:
-    return np.asarray(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), dtype=np.uint8)
-
-
-def _rows(path: Path) -> list[dict[str, str]]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
 
 
 def mean_mid(scale_ratios: list[float], true_ttc_s: Floats, *, frame_gap: int = TARGET) -> float:

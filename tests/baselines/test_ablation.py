@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.ablation import ABLATIONS, get_ablation, scores_of_settings
+from baselines.ablation import get_ablation, scores_of_settings
 from baselines.folders import read_folder
 from baselines.rendering.folders import write_folder
 from baselines.simulation import split
@@ -30,18 +30,6 @@ def truth(rendered: Path) -> GroundTruth:
     return read_truth(rendered / "truth.csv")
 
 
-def test_a_row_has_own_scores_and_the_papers(rendered: Path, truth: GroundTruth) -> None:
-    told: list[int] = []
-    rows = scores_of_settings(
-        get_ablation("shift"), folder=read_folder(rendered), truth=truth, progress=told.append
-    )
-    assert [row.setting for row in rows] == [0, 1, 2, 3, 4]
-    assert [row.published["mid"] for row in rows] == [73.3, None, None, 41.0, None]
-    assert all(row.scores["mid"] is not None and row.n_fallback == 0 for row in rows)
-    assert told[-1] == 5 * N
-    assert told == sorted(told)
-
-
 def test_wider_gaps_have_smaller_errors(rendered: Path, truth: GroundTruth) -> None:
     rows = scores_of_settings(get_ablation("frame-gap"), folder=read_folder(rendered), truth=truth)
     assert rows[0].scores["mid"] > rows[-1].scores["mid"]
@@ -64,8 +52,3 @@ def test_a_truth_of_other_sequences_is_rejected(rendered: Path, truth: GroundTru
     other.write_text("\n".join((rendered / "truth.csv").read_text().splitlines()[:-1]) + "\n")
     with pytest.raises(Rejected, match="1 sequence is only in the ground truth or only in the folder"):
         scores_of_settings(get_ablation("bins"), folder=read_folder(rendered), truth=read_truth(other))
-
-
-def test_the_default_of_every_ablation_is_one_of_its_settings() -> None:
-    assert all(ablation.default in ablation.settings for ablation in ABLATIONS)
-    assert [ablation.name for ablation in ABLATIONS if ablation.table is None] == ["expansion"]

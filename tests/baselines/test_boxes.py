@@ -39,10 +39,6 @@ def test_a_box_beyond_the_edge_is_not_made_smaller() -> None:
     assert boxes.shared_expansion([-20, 10, 40, 60], [10, 10, 60, 60], **IMAGE) == 1.0
 
 
-def test_a_smaller_ratio_is_taken_as_it_is() -> None:
-    assert boxes.shared_expansion([-20, 10, 40, 60], [10, 10, 60, 60], **IMAGE, at_most=0.9) == 0.9
-
-
 def test_the_narrower_of_two_rooms_decides() -> None:
     near_the_edge = [2.0, 100, 82, 180]  # 42 px from the edge to the centre, 40 px half a side
     assert boxes.shared_expansion(near_the_edge, [400, 200, 500, 300], **IMAGE) == pytest.approx(1.05)
@@ -55,9 +51,3 @@ def test_every_measure_but_the_area_gives_the_scale_of_the_box(scale: float) -> 
     found = {m: float(boxes.scale_ratio_of_boxes(reference, target, measure=m)) for m in boxes.MEASURES}
     assert found.pop("area") == pytest.approx(scale**2)
     assert list(found.values()) == pytest.approx([scale] * 3)
-
-
-def test_many_boxes_are_measured_at_once() -> None:
-    references = np.array([[0.0, 0, 8, 4], [0, 0, 5, 5]])
-    targets = np.array([[0.0, 0, 10, 8], [0, 0, 10, 10]])
-    assert boxes.scale_ratio_of_boxes(references, targets, measure="height").tolist() == [0.5, 0.5]

@@ -62,16 +62,6 @@ def test_normalised_boxes_become_pixels_of_the_image(folder: Path) -> None:
     np.testing.assert_allclose(clip.boxes[2], box(2), rtol=1e-12)
 
 
-def test_columns_may_stand_in_any_order_among_others(folder: Path) -> None:
-    rows = [
-        f"car,{frame},{n},{','.join(map(str, reversed(box(frame))))}" for n in range(3) for frame in (0, 5)
-    ]
-    (folder / "boxes.csv").write_text("\r\n".join(["kind,frame,anno_id,y2,x2,y1,x1", *rows]))
-    found = read_folder(folder)
-    assert found.boxes[1, 5].tolist() == list(box(5))
-    assert np.isnan(found.boxes[1, 1]).all()
-
-
 # --- refused ---------------------------------------------------------------------------------------------
 
 
@@ -161,11 +151,6 @@ def test_a_table_at_fault_is_refused_with_place_found_and_expected(
     found = refusal(folder)
     assert found[:2] == (code, place or folder.name)
     assert words in found[2]
-
-
-def test_a_table_that_is_no_text_is_refused(folder: Path) -> None:
-    (folder / "boxes.csv").write_bytes(b"anno_id,\xff\n")
-    assert refusal(folder) == ("not-utf8", "boxes.csv", "Byte 8 is not UTF-8.")
 
 
 def test_a_folder_of_neither_kind_is_refused(tmp_path: Path) -> None:

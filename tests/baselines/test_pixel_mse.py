@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from baselines import patches, pixel_mse_toolkit
 from baselines.clips import Clip, Image
 from baselines.estimates import Unusable
 from baselines.pixel_mse import SEARCHES, PixelMse
 from baselines.scales import SCALE_RANGES
-from tests.baselines.warped_frames import planted, rescaled, swapped, texture
+from tests.baselines.scenes import swapped
+from tests.baselines.warped_frames import planted, rescaled, texture
 
 BIN = (1.5 - 0.65) / 124
 RATIOS = (0.72, 0.85, 0.97, 1.0, 1.08, 1.3)
@@ -60,30 +60,6 @@ def test_the_coarse_search_ends_at_the_bins_of_the_full_one() -> None:
     assert len(fine.scales) < len(full.scales) / 5
 
 
-def test_a_shift_of_the_object_is_reported_in_cells() -> None:
-    clip = planted(9, scale_ratio=1.0, size=(40, 40))
-    moved = Clip(clip.anno_id, clip.boxes + np.eye(6)[0][:, np.newaxis] * [-2, 1, -2, 1], clip.load)
-    match = PixelMse(expand=1.0).match(moved, frame_gap=5)
-    assert match.shifts[np.argmin(match.errors)].tolist() == [2, -1]
-
-
-def test_the_toolkits_patch_is_off_for_receding_objects_as_described() -> None:
-    crops = pixel_mse_toolkit.Crops(
-        reference=np.zeros((3, 0, 0), np.float32),
-        target=np.zeros((3, 1000, 1000), np.float32),
-        margin=0,
-        patch=np.array([650, 650]),
-    )
-    for scale in (0.9, 1.1, 1.3):
-        size = 650.0
-        centre_in_crop = crops.starts(scale)[0] + size / 2
-        object_in_crop = (
-            scale * size / 0.65 / 2
-        )  # the crop begins at the corner of the object's own surroundings
-        off = (1 - scale) * (0.769 - 0.5 / scale)
-        assert (centre_in_crop - object_in_crop) / size == pytest.approx(off, abs=0.002)
-
-
 def test_the_toolkits_variant_finds_approaching_objects_and_loses_receding_ones() -> None:
     variant = PixelMse(variant="toolkit")
     approaching, receding = (
@@ -127,9 +103,3 @@ def test_a_clip_that_shows_nothing_is_unusable_and_says_why(reason: str, variant
 def test_a_frame_gap_beyond_the_sequence_is_refused() -> None:
     with pytest.raises(ValueError, match="expected 1 to 5"):
         PixelMse()(planted(1, scale_ratio=1.0), frame_gap=6)
-
-
-def test_what_lies_outside_the_image_repeats_its_border() -> None:
-    image = texture(13)
-    window = patches.cut(image, centre=np.array([0.0, 0.0]), size=(20, 20))
-    assert np.all(window.pixels[:10, :10] == image[0, 0])

@@ -46,19 +46,6 @@ def test_the_error_falls_with_every_frame_of_gap(rendered: tuple[list[Rendered],
     assert all(wider < narrower for narrower, wider in itertools.pairwise(errors))
 
 
-def test_more_bins_are_not_worse(rendered: tuple[list[Rendered], Floats]) -> None:
-    sequences, truth = rendered
-    clips = [decoded(each, each.boxes) for each in sequences]
-    assert mid(clips, truth, PixelMse(bins=125)) <= 1.05 * mid(clips, truth, PixelMse(bins=25))
-
-
-def test_the_coarse_search_is_as_good_as_the_full_one(rendered: tuple[list[Rendered], Floats]) -> None:
-    sequences, truth = rendered
-    clips = [decoded(each, each.boxes) for each in sequences]
-    full, fine = (mid(clips, truth, PixelMse(search=name)) for name in ("full", "coarse-to-fine"))
-    assert fine == pytest.approx(full, rel=0.05)
-
-
 def test_shifts_halve_the_error_where_each_box_errs_by_itself(
     rendered: tuple[list[Rendered], Floats],
 ) -> None:

@@ -179,12 +179,6 @@ def test_a_strict_run_names_every_missing_box_and_image_before_it_begins(folder:
     assert names(folder) == set()
 
 
-def test_a_first_frame_that_is_late_is_not_taken_for_a_missing_one(folder: Path) -> None:
-    path = image_path(folder, 0, 0)
-    path.rename(path.with_name(f"{int(path.stem) + 3_000_000}.jpg"))
-    assert estimate(folder).n_fallback == {"frames are not 0.1 s apart": 1}
-
-
 @pytest.mark.parametrize(
     ("change", "suffix"), [(cut_off, ".jpg"), (cut_off_png, ".png")], ids=["JPEG", "PNG"]
 )
@@ -210,11 +204,6 @@ def test_what_a_method_cannot_say_and_where_it_fails_take_the_fallback(folder: P
 def test_an_estimate_that_no_file_may_hold_takes_the_fallback(folder: Path) -> None:
     done = estimate(folder, constant=-0.5)
     assert done.n_fallback == {"estimate is not a positive number": N}
-
-
-def test_a_parameter_that_is_no_number_is_refused(folder: Path) -> None:
-    with pytest.raises(ValueError, match="--power is nan; expected a finite number"):
-        estimate(folder, power=math.nan)
 
 
 # --- interrupted runs ------------------------------------------------------------------------------------
@@ -269,16 +258,6 @@ def test_a_run_with_anything_else_begins_anew(folder: Path, change: dict[str, An
     if change.pop("boxes", False):
         write_boxes(folder, n=N, changes={(0, 0): (1, 1, 30, 30)})
     assert estimate(folder, **change).n_resumed == 0
-
-
-def test_an_older_file_stays_until_the_new_one_is_whole(folder: Path) -> None:
-    old = folder.parent / "p.json"
-    old.write_text("old")
-    with pytest.raises(Ended):
-        estimate(folder, progress=end_after(1))
-    assert old.read_text() == "old"
-    estimate(folder)
-    assert old.read_text() != "old"
 
 
 # --- several processes -----------------------------------------------------------------------------------

@@ -1,12 +1,10 @@
 """The six scripts: how many runs, where their events lie, and that no step is needed to get there."""
 
 from collections import Counter
-from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from baselines import scenarios
 from baselines.scenarios import LANE_WIDTH_M, Run, runs, solve
 
 CENTIMETRE = 0.01
@@ -67,12 +65,6 @@ def test_script_2_leaves_the_lane_in_the_time_that_its_width_takes() -> None:
     np.testing.assert_allclose(motion.end_s[finished], (reached_s + LANE_WIDTH_M / 2)[finished], atol=1e-9)
 
 
-def test_in_script_3_the_vehicle_comes_from_the_next_lane_into_ego_s() -> None:
-    motion = solve(of_script(3))
-    np.testing.assert_array_equal(motion.at(np.array([0.0])).lateral_m, LANE_WIDTH_M)
-    assert np.nanmin(motion.last.lateral_m) == pytest.approx(0, abs=1e-9)
-
-
 @pytest.mark.parametrize("script", [5, 6])
 def test_scripts_5_and_6_never_come_nearer_than_5_m(script: int) -> None:
     motion = solve(of_script(script))
@@ -98,34 +90,8 @@ def test_small_steps_in_time_come_to_the_same_end(script: int) -> None:
         assert motion.last.gap_m[number, 0] == pytest.approx(gap_m, abs=0.1)
 
 
-def test_a_run_alone_and_among_all_others_is_the_same() -> None:
-    every, times_s = runs(closed=False), np.arange(0, 11, 0.7)
-    together = solve(every).at(times_s).gap_m
-    for number in range(0, len(every), 499):
-        np.testing.assert_array_equal(solve([every[number]]).at(times_s).gap_m[0], together[number])
-
-
-def test_gap_and_speeds_have_no_jump_from_phase_to_phase() -> None:
-    motion = solve(runs(closed=False)[::37])
-    state = motion.at(np.arange(0, 11.7, 0.01))
-    for values in (state.gap_m, state.ego_mps, state.vehicle_mps, state.lateral_m):
-        assert np.nanmax(np.abs(np.diff(values, axis=1))) < 0.5
-
-
 def test_after_the_end_of_a_run_there_is_nothing() -> None:
     motion = solve(of_script(1))
     after = motion.at(motion.end_s[:, None] + np.array([0.01, 5.0]))
     assert np.isnan(after.gap_m).all()
     assert np.isnan(after.ttc_s).all()
-
-
-def test_the_time_to_contact_is_the_gap_over_the_closing_speed() -> None:
-    state = solve(of_script(2)).at(np.array([0.0]))
-    np.testing.assert_allclose(state.ttc_s, 65 / (20 / 3.6))
-
-
-def test_a_lane_change_at_every_gap_of_its_triple_is_a_run_of_its_own() -> None:
-    gaps_m = sorted({run.lane_gap_m for run in of_script(2)})
-    assert gaps_m == [10, 15, 20, 25, 30, 35, 40, 45, 50]
-    assert {round(b - a, 9) for a, b in pairwise(sorted({run.lateral_mps for run in of_script(5)}))} == {0.2}
-    assert scenarios.LANE_WIDTH_M == 3.75

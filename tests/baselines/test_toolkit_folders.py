@@ -81,16 +81,6 @@ def write_renumbered(folder: Path, own: Manifest) -> None:
     (folder / "manifest.csv").write_text("\n".join([header, *renumbered, ""]))
 
 
-def test_a_manifest_beside_the_files_gives_order_and_anno_ids(tmp_path: Path) -> None:
-    folder = download(tmp_path)
-    own = read_folder(folder)
-    write_renumbered(folder, own.manifest)
-    found = read_folder(folder)
-    assert found.manifest.anno_id.tolist() == [50, 40]
-    assert found.manifest.ts_ns.tolist() == own.manifest.ts_ns.tolist()[::-1]
-    np.testing.assert_array_equal(found.boxes, own.boxes[::-1])
-
-
 def test_a_manifest_of_other_sequences_is_refused(tmp_path: Path) -> None:
     folder = download(tmp_path)
     text = read_manifest(folder).to_csv().decode()

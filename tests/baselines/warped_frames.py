@@ -46,15 +46,6 @@ def planted(seed: int, *, scale_ratio: float, size: tuple[float, float] = (60, 4
     return Clip.from_frames(frames, boxes=np.array([expand(box, scale_ratio)] * TARGET + [box]))
 
 
-def swapped(clip: Clip) -> Clip:
-    """The same frames in the opposite order."""
-
-    def load(frame: int, colour: bool) -> Image:
-        return clip.load(TARGET - frame, colour)
-
-    return Clip(anno_id=clip.anno_id, boxes=clip.boxes[::-1], load=load)
-
-
 def rescaled(clip: Clip, factor: float) -> Clip:
     """The same frames, larger or smaller."""
 

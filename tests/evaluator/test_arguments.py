@@ -15,7 +15,6 @@ import pytest
 import evaluator
 from evaluator import (
     GroundTruth,
-    Manifest,
     Predictions,
     Rejected,
     evaluate,
@@ -49,12 +48,6 @@ def test_every_reader_takes_paths_bytes_and_open_files(truth: GroundTruth) -> No
     assert {read_truth(source).digest for source in forms(TABLE)} == {truth.digest}
     assert {read_manifest(source).digest for source in forms(TABLE)} == {truth.manifest.digest}
     assert {evaluator.convert(source, to="ttc") for source in forms(FILE)} == {evaluator.convert(FILE)}
-
-
-def test_predictions_are_written_to_an_open_file_as_well(truth: GroundTruth) -> None:
-    kept = io.BytesIO()
-    data = evaluator.write_predictions(kept, manifest=truth.manifest, ttc_s=truth.ttc_s)
-    assert kept.getvalue() == data
 
 
 @pytest.mark.parametrize(
@@ -111,18 +104,16 @@ def test_arrays_may_be_scale_ratios(truth: GroundTruth) -> None:
         ({"scale_ratio": [1.0]}, "Scale ratios need either fps_hz or frame_gap"),
         ({"scale_ratio": [1.0], "frame_gap": 6}, "frame_gap is 6; expected 1 to 5"),
         ({"ttc_s": [1.0], "frame_gap": 5}, "Times to contact have no rate"),
+        (
+            {"scale_ratio": [1.0], "fps_hz": [5, 5]},
+            "fps_hz has 2 values; expected one number for all sequences",
+        ),
         ({"scale_ratio": [1.0, 2.0], "frame_gap": 5}, r"scale_ratio has the shape \(2,\); expected \(1,\)"),
     ],
 )
 def test_arrays_that_do_not_fit_together_are_refused(arguments: dict[str, object], words: str) -> None:
     with pytest.raises(ValueError, match=words):
         Predictions.from_arrays(manifest=make_truth([4.0]).manifest, **arguments)
-
-
-def test_a_scale_ratio_of_nothing_is_named() -> None:
-    with pytest.raises(Rejected) as caught:
-        Predictions.from_arrays(scale_ratio=[0.9, 0.0], frame_gap=1, manifest=make_truth([4.0, 5.0]).manifest)
-    assert [problem.code for problem in caught.value.problems] == ["not-positive"]
 
 
 def shuffled(truth: GroundTruth) -> pd.Series:
@@ -157,18 +148,6 @@ def test_a_series_may_be_indexed_by_the_manifest_s_own_anno_ids_alone() -> None:
     assert found.ttc_s.tolist() == [4.0, 5.0, 6.0]
     with pytest.raises(ValueError, match="with the index 0, 1, 2; expected 2, 0, 1"):
         Predictions.from_arrays(ttc_s=own.sort_index(), manifest=truth.manifest)
-
-
-def test_an_arrow_array_has_a_method_index_and_no_order_of_its_own(truth: GroundTruth) -> None:
-    pyarrow = pytest.importorskip("pyarrow", reason="pyarrow is not installed")
-    found = Predictions.from_arrays(ttc_s=pyarrow.array(truth.ttc_s), manifest=truth.manifest)
-    assert found.ttc_s.tolist() == truth.ttc_s.tolist()
-
-
-def test_the_series_of_a_frame_are_written_with_their_own_keys(truth: GroundTruth) -> None:
-    frame = manifest_frame(truth.manifest).assign(ttc_s=truth.ttc_s).sample(frac=1, random_state=1)
-    data = evaluator.write_predictions(keys=frame.index, ttc_s=frame["ttc_s"])
-    assert read_predictions(data, manifest=truth.manifest).ttc_s.tolist() == truth.ttc_s.tolist()
 
 
 class FakeTensor:
@@ -218,13 +197,6 @@ def test_tensors_are_taken_in_bfloat16_and_with_a_gradient(tensor: Callable[[obj
         assert MID.errors(given, given).shape == (2,)
 
 
-def test_a_tensor_s_memory_is_not_the_predictions() -> None:
-    memory = FakeTensor([4.0, 5.0], state="")
-    found = Predictions.from_arrays(ttc_s=memory, manifest=make_truth([4.0, 5.0]).manifest)
-    memory.values[0] = 9.0
-    assert found.ttc_s.tolist() == [4.0, 5.0]
-
-
 def test_a_dict_is_told_the_call_that_takes_one(truth: GroundTruth) -> None:
     values = dict(zip(truth.manifest.anno_id_keys, truth.ttc_s.tolist(), strict=True))
     words = (
@@ -240,24 +212,6 @@ def test_a_dict_is_told_the_call_that_takes_one(truth: GroundTruth) -> None:
         Predictions.from_arrays(scale_ratio=values, frame_gap=5, manifest=truth.manifest)
     data = evaluator.write_predictions(keys=list(values), ttc_s=list(values.values()))
     assert read_predictions(data, manifest=truth.manifest).ttc_s.tolist() == truth.ttc_s.tolist()
-
-
-@pytest.mark.parametrize("rate", ["fps_hz", "frame_gap"])
-def test_a_rate_for_each_sequence_is_refused_in_words(rate: str) -> None:
-    for values in ([5, 5], np.array([5, 5])):
-        with pytest.raises(ValueError, match=f"{rate} has 2 values; expected one number for all sequences"):
-            Predictions.from_arrays(
-                scale_ratio=[0.5, 0.6], manifest=make_truth([4.0, 5.0]).manifest, **{rate: values}
-            )
-
-
-def test_things_are_short_in_a_notebook() -> None:
-    truth = make_truth(np.linspace(0.5, 25, 5_000))
-    predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
-    for thing in (truth, truth.manifest, predictions, truth.objects, evaluate(predictions, truth)):
-        assert len(repr(thing)) < 120
-    assert repr(truth).startswith("GroundTruth(5,000 sequences, 0.5 to 25 s, sha256:")
-    assert isinstance(truth.manifest, Manifest)
 
 
 WITHOUT_THE_COMMAND = """

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import importlib
-import json
-import os
 import re
 import subprocess
 import sys
-from importlib.util import find_spec
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -107,66 +104,6 @@ def test_the_lightning_callback_logs_the_scores_of_a_whole_epoch(monkeypatch: py
     found = Predictions.from_arrays(ttc_s=1.1 * scores.truth.ttc_s, manifest=scores.truth.manifest)
     assert logged == {f"tsttc/{name}": value for name, value in evaluate(found, scores.truth).flat().items()}
     assert len(scores.report.breakdown("recording")) == 6
-
-
-def test_a_sanity_check_of_lightning_is_not_warned_of(monkeypatch: pytest.MonkeyPatch) -> None:
-    callback(monkeypatch).on_validation_epoch_end(SimpleNamespace(sanity_checking=True), None)
-
-
-def trained(folder: Path, *arguments: str) -> tuple[list[dict[str, Any]], str]:
-    """What each device has after a training by Lightning on 59 sequences, and standard error."""
-    for module, how in (("torch", "'.[train]'"), ("lightning", "lightning")):
-        if find_spec(module) is None:
-            pytest.skip(f"{module} is not installed: pip install {how}")
-    lines = (EXAMPLES / "truth.csv").read_text(encoding="utf-8").splitlines(keepends=True)
-    (folder / "truth.csv").write_text("".join(lines[:60]), encoding="utf-8")
-    program = Path(__file__).with_name("lightning_training.py")
-    done = subprocess.run(
-        [sys.executable, program, folder, *arguments],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(REPOSITORY), "OMP_NUM_THREADS": "1"},
-    )
-    assert done.returncode == 0, done.stderr
-    return [json.loads(path.read_text()) for path in sorted(folder.glob("rank-*.json"))], done.stderr
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    ("precision", "n_devices"), [("bf16-mixed", 1), ("bf16-true", 1), ("32-true", 2), ("bf16-mixed", 2)]
-)
-def test_lightning_follows_the_board_s_number_in_bfloat16_and_on_two_devices(
-    tmp_path: Path, precision: str, n_devices: int
-) -> None:
-    devices, errors = trained(tmp_path, precision, str(n_devices))
-    assert len(devices) == n_devices
-    assert "no tsttc/ scores" not in errors
-    truth = read_truth(tmp_path / "truth.csv")
-    for found in devices:
-        np.testing.assert_allclose(
-            found["ttc_s"], 1.1 * truth.ttc_s, rtol=1e-6 if "32" in precision else 0.01
-        )
-        predictions = Predictions.from_arrays(ttc_s=found["ttc_s"], manifest=truth.manifest)
-        expected = {
-            name: each for name, each in evaluate(predictions, truth).flat().items() if each is not None
-        }
-        assert found["flat"] == expected
-        assert found["logged"] == pytest.approx({f"tsttc/{name}": each for name, each in expected.items()})
-        assert found["best"] == pytest.approx(expected["mid"]), "what ModelCheckpoint monitors"
-
-
-@pytest.mark.slow
-def test_an_epoch_without_all_sequences_is_warned_of(tmp_path: Path) -> None:
-    [found], errors = trained(tmp_path, "32-true", "1", "2")
-    assert "The epoch has no tsttc/ scores: 43 of 59 sequences have no prediction" in errors
-    assert (found["flat"], found["logged"]) == (None, {})
-
-
-def test_the_callback_is_one_of_lightning_s(monkeypatch: pytest.MonkeyPatch) -> None:
-    lightning = pytest.importorskip("lightning.pytorch", reason="Lightning is not installed")
-    assert isinstance(callback(monkeypatch), lightning.Callback)
 
 
 def test_every_program_is_named_where_the_examples_are_and_on_the_page() -> None:

@@ -40,13 +40,6 @@ def test_fault_of_a_frame_has_the_words_of_a_file(truth: GroundTruth, code: str)
     assert code in {problem.code for problem in caught.value.problems}
 
 
-def test_natural_keys_name_the_sequences_of_a_frame_in_any_order(truth: GroundTruth) -> None:
-    frame = manifest_frame(truth.manifest).assign(ttc_s=truth.ttc_s)
-    shuffled = frame.sample(frac=1, random_state=0).reset_index(drop=True)
-    report = evaluate(predictions_from_frame(shuffled, manifest=truth.manifest), truth)
-    assert report.scores["crucial"].mid == 0.0
-
-
 def test_row_numbers_are_not_taken_for_anno_ids(truth: GroundTruth) -> None:
     frame = manifest_frame(truth.manifest).assign(ttc_s=truth.ttc_s)[["ttc_s"]].reset_index(drop=True)
     with pytest.raises(ValueError, match="does not name the sequences; expected the columns bag_stamp"):

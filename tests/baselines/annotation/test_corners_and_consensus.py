@@ -78,17 +78,3 @@ def test_velocities_of_ten_noisy_frames_cost_at_most_2_6_mid() -> None:
     assert MID.errors(-found.depth_m / found.mps, -true_m / mps).mean() <= 2.6
     plain = least_squares_velocity(time_s, depth_m, there)
     assert MID.errors(-true_m / plain.mps, -true_m / mps).mean() > 10
-
-
-def test_the_consensus_is_as_good_as_scikit_learns_ransac() -> None:
-    linear_model = pytest.importorskip("sklearn.linear_model", reason="scikit-learn is not installed")
-    time_s, depth_m, true_m, mps = noisy_windows(100)
-    ransac = [
-        linear_model.RANSACRegressor(residual_threshold=0.15, random_state=0)
-        .fit(time[:, None], depth)
-        .estimator_.coef_[0]
-        for time, depth in zip(time_s.T, depth_m.T, strict=True)
-    ]
-    found = consensus_velocity(time_s, depth_m, np.ones(time_s.shape, dtype=bool))
-    own, theirs = (MID.errors(-true_m / v, -true_m / mps).mean() for v in (found.mps, np.array(ransac)))
-    assert abs(own - theirs) <= 0.2 or own < theirs

@@ -65,8 +65,3 @@ def test_labels_at_fault_are_named_by_file_and_line(tmp_path: Path, lines: list[
     with pytest.raises(Rejected) as fault:
         read_kitti(tmp_path)
     assert message in str(fault.value)
-
-
-def test_a_folder_without_labels_is_a_problem(tmp_path: Path) -> None:
-    with pytest.raises(Rejected, match="The folder has no label files"):
-        read_kitti(tmp_path)

@@ -9,7 +9,6 @@ from evaluator.metrics.metrics import MID
 from evaluator.problems import Rejected
 from evaluator.truth.csv_tables import Table
 from tests.baselines.annotation.made_tracks import tracks_of
-from tests.baselines.annotation.test_pipeline import braking
 
 
 def steady(n_tracks: int = 150, n_frames: int = 25) -> tuple[np.ndarray, np.ndarray]:
@@ -31,41 +30,6 @@ def test_the_noise_is_the_error_of_the_labels() -> None:
     assert found.n_pairs == 150 * 19
     assert found.noise == pytest.approx(error[whole].mean(), rel=0.2)
     assert found.jitter < found.noise
-
-
-def share_of_error_seen(depth_m: np.ndarray, true_s: np.ndarray) -> float:
-    """The noise that the labels of these depths show, over the error that they have."""
-    table = annotate(tracks_of(depth_m), cut="overlapping").table
-    frame, track = np.array(table.ts_ns) // 10**8, np.array(table.track_id, dtype=int)
-    error = MID.errors(table.ttc_s, true_s[frame, track])[np.array(table.ts_ns) >= 9 * 10**8].mean()
-    noise = label_noise(*successive(table))[0].noise
-    assert noise is not None
-    return float(noise / error)
-
-
-def test_errors_that_last_are_not_seen() -> None:
-    true_m, true_s = steady()
-    rng = np.random.default_rng(9)
-    lasting = rng.normal(0, 0.04, true_m.shape)
-    for frame in range(1, len(lasting)):
-        lasting[frame] = 0.8 * lasting[frame - 1] + 0.6 * lasting[frame]
-    assert 0.45 < share_of_error_seen(true_m + lasting, true_s) < 0.7
-    depth_m, _, braking_s = braking()
-    assert 0.2 < share_of_error_seen(depth_m, braking_s) < 0.5
-
-
-def test_exact_labels_of_steady_vehicles_have_no_noise() -> None:
-    _, true_s = steady(3)
-    found = label_noise(true_s[:-1].ravel(), true_s[1:].ravel())
-    assert all(each.jitter is None or each.jitter < 1e-6 for each in found)
-    assert [each.n_pairs for each in found][-1] == 0
-
-
-def test_noise_stands_with_the_ttc_range_of_the_later_label() -> None:
-    found = {each.name: each for each in label_noise(np.array([3.05, -2.0]), np.array([2.9, -2.1]))}
-    assert [found[name].n_pairs for name in ("overall", "crucial", "small", "negative")] == [2, 1, 0, 1]
-    assert found["negative"].noise == pytest.approx(0, abs=1e-6)
-    assert found["small"].noise is None
 
 
 def test_pairs_are_successive_frames_of_one_vehicle() -> None:

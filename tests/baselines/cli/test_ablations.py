@@ -29,11 +29,6 @@ def test_the_papers_table_stands_beside_the_own_scores(tsttc: Tsttc, frames: Pat
     assert "validation split" in result.stdout
 
 
-def test_the_expansion_has_no_table_in_the_paper(tsttc: Tsttc, frames: Path) -> None:
-    result = tsttc("baseline", "ablate", "expansion", frames, "--jobs", "1")
-    assert "The paper has no table for this: its boxes are enlarged by 1.1." in result.stdout
-
-
 def test_the_table_is_a_document_too(tsttc: Tsttc, frames: Path) -> None:
     options = ("--truth", frames / "truth.csv", "--jobs", "1", "--json")
     document = json.loads(tsttc("baseline", "ablate", "shift", frames, *options).stdout)

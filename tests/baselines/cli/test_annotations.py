@@ -7,7 +7,6 @@ import pytest
 
 from evaluator import read_truth
 from tests.baselines.annotation.made_tracks import HEADER, approaching, text
-from tests.evaluator.toolkit_folders import camera, write_folder
 from tests.evaluator.worlds import Tsttc
 
 
@@ -85,10 +84,3 @@ def test_the_noise_of_labels_is_told_by_range_with_what_it_assumes(
         assert "successive labels share 9 of their 10 frames" in result.stdout
     found = json.loads(tsttc("baseline", "noise", out, "--frames", "1", "--json").stdout)
     assert (found["frames"], found["ranges"][0]["n_pairs"]) == (1, 6)
-
-
-def test_the_noise_of_an_annotation_folder_comes_from_all_its_frames(tsttc: Tsttc, tmp_path: Path) -> None:
-    write_folder(tmp_path, {"r.pkl": [camera({7: [*range(12)], 8: [*range(5)]})]})
-    found = json.loads(tsttc("baseline", "noise", tmp_path, "--json").stdout)
-    assert found["ranges"][0]["n_pairs"] == 2 * 5
-    assert found["ranges"][0]["noise"] == pytest.approx(0, abs=1e-6)

@@ -1,6 +1,5 @@
 """`tsttc baseline run` and `list`: from a folder to a file that the other commands take."""
 
-import hashlib
 import json
 from pathlib import Path
 
@@ -8,8 +7,7 @@ import pytest
 
 from baselines.methods import METHODS, Method
 from tests.baselines.made_folders import made_folder, write_boxes
-from tests.baselines.onnx_models import UNCHANGED_PX, write_models
-from tests.evaluator.worlds import Tsttc, on_terminal
+from tests.evaluator.worlds import Tsttc
 
 
 @pytest.fixture
@@ -38,19 +36,6 @@ def test_the_file_of_a_run_is_taken_by_check(tsttc: Tsttc, folder: Path, tmp_pat
     assert result.stderr == ""
     assert tsttc("check", out, "--manifest", folder / "manifest.csv").exit_code == 0
     assert json.loads(out.read_text())["meta"]["parameters"] == {"measure": "height"}
-
-
-def test_the_file_names_its_weights_by_their_digests(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
-    models = dict(zip(("backbone", "head"), write_models(tmp_path, edge_px=UNCHANGED_PX), strict=True))
-    options = [word for name, path in models.items() for word in (f"--{name}", path)]
-    out = tmp_path / "p.json"
-    result = tsttc("baseline", "run", "tracking", folder, "--out", out, "--tracker", "nano", *options)
-    assert result.exit_code == 0, result.stderr
-    meta = json.loads(out.read_text())["meta"]
-    assert meta["parameters"]["backbone"] == "backbone.onnx", "whose folder is nobody's business"
-    assert meta["weights"] == {
-        name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in models.items()
-    }
 
 
 def test_fallbacks_are_counted_by_reason_with_an_example(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
@@ -87,13 +72,6 @@ def test_strict_exits_1_and_writes_nothing(tsttc: Tsttc, folder: Path, tmp_path:
     assert not out.exists()
 
 
-def test_a_folder_at_fault_exits_1(tsttc: Tsttc, tmp_path: Path) -> None:
-    result = tsttc("baseline", "run", "detection", tmp_path, "--out", tmp_path / "p.json")
-    assert result.exit_code == 1
-    assert "has neither manifest.csv with boxes.csv nor annotation files" in result.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("words", "message"),
     [
@@ -123,12 +101,3 @@ def test_every_method_needs_no_option_and_is_as_published_or_says_that_it_is_not
     for parameter in method.parameters:
         if parameter.choices:
             assert parameter.default in parameter.choices
-
-
-@pytest.mark.slow
-def test_a_terminal_shows_a_bar_with_rate_and_time_left(folder: Path, tmp_path: Path) -> None:
-    done, screen = on_terminal("baseline", "run", "detection", folder, "--out", tmp_path / "p.json")
-    assert done.returncode == 0
-    assert "Detection" in screen
-    assert "3/3" in screen
-    assert "/s" in screen

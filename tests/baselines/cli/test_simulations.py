@@ -69,16 +69,3 @@ def test_a_first_sequence_beyond_the_split_is_named(tsttc: Tsttc, tmp_path: Path
     assert result.exit_code == 2
     assert "12; expected an anno_id of the split, 0 to 11." in " ".join(result.stderr.split())
     assert not (tmp_path / "frames").exists()
-
-
-def test_half_open_triples_belong_to_the_scripts(tsttc: Tsttc, tmp_path: Path) -> None:
-    result = tsttc("baseline", "simulate", tmp_path / "t.csv", "--half-open")
-    assert result.exit_code == 2
-    assert "--half-open is an option of --like scripts" in " ".join(result.stderr.split())
-    assert not (tmp_path / "t.csv").exists()
-
-
-def test_a_place_that_cannot_be_written_to_is_named(tsttc: Tsttc, tmp_path: Path) -> None:
-    result = tsttc("baseline", "simulate", tmp_path / "none" / "t.csv", *SPLIT)
-    assert result.exit_code == 2
-    assert "cannot be written: No such file or directory" in " ".join(result.stderr.split())

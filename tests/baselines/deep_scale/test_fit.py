@@ -1,14 +1,12 @@
 """The estimate from a fit: which scale ratio it finds, from where, and when it is used."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from baselines.boxes import box_around, centre_of, size_of
 from baselines.clips import Clip, Image
 from baselines.deep_scale.estimator import DeepScale
-from baselines.deep_scale.fit import Grid, Place, equations, fitted_scale_ratio, solution, weighting
+from baselines.deep_scale.fit import Grid, fitted_scale_ratio
 from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Operations
 from baselines.deep_scale.weights import read_weights
@@ -50,13 +48,6 @@ def test_the_card_of_weights_says_how_they_are_decoded() -> None:
     assert auto == fit != head
 
 
-def test_the_start_goes_on_whose_features_are_more_alike(operations: Operations) -> None:
-    frames, (reference, target) = pair(planted(0.95))
-    shrunk = box_around(centre_of(reference), 0.75 * size_of(reference))
-    for near, boxes in ((0.7, (reference, target)), (0.94, (shrunk, target))):
-        assert fitted_scale_ratio(operations, frames, boxes, near=near) == pytest.approx(0.95, rel=1e-3)
-
-
 def test_boxes_that_lie_beside_the_vehicle_hardly_change_the_estimate(operations: Operations) -> None:
     frames, boxes = pair(planted(0.95))
     beside = box_around(centre_of(boxes[0]) + np.array([4.0, -3.0]), size_of(boxes[0]))
@@ -80,32 +71,3 @@ def test_boxes_that_do_not_belong_together_give_a_number(
     frames, _ = pair(planted(0.95))
     reference, target = (box_around(np.array([160.0, 120.0]), np.array(each)) for each in sides)
     assert 0.25 < fitted_scale_ratio(operations, frames, (reference, target), near=0.95) < 4
-
-
-def test_a_step_says_by_how_much_a_pattern_is_too_large_and_shifted() -> None:
-    grid = Grid.over(np.array([0.0, 0, 40, 40]), box_px=40.0)
-    rows, columns = grid.offsets()
-    growth, shift_x, shift_y = 0.01, 0.2, -0.1
-
-    def pattern(x: Floats, y: Floats) -> Floats:
-        phases = np.arange(1, 25)[:, None, None]
-        return np.sin(0.05 * phases + 0.11 * x + 0.02 * phases * y / 3) + np.cos(0.09 * y - 0.05 * phases)
-
-    x, y = np.meshgrid(columns, rows)
-    target = pattern(x, y)
-    # What lies at u in the target lies at (1 + growth) u + shift in the reference.
-    reference = pattern((x - shift_x) / (1 + growth), (y - shift_y) / (1 + growth))
-    design, errors = equations(np, target, reference, grid=grid, offsets=(rows, columns))
-    metric, weights = weighting(np, design, errors)
-    step = solution(np, metric @ design, metric @ errors, weights)
-    np.testing.assert_allclose(step, [growth, shift_x, shift_y], rtol=0.02)
-
-
-def test_a_place_moves_by_the_step_but_not_too_far() -> None:
-    grid = Grid.over(np.array([0.0, 0, 80, 60]), box_px=40.0)
-    place = Place(0.9, np.array([100.0, 50.0]))
-    moved = grid.moved(place, np.array([0.01, 1.0, -0.5]))
-    assert moved.scale_ratio == pytest.approx(0.9 * np.exp(0.01))
-    np.testing.assert_allclose(moved.centre, place.centre + 0.9 * grid.pixel_size * np.array([1.0, -0.5]))
-    far = grid.moved(place, np.array([5.0, 0.0, 0.0]))
-    assert far == replace(far, scale_ratio=pytest.approx(0.9 * np.exp(0.08)))

@@ -12,7 +12,7 @@ from scipy.signal import convolve2d, correlate2d
 from baselines.clips import Clip
 from baselines.deep_scale.crops import cut_pair
 from baselines.deep_scale.estimator import DeepScale, cut, network_logits, operations_on
-from baselines.deep_scale.layers import NumpyLayers, convolved, doubled
+from baselines.deep_scale.layers import convolved, doubled
 from baselines.deep_scale.roi_align import sampling_matrix
 from baselines.deep_scale.weights import Use, Weights, write_weights
 from baselines.estimates import Unusable
@@ -93,22 +93,6 @@ def test_crops_keep_boxes_where_they_are_beyond_the_border_and_shrunk() -> None:
     assert sides[0] / sides[1] == pytest.approx(27 / 32, rel=0.05)
 
 
-def test_crops_of_small_boxes_show_what_the_image_has_there() -> None:
-    image = (
-        np.add.outer(np.arange(60), 2 * np.arange(80))[:, :, np.newaxis].repeat(3, axis=2).astype(np.uint8)
-    )
-    boxes = np.array([30.0, 20, 38, 30]), np.array([31.0, 22, 41, 34])
-    pair = cut_pair(image, image, boxes, max_scale=1.5, max_box_px=72.0, margin_px=8.0, n_cells=25)
-    for crop, centre in ((pair.reference, (34, 25)), (pair.target, (36, 28))):
-        assert max(crop.box[2:] - crop.box[:2]) == pytest.approx(13.2, rel=0.03)
-        assert np.all(crop.box[:2] >= 8)
-        assert np.all(crop.box[2:] + 8 <= crop.pixels.shape[1::-1])
-        # The middle of the box shows what the image has there: a pixel's value is that of its centre.
-        x, y = ((crop.box[:2] + crop.box[2:]) / 2).astype(int)
-        seen = crop.pixels[y - 1 : y + 1, x - 1 : x + 1].mean()
-        assert seen == pytest.approx(2 * (centre[0] - 0.5) + centre[1] - 0.5, abs=3)
-
-
 @pytest.fixture(scope="module")
 def scene() -> Clip:
     return planted(0.8)
@@ -125,17 +109,6 @@ def test_numpy_and_torch_give_the_same(scene: Clip, similarity: Any) -> None:
         for device in ("numpy", "cpu")
     )
     np.testing.assert_allclose(one, other, atol=1e-3, rtol=1e-3)
-
-
-def test_two_pairs_of_one_batch_do_not_touch_each_other(scene: Clip) -> None:
-    use = Use(similarity="cosine", n_cells=10, max_box_px=24.0, margin_px=24.0)
-    operations = NumpyLayers(random_tensors())
-    frames, boxes = (scene.colour(0), scene.colour(5)), (scene.boxes[0], scene.boxes[5])
-    pairs = [cut(frames, boxes, use=use), cut(frames[::-1], (boxes[1], boxes[0] + 30), use=use)]
-    together = network_logits(operations, pairs, use=use)
-    for row, pair in enumerate(pairs):
-        alone = network_logits(operations, [pair], use=use)[0]
-        np.testing.assert_allclose(together[row], alone, atol=2e-3)
 
 
 def test_no_estimate_without_boxes_of_a_size(tmp_path: Path, scene: Clip) -> None:

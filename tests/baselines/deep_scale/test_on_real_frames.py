@@ -15,9 +15,7 @@ from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.network import Array, Sampling, features, similarities
 from baselines.deep_scale.roi_align import sampling_matrix
 from baselines.deep_scale.weights import read_weights
-from baselines.folders import read_folder
-from baselines.images import ImageCache
-from evaluator import read_truth, scale_ratio_to_ttc
+from evaluator import scale_ratio_to_ttc
 from evaluator.metrics.metrics import MID, RTE
 from tests.services import shared_data
 
@@ -94,14 +92,14 @@ def deep_scale(shared: Path) -> DeepScale:
 
 
 def test_real_frames_reach_their_errors(
-    deep_scale: DeepScale, kitti_clip: Path, clip_folder: Path, golden: Any
+    deep_scale: DeepScale, real_clips: tuple[list[Clip], Array], golden: Any
 ) -> None:
-    folder, cache, truth = read_folder(clip_folder), ImageCache(), read_truth(kitti_clip / "truth.csv")
-    rows = range(0, folder.n_sequences, 2)  # half of them: neighbours share nine of ten frames
-    found = [deep_scale(folder.clip(row, cache=cache), frame_gap=5).scale_ratio for row in rows]
+    clips, all_ttc_s = real_clips
+    rows = range(0, len(clips), 2)  # half of them: neighbours share nine of ten frames
+    found = [deep_scale(clips[row], frame_gap=5).scale_ratio for row in rows]
     sketched = [golden["kitti_clip"]["predictions"][str(row)]["deep_scale_float_boxes"] for row in rows]
     np.testing.assert_allclose(found, sketched, atol=0.01)
-    ttc_s, true_ttc_s = scale_ratio_to_ttc(found, fps_hz=2.0), truth.ttc_s[::2]
+    ttc_s, true_ttc_s = scale_ratio_to_ttc(found, fps_hz=2.0), all_ttc_s[::2]
     assert np.mean(MID.errors(ttc_s, true_ttc_s)) <= 12
     assert np.mean(RTE.errors(ttc_s, true_ttc_s)) <= 10.5
 

@@ -1,32 +1,17 @@
 """The weights that come with the package: what their card says, and what they are good for."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from baselines.clips import Clip
 from baselines.deep_scale.estimator import DeepScale
-from baselines.deep_scale.weights import read_weights
-from baselines.folders import read_folder
-from baselines.images import ImageCache
-from baselines.methods import OWN_WEIGHTS
 from baselines.pixel_mse import PixelMse
 from baselines.rendering.clips import render
 from baselines.simulation import split
-from evaluator import read_truth
-from tests.baselines.scenes import mean_mid
+from tests.baselines.scenes import Floats, mean_mid
 
 SEED, N = 7, 20
 """The first of the rendered sequences of docs/deep-scale.md, from which nothing was learned."""
-
-
-def test_the_card_says_how_the_weights_were_made() -> None:
-    card = read_weights(OWN_WEIGHTS).card
-    assert set(card) >= {"title", "licence", "stages"}
-    for stage in card["stages"]:
-        assert set(stage) >= {"recipe", "data", "epochs"}
-        assert stage["recipe"]["seed"] != SEED
-    assert OWN_WEIGHTS.stat().st_size < 400_000
 
 
 @pytest.mark.slow
@@ -41,8 +26,9 @@ def test_on_rendered_frames_they_beat_the_papers_pixel_mse() -> None:
 
 
 @pytest.mark.slow
-def test_on_real_frames_they_reach_the_errors_of_the_toolkits(kitti_clip: Path, clip_folder: Path) -> None:
-    folder, cache, method = read_folder(clip_folder), ImageCache(), DeepScale()
-    rows = range(0, folder.n_sequences, 2)
-    found = [method(folder.clip(row, cache=cache), frame_gap=5).scale_ratio for row in rows]
-    assert mean_mid(found, read_truth(kitti_clip / "truth.csv").ttc_s[::2]) <= 12
+def test_on_real_frames_they_reach_the_errors_of_the_toolkits(
+    real_clips: tuple[list[Clip], Floats],
+) -> None:
+    clips, ttc_s = real_clips
+    found = [DeepScale()(clip, frame_gap=5).scale_ratio for clip in clips[::2]]
+    assert mean_mid(found, ttc_s[::2]) <= 12

@@ -10,13 +10,12 @@ import pytest
 from numpy.typing import NDArray
 
 from baselines.clips import Clip
-from baselines.deep_scale.layers import NumpyLayers
 from baselines.deep_scale.samples import FolderSequences, RenderedSequences, Sample, batches, usable_pair
 from baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
 from baselines.folders import read_folder
 from baselines.methods import OWN_WEIGHTS
 from baselines.simulation import split
-from evaluator import GroundTruth, read_truth, ttc_to_scale_ratio
+from evaluator import GroundTruth, read_truth
 from evaluator.problems import Rejected
 from tests.baselines.made_folders import made_folder, stamp
 
@@ -49,15 +48,6 @@ def samples(source: RenderedSequences) -> list[Sample]:
     return [sample for _, batch in found for sample in batch]
 
 
-def test_samples_keep_the_true_scale_ratio_or_its_reciprocal_nearly(
-    source: RenderedSequences, samples: list[Sample]
-) -> None:
-    true = ttc_to_scale_ratio(source.truth.ttc_s, fps_hz=2.0)
-    both = np.log(np.concatenate([true, 1 / true]))
-    for sample in samples:
-        assert np.min(np.abs(both - np.log(sample.scale_ratio))) <= 0.075
-
-
 def test_labels_lie_between_the_two_nearest_scale_ratios(training: Any) -> None:
     scales = np.linspace(0.65, 1.5, 20)
     found = training.labels([0.65, 0.9, 1.49])
@@ -76,44 +66,6 @@ def test_thirty_steps_halve_the_loss(training: Any, samples: list[Sample]) -> No
     network = training.Network(training.new_tensors(seed=0), recipe=recipe, device="cpu")
     losses = [network.learn(samples[:3], learning_rate=5e-3) for _ in range(30)]
     assert losses[-1] <= 0.5 * losses[0]
-
-
-@pytest.fixture(scope="module")
-def fit_samples(source: RenderedSequences) -> list[Sample]:
-    """All pairs of the source, with what the fit learns from."""
-    own = NumpyLayers(read_weights(OWN_WEIGHTS).tensors)
-    found = batches(source, use=SMALL, size=4, rng=np.random.default_rng(0), fitting=own)
-    return [sample for _, batch in found for sample in batch]
-
-
-def test_on_our_features_a_step_finds_more_than_half_of_what_is_lacking(
-    training: Any, fit_samples: list[Sample]
-) -> None:
-    own = training.TorchLayers(
-        {name: training.torch.from_numpy(each) for name, each in read_weights(OWN_WEIGHTS).tensors.items()}
-    )
-    fits = [sample.fit for sample in fit_samples if sample.fit is not None]
-    assert len(fits) == len(fit_samples)
-    errors = [float(training.fit_error(own, fit)) for fit in fits]
-    lacking = 2000 * np.abs([fit.lacking for fit in fits])
-    assert np.mean(errors) < 0.5 * np.mean(lacking)
-
-
-def test_the_network_learns_to_fit(training: Any, fit_samples: list[Sample]) -> None:
-    recipe = training.Recipe(optimizer="adam", fit_weight=1.0, use=SMALL)
-    network = training.Network(training.new_tensors(seed=0), recipe=recipe, device="cpu")
-    few = sorted(fit_samples, key=lambda sample: sample.fit.pixels.size if sample.fit else 0)[:3]
-    losses = [network.learn(few, learning_rate=3e-3) for _ in range(12)]
-    assert min(losses[-3:]) <= 0.5 * losses[0]
-
-
-def test_rendered_pairs_have_the_scale_ratio_of_their_distances(source: RenderedSequences) -> None:
-    of_labels = ttc_to_scale_ratio(source.truth.ttc_s, fps_hz=2.0)
-    apart = np.abs(np.log(source.scale_ratios / of_labels))
-    assert np.median(apart) < 1e-4  # most vehicles keep their speed
-    boxes = np.stack([source.clip(row).boxes[[0, 5]] for row in range(16)])
-    widths = boxes[..., 2] - boxes[..., 0]
-    np.testing.assert_allclose(source.scale_ratios, widths[:, 0] / widths[:, 1], rtol=0.2)
 
 
 class Ended(Exception):
@@ -200,51 +152,6 @@ def test_with_a_start_the_score_before_epoch_1_comes_first_and_no_rate_keeps_it(
 
 def as_torch(training: Any, weights: Weights) -> dict[str, Any]:
     return {name: training.torch.from_numpy(each.copy()) for name, each in weights.tensors.items()}
-
-
-def test_a_training_that_was_ended_before_its_second_epoch_keeps_the_score_of_its_start(
-    training: Any, source: RenderedSequences, tmp_path: Path
-) -> None:
-    start = Weights(read_weights(OWN_WEIGHTS).tensors, SMALL)
-    mids = iter([5.0, 7.0, 6.0])
-    validation = SimpleNamespace(scores=lambda *_, **__: {"overall": {"mid": next(mids), "rte": 1.0}})
-    recipe = training.Recipe(epochs=2, batch=4, use=SMALL)
-    known = {"source": Rows(source), "validation": validation, "recipe": recipe, "start": start}
-
-    def end_after_1(epoch: Any) -> None:
-        if epoch.number == 1:
-            raise Ended
-
-    with pytest.raises(Ended):
-        training.train(**known, out=tmp_path / "w.npz", after_epoch=end_after_1)
-    epochs = training.train(**known, out=tmp_path / "w.npz")
-    assert [(epoch.number, epoch.mid) for epoch in epochs] == [(0, 5.0), (1, 7.0), (2, 6.0)]
-    card = read_weights(tmp_path / "w.npz").card
-    assert card["epochs"][-1]["number"] == 2, "the better of both epochs, though the start was better still"
-
-
-def test_a_source_without_a_usable_sequence_is_a_problem(
-    training: Any, source: RenderedSequences, tmp_path: Path
-) -> None:
-    near = SimpleNamespace(
-        truth=SimpleNamespace(n_sequences=2, digest="near"),
-        scale_ratios=ttc_to_scale_ratio(np.array([0.2, -0.5]), fps_hz=2.0),
-        clip=source.clip,
-    )
-    with pytest.raises(Rejected, match="None of the 2 sequences can be learned from"):
-        training.train(
-            source=near,
-            validation=training.Validation(source),
-            recipe=training.Recipe(use=SMALL),
-            out=tmp_path / "w.npz",
-        )
-
-
-def test_an_epoch_is_scored_by_the_evaluator(training: Any, source: RenderedSequences) -> None:
-    network = training.Network(training.new_tensors(seed=0), recipe=training.Recipe(use=SMALL), device="cpu")
-    scores = training.Validation(source).scores(network.operations(), use=SMALL)
-    assert scores["overall"]["mid"] > 0
-    assert set(scores) >= {"overall", "crucial", "negative"}
 
 
 TRUTH = "anno_id,bag_stamp,cam_id,ts,track_id,ttc\n"

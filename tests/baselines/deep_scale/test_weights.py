@@ -1,7 +1,6 @@
 """Weights come in without torch; nothing in them is run, and what is wrong with them is said."""
 
 import io
-import json
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -9,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.deep_scale.checkpoint import MAX_BYTES, MAX_PICKLE_BYTES
+from baselines.deep_scale.checkpoint import MAX_BYTES
 from baselines.deep_scale.weights import CARD, Use, Weights, read_weights, write_weights
 from evaluator.problems import Rejected
 from tests.baselines.deep_scale.made_weights import (
@@ -101,23 +100,7 @@ FAULTY: dict[str, tuple[Callable[[], bytes], str]] = {
         lambda: checkpoint(TENSORS, pickled=replaced(tensor(LAST, (20,), n_items=20, offset=8))),
         f"The tensor {LINEAR} begins at 8 of 20 numbers",
     ),
-    "fewer bytes than it says": (
-        lambda: checkpoint(TENSORS, pickled=replaced(tensor(LAST, (20,), n_items=30))),
-        "has 80 bytes; expected 120",
-    ),
-    "no storage": (
-        lambda: checkpoint(TENSORS, pickled=replaced(tensor(500, (20,), n_items=20))),
-        'The zip has no entry "latest_ckpt/data/500"',
-    ),
-    "a number for a model": (lambda: checkpoint(TENSORS, pickled=b"\x80\x02I1\n."), 'has no "model"'),
-    "a cut pickle": (lambda: checkpoint(TENSORS, pickled=model(TENSORS)[:900]), "not an intact pickle"),
     "a cut zip": (lambda: checkpoint(TENSORS)[:-40], "The file is not a complete zip"),
-    "no zip": (lambda: b"weights", "The file is not a complete zip"),
-    "another zip": (lambda: zipped({"a": b"b"}), "The zip has no data.pkl"),
-    "a long pickle": (
-        lambda: zipped({"c/data.pkl": bytes(MAX_PICKLE_BYTES + 1)}),
-        "data.pkl has 1,048,577 bytes",
-    ),
     "a zip bomb": (lambda: zipped({"c/data.pkl": bytes(MAX_BYTES + 1)}), "The file unpacks to 1 entries"),
 }
 
@@ -156,31 +139,8 @@ def own_entries(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
         (f"{LINEAR}.npy", None, f"The file has no tensor {LINEAR}"),
         (f"{LINEAR}.npy", b"short", f"The tensor {LINEAR} has 5 bytes; expected 208"),
         (f"{LINEAR}.npy", bytes(208), f"The tensor {LINEAR} is not an array (20,) of float32"),
-        (CARD, b"[]", "card.json is not a JSON object"),
         (CARD, b"{", "card.json is not a JSON object"),
         (CARD, b'{"use": {"similarity": "dot"}}', '"use" in card.json says nothing that this version can do'),
-        (
-            CARD,
-            json.dumps(
-                {"use": {"similarity": "dot", "n_cells": 1e9, "max_box_px": 40, "margin_px": 8}}
-            ).encode(),
-            '"use" in card.json',
-        ),
-        (
-            CARD,
-            json.dumps(
-                {
-                    "use": {
-                        "similarity": "dot",
-                        "n_cells": 9,
-                        "max_box_px": 40,
-                        "margin_px": 8,
-                        "decoding": "x",
-                    }
-                }
-            ).encode(),
-            '"use" in card.json',
-        ),
     ],
 )
 def test_a_faulty_own_file_is_a_problem_in_words(

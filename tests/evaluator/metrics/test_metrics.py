@@ -35,23 +35,9 @@ def test_errors_are_finite_and_not_negative(metric: Metric) -> None:
 
 
 @every_metric
-def test_a_sequence_is_scored_alone_as_among_others(metric: Metric) -> None:
-    alone = [float(metric.errors(p, t)) for p, t in zip(PREDICTED_S, TRUE_S, strict=True)]
-    assert metric.errors(PREDICTED_S, TRUE_S).tolist() == alone
-
-
-@every_metric
 def test_scalars_and_arrays_broadcast(metric: Metric) -> None:
     assert metric.errors(5.0, TRUE_S).tolist() == metric.errors(np.full(100, 5.0), TRUE_S).tolist()
     assert metric.errors(PREDICTED_S, 5.0).tolist() == metric.errors(PREDICTED_S, np.full(100, 5.0)).tolist()
-
-
-@every_metric
-def test_inputs_are_left_as_they_were(metric: Metric) -> None:
-    predicted, true = PREDICTED_S.copy(), TRUE_S.copy()
-    metric.errors(predicted, true)
-    assert (predicted == PREDICTED_S).all()
-    assert (true == TRUE_S).all()
 
 
 @every_metric

@@ -40,11 +40,6 @@ def test_the_rate_changes_the_ratio_but_not_the_time(
     assert float(scale_ratio_to_ttc(converted, fps_hz=to_fps_hz)) == pytest.approx(ttc_s, rel=1e-9)
 
 
-def test_ratios_below_one_approach_and_above_one_recede() -> None:
-    assert float(scale_ratio_to_ttc(0.8, fps_hz=2)) == 2.0
-    assert float(scale_ratio_to_ttc(1.25, fps_hz=2)) == pytest.approx(-2.5)
-
-
 def test_a_size_that_stays_never_makes_contact() -> None:
     assert float(scale_ratio_to_ttc(1.0, fps_hz=2)) == math.inf
     assert float(ttc_to_scale_ratio(math.inf, fps_hz=2)) == 1.0

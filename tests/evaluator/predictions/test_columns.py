@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from evaluator import Manifest, Rejected, read_predictions
 from evaluator.metrics.scale import Floats
-from evaluator.predictions import columns
 from evaluator.predictions.alignment import read_slowly
 from evaluator.predictions.columns import read_column
 from tests.evaluator.faulty_files import CASES, FURTHER, MANIFEST
@@ -66,69 +65,48 @@ def assert_equivalent(data: bytes, manifest: Manifest, *, by_columns: bool = Fal
 spellings = st.sampled_from(
     [
         "1",
-        "-1",
-        "7.25",
         "-12.9",
         "0.1",
         "1e0",
-        "1E+2",
-        "1e-2",
         "-1.5E-3",
         "5.0e-324",
         "1.7976931348623157e308",
         "9007199254740993",
         "123456789012345678901234567890",
         "0.30000000000000004",
-        "2.5",
-        "3",
-        "-4",
         "18446744073709551616",
         "1e22",
         "1e23",
         "8.988465674311580e307",
-        "0.000001",
         "100000000000000000000000",
-        "4.35",
-        "0.1e1",
     ]
 ) | st.floats(allow_nan=False, allow_infinity=False).filter(bool).map(repr)
 oddities = st.sampled_from(
     [
         "0",
-        "-0",
         "0.0",
         "1e400",
-        "-1e400",
         "1e-400",
         "NaN",
         "Infinity",
-        "-Infinity",
         "null",
         "true",
-        "false",
         '"5"',
         "[5]",
-        "[]",
         "{}",
         '{"0":1}',
         "05",
         "+5",
         ".5",
-        "5.",
         "5e",
         "-",
         "0x10",
         "1_000",
         "5,5",
-        "5:5",
         "tru",
         "1e5.5",
         "٣",
-        "'5'",
         "1.5.5",
-        "--5",
-        "5-",
-        "5e+",
         '"',
         "",
     ]
@@ -178,40 +156,6 @@ def test_odd_values_read_the_same_both_ways(file: tuple[bytes, Manifest]) -> Non
 
 
 LONG = make_truth([4.0] * 40).manifest
-
-
-@st.composite
-def natural_files(draw: st.DrawFn) -> bytes:
-    """Natural keys in the manifest's order, in a layout of a machine; perhaps with one fault."""
-    colon, comma = draw(
-        st.sampled_from([(":", ","), (": ", ", "), (": ", ",\n  "), (" :", " ,"), (":", ", ")])
-    )
-    values = draw(st.lists(spellings, min_size=40, max_size=40))
-    members = [f'"{key}"{colon}{value}' for key, value in zip(LONG.natural_keys, values, strict=True)]
-    text = "{" + comma.join(members) + "}"
-    faults = st.sampled_from(['"', ",", ", ", " ", "\t", "5", "", ":", "}", '"x":1,', "\\", "é", "\x00"])
-    if draw(st.booleans()):
-        at = draw(st.integers(0, len(text)))
-        text = text[:at] + draw(faults) + text[at + draw(st.integers(0, 2)) :]
-    if draw(st.booleans()):
-        first, second = draw(st.tuples(st.integers(0, 39), st.integers(0, 39)))
-        text = text.replace(LONG.natural_keys[first], LONG.natural_keys[second])
-    return text.encode()
-
-
-@pytest.mark.slow
-@settings(max_examples=200)
-@given(data=natural_files())
-def test_natural_keys_in_order_read_the_same_both_ways(data: bytes) -> None:
-    assert_equivalent(data, LONG)
-
-
-@pytest.mark.parametrize("n_characters", [113, 114, 200])
-@pytest.mark.parametrize("number", ["2.5", "2." + "5" * 125, "2." + "5" * 126])
-def test_keys_and_numbers_of_any_length_read_the_same_both_ways(n_characters: int, number: str) -> None:
-    manifest = make_truth([4.0, 2.0, 3.0], bags=["a", "b" * n_characters, "c"]).manifest
-    data = "{" + ",".join(f'"{key}":{number}' for key in manifest.natural_keys) + "}"
-    assert_equivalent(data.encode(), manifest)
 
 
 @pytest.mark.parametrize("name", ['a"b', "a\\b", "a\nb", "ü"])
@@ -348,17 +292,6 @@ def test_a_doubled_key_is_seen_in_any_order(manifest: Manifest, separators: tupl
             assert read_column(doubled.encode(), manifest) is None
 
 
-def test_short_anno_ids_need_no_dictionary(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(columns, "_OBJECT", None)
-    for manifest in (LONG, FIVE_DIGITS):
-        for keys in (manifest.anno_id_keys, manifest.anno_id_keys[::-1]):
-            for separators in ((",", ":"), (", ", ": "), (",\n", ": ")):
-                data = json.dumps(dict.fromkeys(keys, 2.5), separators=separators).encode()
-                assert_equivalent(data, manifest, by_columns=True)
-            data = json.dumps({"unit": "ttc", "predictions": dict.fromkeys(keys, 2.5)}).encode()
-            assert_equivalent(data, manifest, by_columns=True)
-
-
 @pytest.mark.parametrize("manifest", [WIDE, FIVE_DIGITS])
 def test_a_key_needs_its_first_quotation_mark(manifest: Manifest) -> None:
     data = json.dumps(dict.fromkeys(manifest.anno_id_keys, 2.5))
@@ -366,14 +299,6 @@ def test_a_key_needs_its_first_quotation_mark(manifest: Manifest) -> None:
     key = manifest.anno_id_keys[-1]
     for faulty in (data.replace(f'"{key}"', f'5{key}"'), data.replace(f'"{key}"', f' {key}"')):
         assert read_column(faulty.encode(), manifest) is None
-
-
-@pytest.mark.parametrize("n_spaces", [0, 63, 64, 10_000])
-@pytest.mark.parametrize("natural", [False, True])
-def test_any_white_space_between_members_reads_the_same_both_ways(n_spaces: int, natural: bool) -> None:
-    keys = LONG.natural_keys if natural else LONG.anno_id_keys
-    data = json.dumps(dict.fromkeys(keys, 2.5), separators=("," + " " * n_spaces, ":"))
-    assert_equivalent(data.encode(), LONG, by_columns=True)
 
 
 def test_rates_and_ratios_are_converted_the_same_both_ways() -> None:

@@ -26,10 +26,6 @@ def test_a_faulty_file_is_rejected_in_these_words(name: str) -> None:
     assert all(found.code in PROBLEM_CODES for found in rejected.value.problems)
 
 
-def test_an_empty_object_misses_everything() -> None:
-    assert rejection(b"{}").n_problems == 4
-
-
 def test_a_file_over_the_limit_is_not_looked_at() -> None:
     problem = rejection(b"\xff" * 101, max_bytes=100).problems[0]
     assert problem == Problem("too-large", "The file has 101 bytes; expected at most 100.")
@@ -57,23 +53,6 @@ def test_many_missing_and_unknown_keys_are_counted_and_twenty_are_named() -> Non
     assert unknown.message.startswith("30 keys name no sequence of the manifest: ")
     assert missing.message.startswith("100 sequences have no value: 0, 1, 2, ")
     assert "18, 19, … (the first 20); expected" in missing.message
-
-
-def test_many_different_values_are_counted_and_twenty_are_named() -> None:
-    manifest = make_truth([4.0] * 100).manifest
-    rejected = rejection(flat([str(row) for row in range(100)]), manifest=manifest)
-    assert rejected.n_problems == 100
-    assert [p.where for p in rejected.problems] == [*(f"/{row}" for row in range(20)), ""]
-    assert rejected.problems[-1] == Problem("not-a-number", "And 80 more like these: 100 in all.")
-
-
-def test_an_unfilled_template_is_one_line() -> None:
-    rejected = rejection(flat([None] * 100), manifest=make_truth([4.0] * 100).manifest)
-    (line,) = rejected.problems
-    assert (rejected.n_problems, line.code, line.where) == (100, "not-a-number", "/0")
-    assert line.message.startswith(
-        "The value is null; expected a number of seconds. 99 more places have this problem: /1, /2, "
-    )
 
 
 @pytest.mark.parametrize(

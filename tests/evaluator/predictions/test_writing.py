@@ -2,7 +2,6 @@
 
 import json
 import math
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -28,13 +27,6 @@ def test_seconds_are_written_in_the_toolkits_form() -> None:
     assert read(data) == TTC_S
 
 
-def test_seconds_with_notes_need_the_envelope() -> None:
-    data = write_predictions(manifest=MANIFEST, ttc_s=TTC_S, meta={"model": "Föö++"})
-    predictions = read_predictions(data, manifest=MANIFEST)
-    assert predictions.ttc_s.tolist() == TTC_S
-    assert predictions.meta == {"model": "Föö++"}
-
-
 @pytest.mark.parametrize("rate", [{"fps_hz": 2.5}, {"frame_gap": 4}])
 def test_scale_ratios_are_written_with_their_rate(rate: dict[str, Any]) -> None:
     ratios = [0.9, 1.25, 1.0]
@@ -47,21 +39,11 @@ def test_keys_may_be_given_instead_of_a_manifest(keys: list[str | int]) -> None:
     assert read(write_predictions(keys=keys, ttc_s=TTC_S)) == TTC_S
 
 
-def test_the_file_has_the_bytes_that_are_returned(tmp_path: Path) -> None:
-    path = tmp_path / "mine.json"
-    assert write_predictions(path, manifest=MANIFEST, ttc_s=TTC_S) == path.read_bytes()
-
-
 @given(values=st.lists(st.floats(allow_nan=False).filter(bool), min_size=1, max_size=30))
 def test_every_value_reads_back_exactly(values: list[float]) -> None:
     manifest = make_truth([4.0] * len(values)).manifest
     assert read(write_predictions(manifest=manifest, ttc_s=values), manifest) == values
     assert read(write_predictions(keys=manifest.natural_keys, ttc_s=values, meta={}), manifest) == values
-
-
-def test_values_of_lower_precision_are_widened() -> None:
-    values = np.array(TTC_S, dtype=np.float32)
-    assert read(write_predictions(manifest=MANIFEST, ttc_s=values)) == values.astype(np.float64).tolist()
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from evaluator import GroundTruth, Predictions, Report, Table, confidence_intervals, evaluate
-from evaluator.cli.scores import GROUPS as CHOICES
 from evaluator.scoring.breakdown import GROUPS, scores_of
 
 N = 240
@@ -50,14 +49,6 @@ def test_groups_hold_every_sequence_once_and_average_to_the_whole(report: Report
         assert sum(sums) / N == pytest.approx(report.scores["overall"].means[metric])
 
 
-def test_groups_of_a_range_are_the_scores_of_that_range(report: Report) -> None:
-    by_range = {row.group.split()[0]: row for row in report.breakdown("range")}
-    for name in ("crucial", "small", "large", "negative"):
-        assert by_range[name].scores["mid"] == pytest.approx(report.scores[name].mid)
-        assert by_range[name].n_sequences == report.scores[name].count
-    assert list(by_range["in"].scores) == ["mid", "rte"]
-
-
 def test_groups_have_the_words_and_edges_of_the_documents(report: Report) -> None:
     assert [row.group for row in report.breakdown("occlusion")] == (
         ["0 %", "0–25 %", "25–50 %", "50–100 %", "not stated"]
@@ -78,12 +69,6 @@ def test_the_interval_of_one_group_of_all_is_the_board_s(
     for name, ends in board.items():
         assert whole.intervals[name] == (None if ends is None else pytest.approx(ends, rel=1e-4))
     assert any(board.values())
-
-
-def test_one_recording_has_no_interval(report: Report) -> None:
-    rows = report.breakdown("recording", with_intervals=True)
-    assert {ends for row in rows for ends in row.intervals.values()} == {None}
-    assert {row.n_recordings for row in rows} == {1}
 
 
 @pytest.mark.parametrize("by", OBJECTS)
@@ -129,7 +114,3 @@ def test_a_report_is_short_as_repr_and_a_table_as_text_and_in_a_notebook(report:
     html = report._repr_html_()
     assert html.count("<tr>") == 6
     assert f"{report.scores['crucial'].mid:.2f}" in html
-
-
-def test_the_command_offers_what_the_library_has() -> None:
-    assert tuple(GROUPS) == CHOICES

@@ -1,7 +1,5 @@
 """Intervals of means against plain loops and scipy, and what must not change them."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from scipy import stats
@@ -85,25 +83,6 @@ def test_intervals_agree_with_another_bootstrap_and_with_the_normal_distribution
     assert high[0, 0] - low[0, 0] == pytest.approx(2 * 1.96 * error, rel=0.12)
 
 
-@pytest.mark.parametrize("degrees", [8, 8.3, 10.7, 15, 20, 33, 67, 100, 300, 700, 10_000])
-def test_the_tail_of_few_recordings_is_scipys(degrees: float) -> None:
-    assert uncertainty._student(degrees) == pytest.approx(stats.t.ppf(0.975, degrees), abs=3e-5)
-    n = 1.3 * degrees
-    exact = stats.norm.cdf(-stats.t.ppf(0.975, degrees) * (n / (n - 1)) ** 0.5)
-    assert uncertainty._tail(n, degrees=degrees) == pytest.approx(exact, rel=1e-4)
-
-
-def test_the_degrees_of_freedom_are_those_of_the_variance_not_of_the_mean() -> None:
-    # One recording of 300 sequences among 60 of 10: as many as 24 for the mean, and 1.1 for its error.
-    counts = np.array([[300.0]] + [[10.0]] * 60)
-    (found,) = uncertainty.degrees_of(counts)
-    assert found == pytest.approx((300**2 + 60 * 10**2) ** 2 / (300**4 + 60 * 10**4))
-    assert found == pytest.approx(1.14, abs=0.01)
-    assert not uncertainty.usable_columns(counts).any()
-    equal = uncertainty.degrees_of(np.array([[7.0]] * 25 + [[0.0]] * 9))
-    assert equal == pytest.approx([25.0])
-
-
 def test_fewer_than_8_degrees_of_freedom_in_a_column_give_no_interval_there() -> None:
     counts = np.full((40, 3), 5.0)
     counts[8:, 1], counts[7:, 2] = 0, 0
@@ -135,11 +114,3 @@ def test_an_interval_depends_on_its_own_entry_alone() -> None:
     for i in range(len(sums)):
         own_low, own_high = bootstrap.intervals(sums[i : i + 1])
         assert (own_low[0, 0], own_high[0, 0]) == pytest.approx((low[i, 0], high[i, 0]), rel=1e-9)
-
-
-def test_the_random_numbers_belong_to_the_revision_of_the_ground_truth() -> None:
-    draw: Callable[[str, str], float] = lambda digest, purpose: uncertainty.generator_of(  # noqa: E731
-        digest, purpose=purpose
-    ).random()
-    assert draw("sha256:a", "weights") == draw("sha256:a", "weights")
-    assert len({draw(d, p) for d in ("sha256:a", "sha256:b") for p in ("weights", "signs")}) == 4

@@ -12,7 +12,6 @@ import pytest
 
 from tests import error_models
 from tests.error_models import Drawn, Model
-from tests.evaluator.recordings import sign_flip_p
 from tests.validity import __main__ as tables
 from tests.validity import coverage, fields, margin, worlds
 from tests.validity.coverage import Coverage
@@ -68,13 +67,6 @@ def test_a_test_of_single_sequences_is_wrong_most_of_the_time() -> None:
     assert coverage.by_sequences(0.2, n_recordings=100, n=100, rng=rng) > 0.4
 
 
-def test_a_test_of_recordings_is_right_where_that_of_sequences_is_not() -> None:
-    rng = np.random.default_rng(2)
-    drawn = error_models.MODELS[0].draw(100, 400, rng)
-    p = sign_flip_p(drawn.first - drawn.second, rng=rng, n_flips=999)
-    assert 0.02 <= (p < 0.05).mean() <= 0.09
-
-
 @pytest.mark.parametrize("field", fields.LEVELS)
 @pytest.mark.parametrize("n_recordings", [100, 700])
 def test_rank_ranges_hold_the_true_ranks(n_recordings: int, field: str) -> None:
@@ -119,13 +111,6 @@ def test_recordings_of_alike_days_need_days_as_units() -> None:
     recordings, days = found(coverage.as_drawn), found(coverage.days_of(35))
     assert recordings.all.of_difference < 0.8 < days.all.of_difference
     assert min(recordings.all.of_means) < 0.8 < min(days.all.of_means)
-
-
-def test_one_odd_method_among_ten_costs_more_than_a_quoted_row() -> None:
-    draw = worlds.one_odd("informative", n_methods=10)
-    rng = np.random.default_rng(6)
-    found = fields.ranks_of(draw, means=np.ones(10), n_recordings=50, n=100, rng=rng)
-    assert found.all_at_once < 0.92
 
 
 # --- the tables of the documentation ---------------------------------------------------------------------

@@ -1,11 +1,9 @@
 """The toolkit numbers a folder as the file system lists it: said, warned of, and mended by natural keys."""
 
 import json
-import re
 import shlex
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from evaluator import Rejected, evaluate, read_manifest, read_predictions, read_truth
@@ -64,20 +62,6 @@ def test_results_of_the_toolkit_score_what_they_are_worth_once_they_have_natural
     assert worth.scores["overall"].rte > 20
 
 
-def test_values_are_kept_to_the_last_bit(folder: Path, results: Path) -> None:
-    numbering = read_numbering(folder)
-    by_key = dict(toolkit_results(folder).values())
-    assert json.loads(convert(results.read_bytes(), natural_keys=numbering.natural_keys)) == by_key
-
-
-def test_keys_and_unit_change_together(folder: Path, tsttc: Tsttc, tmp_path: Path) -> None:
-    ratios = tmp_path / "ratios.json"
-    ratios.write_bytes(flat(dict.fromkeys(toolkit_results(folder), 0.9)))
-    made = json.loads(tsttc("convert", ratios, "--frame-gap", 1, "--annotations", folder).stdout)
-    assert set(made) == set(read_manifest(folder).natural_keys)
-    assert set(made.values()) == {0.8999999999999996}
-
-
 def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
     tsttc: Tsttc, folder: Path, results: Path
 ) -> None:
@@ -97,44 +81,6 @@ def test_check_warns_of_the_toolkit_s_numbers_with_the_command_that_mends_them(
     document = json.loads(tsttc("check", results, "--annotations", folder, "--json").stdout)
     assert [warning["code"] for warning in document["warnings"]] == ["shuffled-values", "other-numbering"]
     assert document["n_renumbered"] == n_renumbered
-
-
-def test_check_does_not_warn_of_a_file_in_the_manifest_s_numbers(
-    tsttc: Tsttc, folder: Path, tmp_path: Path
-) -> None:
-    path = tmp_path / "mine.json"
-    path.write_bytes(flat(read_truth(folder).ttc_s.tolist()))
-    checked = tsttc("check", path, "--annotations", folder)
-    assert (checked.exit_code, checked.stderr) == (0, "")
-    assert "the order of files is another one" in checked.stdout
-
-
-def test_check_of_natural_keys_needs_no_warning(tsttc: Tsttc, folder: Path, results: Path) -> None:
-    data = tsttc("convert", results, "--annotations", folder).stdout_bytes
-    checked = tsttc("check", "-", "--annotations", folder, stdin=data)
-    assert (checked.exit_code, checked.stderr) == (0, "")
-
-
-def test_few_sequences_are_warned_of_by_the_order_alone(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
-    for file in sorted(folder.glob("*.pkl"))[2:]:
-        file.unlink()
-    path = tmp_path / "results.json"
-    path.write_bytes(flat({anno_id: ttc_s for anno_id, (_, ttc_s) in toolkit_results(folder).items()}))
-    checked = tsttc("check", path, "--annotations", folder)
-    assert re.search("^Warning: .*If the toolkit wrote the file: give it natural keys", checked.stderr)
-    assert checked.stderr.count("\n") == 1
-
-
-def test_same_order_is_said_as_well(tsttc: Tsttc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for _ in range(2):  # backwards twice is forwards
-        list_backwards(monkeypatch)
-    folder = driving_folder(tmp_path / "annotations")
-    for file in sorted(folder.glob("*.pkl"))[1:]:
-        file.unlink()
-    made = tsttc("manifest", folder, "-o", tmp_path / "manifest.csv")
-    assert made.stderr == (
-        "The toolkit numbers the folder like the manifest: the order of files is the same.\n"
-    )
 
 
 def test_manifest_of_a_folder_says_how_the_toolkit_numbers_it(tsttc: Tsttc, folder: Path) -> None:
@@ -186,21 +132,3 @@ def test_natural_keys_are_not_converted_again(folder: Path, results: Path) -> No
         "unknown-keys: The 327 keys are natural keys already; expected anno_ids of the toolkit. The file "
         "needs no annotations: it can be sent as it is."
     ]
-
-
-def test_folder_without_annotations_is_named(tsttc: Tsttc, results: Path, tmp_path: Path) -> None:
-    empty = tmp_path / "empty"
-    empty.mkdir()
-    refused = tsttc("convert", results, "--annotations", empty)
-    assert refused.exit_code == 1
-    assert "The folder has no annotation files; expected at least one *.pkl." in refused.stderr
-    assert tsttc("convert", results, "--annotations", results).exit_code == 2
-    assert tsttc("check", results).exit_code == 2
-
-
-def test_realigned_values_are_those_of_the_natural_keys(folder: Path, results: Path) -> None:
-    numbering = read_numbering(folder)
-    as_sent = read_predictions(results.read_bytes(), manifest=numbering.manifest)
-    data = convert(results.read_bytes(), natural_keys=numbering.natural_keys)
-    meant = read_predictions(data, manifest=numbering.manifest)
-    assert np.array_equal(numbering.realigned(as_sent.ttc_s), meant.ttc_s)

@@ -95,12 +95,6 @@ def test_scalars_of_numpy_become_python_numbers(scalar: np.generic, protocol: in
     assert type(found) is type(scalar.item())
 
 
-def test_a_file_cannot_change_the_dtypes_of_the_program() -> None:
-    data = pickle.dumps(np.array([1.0], dtype=">f8"), protocol=2)
-    load(data)
-    assert np.dtype("f8").byteorder in {"=", "|"}
-
-
 @pytest.mark.parametrize("protocol", range(6))
 def test_ordered_and_default_dicts_become_dicts(protocol: int) -> None:
     ordered = collections.OrderedDict(a=1, b=2)
@@ -121,26 +115,14 @@ def test_names_of_python_two_are_understood() -> None:
 CALLS = {
     "os.system": Calls(os.system, "true"),
     "eval": Calls(builtins.eval, "1"),
-    "exec": Calls(builtins.exec, "1"),
     "getattr": Calls(getattr, "a", "upper"),
-    "import": Calls(builtins.__import__, "os"),
     "open": Calls(builtins.open, "/dev/null"),
     "subprocess": Calls(subprocess.Popen, ["true"]),
     "bytearray of a terabyte": Calls(bytearray, 10**12),
-    "range": Calls(range, 10**12),
-    "str": Calls(str, [1]),
-    "type": Calls(type, "A", (), {}),
     "Path": Path("/etc/passwd"),
-    "named tuple": Path().stat(),
-    "complex": 1j,
-    "class": Rejected,
-    "slice": slice(1),
     "object array": np.array([{}], dtype=object),
     "records": np.zeros(1, dtype=[("a", "f8")]),
-    "text array": np.array(["a"]),
-    "dates": np.array(["2020-01-01"], dtype="datetime64[D]"),
     "memory-mapped array": Calls(np.memmap, "/etc/passwd"),
-    "numpy.load": Calls(np.load, "/etc/passwd"),
 }
 
 
@@ -148,14 +130,6 @@ CALLS = {
 @pytest.mark.parametrize("name", CALLS)
 def test_calls_of_anything_else_are_refused(name: str, protocol: int) -> None:
     assert codes(pickle.dumps([CALLS[name]], protocol=protocol)) == {"forbidden-pickle"}
-
-
-def test_a_refusal_names_what_was_asked_for() -> None:
-    with pytest.raises(Rejected) as rejected:
-        load(b"cos\nsystem\n(S'touch /tmp/x'\ntR.")
-    assert rejected.value.problems[0].message == (
-        'The pickle asks for "os.system"; expected plain containers, numbers and attribute-dicts.'
-    )
 
 
 def proto2(body: bytes) -> bytes:
@@ -206,26 +180,16 @@ def test_what_a_pickle_may_name_is_after_it_what_it_was(
 
 BROKEN = {
     "state for a list": proto2(b"]}b"),
-    "state for a dict": proto2(b"}}b"),
     "state for an instance of a type": proto4(name("builtins", "list") + b")R}b"),
-    "extension": proto2(b"\x82\x01"),
     "out-of-band buffer": proto4(b"\x97"),
-    "object": proto4(b"(" + name("foo", "EasyDict") + b"o"),
-    "NEWOBJ_EX": proto4(name("foo", "EasyDict") + b")}\x92"),
-    "marker type called": proto4(name("builtins", "object") + b")R"),
     "a number made by a call": pickle.dumps([Calls(int, "7")]),
     "nothing": b"",
     "no end": b"\x80\x04]",
     "bytes of an exabyte": proto4(b"\x8e" + struct.pack("<Q", 2**63)),
-    "memo never filled": proto2(b"h\x07"),
-    "empty stack": proto2(b""),
     "list as a key": proto2(b"}]K\x02s"),
-    "call of a number": proto2(b"K\x01)R"),
     "call without a tuple": proto4(name("builtins", "dict") + b"K\x01R"),
-    "a name as the value": proto4(name("builtins", "dict")),
     "unknown instruction": b"\x80\x04\xff.",
     "a number of 5,000 digits": b"I" + b"9" * 5000 + b"\n.",
-    "bad utf-8": proto4(b"\x8c\x01\xff"),
 }
 
 
