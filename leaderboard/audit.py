@@ -11,16 +11,14 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from django.db import connection, transaction
+from django.db import transaction
 from django.db.models import QuerySet
 from django.utils import timezone
 
 from leaderboard.db import bulk
-from leaderboard.models import AuditEvent, AuditText, User
+from leaderboard.models import AuditEvent, AuditText, SweepBeat, User
 from leaderboard.models.audit import GENESIS, Unsealed
 
-# Names whoever seals among PostgreSQL's advisory locks: "audit" in ASCII.
-_LOCK = 0x6175646974
 _CHUNK = 2000
 # What stands in an event for a name that is in a table of its own.
 _TEXT = "text:"
@@ -111,6 +109,7 @@ def seal() -> int:
 
     Whatever its id and its moment, an event that was committed late is sealed when it is found.
     """
+    SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     n_sealed = 0
     while n_now := _seal_some():
         n_sealed += n_now
@@ -119,7 +118,8 @@ def seal() -> int:
 
 def _seal_some() -> int:
     with transaction.atomic():
-        if not _is_the_sealer():
+        # Whoever has this row is the only one who seals. SQLite has one writer at a time.
+        if not SweepBeat.objects.select_for_update(skip_locked=True, no_key=True):
             return 0
         last = AuditEvent.objects.exclude(hash=None).order_by("-seal_number").first()
         number, tip = (last.seal_number or 0, last.hash or "") if last else (0, GENESIS)
@@ -129,16 +129,6 @@ def _seal_some() -> int:
             rows.append((number, before, tip, event.pk))
         bulk.update(AuditEvent, ["seal_number", "previous_hash", "hash"], rows)
     return len(rows)
-
-
-def _is_the_sealer() -> bool:
-    """Whether nobody else seals, which stays so until the transaction ends."""
-    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
-    if connection.vendor != "postgresql":
-        return True
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT pg_try_advisory_xact_lock(%s)", [_LOCK])
-        return cursor.fetchone() == (True,)
 
 
 # --- reading it ------------------------------------------------------------------------------------------

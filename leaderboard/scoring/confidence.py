@@ -9,7 +9,6 @@ only make it quick. `docs/uncertainty.md` says how and why.
 
 import hashlib
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property, lru_cache
@@ -18,7 +17,7 @@ from uuid import UUID
 
 import numpy as np
 import structlog
-from django.db import connection, transaction
+from django.db import transaction
 from django.db.models import Exists, OuterRef, Q, QuerySet
 from numpy.typing import NDArray
 
@@ -52,7 +51,6 @@ METHOD = "3"
 PATIENCE = timedelta(minutes=1)
 # All pairs are compared each time: 1 s of processor at 200 entries, 19 s at 1,000, half of a worker's time.
 REST_PER_PAIR = timedelta(microseconds=20)
-LOCKS = 0x7753
 # So many files are read between two looks at what else waits.
 MANY = 500
 # What is new of the intervals, by the evaluation's id: low, high and the id of their score.
@@ -220,34 +218,17 @@ def _rests(entries: Entries, *, now: datetime) -> bool:
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
     """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
 
-    False: they hold already, another worker is at it, or the entries have changed since they were read, and
-    whoever looks next does it. `between` is called every fraction of a second. Raises what
-    `recording_sums.sums_of` raises.
+    False: they hold already, or the entries have changed since they were read, or another worker has written
+    theirs meanwhile. `between` is called every fraction of a second. Raises what `recording_sums.sums_of`
+    raises.
     """
-    with _alone(entries.edition) as is_alone:
-        if not is_alone or entries.have_ranges:
-            return False
-        ends = _intervals(entries, between=between)
-        ranges = _ranges(entries, between=between)
-        is_written = _write(entries, ends=ends, ranges=ranges, now=now)
+    if entries.have_ranges:
+        return False
+    ends = _intervals(entries, between=between)
+    ranges = _ranges(entries, between=between)
+    is_written = _write(entries, ends=ends, ranges=ranges, now=now)
     log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
     return is_written
-
-
-@contextmanager
-def _alone(edition: Edition) -> Iterator[bool]:
-    """Whether this worker is the only one at it: what several compute, all but one throw away."""
-    if connection.vendor != "postgresql":
-        yield True
-        return
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT pg_try_advisory_lock(%s, %s)", [LOCKS, edition.pk])
-        (is_alone,) = cursor.fetchone() or (False,)
-        try:
-            yield is_alone
-        finally:
-            if is_alone:
-                cursor.execute("SELECT pg_advisory_unlock(%s, %s)", [LOCKS, edition.pk])
 
 
 def _intervals(entries: Entries, *, between: Callable[[], None]) -> Ends:
