@@ -141,16 +141,15 @@ def claim(
     wall_s: float,
     limit: int = 1,
     in_batches: bool = False,
-    token: uuid.UUID | None = None,
     held: Collection[str] | None = None,
 ) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
     With `held`, only those whose ground truth is among these digests: what this worker can score at all.
     If the first is one of an edition's re-scoring, with `in_batches` some more of that edition's. Two workers
-    never get the same one. Whoever brings a new `token` can find what it got if the answer is lost.
+    never get the same one.
     """
-    token = token or uuid.uuid4()
+    token = uuid.uuid4()
     with transaction.atomic():
         rows = list(claimable.waiting(held)[:limit])
         if not rows:

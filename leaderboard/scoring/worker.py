@@ -2,7 +2,6 @@
 
 import hashlib
 import random
-import threading
 import time
 import uuid
 from collections import deque
@@ -56,39 +55,6 @@ PAUSES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0)
 MAX_STORED_PROBLEMS = 100
 
 
-class _InHand:
-    """How many threads of this process decide evaluations at this moment."""
-
-    def __init__(self) -> None:
-        self._n = 0
-        self._changed = threading.Condition()
-
-    def __enter__(self) -> None:
-        with self._changed:
-            self._n += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._changed:
-            self._n -= 1
-            self._changed.notify_all()
-
-    def wait(self, *, timeout_s: float) -> bool:
-        """Wait until there is none, but not longer than `timeout_s`. Whether there was one."""
-        with self._changed:
-            if not self._n:
-                return False
-            self._changed.wait(timeout_s)
-            return True
-
-
-_in_hand = _InHand()
-
-
-def others_decide(*, timeout_s: float) -> bool:
-    """Whether another thread of this process decides an evaluation. Waits for its end, up to `timeout_s`."""
-    return _in_hand.wait(timeout_s=timeout_s)
-
-
 def run_next(*, rng: random.Random) -> bool:
     """Claim what is most urgent and decide it: one live submission, or a batch of an edition's re-scoring.
 
@@ -98,12 +64,6 @@ def run_next(*, rng: random.Random) -> bool:
     leases = _claimed()
     if not leases:
         return False
-    with _in_hand:
-        _decide(leases, claimed_s=claimed_s, rng=rng)
-    return True
-
-
-def _decide(leases: list[Lease], *, claimed_s: float, rng: random.Random) -> None:
     first = _retry_on_disconnect(lambda: _evaluations(leases[:1]))[0]
     if first.priority == Evaluation.PRIORITY_RESCORE:
         leases = rescore(leases, edition=first.edition)
@@ -114,34 +74,20 @@ def _decide(leases: list[Lease], *, claimed_s: float, rng: random.Random) -> Non
         run(lease, rng=rng, waiting=waiting, evaluation=known)
         if time.monotonic() - claimed_s > settings.LEASE_S / 2:
             _release(waiting)
+    return True
 
 
 def _claimed() -> list[Lease]:
-    """What this worker gets to decide. Raises the database's error if it stays away."""
-    token = uuid.uuid4()
-    try:
-        # Asked first where a claim is a write even of no row, for which SQLite lets nobody else write.
-        if connection.vendor == "sqlite" and not Evaluation.objects.due().exists():
-            return []
-        return lifecycle.claim(
-            lease_s=settings.LEASE_S,
-            wall_s=settings.WALL_S,
-            in_batches=True,
-            token=token,
-            held=truth_values.readable_digests(),
-        )
-    except (OperationalError, InterfaceError) as fault:
-        # It may have been committed and only the answer lost; nobody else would look at it for a whole lease.
-        log.warning("claim_not_answered", reason=str(fault)[:200])
-        connection.close()
-        return _retry_on_disconnect(lambda: _leases_of(token))
-
-
-def _leases_of(token: uuid.UUID) -> list[Lease]:
-    rows = Evaluation.objects.filter(status=Status.RUNNING, lease_token=token).order_by(
-        "priority", "queued_at"
+    """What this worker gets to decide."""
+    # Asked first where a claim is a write even of no row, for which SQLite lets nobody else write.
+    if connection.vendor == "sqlite" and not Evaluation.objects.due().exists():
+        return []
+    return lifecycle.claim(
+        lease_s=settings.LEASE_S,
+        wall_s=settings.WALL_S,
+        in_batches=True,
+        held=truth_values.readable_digests(),
     )
-    return [Lease(pk, attempt, token) for pk, attempt in rows.values_list("pk", "attempt")]
 
 
 def _release(waiting: deque[Lease]) -> None:

@@ -160,31 +160,6 @@ def test_a_run_is_decided_once_wherever_it_is_cut(
     assert n_kept > 10, "a cut while finalising is survived without a second run"
 
 
-def test_claim_whose_answer_is_lost_is_not_left_to_its_lease(
-    proxy: CuttingProxy, edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(worker.time, "sleep", lambda seconds: None)
-    data = builders.predictions(edition)
-    numbers = itertools.count()
-    submissions: list[Submission] = []
-
-    def prepare() -> None:
-        submissions.append(builders.submit(owner, data, method=f"Method {next(numbers)}"))
-
-    def work() -> None:
-        worker.run_next(rng=random.Random(0))
-
-    for came_to_its_end in every_cut(proxy, work, prepare=prepare):
-        assert came_to_its_end, "the server was back at once"
-        row = submissions[-1].evaluations.get()
-        assert (row.status, row.attempt) in [(Status.SCORED, 1), (Status.QUEUED, 0)]
-        # What the cut connection had locked is free once the server has noticed: this waits for it.
-        queue_rows.make_due()
-        while row.status == Status.QUEUED and worker.run_next(rng=random.Random(0)):
-            row.refresh_from_db()
-        assert (row.status, row.attempt, row.n_infrastructure_strikes) == (Status.SCORED, 1, 0)
-
-
 VERBS: dict[str, Callable[[Lease], object]] = {
     "claim": lambda _: lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S),
     "heartbeat": lambda lease: lifecycle.heartbeat(lease, lease_s=LEASE_S),
