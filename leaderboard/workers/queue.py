@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import structlog
 from django.conf import settings
 from django.db import Error, connections
-from django.db.models import BooleanField, ExpressionWrapper, Q
+from django.db.models import Q
 from django.db.models.functions import Now
 
 from leaderboard import audit, versions
@@ -40,48 +40,33 @@ def poll(*, rng: random.Random, stopping: threading.Event) -> int:
     lifecycle.release_expired(rng=rng)
     while not stopping.is_set() and worker.run_next(rng=rng):
         n_found += 1
-    work_behind(rng=rng, stopping=stopping)
+    if not stopping.is_set():
+        backlog.work_off(now=clock.database_now(), rng=rng, is_stopping=stopping.is_set)
     return n_found
 
 
-def work_behind(*, rng: random.Random, stopping: threading.Event) -> int:
-    """Do what waits behind submissions, until `stopping`. Returns how much was done."""
-    if stopping.is_set():
-        return 0
-    return backlog.work_off(now=clock.database_now(), rng=rng, is_stopping=stopping.is_set)
+def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
+    """Sweep, send mails and clean, each when it is due and no other process has begun to.
 
-
-def sweep_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Sweep, unless somebody has begun to within `SWEEP_S`."""
+    Mails and cleaning may wait for a server that is slow; the next sweep is then another process's.
+    """
+    SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     if _begun("sweep_begun_at", every_s=settings.SWEEP_S):
         sweep(rng=rng)
-
-
-def clean_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Clean, unless somebody has begun to within `CLEAN_S`."""
-    if _begun("clean_begun_at", every_s=settings.CLEAN_S):
-        upkeep.clean(now=clock.database_now())
-
-
-def send_mails_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Queue notices and send what waits, unless somebody has begun to within `SWEEP_S`.
-
-    A worker that has no mail server leaves it to others.
-    """
+    # A worker that has no mail server leaves mails to others.
     if settings.SENDS_MAIL and _begun("mails_begun_at", every_s=settings.SWEEP_S):
         now = clock.database_now()
         notices.queue_due(now=now)
         outbox.work_off(now=now, is_stopping=stopping.is_set)
+    if _begun("clean_begun_at", every_s=settings.CLEAN_S):
+        upkeep.clean(now=clock.database_now())
 
 
 def _begun(field: str, *, every_s: float) -> bool:
     """Whether it is due and this process is the one to do it: of all that ask at once, one."""
-    is_due = Q(**{field: None}) | Q(**{f"{field}__lte": clock.after(-every_s)})
+    due = SweepBeat.objects.filter(Q(**{field: None}) | Q(**{f"{field}__lte": clock.after(-every_s)}))
     # Looked at first: an update, also one of no row, waits for SQLite's one writer.
-    found = SweepBeat.objects.values_list(ExpressionWrapper(is_due, BooleanField()), flat=True).first()
-    if found is None:
-        SweepBeat.objects.bulk_create([SweepBeat()], ignore_conflicts=True)
-    return found is not False and bool(SweepBeat.objects.filter(is_due).update(**{field: Now()}))
+    return due.exists() and bool(due.update(**{field: Now()}))
 
 
 def sweep(*, rng: random.Random) -> None:
@@ -106,11 +91,7 @@ def sweep(*, rng: random.Random) -> None:
 
 
 class Poller(threading.Thread):
-    """Does something every few seconds, whether or not a message came.
-
-    Each time in a thread of its own with connections of its own: whatever goes wrong in one, the next starts
-    afresh.
-    """
+    """Does something every few seconds, whether or not a message came, with new connections each time."""
 
     def __init__(self, act: Callable[..., object], *, every_s: float, rng: random.Random) -> None:
         super().__init__(name=act.__name__, daemon=True)
@@ -122,19 +103,15 @@ class Poller(threading.Thread):
     def run(self) -> None:
         """Do it again and again, until stopped."""
         while not self._stopping.wait(self._every_s * self._rng.uniform(0.8, 1.2)):
-            once = threading.Thread(target=self._once, name=self.name, daemon=True)
-            once.start()
-            once.join()
-
-    def _once(self) -> None:
-        """Do it. A database or store that is away is no fault of this time; the next one finds it."""
-        try:
-            self._act(rng=self._rng, stopping=self._stopping)
-        except (Error, OSError) as fault:
-            log.warning("poll_failed", act=self.name, reason=str(fault)[:200])
-        finally:
-            # They belong to this thread, which ends here.
-            connections.close_all()
+            try:
+                self._act(rng=self._rng, stopping=self._stopping)
+            except (Error, OSError) as fault:
+                # A database or store that is away is no fault of this time; the next one finds it.
+                log.warning("poll_failed", act=self.name, reason=str(fault)[:200])
+            except Exception:
+                log.exception("poll_failed", act=self.name)
+            finally:
+                connections.close_all()
 
     def stop(self) -> None:
         """Begin nothing more."""
@@ -142,15 +119,13 @@ class Poller(threading.Thread):
 
 
 def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
-    """Let this process look for work, sweep, clean and send mails by itself.
+    """Let this process look for work and keep up what is to be kept up, by itself.
 
-    One for each, so that neither a long run nor a slow store keeps the queue from being swept.
+    Two threads, so that a long run keeps nothing from being swept.
     """
     pollers = (
         Poller(poll, every_s=settings.POLL_S, rng=rng),
-        Poller(sweep_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
-        Poller(clean_if_due, every_s=min(settings.CLEAN_S, 60.0), rng=rng),
-        Poller(send_mails_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
+        Poller(keep_up, every_s=settings.SWEEP_S / 3, rng=rng),
     )
     for poller in pollers:
         poller.start()

@@ -1,6 +1,5 @@
 """Upkeep: remove files that no submission names and rows that have expired."""
 
-from dataclasses import dataclass
 from datetime import datetime
 
 import structlog
@@ -16,16 +15,7 @@ from leaderboard.submissions import forgetting
 log = structlog.get_logger(__name__)
 
 
-@dataclass(frozen=True)
-class Cleaned:
-    """What was removed."""
-
-    n_files: int
-    n_bytes: int
-    n_leftovers: int  # half-written files of processes that were killed
-
-
-def clean(*, now: datetime) -> Cleaned:
+def clean(*, now: datetime) -> None:
     """Remove what nobody needs. Several may do it at once; each file is removed by one of them.
 
     Raises `OSError` if the store does not answer; what was removed until then stays removed.
@@ -38,6 +28,7 @@ def clean(*, now: datetime) -> Cleaned:
     for orphan in orphans.orphans(now=now):
         if orphans.remove(orphan, now=now):
             n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
+    # Half-written files of processes that were killed.
     for path in orphans.leftovers():
         path.unlink(missing_ok=True)
         n_leftovers += 1
@@ -46,6 +37,4 @@ def clean(*, now: datetime) -> Cleaned:
         n_files_removed=F("n_files_removed") + n_files,
         n_bytes_removed=F("n_bytes_removed") + n_bytes,
     )
-    cleaned = Cleaned(n_files, n_bytes, n_leftovers)
-    log.info("cleaned", **vars(cleaned))
-    return cleaned
+    log.info("cleaned", n_files=n_files, n_bytes=n_bytes, n_leftovers=n_leftovers)
