@@ -13,13 +13,11 @@ from typing import Any
 
 from django.db import transaction
 from django.db.models import QuerySet
-from django.utils import timezone
 
-from leaderboard.db import bulk
 from leaderboard.models import AuditEvent, AuditText, SweepBeat, User
 from leaderboard.models.audit import GENESIS, Unsealed
 
-_CHUNK = 2000
+_CHUNK = 500
 # What stands in an event for a name that is in a table of its own.
 _TEXT = "text:"
 _IS_TEXT = re.compile(r"text:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII)
@@ -72,14 +70,9 @@ def blank(rows: QuerySet[AuditText]) -> int:
 
 def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
     """Write many deeds of the machine itself at once: verb, noun, noun_id, details."""
-    at = timezone.now()
-    bulk.insert(
-        AuditEvent,
-        ["at", "verb", "noun", "noun_id", "details"],
-        [
-            [at, verb, noun, _storable(str(noun_id)), _plain(details)]
-            for verb, noun, noun_id, details in deeds
-        ],
+    AuditEvent.objects.bulk_create(
+        AuditEvent(verb=verb, noun=noun, noun_id=_storable(str(noun_id)), details=_plain(details))
+        for verb, noun, noun_id, details in deeds
     )
 
 
@@ -123,12 +116,14 @@ def _seal_some() -> int:
             return 0
         last = AuditEvent.objects.exclude(hash=None).order_by("-seal_number").first()
         number, tip = (last.seal_number or 0, last.hash or "") if last else (0, GENESIS)
-        rows = []
-        for event in AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK]:
-            number, before, tip = number + 1, tip, event.hash_after(tip)
-            rows.append((number, before, tip, event.pk))
-        bulk.update(AuditEvent, ["seal_number", "previous_hash", "hash"], rows)
-    return len(rows)
+        events = list(AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK])
+        for event in events:
+            number += 1
+            event.seal_number, event.previous_hash = number, tip
+            event.hash = tip = event.hash_after(tip)
+        # Not by the model's own queryset, which refuses every change.
+        QuerySet(AuditEvent).bulk_update(events, ["seal_number", "previous_hash", "hash"])
+    return len(events)
 
 
 # --- reading it ------------------------------------------------------------------------------------------

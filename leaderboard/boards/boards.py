@@ -30,7 +30,6 @@ from leaderboard.boards.rows import (
     scored_in,
     submitted_entry,
 )
-from leaderboard.db.bulk import in_parts
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -269,13 +268,16 @@ def _best_of_each(
 def _with_scores(
     rows: "QuerySet[Evaluation]", *, edition: Edition, has_ranges: bool
 ) -> Iterator[tuple[Evaluation, Scored]]:
-    """Each evaluation with its scores; a large board is read in parts, of which only one is in memory."""
-    ranges = ranges_in(edition) if has_ranges else NO_RANGES
+    """Each evaluation with its scores."""
     # In an order of their own, so that bytes keep theirs; before their scores, which are written with them.
-    for evaluations in in_parts(rows.order_by("pk")):
-        scored = scored_in(edition, evaluations=[row.pk for row in evaluations], ranges=ranges)
-        for row in evaluations:
-            yield row, scored.get(row.pk) or Scored.nothing(edition.rules)
+    evaluations = list(rows.order_by("pk"))
+    scored = scored_in(
+        edition,
+        evaluations=[row.pk for row in evaluations],
+        ranges=ranges_in(edition) if has_ranges else NO_RANGES,
+    )
+    for row in evaluations:
+        yield row, scored.get(row.pk) or Scored.nothing(edition.rules)
 
 
 def _finished_by(at: datetime, *, method: str) -> Q:

@@ -28,7 +28,6 @@ from evaluator.scoring.ranges import Quoted, rank_ranges
 from evaluator.scoring.significance import cut_off
 from leaderboard import versions
 from leaderboard.boards.rows import printed_decimals
-from leaderboard.db import bulk
 from leaderboard.models import (
     Edition,
     EditionRanges,
@@ -352,7 +351,8 @@ def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, n
         )
         if present.inference_digest != edition.inference_digest or not entries.are_those_of(present):
             return False
-        bulk.update(Score, ("low", "high"), [row for rows in ends.values() for row in rows])
+        scores = [Score(pk=pk, low=low, high=high) for rows in ends.values() for low, high, pk in rows]
+        Score.objects.bulk_update(scores, ["low", "high"], batch_size=500)
         if ranges is not None:
             digest, of = ranges
             EditionRanges.objects.update_or_create(edition=edition, defaults={"digest": digest, "ranges": of})
