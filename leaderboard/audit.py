@@ -122,7 +122,7 @@ def _seal_some() -> int:
             event.seal_number, event.previous_hash = number, tip
             event.hash = tip = event.hash_after(tip)
         # Not by the model's own queryset, which refuses every change.
-        QuerySet(AuditEvent).bulk_update(events, ["seal_number", "previous_hash", "hash"])
+        QuerySet[AuditEvent](AuditEvent).bulk_update(events, ["seal_number", "previous_hash", "hash"])
     return len(events)
 
 

@@ -277,7 +277,7 @@ def _with_scores(
         ranges=ranges_in(edition) if has_ranges else NO_RANGES,
     )
     for row in evaluations:
-        yield row, scored.get(row.pk) or Scored.nothing(edition.rules)
+        yield row, scored[row.pk]
 
 
 def _finished_by(at: datetime, *, method: str) -> Q:

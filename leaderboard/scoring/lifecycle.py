@@ -157,8 +157,8 @@ def claim(
     with transaction.atomic():
         due = Evaluation.objects.due() if held is None else Evaluation.objects.due().scorable(held)
         # What others have locked is left out. SQLite has one writer, and skips nothing.
-        waiting = due.select_for_update(skip_locked=True, no_key=True)
-        waiting = waiting.values_list("pk", "attempt", "priority", "edition")
+        free = due.select_for_update(skip_locked=True, no_key=True)
+        waiting = free.values_list("pk", "attempt", "priority", "edition")
         rows = list(waiting[:limit])
         if not rows:
             return []

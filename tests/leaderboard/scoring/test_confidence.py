@@ -3,7 +3,7 @@
 import random
 import threading
 from collections.abc import Collection
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
@@ -326,13 +326,3 @@ def test_a_worker_s_own_look_computes_what_no_message_told_of(
     queue.poll(rng=random.Random(0), stopping=threading.Event())
     edition.refresh_from_db()
     assert edition.inferred_at == first, "there was nothing more to do"
-
-
-def test_a_large_board_rests_between_two_rounds(
-    inferred: list[Submission], edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(confidence, "REST_PER_PAIR", timedelta(seconds=1))
-    submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
-    held = truth_values.readable_digests()
-    assert stale(now=timezone.now(), held=held) == []
-    assert stale(now=timezone.now() + timedelta(seconds=20), held=held) == [edition]

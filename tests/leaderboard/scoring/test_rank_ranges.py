@@ -26,7 +26,7 @@ def look() -> None:
 def anew() -> dict[int, object]:
     """The ranges that a worker makes where there are none."""
     EditionRanges.objects.all().delete()
-    Edition.objects.update(inference_digest=f"{confidence.METHOD} former")
+    Edition.objects.update(inference_digest="former")
     look()
     return ranges()
 
