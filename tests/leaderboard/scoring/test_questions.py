@@ -81,13 +81,6 @@ def test_a_pair_that_cannot_be_computed_keeps_nothing_else_waiting(edition: Edit
     assert upcoming() == pairs[1]
 
 
-def test_pairs_of_one_request_are_written_in_one_order(edition: Edition, pairs: Pairs) -> None:
-    """Else each of two could wait for a row of the other's: they come in the order of an address."""
-    assert ask(edition, *reversed(pairs[:5]))
-    written = Comparison.objects.order_by("pk").values_list("first", "second")
-    assert list(written) == pairs[:5]
-
-
 def test_one_reader_has_a_number_of_new_ones_computed_and_others_theirs(
     edition: Edition, pairs: Pairs, settings: Settings, owner: User
 ) -> None:

@@ -161,12 +161,6 @@ def test_file_that_takes_too_much_processor_time_ends_the_child_and_is_told_from
     assert not children()
 
 
-def test_child_that_is_killed_is_reported(read: Read) -> None:
-    with pytest.raises(ChildDied, match="reading the file ended with signal 9"):
-        read_slowly(read, FAULTY, lambda pid: os.kill(pid, signal.SIGKILL))
-    assert not children()
-
-
 def test_signals_that_stop_a_service_do_not_end_the_reading(read: Read) -> None:
     numbers = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGQUIT)
 
@@ -325,17 +319,3 @@ def test_child_ends_with_a_parent_that_was_killed(tmp_path: Path, manifest: Mani
         ended, _, _ = select.select([child], [], [], 60)
         os.close(child)
     assert ended
-
-
-def test_archives_tables_and_bombs_are_read_in_the_child(read: Read, manifest: Manifest) -> None:
-    ttc_s = np.linspace(1, 9, manifest.n_sequences)
-    rows = zip(manifest.anno_id_keys, ttc_s.tolist(), strict=True)
-    table = "\r\n".join(["anno_id,ttc", *(f"{key},{value!r}" for key, value in rows)]).encode()
-    json_text = write_predictions(manifest=manifest, ttc_s=ttc_s)
-    for data in (table, gzip.compress(table), gzip.compress(json_text)):
-        with opened(data) as source:
-            assert read(source, digest=sha256_digest(data)).ttc_s.tolist() == ttc_s.tolist()
-    # 300 MB in 300 kB: a child that unpacked all of it would take long, and end of too little memory.
-    with opened(gzip.compress(bytes(1_000_000)) * 300) as source, pytest.raises(Rejected) as caught:
-        read(source)
-    assert [problem.code for problem in caught.value.problems] == ["too-large"]
