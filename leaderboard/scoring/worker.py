@@ -168,7 +168,6 @@ def _sent(
         submission__in=evaluation_of,
         status=Status.SCORED,
         edition__ground_truth__manifest_digest=edition.ground_truth.manifest_digest,
-        report__has_key="warnings",
     )
     warned = {
         evaluation_of[submission]: [FileWarning(**warning) for warning in warnings]

@@ -6,6 +6,9 @@ from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
+import pytest
+from django.db import connection
+
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.scoring import lifecycle
 from leaderboard.scoring.lifecycle import MAX_INFRASTRUCTURE_STRIKES, Lease, LostRace
@@ -13,11 +16,13 @@ from tests import builders
 from tests.leaderboard.db.test_races import at_once
 from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
-from tests.services import ON_POSTGRESQL
 
 T = TypeVar("T")
 
-pytestmark = ON_POSTGRESQL
+pytestmark = [
+    pytest.mark.django_db(transaction=True),
+    pytest.mark.skipif(connection.vendor != "postgresql", reason="SQLite has one connection for all"),
+]
 
 N_ZOMBIES = 50
 
