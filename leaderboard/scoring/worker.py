@@ -106,9 +106,7 @@ def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
 def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     """Score a batch of an edition from the values that were kept when their files were first read.
 
-    Returns the leases that need their file read again: those without such values, and those that the protocol
-    rejects, so that the problem is worded from the file itself. A store that does not answer is theirs to
-    report as well.
+    Returns the leases that need their file read again: without such values, or rejected by the protocol.
     """
     sent, warned = _retry_on_disconnect(lambda: _sent(leases, edition))
     try:
@@ -192,44 +190,39 @@ def run(
     waiting = deque() if waiting is None else waiting
     if evaluation is None:
         evaluation = _retry_on_disconnect(lambda: _evaluations([lease]))[0]
+    started_s = time.monotonic()
     # Every line from here on says what it is about, also those of modules that know of no submission.
     with structlog.contextvars.bound_contextvars(
         submission_id=str(evaluation.submission_id),
         evaluation_id=str(lease.evaluation_id),
         attempt=lease.attempt,
     ):
-        _run(lease, evaluation, waiting=waiting, rng=rng)
-
-
-def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: random.Random) -> None:
-    started_s = time.monotonic()
-    try:
-        outcome = _outcome(
-            evaluation,
-            heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
-        )
-        _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
-    except LostRace as race:
-        log.warning("evaluation_lost", reason=str(race))
-    except OUR_FAULTS as fault:
-        _fail_attempt(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
-    except FAULTS_OF_THE_FILE as fault:
-        log.warning("evaluation_failed", exc_info=fault)
-        is_last = isinstance(fault, sandbox.ChildOutOfTime)
-        _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng, is_last=is_last)
-    else:
-        log.info(
-            "evaluation_finished",
-            status=outcome.status.value,
-            duration_s=round(time.monotonic() - started_s, 3),
-        )
+        try:
+            outcome = _outcome(
+                evaluation,
+                heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
+            )
+            _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
+        except LostRace as race:
+            log.warning("evaluation_lost", reason=str(race))
+        except OUR_FAULTS as fault:
+            _fail_attempt(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
+        except FAULTS_OF_THE_FILE as fault:
+            log.warning("evaluation_failed", exc_info=fault)
+            is_last = isinstance(fault, sandbox.ChildOutOfTime)
+            _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng, is_last=is_last)
+        else:
+            log.info(
+                "evaluation_finished",
+                status=outcome.status.value,
+                duration_s=round(time.monotonic() - started_s, 3),
+            )
 
 
 class Pulse:
     """The heartbeat of one run: False once the work is somebody else's, or its time is up.
 
-    A database that does not answer says neither: the run goes on, since its result is fenced anyway, but not
-    beyond its own time. A run long enough to have a heartbeat keeps nothing waiting behind it.
+    A database that does not answer says neither. A run with a heartbeat keeps nothing waiting behind it.
     """
 
     def __init__(self, lease: Lease, *, waiting: deque[Lease], lease_s: float, wall_s: float) -> None:

@@ -1,4 +1,4 @@
-"""Jobs of low priority: draw boards, count changed labels, compare, compute intervals, analyse.
+"""Jobs of low priority: count changed labels, compare, compute intervals, analyse.
 
 Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
 for longer than a fraction of a second.
