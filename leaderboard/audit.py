@@ -35,12 +35,9 @@ def record(
 ) -> AuditEvent:
     """Write one deed. Call it inside the transaction of the deed itself: both happen, or neither.
 
-    `names` are what people call themselves and their work. They stand in a table of their own, where they can
-    be blanked; the event has their ids among its details. An address stands in neither.
-
-    `details` are texts, whole numbers, truth values, None, and lists and mappings of them; never a secret,
-    never a value of a hidden ground truth. Raises `TypeError` for anything else, also for floats, which no
-    two databases give back alike.
+    `names`, what people call themselves and their work, stand in a table where they can be blanked. `details`
+    hold neither those nor addresses, secrets, or values of a hidden ground truth. Raises `TypeError` for
+    others than texts, whole numbers, truth values, None, and lists and mappings of them.
     """
     noun_id = _storable(str(noun_id))
     texts = {
@@ -161,10 +158,7 @@ class Break:
 
 @dataclass(frozen=True)
 class Verification:
-    """What going through the chain found: its length, its last hash, the first places that do not hold.
-
-    What is `unsealed` is in no chain yet, and was not looked at.
-    """
+    """What going through the chain found: its length, its last hash, the first places that do not hold."""
 
     n_events: int
     tip: str
@@ -173,11 +167,7 @@ class Verification:
 
 
 def verify(*, expected_hash: str = "") -> Verification:
-    """Compute every hash anew, from the first sealed event to the last.
-
-    A chain whose end was cut off, or which was written anew from some event on, is sound in itself: only a
-    hash that was noted elsewhere shows it. With `expected_hash`, some event has to have it.
-    """
+    """Compute every hash anew. With `expected_hash`, which was noted elsewhere, some event has to have it."""
     n_events, tip, breaks = 0, GENESIS, []
     is_found = not expected_hash
     not_yet = AuditEvent.objects.unsealed()

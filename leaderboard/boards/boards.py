@@ -137,7 +137,7 @@ def board(
     MiD among everything that everybody sees, whatever the filters; ties share a rank. Each method is
     represented by the best of its standing submissions; one whose submissions were all withdrawn leaves a row
     without values. Rows that only the viewer's own team sees carry the rank that they would have.
-    `read` gives the rows that everybody sees; else they are read as `public_rows` does. Raises `UnknownColumn`.
+    `read` gives the rows that everybody sees, in `public_rows`' place. Raises `UnknownColumn`.
     """
     edition = edition or (edition_at(split, at) if at else split.published_edition)
     require_column(sort, rules=rules_of(edition))

@@ -1,8 +1,8 @@
 """Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
 
-Workers make them from sums per unit (day or recording), which never leave their private directory. An interval
-belongs to one evaluation and stays; ranges belong to all entries of a board and are made anew when those
-change, which a digest tells. `docs/uncertainty.md` says how and why.
+Workers make them from sums per unit (day or recording), which never leave their private directory. An
+interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made anew when
+those change, which a digest tells. `docs/uncertainty.md` says how and why.
 """
 
 import hashlib

@@ -8,11 +8,12 @@ import random
 import threading
 import time
 from collections.abc import Callable, Sequence
+from datetime import datetime
 
 import structlog
 from django.conf import settings
 from django.db import Error, connections
-from django.db.models import Q
+from django.db.models import F, Q
 from django.db.models.functions import Now
 
 from leaderboard import audit, versions
@@ -21,9 +22,12 @@ from leaderboard.mails import notices, outbox
 from leaderboard.methods import visibility
 from leaderboard.models import Evaluation, SweepBeat
 from leaderboard.ops import health, rate_limits
+from leaderboard.people import addresses
+from leaderboard.quotas import mailboxes
 from leaderboard.scoring import analyses, lifecycle, worker
-from leaderboard.storage import truth_values
-from leaderboard.workers import backlog, upkeep
+from leaderboard.storage import orphans, truth_values
+from leaderboard.submissions import forgetting
+from leaderboard.workers import backlog
 
 log = structlog.get_logger(__name__)
 
@@ -59,7 +63,7 @@ def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
         notices.queue_due(now=now)
         outbox.work_off(now=now, is_stopping=stopping.is_set)
     if _begun("clean_begun_at", every_s=settings.CLEAN_S):
-        upkeep.clean(now=clock.database_now())
+        clean(now=clock.database_now())
 
 
 def _begun(field: str, *, every_s: float) -> bool:
@@ -85,6 +89,31 @@ def sweep(*, rng: random.Random) -> None:
         log.error("ground_truth_out_of_reach", n_waiting=n_out_of_reach)
     audit.seal()
     health.record_sweep(n_out_of_reach=n_out_of_reach)
+
+
+def clean(*, now: datetime) -> None:
+    """Remove what nobody needs. Several may do it at once; each file is removed by one of them.
+
+    Raises `OSError` if the store does not answer; what was removed until then stays removed.
+    """
+    outbox.purge(now=now)
+    mailboxes.delete_expired(now=now)
+    forgetting.delete_late_rows()
+    addresses.delete_unproved(now=now)
+    n_files = n_bytes = n_leftovers = 0
+    for orphan in orphans.orphans(now=now):
+        if orphans.remove(orphan, now=now):
+            n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
+    # Half-written files of processes that were killed.
+    for path in orphans.leftovers():
+        path.unlink(missing_ok=True)
+        n_leftovers += 1
+    SweepBeat.objects.update(
+        cleaned_at=now,
+        n_files_removed=F("n_files_removed") + n_files,
+        n_bytes_removed=F("n_bytes_removed") + n_bytes,
+    )
+    log.info("cleaned", n_files=n_files, n_bytes=n_bytes, n_leftovers=n_leftovers)
 
 
 # --- the threads that do it -------------------------------------------------------------------------------

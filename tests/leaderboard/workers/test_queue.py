@@ -17,7 +17,7 @@ from django.utils import timezone
 from leaderboard import versions
 from leaderboard.models import Edition, Evaluation, Status, SweepBeat, User
 from leaderboard.ops import health
-from leaderboard.workers import queue, upkeep
+from leaderboard.workers import queue
 from leaderboard.workers.queue import Poller
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
@@ -48,7 +48,7 @@ def done(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The times that something was swept, and cleaned."""
     done: list[str] = []
     monkeypatch.setattr(queue, "sweep", lambda *, rng: done.append("swept"))
-    monkeypatch.setattr(upkeep, "clean", lambda *, now: done.append("cleaned"))
+    monkeypatch.setattr(queue, "clean", lambda *, now: done.append("cleaned"))
     return done
 
 
