@@ -11,17 +11,13 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
-from django.db import connection, transaction
+from django.db import transaction
 from django.db.models import QuerySet
-from django.utils import timezone
 
-from leaderboard.db import bulk
-from leaderboard.models import AuditEvent, AuditText, User
+from leaderboard.models import AuditEvent, AuditText, SweepBeat, User
 from leaderboard.models.audit import GENESIS, Unsealed
 
-# Names whoever seals among PostgreSQL's advisory locks: "audit" in ASCII.
-_LOCK = 0x6175646974
-_CHUNK = 2000
+_CHUNK = 500
 # What stands in an event for a name that is in a table of its own.
 _TEXT = "text:"
 _IS_TEXT = re.compile(r"text:[0-9a-f]{8}(-[0-9a-f]{4}){3}-[0-9a-f]{12}", re.ASCII)
@@ -39,12 +35,9 @@ def record(
 ) -> AuditEvent:
     """Write one deed. Call it inside the transaction of the deed itself: both happen, or neither.
 
-    `names` are what people call themselves and their work. They stand in a table of their own, where they can
-    be blanked; the event has their ids among its details. An address stands in neither.
-
-    `details` are texts, whole numbers, truth values, None, and lists and mappings of them; never a secret,
-    never a value of a hidden ground truth. Raises `TypeError` for anything else, also for floats, which no
-    two databases give back alike.
+    `names`, what people call themselves and their work, stand in a table where they can be blanked. `details`
+    hold neither those nor addresses, secrets, or values of a hidden ground truth. Raises `TypeError` for
+    others than texts, whole numbers, truth values, None, and lists and mappings of them.
     """
     noun_id = _storable(str(noun_id))
     texts = {
@@ -74,14 +67,9 @@ def blank(rows: QuerySet[AuditText]) -> int:
 
 def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
     """Write many deeds of the machine itself at once: verb, noun, noun_id, details."""
-    at = timezone.now()
-    bulk.insert(
-        AuditEvent,
-        ["at", "verb", "noun", "noun_id", "details"],
-        [
-            [at, verb, noun, _storable(str(noun_id)), _plain(details)]
-            for verb, noun, noun_id, details in deeds
-        ],
+    AuditEvent.objects.bulk_create(
+        AuditEvent(verb=verb, noun=noun, noun_id=_storable(str(noun_id)), details=_plain(details))
+        for verb, noun, noun_id, details in deeds
     )
 
 
@@ -111,6 +99,7 @@ def seal() -> int:
 
     Whatever its id and its moment, an event that was committed late is sealed when it is found.
     """
+    SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     n_sealed = 0
     while n_now := _seal_some():
         n_sealed += n_now
@@ -119,26 +108,19 @@ def seal() -> int:
 
 def _seal_some() -> int:
     with transaction.atomic():
-        if not _is_the_sealer():
+        # Whoever has this row is the only one who seals. SQLite has one writer at a time.
+        if not SweepBeat.objects.select_for_update(skip_locked=True, no_key=True):
             return 0
         last = AuditEvent.objects.exclude(hash=None).order_by("-seal_number").first()
         number, tip = (last.seal_number or 0, last.hash or "") if last else (0, GENESIS)
-        rows = []
-        for event in AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK]:
-            number, before, tip = number + 1, tip, event.hash_after(tip)
-            rows.append((number, before, tip, event.pk))
-        bulk.update(AuditEvent, ["seal_number", "previous_hash", "hash"], rows)
-    return len(rows)
-
-
-def _is_the_sealer() -> bool:
-    """Whether nobody else seals, which stays so until the transaction ends."""
-    # SQLite has one writer at a time: a transaction that begins IMMEDIATE is it.
-    if connection.vendor != "postgresql":
-        return True
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT pg_try_advisory_xact_lock(%s)", [_LOCK])
-        return cursor.fetchone() == (True,)
+        events = list(AuditEvent.objects.filter(hash=None).order_by("pk")[:_CHUNK])
+        for event in events:
+            number += 1
+            event.seal_number, event.previous_hash = number, tip
+            event.hash = tip = event.hash_after(tip)
+        # Not by the model's own queryset, which refuses every change.
+        QuerySet[AuditEvent](AuditEvent).bulk_update(events, ["seal_number", "previous_hash", "hash"])
+    return len(events)
 
 
 # --- reading it ------------------------------------------------------------------------------------------
@@ -176,10 +158,7 @@ class Break:
 
 @dataclass(frozen=True)
 class Verification:
-    """What going through the chain found: its length, its last hash, the first places that do not hold.
-
-    What is `unsealed` is in no chain yet, and was not looked at.
-    """
+    """What going through the chain found: its length, its last hash, the first places that do not hold."""
 
     n_events: int
     tip: str
@@ -188,11 +167,7 @@ class Verification:
 
 
 def verify(*, expected_hash: str = "") -> Verification:
-    """Compute every hash anew, from the first sealed event to the last.
-
-    A chain whose end was cut off, or which was written anew from some event on, is sound in itself: only a
-    hash that was noted elsewhere shows it. With `expected_hash`, some event has to have it.
-    """
+    """Compute every hash anew. With `expected_hash`, which was noted elsewhere, some event has to have it."""
     n_events, tip, breaks = 0, GENESIS, []
     is_found = not expected_hash
     not_yet = AuditEvent.objects.unsealed()

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from datetime import datetime
 
 from django.db import connection, transaction
-from django.db.models import F
+from django.db.models import F, Sum
 
 from leaderboard.models import (
     BoardVersion,
@@ -42,9 +42,8 @@ def changed(*split_ids: str) -> None:
 def hold() -> None:
     """Let nobody else change a board until the transaction ends; to be called where it ends soon.
 
-    Whoever has this waits for nobody's row. Foreign keys that are checked at COMMIT would wait there for
-    whoever holds a row that they name, and waits for this. So those of all rows written until now are checked
-    before it is taken. Whoever only submits or records takes no notice.
+    Foreign keys of the rows written until now are checked before, since at COMMIT they would wait for rows
+    whose holder waits for this.
     """
     if not transaction.get_connection().in_atomic_block:
         raise RuntimeError("a board was changed outside of the transaction of the change")
@@ -62,10 +61,7 @@ def number(split_id: str) -> int:
 
 def state() -> int:
     """The sum of all versions: the key of everything cached that any board appears in."""
-    # Asked for each public answer, and a third of what the ORM takes to make the same.
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT coalesce(sum(number), 0) FROM leaderboard_boardversion")
-        return int(cursor.fetchone()[0])
+    return BoardVersion.objects.aggregate(n=Sum("number"))["n"] or 0
 
 
 def changed_everywhere() -> None:
@@ -107,8 +103,7 @@ def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
 def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
     """The same for the splits on whose boards these evaluations stand, just decided, for everybody to see.
 
-    Private methods and editions in preparation change nothing that anybody else sees, also not this number.
-    Their intervals are to be computed all the same, so the workers hear of them.
+    Of private methods and editions in preparation the workers alone hear.
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
     hold()

@@ -30,7 +30,6 @@ from leaderboard.boards.rows import (
     scored_in,
     submitted_entry,
 )
-from leaderboard.db.bulk import in_parts
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -134,15 +133,11 @@ def board(
 ) -> Board:
     """The board of a split in one edition (the published one unless named), as `viewer` may see it.
 
-    With `at` the board as it stood then: the edition that was published, with what it had scored by then of
-    what had been shown by then. Methods are told as everybody sees them now: one that is anonymous is so on
-    every board of the past, and the board of a moment knows all that happened to it on that day. Ranks are by
-    published MiD among everything that everybody sees, whatever the filters; ties share a rank; a row without
-    that value has none. Each method is represented by the best of its standing submissions; one whose
-    submissions were all withdrawn leaves a row without values. Rows that only the viewer's own team sees
-    carry the rank that they would have, and take nobody's place.
-    `read` gives the rows that everybody sees, from a cache say; else they are read as `public_rows` does.
-    Raises `UnknownColumn`.
+    With `at` the board as it stood then, with methods told as everybody sees them now. Ranks are by published
+    MiD among everything that everybody sees, whatever the filters; ties share a rank. Each method is
+    represented by the best of its standing submissions; one whose submissions were all withdrawn leaves a row
+    without values. Rows that only the viewer's own team sees carry the rank that they would have.
+    `read` gives the rows that everybody sees, in `public_rows`' place. Raises `UnknownColumn`.
     """
     edition = edition or (edition_at(split, at) if at else split.published_edition)
     require_column(sort, rules=rules_of(edition))
@@ -269,13 +264,16 @@ def _best_of_each(
 def _with_scores(
     rows: "QuerySet[Evaluation]", *, edition: Edition, has_ranges: bool
 ) -> Iterator[tuple[Evaluation, Scored]]:
-    """Each evaluation with its scores; a large board is read in parts, of which only one is in memory."""
-    ranges = ranges_in(edition) if has_ranges else NO_RANGES
+    """Each evaluation with its scores."""
     # In an order of their own, so that bytes keep theirs; before their scores, which are written with them.
-    for evaluations in in_parts(rows.order_by("pk")):
-        scored = scored_in(edition, evaluations=[row.pk for row in evaluations], ranges=ranges)
-        for row in evaluations:
-            yield row, scored.get(row.pk) or Scored.nothing(edition.rules)
+    evaluations = list(rows.order_by("pk"))
+    scored = scored_in(
+        edition,
+        evaluations=[row.pk for row in evaluations],
+        ranges=ranges_in(edition) if has_ranges else NO_RANGES,
+    )
+    for row in evaluations:
+        yield row, scored[row.pk]
 
 
 def _finished_by(at: datetime, *, method: str) -> Q:
@@ -307,10 +305,9 @@ def _attempts(
     assuming_visible: Method | None = None,
     of_teams: bool = True,
 ) -> Mapping[UUID | None, int]:
-    """How many attempts each method's row tells: a public one all that its team shows, another one its own.
+    """How many submissions were scored in a published edition, by method.
 
-    Counted are submissions that were scored in a published edition: those that cost a slot for good. Without
-    `of_teams` every method tells its own.
+    A public method tells all that its team shows; another one, and each without `of_teams`, its own.
     """
     scored = Evaluation.objects.filter(
         submission=OuterRef("pk"), status=Status.SCORED, edition__published_at__isnull=False

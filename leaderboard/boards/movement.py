@@ -1,8 +1,4 @@
-"""How far ranks have moved in a month, on boards of one edition.
-
-The board of a month ago is that of the end of a day. It changes no more, so each process reads it once a day
-and keeps no more of it than ranks.
-"""
+"""How far ranks have moved in a month, on boards of one edition: since the end of a day, read once a day."""
 
 from collections.abc import Mapping
 from datetime import UTC, datetime, time, timedelta

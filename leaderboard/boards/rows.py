@@ -7,7 +7,7 @@ for every page and format: whatever is made of an `Entry` or a `Profile` later c
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from uuid import UUID
 
 from evaluator.metrics import metrics
@@ -51,12 +51,14 @@ class Interval:
     high: float | None = None
     rank_low: int | None = None
     rank_high: int | None = None
-    is_with_best: bool | None = None
+
+    @property
+    def is_with_best(self) -> bool | None:
+        """Whether it is possibly the best of its column."""
+        return None if self.rank_low is None else self.rank_low == 1
 
 
 _UNKNOWN = Interval()
-# Best and worst rank, and whether that is the best of its column.
-Range = tuple[int, int, bool]
 # By the evaluation's id a pair of ranks for each column of the protocol.
 KeptRanges = Mapping[str, Sequence[Sequence[int] | None]]
 NO_RANGES: Final[KeptRanges] = {}
@@ -192,7 +194,7 @@ def submitted_entry(
         **named(profile),
         decimals=decimals,
         scores=dict.fromkeys(scored.values) if withdrawn_at else scored.values,
-        intervals={} if withdrawn_at else scored.ordered_intervals(),
+        intervals={} if withdrawn_at else scored.intervals,
         date=days.truncate_to_day(submission.submitted_at, is_masked=method.is_masked),
         method_id=submission.method_id,
         submission_id=submission.pk,
@@ -219,80 +221,59 @@ def public_reason(problems: Iterable[Mapping[str, str]]) -> str:
 # --- their values ----------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Scored:
+class Scored(NamedTuple):
     """The values of an evaluation by the names of its protocol, and the intervals of those that have one."""
 
-    values: dict[str, float | None]
-    intervals: dict[str, Interval] = field(default_factory=dict)
-
-    @classmethod
-    def nothing(cls, rules: Protocol) -> "Scored":
-        """No value under any of the names."""
-        return cls(dict.fromkeys(rules.score_names))
-
-    def put(self, name: str, value: float | None, interval: Interval) -> None:
-        """Put in a value with what is known of where it may lie."""
-        self.values[name] = value
-        if interval != _UNKNOWN:
-            self.intervals[name] = interval
-
-    def ordered_intervals(self) -> dict[str, Interval]:
-        """The intervals in the order of the values, so that a row has the same bytes whenever it is read."""
-        return {name: self.intervals[name] for name in self.values if name in self.intervals}
+    values: Mapping[str, float | None]
+    intervals: Mapping[str, Interval]
 
 
-def flat_scores(evaluation: Evaluation) -> dict[str, float | None]:
+def _scored(cells: Mapping[str, tuple[float, Interval]], rules: Protocol) -> Scored:
+    """In the order of the protocol, so that a row has the same bytes whenever it is read."""
+    return Scored(
+        {name: cells[name][0] if name in cells else None for name in rules.score_names},
+        {name: cells[name][1] for name in rules.score_names if name in cells and cells[name][1] != _UNKNOWN},
+    )
+
+
+def flat_scores(evaluation: Evaluation) -> Mapping[str, float | None]:
     """The names of its protocol and their values; None where a TTC range is empty."""
     return scored_of(evaluation).values
 
 
 def scored_of(evaluation: Evaluation) -> Scored:
     """The values of one evaluation with their confidence intervals, without rank ranges."""
-    found = Scored.nothing(evaluation.edition.rules)
-    for score in evaluation.scores.all():
-        found.put(score_name(score.metric, score.interval), score.value, Interval(score.low, score.high))
-    return found
-
-
-def scores_in(edition: Edition) -> dict[UUID, dict[str, float | None]]:
-    """The values of every evaluation in an edition: one query, whatever their number."""
-    return {pk: scored.values for pk, scored in scored_in(edition).items()}
+    cells = {
+        score_name(score.metric, score.interval): (score.value, Interval(score.low, score.high))
+        for score in evaluation.scores.all()
+    }
+    return _scored(cells, evaluation.edition.rules)
 
 
 def scored_in(
     edition: Edition, *, evaluations: Collection[UUID] | None = None, ranges: KeptRanges = NO_RANGES
-) -> dict[UUID, Scored]:
+) -> Mapping[UUID, Scored]:
     """Values and intervals of every evaluation in an edition, or of these: one query.
 
     With `ranges_in(edition)` also the rank ranges of the entries that stand now.
     """
+    rules, nothing = edition.rules, [None] * len(edition.rules.score_names)
     rows = Score.objects.filter(evaluation__edition=edition)
     if evaluations is not None:
         rows = rows.filter(evaluation__in=evaluations)
-    found: dict[UUID, Scored] = {}
-    placed_in: dict[UUID, dict[str, Range]] = {}
+    cells: dict[UUID, dict[str, tuple[float, Interval]]] = {pk: {} for pk in evaluations or ()}
     for pk, metric, interval, value, low, high in rows.values_list(
         "evaluation_id", "metric", "interval", "value", "low", "high"
     ):
-        scored = found.get(pk)
-        if scored is None:
-            scored = found[pk] = Scored.nothing(edition.rules)
-            placed_in[pk] = _by_name(ranges.get(str(pk), ()), edition.rules)
         name = score_name(metric, interval)
-        scored.put(name, value, Interval(low, high, *placed_in[pk].get(name, ())))
-    return found
+        pair = ranges.get(str(pk), nothing)[rules.score_names.index(name)] or (None, None)
+        cells.setdefault(pk, {})[name] = value, Interval(low, high, *pair)
+    return {pk: _scored(found, rules) for pk, found in cells.items()}
 
 
 def ranges_in(edition: Edition) -> KeptRanges:
     """The rank ranges of the entries that stand now, as they are kept."""
     return EditionRanges.objects.filter(edition=edition).values_list("ranges", flat=True).first() or NO_RANGES
-
-
-def _by_name(columns: Iterable[Sequence[int] | None], rules: Protocol) -> dict[str, Range]:
-    """The ranges of one evaluation, as they are kept, by the names of its columns."""
-    pairs = zip(rules.score_names, columns, strict=False)
-    return {name: (pair[0], pair[1], pair[0] == 1) for name, pair in pairs if pair is not None}
 
 
 def placed(entry: Entry, rank: int | None) -> Entry:
@@ -302,7 +283,7 @@ def placed(entry: Entry, rank: int | None) -> Entry:
         return replace(entry, rank=rank)
     if found.rank_low <= rank <= found.rank_high:
         return replace(entry, rank=rank)
-    unplaced = replace(found, rank_low=None, rank_high=None, is_with_best=None)
+    unplaced = replace(found, rank_low=None, rank_high=None)
     return replace(entry, rank=rank, intervals={**entry.intervals, PRIMARY: unplaced})
 
 

@@ -1,8 +1,7 @@
 """What everybody sees of a board: read once for all readers, and kept by the number of its split.
 
-The number (`leaderboard/versions.py`) is read from the database by each request, so what is kept under it is
-never old. The rows are read as of one moment, so none mixes two. A board as of a time is kept in the same
-way, apart: anybody can ask for any number of times.
+Each request reads the number (`leaderboard/versions.py`), so what is kept under it is current. The rows are
+read as of one moment. A board as of a time is kept apart: anybody can ask for any number of times.
 """
 
 import threading
@@ -34,7 +33,6 @@ from leaderboard.models import (
     Visibility,
     days,
 )
-from leaderboard.models.benchmark import Listing
 from leaderboard.models.methods import MethodQuerySet
 
 
@@ -69,12 +67,20 @@ def splits() -> list[Split]:
 
     Archived ones come last. It is a whole page's first statement.
     """
-    return _shown(_all_splits())
+    rows = (
+        Split.objects.shown().order_by("position", "name").select_related("published_edition__ground_truth")
+    )
+    rows = rows.annotate(**SiteAnnouncement.of_every_row(), board_number=F("board_version__number"))
+    return sorted(rows, key=lambda split: split.is_archived)
 
 
 def splits_of(request: HttpRequest) -> list[Split]:
     """The same, read once a request."""
-    return _shown(_all_splits_of(request))
+    found: list[Split] | None = getattr(request, "splits", None)
+    if found is None:
+        found = splits()
+        request.splits = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
+    return found
 
 
 def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
@@ -84,25 +90,6 @@ def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
         if ends_at is not None and now < ends_at:
             return str(split.site_line)  # type: ignore[attr-defined]  # an annotation
     return ""
-
-
-def _all_splits() -> list[Split]:
-    rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
-    rows = rows.annotate(**SiteAnnouncement.of_every_row())
-    return list(rows.annotate(board_number=F("board_version__number")))
-
-
-def _all_splits_of(request: HttpRequest) -> list[Split]:
-    found: list[Split] | None = getattr(request, "splits", None)
-    if found is None:
-        found = _all_splits()
-        request.splits = found  # type: ignore[attr-defined]  # our own, as `user` is Django's
-    return found
-
-
-def _shown(rows: Sequence[Split]) -> list[Split]:
-    shown = [split for split in rows if split.listing != Listing.OFF]
-    return sorted(shown, key=lambda split: split.is_archived)
 
 
 def editions() -> "QuerySet[Edition]":

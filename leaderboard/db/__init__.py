@@ -1,4 +1,4 @@
-"""The database beside the ORM: its clock, and statements for many rows.
+"""The database beside the ORM: its clock.
 
 Every room may import this one; it imports none.
 """

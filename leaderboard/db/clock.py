@@ -19,12 +19,3 @@ def database_now() -> datetime:
     row = Split.objects.annotate(now=Now()).values_list("now", flat=True).first()
     # Only a database without a single split, which no migrated one is, cannot be asked in this way.
     return timezone.now() if row is None else row
-
-
-def just_before(now: datetime) -> datetime:
-    """A moment that is over for the database at `now`, its own clock's answer, when that is written back.
-
-    SQLite compares times as texts, its own with three decimals and ours with six: of the same millisecond
-    ours would be the later.
-    """
-    return now - timedelta(milliseconds=1)

@@ -8,7 +8,7 @@ from uuid import UUID
 from django.contrib.auth.models import AnonymousUser
 
 from leaderboard.boards import boards
-from leaderboard.boards.rows import scores_in
+from leaderboard.boards.rows import scored_in
 from leaderboard.editions import corrections, history
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Evaluation, Status, Submission
@@ -213,7 +213,7 @@ def _side(edition: Edition) -> _Side:
     return _Side(
         edition=edition,
         evaluations={evaluation.submission_id: evaluation for evaluation in rows},
-        scores=scores_in(edition),
+        scores={pk: scored.values for pk, scored in scored_in(edition).items()},
         ranks={entry.submission_id: entry.rank for entry in board.entries if entry.submission_id},
     )
 

@@ -23,6 +23,7 @@ from leaderboard.boards import boards, rows, snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.scoring import confidence, disclosure, questions, recording_sums, verdicts
+from leaderboard.scoring.questions import Key
 
 MIN_METHODS, MAX_METHODS = 2, 5
 N_FIRST = 20
@@ -142,10 +143,7 @@ def of(
     known = _known(board.edition, chosen)
     new = [key for key in map(_key, asked) if key not in withheld and not _is_asked_for(known.get(key))]
     questions.ask(edition=board.edition, pairs=new, user=viewer, address=address, now=now)
-    pairs = tuple(
-        _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
-        for pair in asked
-    )
+    pairs = _pairs(asked, known, withheld)
     return Compared(
         split=split,
         edition=board.edition,
@@ -173,10 +171,7 @@ def of_first(*, board: boards.Board) -> tuple[Pair, ...]:
     withheld, known = _withheld(board.edition, pairs), _known(board.edition, first)
     new = [key for key in map(_key, pairs) if key not in withheld and key not in known]
     questions.note(edition=board.edition, pairs=new)
-    return tuple(
-        _plain(*pair, withheld[_key(pair)]) if _key(pair) in withheld else _pair(*pair, known.get(_key(pair)))
-        for pair in pairs
-    )
+    return _pairs(pairs, known, withheld)
 
 
 def neighbours(pairs: Sequence[Pair]) -> list[Pair]:
@@ -203,16 +198,10 @@ def _chosen(board: boards.Board, methods: Sequence[UUID], viewer: User | Anonymo
     return [entry_of[pk] for pk in methods]
 
 
-def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[tuple[UUID, UUID], str]:
+def _withheld(edition: Edition, pairs: Sequence[tuple[Entry, Entry]]) -> dict[Key, str]:
     """By their keys the pairs of which no interval and no p is told, and why."""
     whys = {_key(pair): disclosure.why_withheld(*pair, edition=edition) for pair in pairs}
     return {key: why for key, why in whys.items() if why}
-
-
-def _plain(first: Entry, second: Entry, why: str) -> Pair:
-    """The differences of the published values, which everybody can take from the board."""
-    shown = _differences_of_values(first.scores, second.scores, decimals=first.decimals)
-    return Pair(first, second, shown, withheld=why)
 
 
 def _differences_of_values(
@@ -226,7 +215,7 @@ def _differences_of_values(
     }
 
 
-def _key(pair: tuple[Entry, Entry]) -> tuple[UUID, UUID]:
+def _key(pair: tuple[Entry, Entry]) -> Key:
     """A pair is kept once, under its evaluations in ascending order."""
     first, second = sorted([_evaluation_id(pair[0]), _evaluation_id(pair[1])])
     return first, second
@@ -237,7 +226,7 @@ def _evaluation_id(entry: Entry) -> UUID:
     return entry.evaluation_id
 
 
-def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[tuple[UUID, UUID], Comparison]:
+def _known(edition: Edition, chosen: Sequence[Entry]) -> dict[Key, Comparison]:
     """What was asked for before, computed or not."""
     ids = [_evaluation_id(entry) for entry in chosen]
     asked = Comparison.objects.filter(edition=edition, first__in=ids, second__in=ids)
@@ -248,21 +237,28 @@ def _is_asked_for(row: Comparison | None) -> bool:
     return row is not None and (row.computed_at is not None or row.asked_at is not None)
 
 
-def _pair(first: Entry, second: Entry, row: Comparison | None) -> Pair:
-    if row is None or row.differences is None:
-        return Pair(first, second, None)
-    is_turned = row.first_id != first.evaluation_id
-    shown = {
-        name: found.turned() if is_turned else found
-        for name in first.scores
-        if name in row.differences
-        for found in [_told(row.differences[name])]
-    }
-    return Pair(first, second, shown, withheld=row.differences.get(WITHHELD, ""))
+def _pairs(
+    asked: Sequence[tuple[Entry, Entry]], known: Mapping[Key, Comparison], withheld: Mapping[Key, str]
+) -> tuple[Pair, ...]:
+    found = []
+    for first, second in asked:
+        key = _key((first, second))
+        row = known.get(key)
+        if key in withheld:
+            # Everybody can take these differences from the board.
+            shown = _differences_of_values(first.scores, second.scores, decimals=first.decimals)
+            found.append(Pair(first, second, shown, withheld=withheld[key]))
+        elif row is None or row.differences is None:
+            found.append(Pair(first, second, None))
+        else:
+            kept = {name: _told(row.differences[name]) for name in first.scores if name in row.differences}
+            if row.first_id != first.evaluation_id:
+                kept = {name: gap.turned() for name, gap in kept.items()}
+            found.append(Pair(first, second, kept, withheld=row.differences.get(WITHHELD, "")))
+    return tuple(found)
 
 
 def _told(kept: Mapping[str, Any]) -> Difference:
-    """A difference as it was kept; one from before it was known on how few recordings it rests has none."""
     known = kept.get("influence")
     return Difference(**{**kept, "influence": Influence(**known) if known else None})
 

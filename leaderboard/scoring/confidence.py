@@ -1,15 +1,12 @@
 """Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
 
-Workers make them from sums per unit (day or recording), which never leave the workers' private directory,
-and write them beside the scores. An interval belongs to one evaluation and stays; ranges belong to all
-entries of a board and are made anew when those change. Which entries an edition's ranges were made of is
-kept as a digest, so that anybody can see whether they still hold: the database is the truth, and messages
-only make it quick. `docs/uncertainty.md` says how and why.
+Workers make them from sums per unit (day or recording), which never leave their private directory. An
+interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made anew when
+those change, which a digest tells. `docs/uncertainty.md` says how and why.
 """
 
 import hashlib
 from collections.abc import Callable, Collection, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from functools import cached_property, lru_cache
@@ -18,18 +15,17 @@ from uuid import UUID
 
 import numpy as np
 import structlog
-from django.db import connection, transaction
-from django.db.models import Exists, OuterRef, Q, QuerySet
+from django.db import transaction
+from django.db.models import Exists, OuterRef
 from numpy.typing import NDArray
 
 from evaluator import published
-from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name, split_name
+from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
 from evaluator.scoring import uncertainty
 from evaluator.scoring.ranges import Quoted, rank_ranges
 from evaluator.scoring.significance import cut_off
 from leaderboard import versions
 from leaderboard.boards.rows import printed_decimals
-from leaderboard.db import bulk
 from leaderboard.models import (
     Edition,
     EditionRanges,
@@ -46,17 +42,8 @@ from leaderboard.storage.seeds import seed_of
 log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
-# Every digest begins with it. Raised when intervals or ranges are made in another way: all are made anew.
-METHOD = "3"
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
 PATIENCE = timedelta(minutes=1)
-# All pairs are compared each time: 1 s of processor at 200 entries, 19 s at 1,000, half of a worker's time.
-REST_PER_PAIR = timedelta(microseconds=20)
-LOCKS = 0x7753
-# So many files are read between two looks at what else waits.
-MANY = 500
-# What is new of the intervals, by the evaluation's id: low, high and the id of their score.
-Ends = dict[UUID, list[tuple[float | None, float | None, int]]]
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
@@ -85,7 +72,13 @@ def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
 
 def active_entries(edition: Edition) -> list[ScoredEntry]:
     """Everything that stands in an edition, private methods included: one query."""
-    rows = _standing(edition).values_list(
+    rows = Score.objects.filter(
+        evaluation__edition=edition,
+        evaluation__status=Status.SCORED,
+        evaluation__submission__withdrawn_at=None,
+        metric=PRIMARY,
+        interval=OVERALL,
+    ).values_list(
         "evaluation_id",
         "evaluation__submission__digest",
         "evaluation__submission__manifest_digest",
@@ -100,16 +93,6 @@ def active_entries(edition: Edition) -> list[ScoredEntry]:
     ]
 
 
-def _standing(edition: Edition) -> "QuerySet[Score]":
-    return Score.objects.filter(
-        evaluation__edition=edition,
-        evaluation__status=Status.SCORED,
-        evaluation__submission__withdrawn_at=None,
-        metric=PRIMARY,
-        interval=OVERALL,
-    )
-
-
 def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
     """What everybody sees ranked: of each shown method its best, the earlier one of two that are as good."""
     best: dict[UUID, ScoredEntry] = {}
@@ -117,15 +100,6 @@ def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
         if row.is_shown:
             best.setdefault(row.method_id, row)
     return list(best.values())
-
-
-def digest_of(edition: Edition, rows: Sequence[ScoredEntry]) -> str:
-    """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
-    return Entries(edition, tuple(rows), _printed_lines(edition)).digest
-
-
-def _printed_lines(edition: Edition) -> tuple[str, ...]:
-    return tuple(sorted(map(repr, _printed(edition))))
 
 
 def _printed(edition: Edition) -> list[tuple[float, ...]]:
@@ -141,12 +115,12 @@ class Entries:
 
     edition: Edition
     rows: tuple[ScoredEntry, ...]
-    printed: tuple[str, ...]
+    printed: tuple[tuple[float, ...], ...]
 
     @classmethod
     def of(cls, edition: Edition) -> "Entries":
         """As they are now."""
-        return cls(edition, tuple(active_entries(edition)), _printed_lines(edition))
+        return cls(edition, tuple(active_entries(edition)), tuple(_printed(edition)))
 
     @cached_property
     def ranked(self) -> list[ScoredEntry]:
@@ -155,7 +129,7 @@ class Entries:
 
     @cached_property
     def digest(self) -> str:
-        """Names what intervals and ranges are made of; see `digest_of`."""
+        """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
         rivals = {row.evaluation_id for row in self.ranked}
         return self._digest([f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in self.rows])
 
@@ -165,21 +139,9 @@ class Entries:
         return self._digest([str(row.evaluation_id) for row in self.ranked])
 
     def _digest(self, lines: Sequence[str]) -> str:
-        edition = self.edition
-        text = "\n".join([edition.ground_truth_id, edition.protocol, *self.printed, *sorted(lines)])
-        return f"{METHOD} sha256:{hashlib.sha256(text.encode()).hexdigest()}"
-
-    def are_those_of(self, present: Edition) -> bool:
-        """Whether the edition has the same ones now."""
-        # All else of an entry never changes, and takes longer to read.
-        found = _standing(present).values_list(
-            "evaluation_id",
-            "evaluation__submission__method_id",
-            "evaluation__submission__method__visibility",
-        )
-        now = {(pk, method, visibility != Visibility.PRIVATE) for pk, method, visibility in found}
-        before = {(row.evaluation_id, row.method_id, row.is_shown) for row in self.rows}
-        return now == before and _printed_lines(present) == self.printed
+        printed = sorted(map(repr, self.printed))
+        text = "\n".join([self.edition.ground_truth_id, self.edition.protocol, *printed, *sorted(lines)])
+        return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
 
     @property
     def have_ranges(self) -> bool:
@@ -191,7 +153,7 @@ def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
     """The entries of editions whose ranges were made of others, each read when it is asked for.
 
     Only those whose ground truth is `held`, among these digests: what this worker can do. An edition in
-    which something is still to be scored has patience, and so has a large one whose ranges are quite new.
+    which something is still to be scored has patience.
     """
     undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
     found = (
@@ -204,14 +166,8 @@ def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
         if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:
             continue
         entries = Entries.of(edition)
-        if not (entries.have_ranges or _rests(entries, now=now)):
+        if not entries.have_ranges:
             yield entries
-
-
-def _rests(entries: Entries, *, now: datetime) -> bool:
-    edition, n = entries.edition, len(entries.rows)
-    rest = min(PATIENCE, n**2 * REST_PER_PAIR)
-    return edition.inferred_at is not None and now - edition.inferred_at < rest
 
 
 # --- a worker's work -------------------------------------------------------------------------------------
@@ -220,69 +176,42 @@ def _rests(entries: Entries, *, now: datetime) -> bool:
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
     """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
 
-    False: they hold already, another worker is at it, or the entries have changed since they were read, and
-    whoever looks next does it. `between` is called every fraction of a second. Raises what
-    `recording_sums.sums_of` raises.
+    False: they hold already, or the entries have changed since they were read, or another worker has written
+    theirs meanwhile. `between` is called every fraction of a second. Raises what `recording_sums.sums_of`
+    raises.
     """
-    with _alone(entries.edition) as is_alone:
-        if not is_alone or entries.have_ranges:
-            return False
-        ends = _intervals(entries, between=between)
-        ranges = _ranges(entries, between=between)
-        is_written = _write(entries, ends=ends, ranges=ranges, now=now)
+    if entries.have_ranges:
+        return False
+    intervals = _intervals(entries, between=between)
+    ranges = _ranges(entries, between=between)
+    is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
     log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
     return is_written
 
 
-@contextmanager
-def _alone(edition: Edition) -> Iterator[bool]:
-    """Whether this worker is the only one at it: what several compute, all but one throw away."""
-    if connection.vendor != "postgresql":
-        yield True
-        return
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT pg_try_advisory_lock(%s, %s)", [LOCKS, edition.pk])
-        (is_alone,) = cursor.fetchone() or (False,)
-        try:
-            yield is_alone
-        finally:
-            if is_alone:
-                cursor.execute("SELECT pg_advisory_unlock(%s, %s)", [LOCKS, edition.pk])
-
-
-def _intervals(entries: Entries, *, between: Callable[[], None]) -> Ends:
-    """What is new of the intervals beside the scores."""
+def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
+    """The scores that have no interval yet and can have one, with it."""
     edition = entries.edition
     usable = uncertainty.usable_columns(recording_sums.unit_counts_of(edition))
-    names = edition.rules.score_names
-    column_of = {name: j for j, name in enumerate(names)}
-    scores = Score.objects.filter(evaluation__edition=edition)
-    if edition.inference_digest.startswith(f"{METHOD} "):
-        is_usable = Q(pk=None)
-        for column in np.flatnonzero(usable).tolist():
-            metric, interval = split_name(names[column])
-            is_usable |= Q(metric=metric, interval=interval)
-        scores = scores.filter(is_usable, low=None)
-    found: dict[UUID, list[tuple[int, int, float | None, float | None]]] = {}
-    for pk, evaluation_id, metric, interval, low, high in scores.values_list(
-        "pk", "evaluation_id", "metric", "interval", "low", "high"
-    ):
-        cell = (pk, column_of[score_name(metric, interval)], low, high)
-        found.setdefault(evaluation_id, []).append(cell)
-    missing = [row for row in entries.rows if row.evaluation_id in found]
-    changed: Ends = {}
-    for start in range(0, len(missing), uncertainty.BATCH):
+    column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
+    missing: dict[UUID, list[Score]] = {}
+    for score in Score.objects.filter(evaluation__edition=edition, low=None):
+        if usable[column_of[score_name(score.metric, score.interval)]]:
+            missing.setdefault(score.evaluation_id, []).append(score)
+    rows = [row for row in entries.rows if row.evaluation_id in missing]
+    for start in range(0, len(rows), uncertainty.BATCH):
         between()
-        some = missing[start : start + uncertainty.BATCH]
+        some = rows[start : start + uncertainty.BATCH]
         sums = np.stack([recording_sums.unit_sums_of(edition, file=row.file) for row in some])
         # As they are kept: ranges must not depend on which of them were made before.
         lows, highs = disclosure.published_ends(*bootstrap_of(edition).intervals(sums), edition=edition)
         for i, row in enumerate(some):
-            for pk, j, *before in found[row.evaluation_id]:
-                ends = [_published(ends[i, j], edition.decimals) for ends in (lows, highs)]
-                if ends != before:
-                    changed.setdefault(row.evaluation_id, []).append((ends[0], ends[1], pk))
-    return changed
+            for score in missing[row.evaluation_id]:
+                j = column_of[score_name(score.metric, score.interval)]
+                score.low, score.high = (
+                    published(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
+                )
+    return [score for row in rows for score in missing[row.evaluation_id]]
 
 
 def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Ranges] | None:
@@ -293,15 +222,13 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
     counts = recording_sums.unit_counts_of(edition)
     sums = np.empty((len(rivals), *counts.shape))
     for i, row in enumerate(rivals):
-        if i % MANY == MANY - 1:
-            between()
         sums[i] = recording_sums.unit_sums_of(edition, file=row.file)
     found = rank_ranges(
         sums,
         published=_published_values(edition, [row.evaluation_id for row in rivals]),
         usable=uncertainty.usable_columns(counts),
         rng=generator_of(edition, purpose="signs"),
-        quoted=_quoted(edition, counts),
+        quoted=_quoted(entries, counts),
         between=between,
     )
     ends = np.stack([found.low, found.high], axis=2).tolist()
@@ -329,18 +256,14 @@ def _n_effective(edition: Edition) -> dict[str, float]:
     return {name: cut_off(n) for name, n in zip(edition.rules.score_names, degrees.tolist(), strict=True)}
 
 
-def _quoted(edition: Edition, counts: Floats) -> Quoted | None:
+def _quoted(entries: Entries, counts: Floats) -> Quoted | None:
     """The rows quoted from papers, each value as exact as it was printed: 14.8 is 14.75 to 14.85."""
-    values = np.array(_printed(edition)).reshape(-1, len(edition.rules.score_names))
+    values = np.array(entries.printed).reshape(-1, len(entries.edition.rules.score_names))
     if not len(values):
         return None
     decimals = [printed_decimals(v for v in row if not np.isnan(v)) for row in values.tolist()]
     half_widths = 0.5 * 10.0 ** -np.array(decimals)[:, None]
     return Quoted(values, np.where(np.isnan(values), np.nan, half_widths), counts)
-
-
-def _published(value: float, decimals: int) -> float | None:
-    return None if np.isnan(value) else published(float(value), decimals=decimals)
 
 
 def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
@@ -354,7 +277,9 @@ def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.
     return uncertainty.bootstrap_of(seed, np.frombuffer(counts).reshape(shape))
 
 
-def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, now: datetime) -> bool:
+def _write(
+    entries: Entries, *, intervals: list[Score], ranges: tuple[str, Ranges] | None, now: datetime
+) -> bool:
     """Write what was made, all or nothing, if the entries are still the same.
 
     They are read for the second time here, with the edition locked: the comparison of compare-and-set. Scores
@@ -369,9 +294,10 @@ def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, n
             .select_related("ground_truth", "split")
             .get(pk=edition.pk)
         )
-        if present.inference_digest != edition.inference_digest or not entries.are_those_of(present):
+        is_first = present.inference_digest == edition.inference_digest
+        if not is_first or Entries.of(present).digest != entries.digest:
             return False
-        bulk.update(Score, ("low", "high"), [row for rows in ends.values() for row in rows])
+        Score.objects.bulk_update(intervals, ["low", "high"], batch_size=500)
         if ranges is not None:
             digest, of = ranges
             EditionRanges.objects.update_or_create(edition=edition, defaults={"digest": digest, "ranges": of})
@@ -382,7 +308,7 @@ def _write(entries: Entries, *, ends: Ends, ranges: tuple[str, Ranges] | None, n
         is_seen = (
             (floor, n_effective) != (present.floor, present.n_effective)
             or ranges is not None
-            or not shown.isdisjoint(ends)
+            or any(score.evaluation_id in shown for score in intervals)
         )
         if is_seen and present.published_at is not None:
             versions.changed(present.split_id)

@@ -106,8 +106,7 @@ class ForkServer:
     ) -> Answer:
         """Have one file read by a process of its own, with a heartbeat every `heartbeat_s` seconds.
 
-        Raises `NotStarted`, `ServerEnded`, `Interrupted`, or `TooMuch` for more than `max_bytes` of output or
-        errors. This server is closed after the latter three, and after whatever the heartbeat raises.
+        Raises `NotStarted`, and with this server closed `ServerEnded`, `Interrupted`, or `TooMuch`.
         """
         reading = _Reading(max_bytes=max_bytes)
         try:

@@ -29,12 +29,10 @@ from django.db.models import F, Q, QuerySet
 from django.db.models.functions import Least, Now
 
 from leaderboard import audit, versions
-from leaderboard.db import bulk
-from leaderboard.db.clock import after, database_now, just_before
+from leaderboard.db.clock import after
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.models.submissions import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
 from leaderboard.ops import broker
-from leaderboard.scoring import claimable
 
 log = structlog.get_logger(__name__)
 
@@ -119,11 +117,17 @@ def enqueue_many(*, submission_ids: Sequence[uuid.UUID], edition: Edition) -> No
 
     Must run inside the transaction that holds the split; the nudges follow its commit.
     """
-    now = database_now()
-    bulk.insert(
-        Evaluation,
-        ["submission", "edition", "priority", "queued_at", "due_at"],
-        [(pk, edition.pk, Evaluation.PRIORITY_RESCORE, now, just_before(now)) for pk in submission_ids],
+    Evaluation.objects.bulk_create(
+        [
+            Evaluation(
+                submission_id=pk,
+                edition=edition,
+                priority=Evaluation.PRIORITY_RESCORE,
+                queued_at=Now(),
+                due_at=Now(),
+            )
+            for pk in submission_ids
+        ],
         ignore_conflicts=True,
     )
     n_waiting = len(submission_ids)
@@ -141,24 +145,27 @@ def claim(
     wall_s: float,
     limit: int = 1,
     in_batches: bool = False,
-    token: uuid.UUID | None = None,
     held: Collection[str] | None = None,
 ) -> list[Lease]:
     """Take up to `limit` evaluations that are queued and due, the most urgent and oldest first.
 
     With `held`, only those whose ground truth is among these digests: what this worker can score at all.
     If the first is one of an edition's re-scoring, with `in_batches` some more of that edition's. Two workers
-    never get the same one. Whoever brings a new `token` can find what it got if the answer is lost.
+    never get the same one.
     """
-    token = token or uuid.uuid4()
+    token = uuid.uuid4()
     with transaction.atomic():
-        rows = list(claimable.waiting(held)[:limit])
+        due = Evaluation.objects.due() if held is None else Evaluation.objects.due().scorable(held)
+        # What others have locked is left out. SQLite has one writer, and skips nothing.
+        free = due.select_for_update(skip_locked=True, no_key=True)
+        waiting = free.values_list("pk", "attempt", "priority", "edition")
+        rows = list(waiting[:limit])
         if not rows:
             return []
         alike = {"priority": rows[0][2], "edition": rows[0][3]}
         if alike["priority"] == Evaluation.PRIORITY_RESCORE and in_batches:
             n_waiting = Evaluation.objects.due().filter(**alike)[: 2 * RESCORE_BATCH].count()
-            more = claimable.waiting(held).filter(**alike).exclude(pk__in=[row[0] for row in rows])
+            more = waiting.filter(**alike).exclude(pk__in=[row[0] for row in rows])
             rows += more[: max(batch_of(n_waiting) - len(rows), 0)]
         Evaluation.objects.filter(pk__in=[row[0] for row in rows], status=Status.QUEUED).update(
             status=Status.RUNNING,
@@ -215,29 +222,29 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
     with transaction.atomic():
         held = _locked([lease for lease, _ in outcomes])
         decided = [(lease, outcome) for lease, outcome in outcomes if lease.evaluation_id in held]
-        bulk.update(
-            Evaluation,
+        Evaluation.objects.bulk_update(
+            [
+                Evaluation(
+                    pk=lease.evaluation_id,
+                    status=outcome.status,
+                    finished_at=held[lease.evaluation_id],
+                    finished_attempt=lease.attempt,
+                    report=outcome.report,
+                    report_digest=outcome.report_digest,
+                    problems=list(outcome.problems),
+                    n_problems=outcome.n_problems,
+                )
+                for lease, outcome in decided
+            ],
             [
                 *("status", "finished_at", "finished_attempt", "last_error"),
                 *("report", "report_digest", "problems", "n_problems"),
             ],
-            [
-                (
-                    *(outcome.status, held[lease.evaluation_id], lease.attempt, ""),
-                    *(outcome.report, outcome.report_digest, list(outcome.problems), outcome.n_problems),
-                    lease.evaluation_id,
-                )
-                for lease, outcome in decided
-            ],
         )
-        bulk.insert(
-            Score,
-            ["evaluation", "metric", "interval", "value"],
-            [
-                (lease.evaluation_id, metric, interval, value)
-                for lease, outcome in decided
-                for (metric, interval), value in outcome.scores.items()
-            ],
+        Score.objects.bulk_create(
+            Score(evaluation_id=lease.evaluation_id, metric=metric, interval=interval, value=value)
+            for lease, outcome in decided
+            for (metric, interval), value in outcome.scores.items()
         )
         audit.record_many(
             (
@@ -255,9 +262,12 @@ def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
 
     With each the present time, by the database's clock.
     """
-    ids = [lease.evaluation_id for lease in leases]
     valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
-    return {row[0]: row[3] for row in claimable.running(ids) if row[:3] in valid}
+    ids = [lease.evaluation_id for lease in leases]
+    rows = Evaluation.objects.select_for_update(no_key=True).filter(pk__in=ids, status=Status.RUNNING)
+    # Every batch locks in the same order, so that two cannot wait for each other.
+    found = rows.order_by("pk").values_list("pk", "attempt", "lease_token", Now())
+    return {row[0]: row[3] for row in found if row[:3] in valid}
 
 
 def fail_attempt(

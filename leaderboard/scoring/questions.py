@@ -87,5 +87,5 @@ def waiting(*, held: Collection[str]) -> QuerySet[Comparison]:
 
 
 def begin(row: Comparison, *, now: datetime) -> None:
-    """Send the pair to the end of the line before it is computed: one that fails keeps nothing waiting."""
+    """Send the pair to the end of the line: one that fails keeps nothing waiting."""
     Comparison.objects.filter(pk=row.pk, computed_at=None).update(asked_at=now)

@@ -1,13 +1,11 @@
 """Sums per recording, saved in the private directory of workers, beside the ground truth.
 
-They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. Each file
-is named by what it was made of, so it never changes; whatever is missing, as on another worker, is made anew
-from the submission's values. What is inferred is inferred from the sums of an edition's units, which are days
-or recordings: whole recordings added up.
+They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. What is
+missing, as on another worker, is made anew from the submission's values. An edition's units are days or
+recordings: whole recordings added up.
 """
 
 import math
-import os
 import uuid
 from functools import lru_cache
 from pathlib import Path
@@ -30,41 +28,28 @@ from leaderboard.storage import truth_values
 log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
-_NEW = os.O_WRONLY | os.O_CREAT | os.O_EXCL
 
 
 def path(edition: Edition, *, file: SentFile) -> Path:
     """Where the sums of a file are kept for this ground truth and protocol."""
-    return Path(_folder(edition), _name(file))
-
-
-def _folder(edition: Edition) -> str:
-    truth = edition.ground_truth_id.removeprefix("sha256:")
-    kept = settings.BAGS_DIR or f"{settings.GROUND_TRUTH_DIR}/bags"
-    return f"{kept}/{truth[:32]}-{edition.protocol}"
-
-
-def _name(file: SentFile) -> str:
-    digest, manifest = (part.removeprefix("sha256:") for part in file)
-    return f"{digest}-{manifest[:32]}.f8"
+    truth, digest, manifest = (
+        each.removeprefix("sha256:") for each in (edition.ground_truth_id, file.digest, file.manifest_digest)
+    )
+    kept = Path(settings.BAGS_DIR or f"{settings.GROUND_TRUTH_DIR}/bags")
+    return kept / f"{truth[:32]}-{edition.protocol}" / f"{digest}-{manifest[:32]}.f8"
 
 
 def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> None:
     """Keep a file's sums, little-endian float64. A disk that does not take them costs only time later."""
     if bags is None:
         return
-    # Once for each file of a re-scoring: paths as objects would take longer than the writing.
-    folder = _folder(edition)
-    temporary = f"{folder}/tmp{uuid.uuid4().hex}"  # noqa: S108 - a folder of our own
+    kept = path(edition, file=file)
+    temporary = kept.with_name(f"tmp{uuid.uuid4().hex}")
     try:
-        try:
-            handle = os.open(temporary, _NEW, 0o600)
-        except FileNotFoundError:
-            Path(folder).mkdir(parents=True, exist_ok=True, mode=0o700)
-            handle = os.open(temporary, _NEW, 0o600)
-        with os.fdopen(handle, "wb") as out:
-            out.write(np.ascontiguousarray(bags.sums, dtype="<f8").data)
-        os.replace(temporary, f"{folder}/{_name(file)}")  # noqa: PTH105 - see above
+        kept.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        temporary.touch(mode=0o600, exist_ok=False)
+        temporary.write_bytes(np.ascontiguousarray(bags.sums, dtype="<f8").data)
+        temporary.replace(kept)
     except OSError as fault:
         log.warning("bags_not_kept", digest=file.digest, reason=str(fault)[:200])
 
@@ -123,13 +108,8 @@ def _units(truth_digest: str, kind: str) -> Units:
 
 def floor_of(edition: Edition) -> dict[str, float | None]:
     """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
-    floor = _floor(edition.ground_truth_id, edition.protocol)
+    floor = scoring.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
     return {name: published(value, decimals=edition.decimals) for name, value in floor.items()}
-
-
-@lru_cache(maxsize=4)
-def _floor(truth_digest: str, protocol: str) -> dict[str, float | None]:
-    return scoring.floor_of(truth_values.load(truth_digest), protocol=protocol)
 
 
 def scorer(truth_digest: str, protocol: str) -> Scorer:

@@ -1,14 +1,10 @@
 """A submission's values in the order of an edition's ground truth: saved before, or read from the file.
 
-Untrusted bytes are parsed in a limited child process. It has no database credentials and cannot open files
-or sockets. If it dies once it has begun to read the file, that is known at once, and known to be the file's
-doing: the worker itself lives on. Nothing that the child writes is believed but what a file may say of
-itself: an answer has a bounded length, is of this file, and has a value that a file may have for each
-sequence; any other counts as the child's death.
+Untrusted bytes are parsed in a limited child process, without credentials, files or sockets. Nothing that it
+writes is believed but what a file may say of itself; any other answer counts as the child's death.
 
-A file is read with its own manifest, the one that was public when it came. From there its values go sequence
-by sequence, by natural keys, to the manifest of the edition. So a correction that numbers the sequences anew
-changes nothing, one that removes some leaves the others, and only one that adds some asks for another file.
+A file is read with the manifest that was public when it came. From there its values go by natural keys to the
+manifest of the edition, so only a correction that adds sequences asks for another file.
 """
 
 import json
@@ -115,8 +111,7 @@ def _forked(
 ) -> Answer:
     """What a child says that is forked for the file.
 
-    A server that has ended since the last file is replaced, once; one that ends while a child reads takes the
-    child with it, and the file is not to blame.
+    A server that has ended since the last file is replaced, once.
     """
     for _ in range(2):
         server = fork_server.server_of_this_thread(python_path=settings.BASE_DIR)
@@ -252,9 +247,8 @@ def _rejection(header: Mapping[str, Any]) -> Rejected:
 def saved(file: SentFile, edition: Edition) -> Predictions | None:
     """The values that were kept when the file was first read; None if they are not all there.
 
-    Neither the file's bytes nor its own manifest are read, but once for each pair of manifests. Raises
-    `evaluator.Rejected` if the edition has sequences that the file's manifest did not have, and `OSError` if
-    the private directory or the store does not answer.
+    Raises `evaluator.Rejected` if the edition has sequences that the file's manifest did not have, and
+    `OSError` if the private directory or the store does not answer.
     """
     manifest = truth_values.load(edition.ground_truth_id).manifest
     n_sent, places, missing = _places(file.manifest_digest, edition.ground_truth_id)

@@ -4,7 +4,6 @@ What is told are ratios of sums of squares over all recordings: they say nothing
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
 
 from evaluator.metrics.protocol import PRIMARY
@@ -16,14 +15,6 @@ from leaderboard.scoring import confidence, recording_sums
 from leaderboard.storage import truth_values
 
 N_FIRST: Final = 20
-
-
-@dataclass(frozen=True)
-class UnitCheck:
-    """Of the MiD of a method, or of its difference from the best one; None where nothing can be found."""
-
-    what: str
-    found: Dependence | None
 
 
 def groups_of(edition: Edition) -> Units:
@@ -39,8 +30,8 @@ def groups_of(edition: Edition) -> Units:
         raise Refused("edition-refused", f"{edition} has nothing to check. {fault}") from None
 
 
-def checks(edition: Edition, groups: Units) -> Iterator[UnitCheck]:
-    """The first methods of the board, best first, and how each differs from the best.
+def checks(edition: Edition, groups: Units) -> Iterator[tuple[str, Dependence | None]]:
+    """Of the MiD of the first methods, best first, and of how each differs from the best; None where unknown.
 
     Raises what `recording_sums.sums_of` raises.
     """
@@ -52,8 +43,8 @@ def checks(edition: Edition, groups: Units) -> Iterator[UnitCheck]:
     for entry in entries[:N_FIRST]:
         sums, name = recording_sums.sums_of(edition, file=entry.file)[:, column], names[entry.method_id]
         rng = confidence.generator_of(edition, purpose="units")
-        yield UnitCheck(name, dependence(sums, counts, groups, rng=rng))
+        yield name, dependence(sums, counts, groups, rng=rng)
         if best is None:
             best = sums, name
         else:
-            yield UnitCheck(f"{name} − {best[1]}", dependence(sums - best[0], counts, groups, rng=rng))
+            yield f"{name} − {best[1]}", dependence(sums - best[0], counts, groups, rng=rng)

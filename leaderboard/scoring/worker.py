@@ -2,7 +2,6 @@
 
 import hashlib
 import random
-import threading
 import time
 import uuid
 from collections import deque
@@ -56,39 +55,6 @@ PAUSES_S = (0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0)
 MAX_STORED_PROBLEMS = 100
 
 
-class _InHand:
-    """How many threads of this process decide evaluations at this moment."""
-
-    def __init__(self) -> None:
-        self._n = 0
-        self._changed = threading.Condition()
-
-    def __enter__(self) -> None:
-        with self._changed:
-            self._n += 1
-
-    def __exit__(self, *_: object) -> None:
-        with self._changed:
-            self._n -= 1
-            self._changed.notify_all()
-
-    def wait(self, *, timeout_s: float) -> bool:
-        """Wait until there is none, but not longer than `timeout_s`. Whether there was one."""
-        with self._changed:
-            if not self._n:
-                return False
-            self._changed.wait(timeout_s)
-            return True
-
-
-_in_hand = _InHand()
-
-
-def others_decide(*, timeout_s: float) -> bool:
-    """Whether another thread of this process decides an evaluation. Waits for its end, up to `timeout_s`."""
-    return _in_hand.wait(timeout_s=timeout_s)
-
-
 def run_next(*, rng: random.Random) -> bool:
     """Claim what is most urgent and decide it: one live submission, or a batch of an edition's re-scoring.
 
@@ -98,12 +64,6 @@ def run_next(*, rng: random.Random) -> bool:
     leases = _claimed()
     if not leases:
         return False
-    with _in_hand:
-        _decide(leases, claimed_s=claimed_s, rng=rng)
-    return True
-
-
-def _decide(leases: list[Lease], *, claimed_s: float, rng: random.Random) -> None:
     first = _retry_on_disconnect(lambda: _evaluations(leases[:1]))[0]
     if first.priority == Evaluation.PRIORITY_RESCORE:
         leases = rescore(leases, edition=first.edition)
@@ -114,34 +74,20 @@ def _decide(leases: list[Lease], *, claimed_s: float, rng: random.Random) -> Non
         run(lease, rng=rng, waiting=waiting, evaluation=known)
         if time.monotonic() - claimed_s > settings.LEASE_S / 2:
             _release(waiting)
+    return True
 
 
 def _claimed() -> list[Lease]:
-    """What this worker gets to decide. Raises the database's error if it stays away."""
-    token = uuid.uuid4()
-    try:
-        # Asked first where a claim is a write even of no row, for which SQLite lets nobody else write.
-        if connection.vendor == "sqlite" and not Evaluation.objects.due().exists():
-            return []
-        return lifecycle.claim(
-            lease_s=settings.LEASE_S,
-            wall_s=settings.WALL_S,
-            in_batches=True,
-            token=token,
-            held=truth_values.readable_digests(),
-        )
-    except (OperationalError, InterfaceError) as fault:
-        # It may have been committed and only the answer lost; nobody else would look at it for a whole lease.
-        log.warning("claim_not_answered", reason=str(fault)[:200])
-        connection.close()
-        return _retry_on_disconnect(lambda: _leases_of(token))
-
-
-def _leases_of(token: uuid.UUID) -> list[Lease]:
-    rows = Evaluation.objects.filter(status=Status.RUNNING, lease_token=token).order_by(
-        "priority", "queued_at"
+    """What this worker gets to decide."""
+    # Asked first where a claim is a write even of no row, for which SQLite lets nobody else write.
+    if connection.vendor == "sqlite" and not Evaluation.objects.due().exists():
+        return []
+    return lifecycle.claim(
+        lease_s=settings.LEASE_S,
+        wall_s=settings.WALL_S,
+        in_batches=True,
+        held=truth_values.readable_digests(),
     )
-    return [Lease(pk, attempt, token) for pk, attempt in rows.values_list("pk", "attempt")]
 
 
 def _release(waiting: deque[Lease]) -> None:
@@ -160,9 +106,7 @@ def _evaluations(leases: Sequence[Lease]) -> list[Evaluation]:
 def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     """Score a batch of an edition from the values that were kept when their files were first read.
 
-    Returns the leases that need their file read again: those without such values, and those that the protocol
-    rejects, so that the problem is worded from the file itself. A store that does not answer is theirs to
-    report as well.
+    Returns the leases that need their file read again: without such values, or rejected by the protocol.
     """
     sent, warned = _retry_on_disconnect(lambda: _sent(leases, edition))
     try:
@@ -222,7 +166,6 @@ def _sent(
         submission__in=evaluation_of,
         status=Status.SCORED,
         edition__ground_truth__manifest_digest=edition.ground_truth.manifest_digest,
-        report__has_key="warnings",
     )
     warned = {
         evaluation_of[submission]: [FileWarning(**warning) for warning in warnings]
@@ -247,44 +190,39 @@ def run(
     waiting = deque() if waiting is None else waiting
     if evaluation is None:
         evaluation = _retry_on_disconnect(lambda: _evaluations([lease]))[0]
+    started_s = time.monotonic()
     # Every line from here on says what it is about, also those of modules that know of no submission.
     with structlog.contextvars.bound_contextvars(
         submission_id=str(evaluation.submission_id),
         evaluation_id=str(lease.evaluation_id),
         attempt=lease.attempt,
     ):
-        _run(lease, evaluation, waiting=waiting, rng=rng)
-
-
-def _run(lease: Lease, evaluation: Evaluation, *, waiting: deque[Lease], rng: random.Random) -> None:
-    started_s = time.monotonic()
-    try:
-        outcome = _outcome(
-            evaluation,
-            heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
-        )
-        _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
-    except LostRace as race:
-        log.warning("evaluation_lost", reason=str(race))
-    except OUR_FAULTS as fault:
-        _fail_attempt(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
-    except FAULTS_OF_THE_FILE as fault:
-        log.warning("evaluation_failed", exc_info=fault)
-        is_last = isinstance(fault, sandbox.ChildOutOfTime)
-        _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng, is_last=is_last)
-    else:
-        log.info(
-            "evaluation_finished",
-            status=outcome.status.value,
-            duration_s=round(time.monotonic() - started_s, 3),
-        )
+        try:
+            outcome = _outcome(
+                evaluation,
+                heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
+            )
+            _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
+        except LostRace as race:
+            log.warning("evaluation_lost", reason=str(race))
+        except OUR_FAULTS as fault:
+            _fail_attempt(lease, strike=Strike.INFRASTRUCTURE, reason=_in_words(fault), rng=rng)
+        except FAULTS_OF_THE_FILE as fault:
+            log.warning("evaluation_failed", exc_info=fault)
+            is_last = isinstance(fault, sandbox.ChildOutOfTime)
+            _fail_attempt(lease, strike=Strike.POISON, reason=_in_words(fault), rng=rng, is_last=is_last)
+        else:
+            log.info(
+                "evaluation_finished",
+                status=outcome.status.value,
+                duration_s=round(time.monotonic() - started_s, 3),
+            )
 
 
 class Pulse:
     """The heartbeat of one run: False once the work is somebody else's, or its time is up.
 
-    A database that does not answer says neither: the run goes on, since its result is fenced anyway, but not
-    beyond its own time. A run long enough to have a heartbeat keeps nothing waiting behind it.
+    A database that does not answer says neither. A run with a heartbeat keeps nothing waiting behind it.
     """
 
     def __init__(self, lease: Lease, *, waiting: deque[Lease], lease_s: float, wall_s: float) -> None:

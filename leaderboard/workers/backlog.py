@@ -1,4 +1,4 @@
-"""Jobs of low priority: draw boards, count changed labels, compare, compute intervals, analyse.
+"""Jobs of low priority: count changed labels, compare, compute intervals, analyse.
 
 Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
 for longer than a fraction of a second.
@@ -20,8 +20,6 @@ log = structlog.get_logger(__name__)
 
 # Of each kind at most so much in one go, so that every kind has its turn.
 MAX_AT_ONCE = 50
-# So often it is asked what waits while another thread of this process decides something.
-PATIENCE_S = 0.1
 FAULTS = (OSError, Rejected, sandbox.ChildDied, sandbox.ChildNotReady, sandbox.LeaseLost)
 
 
@@ -72,11 +70,8 @@ def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[
 
 
 def _yield_to_live_work(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
-    """Decide what waits before going on, and let another thread of this process finish what it decides.
-
-    Somebody watches a page for it, and what is computed here would take half of its processor.
-    """
-    while not is_stopping() and (worker.run_next(rng=rng) or worker.others_decide(timeout_s=PATIENCE_S)):
+    """Decide what waits before going on: somebody watches a page for it."""
+    while not is_stopping() and worker.run_next(rng=rng):
         pass
     if is_stopping():
         raise Stopping

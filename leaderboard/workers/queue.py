@@ -8,11 +8,12 @@ import random
 import threading
 import time
 from collections.abc import Callable, Sequence
+from datetime import datetime
 
 import structlog
 from django.conf import settings
 from django.db import Error, connections
-from django.db.models import BooleanField, ExpressionWrapper, Q
+from django.db.models import F, Q
 from django.db.models.functions import Now
 
 from leaderboard import audit, versions
@@ -21,9 +22,12 @@ from leaderboard.mails import notices, outbox
 from leaderboard.methods import visibility
 from leaderboard.models import Evaluation, SweepBeat
 from leaderboard.ops import health, rate_limits
+from leaderboard.people import addresses
+from leaderboard.quotas import mailboxes
 from leaderboard.scoring import analyses, lifecycle, worker
-from leaderboard.storage import truth_values
-from leaderboard.workers import backlog, upkeep
+from leaderboard.storage import orphans, truth_values
+from leaderboard.submissions import forgetting
+from leaderboard.workers import backlog
 
 log = structlog.get_logger(__name__)
 
@@ -40,48 +44,33 @@ def poll(*, rng: random.Random, stopping: threading.Event) -> int:
     lifecycle.release_expired(rng=rng)
     while not stopping.is_set() and worker.run_next(rng=rng):
         n_found += 1
-    work_behind(rng=rng, stopping=stopping)
+    if not stopping.is_set():
+        backlog.work_off(now=clock.database_now(), rng=rng, is_stopping=stopping.is_set)
     return n_found
 
 
-def work_behind(*, rng: random.Random, stopping: threading.Event) -> int:
-    """Do what waits behind submissions, until `stopping`. Returns how much was done."""
-    if stopping.is_set():
-        return 0
-    return backlog.work_off(now=clock.database_now(), rng=rng, is_stopping=stopping.is_set)
+def keep_up(*, rng: random.Random, stopping: threading.Event) -> None:
+    """Sweep, send mails and clean, each when it is due and no other process has begun to.
 
-
-def sweep_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Sweep, unless somebody has begun to within `SWEEP_S`."""
+    Mails and cleaning may wait for a server that is slow; the next sweep is then another process's.
+    """
+    SweepBeat.objects.get_or_create(pk=SweepBeat.THE_ONE)
     if _begun("sweep_begun_at", every_s=settings.SWEEP_S):
         sweep(rng=rng)
-
-
-def clean_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Clean, unless somebody has begun to within `CLEAN_S`."""
-    if _begun("clean_begun_at", every_s=settings.CLEAN_S):
-        upkeep.clean(now=clock.database_now())
-
-
-def send_mails_if_due(*, rng: random.Random, stopping: threading.Event) -> None:
-    """Queue notices and send what waits, unless somebody has begun to within `SWEEP_S`.
-
-    A worker that has no mail server leaves it to others.
-    """
+    # A worker that has no mail server leaves mails to others.
     if settings.SENDS_MAIL and _begun("mails_begun_at", every_s=settings.SWEEP_S):
         now = clock.database_now()
         notices.queue_due(now=now)
         outbox.work_off(now=now, is_stopping=stopping.is_set)
+    if _begun("clean_begun_at", every_s=settings.CLEAN_S):
+        clean(now=clock.database_now())
 
 
 def _begun(field: str, *, every_s: float) -> bool:
     """Whether it is due and this process is the one to do it: of all that ask at once, one."""
-    is_due = Q(**{field: None}) | Q(**{f"{field}__lte": clock.after(-every_s)})
+    due = SweepBeat.objects.filter(Q(**{field: None}) | Q(**{f"{field}__lte": clock.after(-every_s)}))
     # Looked at first: an update, also one of no row, waits for SQLite's one writer.
-    found = SweepBeat.objects.values_list(ExpressionWrapper(is_due, BooleanField()), flat=True).first()
-    if found is None:
-        SweepBeat.objects.bulk_create([SweepBeat()], ignore_conflicts=True)
-    return found is not False and bool(SweepBeat.objects.filter(is_due).update(**{field: Now()}))
+    return due.exists() and bool(due.update(**{field: Now()}))
 
 
 def sweep(*, rng: random.Random) -> None:
@@ -102,15 +91,36 @@ def sweep(*, rng: random.Random) -> None:
     health.record_sweep(n_out_of_reach=n_out_of_reach)
 
 
+def clean(*, now: datetime) -> None:
+    """Remove what nobody needs. Several may do it at once; each file is removed by one of them.
+
+    Raises `OSError` if the store does not answer; what was removed until then stays removed.
+    """
+    outbox.purge(now=now)
+    mailboxes.delete_expired(now=now)
+    forgetting.delete_late_rows()
+    addresses.delete_unproved(now=now)
+    n_files = n_bytes = n_leftovers = 0
+    for orphan in orphans.orphans(now=now):
+        if orphans.remove(orphan, now=now):
+            n_files, n_bytes = n_files + 1, n_bytes + orphan.size_bytes
+    # Half-written files of processes that were killed.
+    for path in orphans.leftovers():
+        path.unlink(missing_ok=True)
+        n_leftovers += 1
+    SweepBeat.objects.update(
+        cleaned_at=now,
+        n_files_removed=F("n_files_removed") + n_files,
+        n_bytes_removed=F("n_bytes_removed") + n_bytes,
+    )
+    log.info("cleaned", n_files=n_files, n_bytes=n_bytes, n_leftovers=n_leftovers)
+
+
 # --- the threads that do it -------------------------------------------------------------------------------
 
 
 class Poller(threading.Thread):
-    """Does something every few seconds, whether or not a message came.
-
-    Each time in a thread of its own with connections of its own: whatever goes wrong in one, the next starts
-    afresh.
-    """
+    """Does something every few seconds, whether or not a message came, with new connections each time."""
 
     def __init__(self, act: Callable[..., object], *, every_s: float, rng: random.Random) -> None:
         super().__init__(name=act.__name__, daemon=True)
@@ -122,19 +132,15 @@ class Poller(threading.Thread):
     def run(self) -> None:
         """Do it again and again, until stopped."""
         while not self._stopping.wait(self._every_s * self._rng.uniform(0.8, 1.2)):
-            once = threading.Thread(target=self._once, name=self.name, daemon=True)
-            once.start()
-            once.join()
-
-    def _once(self) -> None:
-        """Do it. A database or store that is away is no fault of this time; the next one finds it."""
-        try:
-            self._act(rng=self._rng, stopping=self._stopping)
-        except (Error, OSError) as fault:
-            log.warning("poll_failed", act=self.name, reason=str(fault)[:200])
-        finally:
-            # They belong to this thread, which ends here.
-            connections.close_all()
+            try:
+                self._act(rng=self._rng, stopping=self._stopping)
+            except (Error, OSError) as fault:
+                # A database or store that is away is no fault of this time; the next one finds it.
+                log.warning("poll_failed", act=self.name, reason=str(fault)[:200])
+            except Exception:
+                log.exception("poll_failed", act=self.name)
+            finally:
+                connections.close_all()
 
     def stop(self) -> None:
         """Begin nothing more."""
@@ -142,15 +148,13 @@ class Poller(threading.Thread):
 
 
 def start_pollers(*, rng: random.Random) -> Sequence[Poller]:
-    """Let this process look for work, sweep, clean and send mails by itself.
+    """Let this process look for work and keep up what is to be kept up, by itself.
 
-    One for each, so that neither a long run nor a slow store keeps the queue from being swept.
+    Two threads, so that a long run keeps nothing from being swept.
     """
     pollers = (
         Poller(poll, every_s=settings.POLL_S, rng=rng),
-        Poller(sweep_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
-        Poller(clean_if_due, every_s=min(settings.CLEAN_S, 60.0), rng=rng),
-        Poller(send_mails_if_due, every_s=settings.SWEEP_S / 3, rng=rng),
+        Poller(keep_up, every_s=settings.SWEEP_S / 3, rng=rng),
     )
     for poller in pollers:
         poller.start()

@@ -94,7 +94,7 @@ def writes_a_status(call: ast.Call) -> bool:
         return (
             len(call.args) > 1 and isinstance(call.args[1], ast.Constant) and call.args[1].value == "status"
         )
-    if name in {"update", "insert"}:  # of `leaderboard.db.bulk`, which takes the names of columns
+    if name == "bulk_update":  # it takes the names of columns
         texts = {node.value for arg in call.args for node in ast.walk(arg) if isinstance(node, ast.Constant)}
         if "status" in texts:
             return True
@@ -122,8 +122,7 @@ def test_only_lifecycle_writes_a_status() -> None:
         "Evaluation(status='SCORED').save()",
         "Evaluation.objects.update_or_create(pk=1, defaults={'status': 'SCORED'})",
         "setattr(evaluation, 'status', 'SCORED')",
-        "bulk.update(Evaluation, ['status'], rows)",
-        "bulk.insert(Evaluation, ['submission', *('status', 'edition')], rows)",
+        "Evaluation.objects.bulk_update(rows, ['report', *('status', 'n_problems')])",
     ],
 )
 def test_the_rule_about_statuses_sees_every_way_to_write_one(source: str) -> None:

@@ -37,13 +37,12 @@ class Command(RefusingCommand):
                 "truth can name another one."
             )
         self.stdout.write("SE factor  correlation       p  overall MiD of")
-        for row in rows:
-            found = row.found
+        for what, found in rows:
             numbers = (
                 f"{found.se_factor:9.2f}  {found.correlation:11.3f}  {found.p:6.4f}"
                 if found
                 else f"{'–':>9}  {'–':>11}  {'–':>6}"
             )
-            self.stdout.write(f"{numbers}  {row.what}")
+            self.stdout.write(f"{numbers}  {what}")
         if not rows:
             self.stdout.write("No public method has a score in this edition yet.")

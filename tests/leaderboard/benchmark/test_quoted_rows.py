@@ -102,9 +102,9 @@ def test_a_board_that_stands_has_every_row_and_a_former_one_those_of_its_time(
 
 def test_ranges_of_a_former_edition_count_the_rows_of_its_time(former: Edition) -> None:
     first, second = Edition.objects.order_by("number").select_related("split")
-    before = [confidence.digest_of(edition, []) for edition in (first, second)]
+    before = [confidence.Entries.of(edition).digest for edition in (first, second)]
     quote("later")
-    after = [confidence.digest_of(edition, []) for edition in (first, second)]
+    after = [confidence.Entries.of(edition).digest for edition in (first, second)]
     assert before[0] == after[0]
     assert before[1] != after[1]
 

@@ -6,7 +6,6 @@ import json
 import re
 from pathlib import Path
 
-import jwt
 import pytest
 from django.db import IntegrityError, transaction
 from django.test import Client
@@ -15,8 +14,7 @@ from django.utils import timezone
 from leaderboard.editions import corrections, preview
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Split, Submission, User
-from leaderboard.submissions import receipts
-from tests import builders, pages
+from tests import builders
 from tests.editions import publish
 
 pytestmark = pytest.mark.slow
@@ -78,27 +76,9 @@ def test_every_form_has_the_editions_decimals(
         line = next(line for line in body.splitlines() if "Foo" in line)
         assert texts["mid"] in line
         assert texts["mid_high"] in line
-    texts["receipt"] = jwt.decode(
-        receipts.receipt(submission=submission), options={"verify_signature": False}
-    )["scores"]["mid"]
-    for form, address in {
-        "badge": f"/methods/{submission.method_id}/badge.svg?split=test",
-        "feed": "/board/test/feed.atom",
-    }.items():
-        found = re.search(r"MiD ([\d.]+)", client.get(address).text)
-        assert found is not None
-        texts[form] = found[1]
-    found = re.search(r">Foo <span[^>]*>[^<]*MiD&nbsp;([\d.]+)<", client.get("/compare/?split=test").text)
+    found = re.search(r"MiD ([\d.]+)", client.get("/board/test/feed.atom").text)
     assert found is not None
-    texts["choice"] = found[1]
-    options = client.get("/board/test/charts/progress.json").text
-    found = re.search(r'"name": "Foo", "read": \["[^"]*", "MiD ([\d.]+) ', options)
-    assert found is not None
-    texts["chart"] = found[1]
-    page = pages.page(client.get(f"/submissions/{submission.pk}/"))
-    texts["page"] = (
-        page.all("table", class_="numbers")[0].one("tbody").all("td")[0].text.split()[0].rstrip(",")
-    )
+    texts["feed"] = found[1]
     assert {name: len(text.partition(".")[2]) for name, text in texts.items()} == dict.fromkeys(
         texts, decimals
     )

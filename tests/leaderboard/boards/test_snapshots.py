@@ -1,7 +1,5 @@
 """What everybody sees is drawn once, is never old, never mixed, and says nothing of what is private."""
 
-import gzip
-import uuid
 from collections.abc import Callable
 from pathlib import Path
 
@@ -57,10 +55,6 @@ def n_queries(client: Client, address: str) -> int:
         assert client.get(address).status_code == 200, address
     # A test is one transaction: what would begin and end one within is none of the page's statements.
     return sum(not query["sql"].startswith(("SAVEPOINT", "RELEASE")) for query in captured)
-
-
-def etag(client: Client, address: str = API) -> str:
-    return str(client.get(address)["ETag"])
 
 
 # --- it is what it was read from ---------------------------------------------------------------------------
@@ -184,10 +178,10 @@ def test_a_public_page_takes_four_statements_whatever_its_size(
     assert {n_queries(client, address) for address in kept} == {1}
 
 
-# --- conditional requests and compression ------------------------------------------------------------------
+# --- conditional requests -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("address", [PAGE, API, "/board/test/editions/1/", "/api/v1/methods/{}"])
+@pytest.mark.parametrize("address", [PAGE, "/api/v1/methods/{}"])
 def test_who_knows_an_answer_is_not_sent_it_again(
     edition: Edition, filled: list[Method], client: Client, address: str
 ) -> None:
@@ -204,59 +198,6 @@ def test_who_knows_an_answer_is_not_sent_it_again(
     third = client.get(address, headers={"If-None-Match": tag})
     assert third.status_code == 200
     assert "Renamed" in third.text
-
-
-def test_a_change_that_nobody_sees_keeps_the_tag(
-    edition: Edition, filled: list[Method], client: Client
-) -> None:
-    before = etag(client)
-    by_hand(lambda: None)
-    assert etag(client) == before
-
-
-def test_answers_come_compressed_for_who_takes_that(
-    edition: Edition, filled: list[Method], client: Client
-) -> None:
-    plain = client.get(API)
-    packed = client.get(API, headers={"Accept-Encoding": "br, gzip"})
-    assert packed["Content-Encoding"] == "gzip"
-    assert gzip.decompress(packed.content) == plain.content
-    assert packed["ETag"] != plain["ETag"]  # other bytes, another strong tag
-    refusing = client.get(API, headers={"Accept-Encoding": "gzip;q=0, *"})
-    assert refusing.content == plain.content
-    assert int(packed["Content-Length"]) == len(packed.content) < len(plain.content) / 3
-    known = {"Accept-Encoding": "gzip", "If-None-Match": packed["ETag"]}
-    assert client.get(API, headers=known).status_code == 304
-
-
-def test_head_says_the_same_without_the_bytes(edition: Edition, filled: list[Method], client: Client) -> None:
-    whole = client.get(API)
-    head = client.head(API)
-    assert head.content == b""
-    assert {name: head[name] for name in ("ETag", "Content-Length", "Content-Type")} == {
-        name: whole[name] for name in ("ETag", "Content-Length", "Content-Type")
-    }
-
-
-def test_security_headers_are_those_of_any_page(
-    edition: Edition, filled: list[Method], client: Client
-) -> None:
-    client.get(PAGE)
-    kept = client.get(PAGE)
-    for name in ("Content-Security-Policy", "X-Frame-Options", "X-Content-Type-Options", "X-Request-ID"):
-        assert kept.headers.get(name), name
-
-
-def test_only_whole_answers_are_remembered(edition: Edition, client: Client) -> None:
-    for address in (
-        *(f"{API}?sort=nothing", "/board/nowhere/", f"{API}?at=2026-01-01T00:00:00Z"),
-        f"/api/v1/methods/{uuid.uuid4()}",
-    ):
-        first = client.get(address)
-        assert first.has_header("ETag") == (first.status_code == 200), address
-        with CaptureQueriesContext(connection) as captured:
-            client.get(address)
-        assert len(captured) > 1, address
 
 
 def test_a_method_is_nowhere_until_it_is_shown_and_told_of_as_it_is_then(

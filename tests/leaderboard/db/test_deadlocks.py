@@ -1,171 +1,145 @@
-"""No two verbs wait for each other for ever: all pairs of them, against each other, on PostgreSQL.
+"""No two verbs wait for each other for ever: locks have one order, and pairs that once did so meet."""
 
-`python -m tests.deadlocks` does it fifty times over, each time held at another statement, and each pair alone
-as well.
-"""
-
-import os
-from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import permutations, product
+import uuid
+from collections.abc import Callable
+from datetime import timedelta
+from functools import partial
 from pathlib import Path
 
 import pytest
-from django.db import connection
+from allauth.account.models import EmailAddress
+from django.db import connection, transaction
 from django.utils import timezone
 
-from evaluator import read_predictions
-from evaluator.metrics.protocol import get_protocol
-from evaluator.scoring.scoring import Scorer
 from leaderboard.editions import ground_truth
-from leaderboard.errors.outages import outage_of
-from leaderboard.errors.refusals import Refused
-from leaderboard.models import Team, User
-from leaderboard.models.submissions import SentFile
-from leaderboard.quotas import quotas
-from leaderboard.scoring import lifecycle, recording_sums
-from leaderboard.storage import truth_values
+from leaderboard.methods import visibility
+from leaderboard.models import Edition, Submission, User
+from leaderboard.people import invitations, teams, tokens
+from leaderboard.scoring import confidence, lifecycle
+from leaderboard.submissions import forgetting, submissions
 from tests import builders
-from tests.interlocking import Meeting, Outcome, at_the_board_lock, at_the_event
-from tests.locking_scene import World, scene
-from tests.locking_verbs import VERBS
+from tests.editions import corrected, open_edition, publish
+from tests.interlocking import Hold, meet
+from tests.leaderboard.web.maintain import queue_rows
 from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
-N_ROUNDS = int(os.environ.get("TSTTC_DEADLOCK_ROUNDS", "1"))
-DEADLOCK_DETECTED = "40P01"
-# What a verb may answer to somebody who came second.
-ANSWERS = (
-    Refused,
-    quotas.QuotaExceeded,
-    Refused,
-    lifecycle.LostRace,
-    Team.DoesNotExist,  # it has just ended, which is a 404
-)
 pytestmark = [pytest.mark.slow, *ON_POSTGRESQL]
 
+Deed = Callable[[], object]
+BOARD, EVENT = "SET CONSTRAINTS ALL IMMEDIATE", 'INSERT INTO "leaderboard_auditevent"'
+ORDER = (
+    "pg_advisory_xact_lock_shared",  # the bytes of a file
+    "leaderboard_split",
+    "leaderboard_user",
+    "leaderboard_team",
+    "leaderboard_invitation",
+    "leaderboard_method",
+    "leaderboard_submission",
+    "leaderboard_evaluation",
+    "leaderboard_edition",
+    BOARD,
+)
+"""What a transaction locks, from first to last; `docs/architecture.md` says it as well."""
+
 
 @pytest.fixture
-def world(benchmark: None, maintainer: User, tmp_path: Path) -> World:
-    edition = builders.import_truth(tmp_path, n=40, n_recordings=10)
-    path = builders.truth_csv(tmp_path / "corrected.csv", n=40, n_recordings=10, seed=2)
-    row = ground_truth.add(split_name="test", path=path, now=timezone.now(), actor=None)
-    truth = truth_values.load(edition.ground_truth_id)
-    predictions = read_predictions(builders.predictions(edition), manifest=truth.manifest)
-    report = Scorer(truth, get_protocol(edition.protocol)).report(predictions, keep_bags=True)
-    files = [SentFile(f"sha256:{number:064}", truth.manifest.digest) for number in range(5)]
-    for file in files:
-        recording_sums.save(edition, file=file, bags=report.bags)
-    return World(edition=edition, files=files, correction=row, maintainer=maintainer, folder=tmp_path)
+def verbs(entries: list[Submission], edition: Edition, maintainer: User, tmp_path: Path) -> dict[str, Deed]:
+    """Verbs that take locks, each ready to be done once."""
+    now, owner = timezone.now(), entries[0].submitted_by
+    assert owner is not None
+    team, split = teams.team_of(user=owner), edition.split_id
+    # The newcomer is another account of the loner's mailbox.
+    loner, newcomer = (User.objects.create_user(f"loner{each}@example.org") for each in ("", "+2"))
+    alone = teams.create(user=loner, name="Alone", now=now)
+    secret = invitations.make(team=team, actor=owner, now=now)[1]
+    private = builders.send(owner, b"{}", method="Private").submission.method
+    prepared = open_edition(corrected(tmp_path, factor=1.3))
+    lifecycle.claim(lease_s=60, wall_s=300, limit=9)
+    leases = [
+        lifecycle.Lease(row.pk, row.attempt, row.lease_token)
+        for row in prepared.evaluations.order_by("pk")
+        if row.lease_token
+    ]
+    entries_now = confidence.Entries.of(Edition.objects.select_related("ground_truth").get(pk=edition.pk))
+    address = EmailAddress.objects.create(user=owner, email="other@example.org", verified=True)
+    truth, other = (corrected(tmp_path, factor=factor) for factor in (1.4, 1.5))
+
+    def change_address() -> None:
+        with transaction.atomic():
+            address.set_as_primary()
+
+    def send(user: User, **fields: str) -> Deed:
+        return partial(builders.send, user, uuid.uuid4().bytes, method="M1.05", **fields)
+
+    return {
+        "submit": send(owner, description="What it is."),
+        "submit for the first time": send(newcomer),
+        "withdraw": partial(submissions.withdraw, submission=entries[0], actor=owner, now=now),
+        "finalise": lambda: lifecycle.finalise_many([(lease, queue_rows.SCORED) for lease in leases]),
+        "infer": partial(confidence.infer, entries_now, now=now + timedelta(hours=1)),
+        "import a ground truth": partial(ground_truth.add, split_name=split, path=truth, now=now, actor=None),
+        "open an edition": partial(open_edition, other),
+        "publish": partial(publish, prepared, leave_out=True),
+        "override a quota": partial(builders.override, team),
+        "override a loner's quota": partial(builders.override, alone),
+        "make a token": partial(tokens.create, user=owner, name="CI", now=now, split_name=split),
+        "change an address": change_address,
+        "rename the team": partial(teams.rename, team=team, name="Eagle Owls", actor=owner, now=now),
+        "join": partial(invitations.accept, secret=secret, user=loner, now=now),
+        "leave alone": partial(teams.leave, user=loner),
+        "show a method": partial(
+            visibility.change, method=private, visibility="PUBLIC", actor=owner, now=now
+        ),
+        "forget": partial(forgetting.forget, user=owner, reason="Asked for.", actor=maintainer, now=now),
+    }
 
 
-@pytest.fixture
-def meeting(world: World) -> Iterator[Meeting]:
-    assert connection.vendor == "postgresql"
-    with crowd_on_postgres(), Meeting(len(VERBS) // 2) as meeting:
-        yield meeting
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("submit", "infer"),
+        ("make a token", "open an edition"),
+        ("override a quota", "open an edition"),
+        ("override a quota", "import a ground truth"),
+        ("override a quota", "rename the team"),
+        ("override a loner's quota", "leave alone"),
+        ("open an edition", "submit for the first time"),
+        ("submit for the first time", "publish"),
+        ("submit", "change an address"),
+        ("submit for the first time", "override a loner's quota"),
+        ("finalise", "publish"),
+        ("submit", "forget"),
+        ("withdraw", "show a method"),
+        ("join", "submit for the first time"),
+    ],
+)
+def test_what_once_waited_for_each_other_for_ever_does_not(
+    verbs: dict[str, Deed], first: str, second: str
+) -> None:
+    """The first ten had: one had the lock of all boards and wanted a row, the other the row and wanted it."""
+    last = BOARD if first in {"submit", "finalise", "withdraw"} else EVENT
+    with crowd_on_postgres():
+        outcome = meet(verbs[first], verbs[second], at=lambda number, sql: last in sql)
+    assert outcome.was_held
+    assert outcome.faults == (None, None)
 
 
-def meet(world: World, meeting: Meeting, first: str, *others: str, at: int = 0) -> Outcome:
-    """One round: the first verb is held at its statement `at`, or where it has all its locks."""
-    places = [lambda number, sql: number == at] if at else [at_the_board_lock, at_the_event]
-    for place in places:
-        there = scene(world)
-        deeds = [VERBS[name](there) for name in (first, *others)]
-        outcome = meeting.of(*deeds, at=place)
-        if outcome.was_held or any(outcome.faults):
-            break
-    return outcome
+def test_whoever_has_recorded_and_not_ended_keeps_nobody_waiting(verbs: dict[str, Deed]) -> None:
+    outcome = meet(
+        verbs["make a token"], verbs["submit for the first time"], at=lambda number, sql: EVENT in sql
+    )
+    assert outcome == ((None, None), True, False)
 
 
-MET = [
-    ("submit", "infer"),
-    ("make a token", "open an edition"),
-    ("override a quota", "open an edition"),
-    ("override a quota", "import a ground truth"),
-    ("override a quota", "rename the team"),
-    ("override a loner's quota", "leave alone"),
-    ("open an edition", "submit for the first time"),
-    ("submit for the first time", "publish"),
-    ("submit", "change an address"),
-    ("submit for the first time", "override a loner's quota"),
-]
-"""Pairs of which one had the lock of all and wanted a row, and the other had the row and wanted the lock."""
-
-
-def test_every_verb_does_its_deed_in_the_scene(world: World) -> None:
-    """Else what follows would say nothing of it."""
-    failed = {}
-    for name, prepare in VERBS.items():
-        try:
-            prepare(scene(world))()
-        except Exception as fault:  # noqa: BLE001 - told below, with all the others
-            failed[name] = repr(fault)
-    assert failed == {}
-
-
-def test_whoever_has_recorded_and_not_ended_keeps_nobody_waiting(world: World, meeting: Meeting) -> None:
-    for first, second in permutations(("make a token", "submit for the first time")):
-        there = scene(world)
-        outcome = meeting.of(VERBS[first](there), VERBS[second](there), at=at_the_event)
-        assert (outcome.was_held, outcome.n_waited, outcome.faults) == (True, 0, (None, None))
-
-
-def test_what_once_waited_for_each_other_for_ever_does_not(world: World, meeting: Meeting) -> None:
-    faults = {}
-    for first, second in MET:
-        outcome = meet(world, meeting, first, second)
-        assert outcome.was_held, first
-        faults[first, second] = outcome.faults
-    assert {pair: found for pair, found in faults.items() if found != (None, None)} == {}
-
-
-def test_no_verbs_wait_for_each_other_for_ever(world: World, meeting: Meeting) -> None:
-    """Each is held once where it has all its locks, and meets half of the others: so all pairs meet."""
-    found: Counter[str] = Counter()
-    n_statements = {}
-    for first, others in crowds().items():
-        outcome = meet(world, meeting, first, *others)
-        n_statements[first] = outcome.n_statements
-        count(found, (first, *others), outcome)
-    for number in range(1, N_ROUNDS):
-        for first, others in crowds(is_backward=number % 2 == 1).items():
-            at = number % (n_statements[first] + 1)
-            count(found, (first, *others), meet(world, meeting, first, *others, at=at))
-    tell(found)
-
-
-@pytest.mark.skipif(N_ROUNDS == 1, reason="runs with: python -m tests.deadlocks")
-def test_no_pair_alone_waits_for_each_other_for_ever(world: World, meeting: Meeting) -> None:
-    """Forward and backward."""
-    found: Counter[str] = Counter()
-    for pair in product(VERBS, repeat=2):
-        count(found, pair, meet(world, meeting, *pair))
-    tell(found)
-
-
-def crowds(*, is_backward: bool = False) -> dict[str, list[str]]:
-    """For each verb, itself and the half of the others that follow it, or that precede it, in a circle."""
-    names, n = list(VERBS)[:: -1 if is_backward else 1], len(VERBS) // 2
-    return {name: (2 * names)[i : i + n] for i, name in enumerate(names)}
-
-
-def count(found: "Counter[str]", names: Sequence[str], outcome: Outcome) -> None:
-    """Add what came of one round."""
-    found["rounds"] += 1
-    found["pairs"] += len(names) - 1
-    found["that waited"] += outcome.n_waited
-    for name, fault in zip(names, outcome.faults, strict=True):
-        if fault is None or isinstance(fault, ANSWERS):
-            continue
-        outage = outage_of(fault)
-        found["deadlocks"] += getattr(fault.__cause__, "sqlstate", None) == DEADLOCK_DETECTED
-        found["answers 503"] += outage is not None
-        found["other faults"] += outage is None
-        found[f"{name}, {names[0]} being held: {fault!r}"[:300]] += 1
-
-
-def tell(found: "Counter[str]") -> None:
-    """Print the figures, which have to be these."""
-    print(dict(found))  # noqa: T201 - for whoever runs `python -m tests.deadlocks`
-    assert found["that waited"] > found["rounds"] / 2, "else they did not meet"
-    assert (found["deadlocks"], found["answers 503"], found["other faults"]) == (0, 0, 0)
+def test_locks_are_taken_in_one_order(verbs: dict[str, Deed]) -> None:
+    """Of all verbs but those that end what others need."""
+    n_taken = 0
+    for name in [name for name in verbs if name not in {"forget", "leave alone"}]:
+        hold = Hold(lambda number, sql: False)
+        with connection.execute_wrapper(hold):
+            verbs[name]()
+        locking = [sql for sql in hold.statements if "FOR " in sql or "SET CONS" in sql or "pg_adv" in sql]
+        taken = [rank for sql in locking for rank, what in enumerate(ORDER) if what in sql.split("WHERE")[0]]
+        assert taken == sorted(taken), name
+        n_taken += len(taken)
+    assert n_taken > 20

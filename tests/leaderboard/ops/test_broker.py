@@ -56,11 +56,6 @@ def test_without_a_broker_nothing_is_sent() -> None:
     assert not broker.work_off()
 
 
-def test_messages_of_a_former_version_are_understood(transactional_db: None) -> None:
-    tasks.nudge("9f0a6a1e-0000-0000-0000-000000000000")
-    tasks.work_off("test")
-
-
 def test_a_broker_that_is_down_is_no_fault(listener: socket.socket) -> None:
     listener.close()
     assert not broker.nudge()

@@ -18,7 +18,7 @@ from leaderboard.people import teams
 from leaderboard.quotas import mailboxes, quotas
 from leaderboard.quotas.quotas import QuotaExceeded
 from leaderboard.submissions import forgetting
-from leaderboard.workers import upkeep
+from leaderboard.workers import queue
 from tests import builders
 from tests.leaderboard.web.account import proving
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -191,9 +191,9 @@ def test_what_is_kept_names_nobody_and_goes_with_the_longest_window(limited: Edi
     tables = (SpentMailbox, User, EmailAddress, Submission)
     everything = "".join(serializers.serialize("json", model._base_manager.all()) for model in tables)
     assert [text for text in ("kestrel", "example.org") if text in everything] == []
-    upkeep.clean(now=row.kept_until - timedelta(seconds=1))
+    queue.clean(now=row.kept_until - timedelta(seconds=1))
     assert SpentMailbox.objects.exists()
-    upkeep.clean(now=row.kept_until)
+    queue.clean(now=row.kept_until)
     assert not SpentMailbox.objects.exists()
     assert Submission.objects.get().submitted_by == first
 

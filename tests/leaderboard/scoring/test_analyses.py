@@ -1,7 +1,6 @@
 """The closer look at a submission: for its owner, on open splits, and never of a hidden one."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -9,11 +8,9 @@ from django.utils import timezone
 
 import evaluator
 from evaluator import get_protocol
-from leaderboard.editions import corrections
 from leaderboard.models import Analysis, Edition, Split, Submission, User
 from leaderboard.scoring import analyses
 from leaderboard.storage import files, truth_values
-from leaderboard.submissions import submissions
 from tests import builders
 from tests.editions import ANYBODY
 
@@ -34,10 +31,6 @@ def sent(val: Edition, owner: User) -> Submission:
     builders.score_all()
     builders.infer_all()
     return made
-
-
-def means_of(curve: list[dict[str, Any]]) -> list[dict[str, Any]]:
-    return [{name: value for name, value in part.items() if name != "intervals"} for part in curve]
 
 
 def plain(submission: Submission, edition: Edition) -> evaluator.Report:
@@ -116,32 +109,6 @@ def test_hidden_values_are_looked_at_by_no_worker_whatever_the_database_calls_th
     Split.objects.filter(pk="test").update(is_hidden=False)
     builders.infer_all()
     analyses.make(submission.evaluations.get(), now=timezone.now())
-    assert not Analysis.objects.exists()
-
-
-def test_a_correction_that_renumbers_looks_at_the_same_sequences(
-    sent: Submission, val: Edition, tmp_path: Path
-) -> None:
-    table = truth_values.load(val.ground_truth_id).to_table()
-    table.anno_id = table.anno_id[::-1]
-    path = tmp_path / "renumbered.csv"
-    path.write_bytes(evaluator.GroundTruth.from_table(table).to_csv())
-    second = corrections.open_edition(split_name="val", path=path, now=timezone.now(), actor=None)
-    assert second.ground_truth_id != val.ground_truth_id
-    builders.score_all()
-    corrections.publish(edition=second, reason="Numbers.", now=timezone.now(), actor=None, replaces=1)
-    builders.infer_all()
-    before, after = (Analysis.objects.get(evaluation__edition=each).content for each in (val, second))
-    assert after["worst"] == before["worst"]
-    # Another revision resamples with other weights: the ends of confidence intervals differ by a hair.
-    assert means_of(after["curve"]) == means_of(before["curve"])
-
-
-def test_what_was_withdrawn_before_is_not_looked_at(val: Edition, owner: User) -> None:
-    made = builders.submit(owner, builders.predictions(val), split="val")
-    builders.score_all()
-    submissions.withdraw(submission=made, actor=owner, now=timezone.now())
-    builders.infer_all()
     assert not Analysis.objects.exists()
 
 

@@ -10,11 +10,10 @@ from django.utils import timezone
 
 from evaluator import SCORE_NAMES, Difference, compare_predictions, published, read_predictions
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
-from leaderboard.scoring import comparisons, questions, recording_sums
+from leaderboard.scoring import comparisons
 from leaderboard.scoring.comparisons import BadComparison, NotOnTheBoard, UnknownMethod
 from leaderboard.storage import files, truth_values
 from leaderboard.submissions import submissions
-from leaderboard.workers import backlog
 from tests import builders
 from tests.editions import ANYBODY
 
@@ -88,19 +87,6 @@ def test_the_worker_computes_what_the_evaluator_says_offline(
     offline = compare_predictions(read[0], read[1], truth, decimals=1)
     for name, found in known(pair).items():
         assert found == offline[name], name
-
-
-def test_what_is_published_of_a_difference_says_the_same_of_0_as_its_p(
-    entries: list[Submission], edition: Edition
-) -> None:
-    ask(*entries)
-    builders.infer_all()
-    pairs = ask(*entries).pairs
-    found = [gap for pair in pairs for gap in known(pair).values() if gap.low is not None]
-    assert len(found) > 20
-    for gap in found:
-        assert (gap.low > 0 or gap.high < 0) == gap.is_significant == (gap.p_below <= 0.05)
-        assert gap.p == round(gap.p, 4)
 
 
 def test_the_same_pair_the_other_way_round_is_the_same_comparison(entries: list[Submission]) -> None:
@@ -178,22 +164,6 @@ def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission],
     assert codes == {"bad-comparison", "unknown-method", "not-on-the-board"}
 
 
-def test_what_cannot_be_computed_keeps_nothing_else_waiting(
-    entries: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(backlog, "MAX_AT_ONCE", 1)
-    lost, manifest = entries[0].digest, truth_values.load(edition.ground_truth_id).manifest
-    recording_sums.path(edition, file=entries[0].sent_file).unlink()
-    files.store().delete(files.aligned_name(manifest_digest=manifest.digest, digest=lost))
-    files.store().delete(files.predictions_name(lost))
-    ask(*entries[:2])
-    ask(*entries[1:3])
-    for _ in range(2):
-        builders.infer_all()
-    assert not ask(*entries[:2]).is_complete
-    assert ask(*entries[1:3]).is_complete
-
-
 def test_too_few_recordings_give_differences_without_p(benchmark: None, owner: User, tmp_path: Path) -> None:
     edition = builders.import_truth(tmp_path, n_recordings=7)
     sent = [
@@ -226,10 +196,3 @@ def test_what_is_published_alike_is_not_told_apart(
             assert (found.difference, found.p, found.p_below) == (0.0, 1.0, 1.0)
             assert found.low <= 0 <= found.high
     assert pair.sentence() == "M1.05 and Other have the same MiD to one decimal."
-
-
-def test_a_question_waits_for_a_worker_that_has_the_values(entries: list[Submission]) -> None:
-    builders.infer_all()
-    ask(*entries[:2])
-    assert questions.waiting(held=set()).count() == 0
-    assert questions.waiting(held=truth_values.readable_digests()).count() == 1

@@ -1,15 +1,13 @@
 """Intervals and rank ranges on the server: what is written beside the scores, when, and for whom."""
 
 import random
-import threading
 from collections.abc import Collection
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 from django.conf import settings
-from django.db import connection
 from django.utils import timezone
 from scipy import stats
 
@@ -31,9 +29,9 @@ from leaderboard.scoring import confidence, disclosure, recording_sums, verdicts
 from leaderboard.scoring.confidence import Entries
 from leaderboard.storage import files, truth_values
 from leaderboard.submissions import submissions
-from leaderboard.workers import backlog, queue
+from leaderboard.workers import backlog
 from tests import builders
-from tests.editions import ANYBODY, board_now, corrected, open_edition, publish
+from tests.editions import ANYBODY, board_now, corrected, open_edition
 from tests.leaderboard.scoring.inferred_scores import INFERRED, everything, scores_of
 
 pytestmark = pytest.mark.slow
@@ -170,19 +168,6 @@ def test_private_entries_get_an_interval_and_change_nothing_that_others_see(
     assert version() == number + 1
 
 
-def test_only_the_best_submission_of_a_method_is_ranked_and_all_have_intervals(
-    inferred: list[Submission], edition: Edition, owner: User
-) -> None:
-    worse = builders.submit(owner, builders.predictions(edition, factor=1.5), method="M1.05")
-    builders.score_all()
-    builders.infer_all()
-    row = scores_of(worse, edition)["mid"]
-    assert row.low is not None
-    assert row.rank_low is None
-    best = scores_of(inferred[0], edition)["mid"]
-    assert (best.rank_low, best.is_with_best) == (1, True)
-
-
 def test_printed_rows_are_counted_where_they_surely_or_possibly_stand(
     inferred: list[Submission], edition: Edition
 ) -> None:
@@ -229,18 +214,6 @@ def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
         found = entry.intervals["mid"]
         assert None not in (found.low, found.high)
         assert (found.rank_low, found.rank_high, found.is_with_best) == (None, None, None)
-
-
-def test_an_edition_in_preparation_shows_intervals_as_soon_as_it_is_published(
-    rescored: Edition,
-) -> None:
-    number = version()
-    assert builders.infer_all() == 2
-    assert version() == number + 1
-    publish(rescored)
-    submitted = [entry for entry in board_now().entries if entry.kind == "submission"]
-    assert all(entry.intervals["mid"].rank_low for entry in submitted)
-    assert builders.infer_all() == 0
 
 
 def test_sums_that_are_gone_are_made_anew_from_values_and_from_the_file(
@@ -309,37 +282,9 @@ def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submissio
     assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
 
 
-def test_only_one_worker_at_a_time_is_at_an_edition(entries: list[Submission], edition: Edition) -> None:
-    if connection.vendor != "postgresql":
-        pytest.skip("SQLite's workers are one; `python -m tests.everything` runs this")
-    edition.refresh_from_db()
-    other = connection.copy()
-    try:
-        with other.cursor() as cursor:
-            cursor.execute("SELECT pg_advisory_lock(%s, %s)", [confidence.LOCKS, edition.pk])
-        assert not confidence.infer(Entries.of(edition), now=timezone.now())
-    finally:
-        other.close()
-    assert confidence.infer(Entries.of(edition), now=timezone.now())
-
-
-def test_a_worker_s_own_look_computes_what_no_message_told_of(
+def test_of_two_workers_that_made_the_same_the_second_writes_nothing(
     entries: list[Submission], edition: Edition
 ) -> None:
-    queue.poll(rng=random.Random(0), stopping=threading.Event())
     edition.refresh_from_db()
-    first = edition.inferred_at
-    assert first is not None
-    queue.poll(rng=random.Random(0), stopping=threading.Event())
-    edition.refresh_from_db()
-    assert edition.inferred_at == first, "there was nothing more to do"
-
-
-def test_a_large_board_rests_between_two_rounds(
-    inferred: list[Submission], edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(confidence, "REST_PER_PAIR", timedelta(seconds=1))
-    submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
-    held = truth_values.readable_digests()
-    assert stale(now=timezone.now(), held=held) == []
-    assert stale(now=timezone.now() + timedelta(seconds=20), held=held) == [edition]
+    now, both = timezone.now(), [Entries.of(edition) for _ in range(2)]
+    assert [confidence.infer(each, now=now) for each in both] == [True, False]

@@ -18,18 +18,6 @@ def inferred(entries: list[Submission]) -> list[Submission]:
     return entries
 
 
-def test_what_was_made_in_another_way_is_made_anew(inferred: list[Submission], edition: Edition) -> None:
-    expected = everything()
-    Score.objects.exclude(low=None).update(low=0.0, high=99.0)
-    EditionRanges.objects.update(digest="former", ranges={})
-    edition.refresh_from_db()
-    assert edition.inference_digest.startswith(f"{confidence.METHOD} sha256:")
-    former = edition.inference_digest.partition(" ")[2]
-    Edition.objects.filter(pk=edition.pk).update(inference_digest=former)
-    assert builders.infer_all() == 1
-    assert everything() == expected
-
-
 def test_an_edition_knows_its_effective_numbers_of_recordings(
     inferred: list[Submission], edition: Edition
 ) -> None:

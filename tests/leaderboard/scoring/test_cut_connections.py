@@ -9,14 +9,13 @@ import pytest
 from django.db import Error, connection
 
 from leaderboard.errors import outages
-from leaderboard.models import AuditEvent, Edition, Evaluation, Status, Submission, User
-from leaderboard.scoring import lifecycle, worker
+from leaderboard.models import AuditEvent, Edition, Status, Submission, User
+from leaderboard.scoring import worker
 from leaderboard.scoring.lifecycle import Lease
 from leaderboard.storage import files
 from tests import builders
 from tests.leaderboard.scoring.cutting_proxy import Cut, CuttingProxy
 from tests.leaderboard.web.maintain import queue_rows
-from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
 
 pytestmark = [
     pytest.mark.slow,
@@ -108,24 +107,6 @@ def test_submit_is_never_lost_once_acknowledged_and_never_doubled_when_sent_agai
     assert n_known >= 1, "the answer to COMMIT was lost, and the file was known when it came again"
 
 
-def test_first_submission_of_a_newcomer_survives_every_cut(proxy: CuttingProxy, edition: Edition) -> None:
-    numbers = itertools.count()
-    newcomers: list[User] = []
-    data = builders.predictions(edition)
-
-    def prepare() -> None:
-        number = next(numbers)
-        newcomers.append(User.objects.create(email=f"n{number}@example.org", name=f"Newcomer {number}"))
-
-    def send() -> Submission:
-        return builders.submit(newcomers[-1], data, visibility="PRIVATE")
-
-    for _ in every_cut(proxy, send, prepare=prepare):
-        again = send()
-        assert list(Submission.objects.filter(submitted_by=newcomers[-1])) == [again]
-        assert list(again.method.team.members.all()) == [newcomers[-1]]
-
-
 def test_a_run_is_decided_once_wherever_it_is_cut(
     proxy: CuttingProxy, edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -158,65 +139,3 @@ def test_a_run_is_decided_once_wherever_it_is_cut(
         assert evaluation.scores.count() == 10
         assert AuditEvent.objects.filter(noun_id=evaluation.pk, verb="scored").count() == 1
     assert n_kept > 10, "a cut while finalising is survived without a second run"
-
-
-def test_claim_whose_answer_is_lost_is_not_left_to_its_lease(
-    proxy: CuttingProxy, edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(worker.time, "sleep", lambda seconds: None)
-    data = builders.predictions(edition)
-    numbers = itertools.count()
-    submissions: list[Submission] = []
-
-    def prepare() -> None:
-        submissions.append(builders.submit(owner, data, method=f"Method {next(numbers)}"))
-
-    def work() -> None:
-        worker.run_next(rng=random.Random(0))
-
-    for came_to_its_end in every_cut(proxy, work, prepare=prepare):
-        assert came_to_its_end, "the server was back at once"
-        row = submissions[-1].evaluations.get()
-        assert (row.status, row.attempt) in [(Status.SCORED, 1), (Status.QUEUED, 0)]
-        # What the cut connection had locked is free once the server has noticed: this waits for it.
-        queue_rows.make_due()
-        while row.status == Status.QUEUED and worker.run_next(rng=random.Random(0)):
-            row.refresh_from_db()
-        assert (row.status, row.attempt, row.n_infrastructure_strikes) == (Status.SCORED, 1, 0)
-
-
-VERBS: dict[str, Callable[[Lease], object]] = {
-    "claim": lambda _: lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S),
-    "heartbeat": lambda lease: lifecycle.heartbeat(lease, lease_s=LEASE_S),
-    "finalise": lambda lease: lifecycle.finalise(lease, SCORED),
-    "give back": queue_rows.give_back,
-    "hand back": lambda lease: lifecycle.release([lease]),
-    "release": lambda _: queue_rows.release_expired(),
-}
-
-
-@pytest.mark.parametrize("name", VERBS)
-def test_cut_verb_leaves_a_state_from_which_the_work_goes_on(
-    proxy: CuttingProxy, edition: Edition, owner: User, name: str
-) -> None:
-    leases: list[Lease] = []
-
-    def prepare() -> None:
-        evaluation = queue_rows.queued(edition, owner)
-        leases[:] = [queue_rows.claim()]
-        if name == "claim":
-            lifecycle.release(leases)
-        if name == "release":
-            queue_rows.expire(leases[0])
-        assert evaluation.pk == leases[0].evaluation_id
-
-    for _ in every_cut(proxy, lambda: VERBS[name](leases[0]), prepare=prepare):
-        row = queue_rows.row(leases[0])
-        assert row.n_infrastructure_strikes <= 1
-        if row.status == Status.RUNNING:
-            Evaluation.objects.filter(pk=row.pk).update(leased_until=row.started_at)
-            assert queue_rows.release_expired() == 1
-        if row.status != Status.SCORED:
-            queue_rows.make_due()
-            assert lifecycle.finalise(queue_rows.claim(), SCORED)
-        assert queue_rows.n_scores(leases[0]) == len(SCORED.scores)

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 
-import numpy as np
 import pytest
 from django.db import transaction
 from django.test import Client
@@ -79,18 +78,6 @@ def test_ends_of_a_difference_are_rounded_outwards_and_p_alone_judges_it(
     assert told.p is None
     assert told.is_significant == (p < 0.05)
     assert published(found, found, is_hidden=False) == found
-
-
-@pytest.mark.parametrize("decimals", [1, 2])
-def test_an_interval_is_at_most_a_fifth_wider_or_two_units_of_the_last_digit(decimals: int) -> None:
-    unit, widest = 10.0**-decimals, 0.0
-    for width in np.geomspace(0.02, 50, 400).tolist():
-        for low in np.linspace(-1, 1, 41).tolist():
-            ends = disclosure.coarse_ends(low, low + width, decimals=decimals)
-            wider = ends[1] - ends[0] - width
-            assert wider < max(width / 5, 2 * unit) + 1e-6
-            widest = max(widest, wider / width if width < 10 * unit else 0.0)
-    assert widest > 0.2  # so it is not a fifth below ten units
 
 
 def test_what_is_published_alike_is_not_told_apart() -> None:
@@ -198,19 +185,6 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
         versions.changed("test")
     (pair,) = ask(entries[0], other, viewer=owner).pairs
     assert pair.withheld == ""
-
-
-def test_page_and_api_say_the_same_words(entries: list[Submission], client: Client) -> None:
-    query = {"split": "test", "m": [str(sent.method_id) for sent in entries[:3]]}
-    response = client.get("/api/v1/compare", query)
-    assert response.status_code == 200
-    pairs = response.json()["pairs"]
-    page = client.get("/compare/", query)
-    assert page.status_code == 200
-    for pair in pairs:
-        assert pair["withheld"] in page.text
-        assert pair["differences"]["mid"]["low"] is None
-        assert pair["sentence"].endswith(pair["withheld"])
 
 
 # --- whatever the database says --------------------------------------------------------------------------

@@ -3,7 +3,7 @@
 from django.test import Client
 
 from evaluator import SCORE_NAMES, write_predictions
-from leaderboard.models import BoardVersion, Edition, Score, User
+from leaderboard.models import Edition, Score, User
 from leaderboard.storage import truth_values
 from tests import builders, pages
 
@@ -26,16 +26,6 @@ def test_the_floor_is_what_a_file_of_the_ground_truth_itself_scores(edition: Edi
     assert floor == {name: scored.get(name) for name in SCORE_NAMES}
     assert floor["mid"], "one sequence is at 25 s, where a prediction is truncated"
     assert floor["mid_small"] == 0
-
-
-def test_an_edition_without_a_floor_gets_one_and_its_board_changes(edition: Edition) -> None:
-    floor = floor_of(edition)
-    before = BoardVersion.objects.get(split="test").number
-    Edition.objects.update(floor=None)
-    assert floor_of(edition) == floor
-    assert BoardVersion.objects.get(split="test").number == before + 1
-    builders.infer_all()
-    assert BoardVersion.objects.get(split="test").number == before + 1, "the same again changes nothing"
 
 
 def test_readers_see_the_floor_beside_the_rows_and_never_as_one(

@@ -19,12 +19,6 @@ from tests.leaderboard.web.maintain.queue_rows import LEASE_S, REJECTED, SCORED,
 # --- enqueue ---------------------------------------------------------------------------------------------
 
 
-def test_same_submission_and_edition_are_queued_once(edition: Edition, owner: User) -> None:
-    first = queue_rows.queued(edition, owner)
-    assert lifecycle.enqueue(submission=first.submission, edition=edition) == first
-    assert Evaluation.objects.count() == 1
-
-
 def test_the_database_refuses_a_second_evaluation_of_a_submission_in_an_edition(
     edition: Edition, owner: User
 ) -> None:
@@ -64,12 +58,6 @@ def test_claim_gives_attempt_token_lease_and_deadline(edition: Edition, owner: U
     assert evaluation.started_at is not None
     assert evaluation.leased_until == evaluation.started_at + timedelta(seconds=LEASE_S)
     assert evaluation.deadline_at == evaluation.started_at + timedelta(seconds=WALL_S)
-
-
-def test_what_is_claimed_is_not_claimed_again(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    queue_rows.claim()
-    assert lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S) == []
 
 
 def test_most_urgent_then_oldest_goes_first(edition: Edition, owner: User) -> None:
@@ -128,14 +116,6 @@ def test_rescoring_of_a_teams_files_takes_no_turn_of_its_new_ones(
     assert list(Evaluation.objects.due()) == [older, newer]
 
 
-def test_claim_takes_no_more_than_its_limit_and_each_has_its_own_lease(edition: Edition, owner: User) -> None:
-    for _ in range(3):
-        queue_rows.queued(edition, owner)
-    leases = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=2)
-    assert len({lease.evaluation_id for lease in leases}) == 2
-    assert Evaluation.objects.due().count() == 1
-
-
 def test_what_is_not_due_yet_is_left_alone(edition: Edition, owner: User) -> None:
     queue_rows.queued(edition, owner)
     Evaluation.objects.update(due_at=Now() + timedelta(seconds=30))
@@ -174,13 +154,6 @@ def test_heartbeat_after_the_deadline_says_stop(lease: Lease) -> None:
     assert not lifecycle.heartbeat(lease, lease_s=LEASE_S)
 
 
-@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_heartbeat_with_a_stale_lease_says_stop_and_renews_nothing(lease: Lease, what: str) -> None:
-    before = queue_rows.row(lease).leased_until
-    assert not lifecycle.heartbeat(queue_rows.stale(lease)[what], lease_s=10 * LEASE_S)
-    assert queue_rows.row(lease).leased_until == before
-
-
 # --- finalise --------------------------------------------------------------------------------------------
 
 
@@ -200,50 +173,6 @@ def test_rejection_keeps_its_problems_and_has_no_scores(lease: Lease) -> None:
     row = queue_rows.row(lease)
     assert (row.status, row.problems, row.n_problems) == (Status.REJECTED, list(REJECTED.problems), 1)
     assert queue_rows.n_scores(lease) == 0
-
-
-@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_result_of_a_stale_lease_is_discarded(lease: Lease, what: str) -> None:
-    with pytest.raises(LostRace):
-        lifecycle.finalise(queue_rows.stale(lease)[what], SCORED)
-    assert queue_rows.row(lease).status == Status.RUNNING
-    assert not Score.objects.exists()
-    assert lifecycle.finalise(lease, SCORED)
-
-
-def test_finalise_again_recognises_its_own_commit_and_writes_nothing(lease: Lease) -> None:
-    assert lifecycle.finalise(lease, SCORED)
-    before = queue_rows.row(lease).finished_at
-    assert not lifecycle.finalise(lease, SCORED)
-    assert queue_rows.row(lease).finished_at == before
-    assert queue_rows.n_scores(lease) == len(SCORED.scores)
-    assert AuditEvent.objects.filter(noun_id=lease.evaluation_id).count() == 1
-
-
-def test_a_decided_evaluation_is_not_decided_otherwise(lease: Lease) -> None:
-    lifecycle.finalise(lease, SCORED)
-    with pytest.raises(LostRace):
-        lifecycle.finalise(lease, REJECTED)
-    with pytest.raises(LostRace):
-        queue_rows.give_back(lease)
-    assert queue_rows.row(lease).status == Status.SCORED
-
-
-def test_zombie_is_fenced_after_another_worker_took_over(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    zombie = queue_rows.claim()
-    queue_rows.expire(zombie)
-    assert queue_rows.release_expired() == 1
-    queue_rows.make_due()
-    successor = queue_rows.claim()
-    with pytest.raises(LostRace):
-        lifecycle.finalise(zombie, replace(SCORED, scores={("mid", "overall"): 1.0}))
-    assert not lifecycle.heartbeat(zombie, lease_s=LEASE_S)
-    assert lifecycle.finalise(successor, SCORED)
-    with pytest.raises(LostRace):
-        lifecycle.finalise(zombie, REJECTED)
-    assert Score.objects.get(metric="mid").value == 14.25
-    assert queue_rows.row(successor).finished_attempt == 2
 
 
 def test_a_score_that_cannot_be_kept_leaves_the_evaluation_undecided(lease: Lease) -> None:
@@ -281,14 +210,6 @@ def test_cancelled_evaluation_is_final_and_its_run_is_discarded(
     assert evaluation.status == Status.CANCELLED
 
 
-def test_what_is_decided_cannot_be_cancelled(edition: Edition, owner: User) -> None:
-    evaluation = queue_rows.queued(edition, owner)
-    lifecycle.finalise(queue_rows.claim(), SCORED)
-    assert lifecycle.cancel(submission=evaluation.submission, actor=owner) == 0
-    evaluation.refresh_from_db()
-    assert evaluation.status == Status.SCORED
-
-
 def test_maintainer_retries_a_system_error_with_a_clean_slate(
     edition: Edition, owner: User, maintainer: User
 ) -> None:
@@ -305,15 +226,3 @@ def test_maintainer_retries_a_system_error_with_a_clean_slate(
     assert queue_rows.give_back(lease, Strike.POISON) == Status.QUEUED
     event = AuditEvent.objects.get(verb="retried")
     assert (event.actor, event.details) == (maintainer, {"reason": "the limit was too tight"})
-
-
-@pytest.mark.parametrize("outcome", [None, SCORED, REJECTED])
-def test_only_a_system_error_can_be_retried(
-    edition: Edition, owner: User, maintainer: User, outcome: Outcome | None
-) -> None:
-    evaluation = queue_rows.queued(edition, owner)
-    if outcome is not None:
-        lifecycle.finalise(queue_rows.claim(), outcome)
-    with pytest.raises(LostRace, match="nothing to retry"):
-        lifecycle.retry(evaluation=evaluation, actor=maintainer)
-    assert not AuditEvent.objects.filter(verb="retried").exists()

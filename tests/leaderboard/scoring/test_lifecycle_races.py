@@ -1,20 +1,19 @@
 """Workers, zombies and impatient clients at the same moment, each with a connection of its own."""
 
 import random
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
 import pytest
-from django.db import connection, connections
+from django.db import connection
 
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, Submission, User
 from leaderboard.scoring import lifecycle
 from leaderboard.scoring.lifecycle import MAX_INFRASTRUCTURE_STRIKES, Lease, LostRace
 from tests import builders
+from tests.leaderboard.db.test_races import at_once
 from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
 
@@ -22,29 +21,15 @@ T = TypeVar("T")
 
 pytestmark = [
     pytest.mark.django_db(transaction=True),
-    pytest.mark.skipif(
-        connection.vendor != "postgresql",
-        reason="SQLite in memory has one connection for all; `python -m tests.everything` runs this",
-    ),
+    pytest.mark.skipif(connection.vendor != "postgresql", reason="SQLite has one connection for all"),
 ]
 
 N_ZOMBIES = 50
 
 
-def at_once(*deeds: Callable[[], T]) -> list[T]:
-    """Do everything at the same moment, each in a thread with its own connection; what came of each."""
-    start = threading.Barrier(len(deeds))
-
-    def do(deed: Callable[[], T]) -> T:
-        try:
-            connection.ensure_connection()
-            start.wait(180)
-            return deed()
-        finally:
-            connections.close_all()
-
-    with ThreadPoolExecutor(len(deeds)) as threads:
-        return list(threads.map(do, deeds))
+def all_at_once(*deeds: Callable[[], T]) -> list[T]:
+    """Do everything at the same moment; what came of each."""
+    return at_once(len(deeds), lambda number: deeds[number]())
 
 
 def verdict(lease: Lease, value: float) -> str:
@@ -69,7 +54,7 @@ def test_fifty_zombies_are_fenced_each_while_its_successor_writes(edition: Editi
         both = [partial(verdict, zombie, 1.0), partial(verdict, successor, 2.0)]
         if number % 2:
             both.reverse()
-        verdicts.append(sorted(at_once(*both)))
+        verdicts.append(sorted(all_at_once(*both)))
         assert verdict(zombie, 1.0) == "discarded"
     assert verdicts == [["discarded", "written"]] * N_ZOMBIES
     assert list(Score.objects.values_list("value", flat=True)) == [2.0] * N_ZOMBIES
@@ -88,17 +73,9 @@ def test_two_hundred_evaluations_are_claimed_once_each_by_eight_workers(
             mine += claimed
         return mine
 
-    claimed = [lease for mine in at_once(*[work] * 8) for lease in mine]
+    claimed = [lease for mine in all_at_once(*[work] * 8) for lease in mine]
     assert len(claimed) == len({lease.evaluation_id for lease in claimed}) == 200
     assert set(Evaluation.objects.values_list("attempt", flat=True)) == {1}
-
-
-def test_a_lease_that_ran_out_is_one_strike_however_many_sweeps_see_it(edition: Edition, owner: User) -> None:
-    queue_rows.queued(edition, owner)
-    lease = queue_rows.claim()
-    queue_rows.expire(lease)
-    assert sum(at_once(*[queue_rows.release_expired] * 6)) == 1
-    assert queue_rows.row(lease).n_infrastructure_strikes == 1
 
 
 def test_finalise_against_cancel_ends_in_exactly_one_of_the_two(edition: Edition, owner: User) -> None:
@@ -109,7 +86,7 @@ def test_finalise_against_cancel_ends_in_exactly_one_of_the_two(edition: Edition
         def cancel(submission: Submission = evaluation.submission) -> str:
             return "cancelled" if lifecycle.cancel(submission=submission, actor=owner) else "too late"
 
-        outcome = at_once(cancel, partial(verdict, lease, 1.0))
+        outcome = all_at_once(cancel, partial(verdict, lease, 1.0))
         status = queue_rows.row(lease).status
         assert (outcome, status) in [
             (["cancelled", "discarded"], Status.CANCELLED),
@@ -118,54 +95,13 @@ def test_finalise_against_cancel_ends_in_exactly_one_of_the_two(edition: Edition
         assert queue_rows.n_scores(lease) == (status == Status.SCORED)
 
 
-def test_finalise_against_the_sweep_is_decided_or_queued_but_never_both(
-    edition: Edition, owner: User
-) -> None:
-    for _ in range(10):
-        queue_rows.queued(edition, owner)
-        lease = queue_rows.claim()
-        queue_rows.expire(lease)
-        heard, n_released = at_once(partial(verdict, lease, 1.0), queue_rows.release_expired)
-        row = queue_rows.row(lease)
-        assert (heard, n_released, row.status) in [
-            ("written", 0, Status.SCORED),
-            ("discarded", 1, Status.QUEUED),
-        ]
-        Evaluation.objects.filter(pk=row.pk, status=Status.QUEUED).update(status=Status.CANCELLED)
-
-
-def test_the_same_bytes_sent_twice_at_once_are_one_submission(edition: Edition, owner: User) -> None:
-    for number in range(10):
-        data = builders.predictions(edition, factor=1 + number / 100)
-        both = at_once(*[partial(builders.submit, owner, data)] * 4)
-        assert len({submission.pk for submission in both}) == 1
-    assert Submission.objects.count() == Evaluation.objects.count() == 10
-
-
 def test_a_newcomers_first_files_sent_at_once_make_one_team(edition: Edition, db: None) -> None:
     newcomer = User.objects.create(email="new@example.org", name="Newcomers")
     files = [builders.predictions(edition, factor=1.1 + number / 100) for number in range(4)]
-    sent = at_once(*[partial(builders.submit, newcomer, data) for data in files])
+    sent = all_at_once(*[partial(builders.submit, newcomer, data) for data in files])
     assert len({submission.pk for submission in sent}) == 4
     assert len({submission.method.team_id for submission in sent}) == 1
     assert len({submission.method_id for submission in sent}) == 1
-
-
-def test_one_system_error_is_retried_once_by_two_maintainers(
-    edition: Edition, owner: User, maintainer: User
-) -> None:
-    evaluation = queue_rows.queued(edition, owner)
-    Evaluation.objects.update(status=Status.SYSTEM_ERROR)
-
-    def retry() -> bool:
-        try:
-            lifecycle.retry(evaluation=evaluation, actor=maintainer)
-        except LostRace:
-            return False
-        return True
-
-    assert sorted(at_once(retry, retry)) == [False, True]
-    assert AuditEvent.objects.filter(verb="retried").count() == 1
 
 
 def test_random_workers_at_once_decide_everything_exactly_once(edition: Edition, owner: User) -> None:
@@ -187,6 +123,6 @@ def test_random_workers_at_once_decide_everything_exactly_once(edition: Edition,
                 n_written += verdict(lease, 3.0) == "written"
         return n_written
 
-    assert sum(at_once(*[partial(work, seed) for seed in range(4)])) == 60
+    assert sum(all_at_once(*[partial(work, seed) for seed in range(4)])) == 60
     assert Score.objects.count() == AuditEvent.objects.filter(verb="scored").count() == 60
     assert set(Evaluation.objects.values_list("status", flat=True)) == {Status.SCORED}

@@ -13,11 +13,10 @@ from leaderboard.scoring.lifecycle import (
     MAX_INFRASTRUCTURE_STRIKES,
     MAX_POISON_STRIKES,
     Lease,
-    LostRace,
     Strike,
 )
 from tests.leaderboard.web.maintain import queue_rows
-from tests.leaderboard.web.maintain.queue_rows import LEASE_S, SCORED, WALL_S
+from tests.leaderboard.web.maintain.queue_rows import LEASE_S, WALL_S
 
 # --- strikes ---------------------------------------------------------------------------------------------
 
@@ -76,29 +75,6 @@ def test_a_run_that_is_the_last_leaves_a_system_error_until_a_maintainer_retries
     assert queue_rows.claim().attempt == 2
 
 
-@pytest.mark.parametrize("what", ["attempt", "token", "evaluation"])
-def test_giving_back_a_stale_lease_counts_no_strike(lease: Lease, what: str) -> None:
-    with pytest.raises(LostRace):
-        queue_rows.give_back(queue_rows.stale(lease)[what])
-    row = queue_rows.row(lease)
-    assert (row.status, row.n_infrastructure_strikes) == (Status.RUNNING, 0)
-
-
-def test_what_was_never_begun_is_handed_back_without_a_strike(edition: Edition, owner: User) -> None:
-    for _ in range(3):
-        queue_rows.queued(edition, owner)
-    begun, *waiting = lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)
-    lifecycle.finalise(begun, SCORED)
-    assert lifecycle.release([begun, *waiting]) == 2
-    assert queue_rows.row(begun).status == Status.SCORED
-    for lease in waiting:
-        row = queue_rows.row(lease)
-        assert (row.status, row.n_infrastructure_strikes) == (Status.QUEUED, 0)
-        with pytest.raises(LostRace):
-            lifecycle.finalise(lease, SCORED)
-    assert len(lifecycle.claim(lease_s=LEASE_S, wall_s=WALL_S, limit=3)) == 2
-
-
 # --- the sweep -------------------------------------------------------------------------------------------
 
 
@@ -108,11 +84,6 @@ def test_expired_lease_is_taken_back_once_as_an_infrastructure_strike(lease: Lea
     row = queue_rows.row(lease)
     assert (row.status, row.n_infrastructure_strikes, row.n_poison_strikes) == (Status.QUEUED, 1, 0)
     assert row.last_error == "the worker stopped answering"
-
-
-def test_a_valid_lease_is_not_taken_back(lease: Lease) -> None:
-    assert queue_rows.release_expired() == 0
-    assert queue_rows.row(lease).status == Status.RUNNING
 
 
 def test_a_run_that_held_on_until_its_deadline_is_poison(lease: Lease) -> None:

@@ -10,9 +10,9 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django import Settings
 
-from leaderboard.models import Comparison, Edition, Evaluation, Submission, User
+from leaderboard.models import Comparison, Edition, Submission, User
 from leaderboard.ops import rate_limits
-from leaderboard.scoring import comparisons, questions
+from leaderboard.scoring import questions
 from leaderboard.scoring.questions import AskedTooOften
 from leaderboard.storage import truth_values
 from tests import builders
@@ -81,13 +81,6 @@ def test_a_pair_that_cannot_be_computed_keeps_nothing_else_waiting(edition: Edit
     assert upcoming() == pairs[1]
 
 
-def test_pairs_of_one_request_are_written_in_one_order(edition: Edition, pairs: Pairs) -> None:
-    """Else each of two could wait for a row of the other's: they come in the order of an address."""
-    assert ask(edition, *reversed(pairs[:5]))
-    written = Comparison.objects.order_by("pk").values_list("first", "second")
-    assert list(written) == pairs[:5]
-
-
 def test_one_reader_has_a_number_of_new_ones_computed_and_others_theirs(
     edition: Edition, pairs: Pairs, settings: Settings, owner: User
 ) -> None:
@@ -122,24 +115,3 @@ def test_who_has_asked_for_too_many_is_told_on_the_page_and_in_the_api(
         assert "You have asked for many new comparisons in a short time" in answer.content.decode()
     assert answer.json()["code"] == "throttled"
     assert Comparison.objects.count() == 1
-
-
-def test_a_worker_looks_anew_what_somebody_waits_for(
-    entries: list[Submission], edition: Edition, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Within one go, in which it computes up to fifty."""
-    ids = Evaluation.objects.filter(edition=edition).order_by("pk").values_list("pk", flat=True)
-    some = list(itertools.combinations(ids, 2))
-    questions.note(edition=edition, pairs=some[:3])
-    done: list[tuple[Any, Any]] = []
-    compute = comparisons.compute
-
-    def computed(row: Comparison, **options: Any) -> None:
-        compute(row, **options)
-        done.append((row.first_id, row.second_id))
-        if len(done) == 1:
-            ask(edition, some[4])
-
-    monkeypatch.setattr(comparisons, "compute", computed)
-    builders.infer_all()
-    assert done == [some[0], some[4], some[1], some[2]]

@@ -220,17 +220,10 @@ def test_a_lie_is_refused_in_words(read: Read, settings: Settings, tmp_path: Pat
         read(data)
 
 
-@pytest.mark.parametrize("is_forked", [True, False])
 @pytest.mark.parametrize("descriptor", [1, 2])
 def test_a_reader_that_writes_without_end_costs_the_worker_no_memory(
-    read: Read,
-    settings: Settings,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    is_forked: bool,
-    descriptor: int,
+    read: Read, settings: Settings, tmp_path: Path, descriptor: int
 ) -> None:
-    monkeypatch.setattr(sandbox.fork_server, "AVAILABLE", is_forked)
     before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     endless = MARK + b"while True: os.write(%d, bytes(1 << 20))" % descriptor
     with (

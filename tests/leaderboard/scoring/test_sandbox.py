@@ -25,20 +25,17 @@ from evaluator import Manifest, Rejected, read_predictions, read_truth, write_pr
 from evaluator.limits import READY
 from evaluator.predictions.predictions import Predictions, sha256_digest
 from leaderboard.scoring import sandbox
-from leaderboard.scoring.sandbox import ChildDied, ChildNotReady, ChildOutOfTime, LeaseLost
+from leaderboard.scoring.sandbox import ChildNotReady, LeaseLost
 from tests import builders
 from tests.chaos.processes import REPOSITORY
-from tests.chaos.uploads import bomb_file, reader_memory_bytes
 from tests.leaderboard.scoring.child_processes import (
     children,
     fork_servers,
     ignores,
     is_reading,
     kernel_says,
-    limits,
     needs_root,
 )
-from tests.leaderboard.scoring.hostile_reader import MARK, obeying_its_file
 
 pytestmark = pytest.mark.slow
 
@@ -125,18 +122,6 @@ def test_faulty_file_is_rejected_with_the_words_of_the_evaluator(read: Read, man
     assert there.value.as_dict() == here.value.as_dict()
 
 
-def test_file_that_needs_too_much_memory_ends_the_child_alone(
-    read: Read, settings: Settings, truth_path: Path, tmp_path: Path
-) -> None:
-    settings.CHILD_MEMORY_BYTES = reader_memory_bytes(read_truth(truth_path), directory=tmp_path)
-    with (
-        opened(bomb_file(0)) as source,
-        pytest.raises(ChildDied, match=r"needed more than \d+ MB of memory|ended with signal"),
-    ):
-        read(source)
-    assert not children()
-
-
 @pytest.mark.parametrize(
     "data",
     [
@@ -153,18 +138,6 @@ def test_archives_and_tables_of_too_many_parts_are_refused_within_a_second_of_pr
     with opened(data) as source, pytest.raises(Rejected) as rejected:
         read(source)
     assert [problem.code for problem in rejected.value.problems] == ["too-many-members"]
-
-
-def test_file_that_takes_too_much_processor_time_ends_the_child_and_is_told_from_a_crash(read: Read) -> None:
-    with pytest.raises(ChildOutOfTime, match="reading the file took more than 4 s of processor time"):
-        read_slowly(read, FAULTY, lambda pid: os.kill(pid, signal.SIGXCPU))
-    assert not children()
-
-
-def test_child_that_is_killed_is_reported(read: Read) -> None:
-    with pytest.raises(ChildDied, match="reading the file ended with signal 9"):
-        read_slowly(read, FAULTY, lambda pid: os.kill(pid, signal.SIGKILL))
-    assert not children()
 
 
 def test_signals_that_stop_a_service_do_not_end_the_reading(read: Read) -> None:
@@ -251,59 +224,6 @@ def test_server_has_no_descriptor_but_a_socket_and_no_credentials(
     assert "secret" not in kernel_says(server, "environ")
 
 
-def test_where_fork_is_not_to_be_trusted_a_process_is_started_for_each_file(
-    read: Read, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(sandbox.fork_server, "AVAILABLE", False)
-    before = fork_servers()
-    commands: list[str] = []
-    with pytest.raises(Rejected):
-        read_slowly(read, FAULTY, lambda pid: commands.append(kernel_says(pid, "cmdline")))
-    [command] = commands
-    assert "evaluator.predictions.sandbox" in command
-    assert fork_servers() == before
-
-
-def test_child_that_cannot_begin_does_not_blame_the_file(read: Read, tmp_path: Path) -> None:
-    with (
-        opened(FAULTY) as source,
-        pytest.raises(ChildNotReady, match="did not start: FileNotFoundError"),
-    ):
-        read(source, manifest_path=tmp_path / "absent.npz")
-
-
-def test_child_has_no_credentials_in_its_environment(
-    read: Read, monkeypatch: pytest.MonkeyPatch, settings: Settings, tmp_path: Path
-) -> None:
-    monkeypatch.setenv("TSTTC_DATABASE_URL", "postgres://somebody:secret@db/tsttc")
-    tell = MARK + b"raise Rejected([Problem('not-json', json.dumps(dict(os.environ)))])"
-    with obeying_its_file(tmp_path, settings), opened(tell) as source, pytest.raises(Rejected) as told:
-        read(source)
-    environment = told.value.problems[0].message
-    assert "OPENBLAS_NUM_THREADS" in environment
-    assert "secret" not in environment
-
-
-def test_child_may_open_nothing_write_nothing_and_start_nothing(read: Read, settings: Settings) -> None:
-    settings.CHILD_CPU_S = 7
-    found: list[dict[str, list[str]]] = []
-    with pytest.raises(Rejected):
-        read_slowly(read, FAULTY, lambda pid: found.append(limits(pid)))
-    [rows] = found
-    assert rows["Max open files"] == ["0", "0"]
-    assert rows["Max file size"] == ["0", "0"]
-    assert rows["Max processes"] == ["0", "0"]
-    assert rows["Max core file size"] == ["0", "0"]
-    assert rows["Max cpu time"] == ["7", "8"]
-    assert rows["Max address space"] == [str(settings.CHILD_MEMORY_BYTES)] * 2
-
-
-def test_processor_time_that_is_used_up_ends_the_child() -> None:
-    burn = "import time; from evaluator.limits import limit; limit(memory_bytes=1 << 40, cpu_s=1)\n"
-    burn += "while time.process_time() < 3: pass"
-    assert subprocess.run([sys.executable, "-c", burn], check=False).returncode == -signal.SIGXCPU
-
-
 def test_child_ends_with_a_parent_that_was_killed(tmp_path: Path, manifest: Manifest) -> None:
     """A worker that is killed leaves nothing behind that burns a processor."""
     manifest_path = tmp_path / "manifest.npz"
@@ -325,17 +245,3 @@ def test_child_ends_with_a_parent_that_was_killed(tmp_path: Path, manifest: Mani
         ended, _, _ = select.select([child], [], [], 60)
         os.close(child)
     assert ended
-
-
-def test_archives_tables_and_bombs_are_read_in_the_child(read: Read, manifest: Manifest) -> None:
-    ttc_s = np.linspace(1, 9, manifest.n_sequences)
-    rows = zip(manifest.anno_id_keys, ttc_s.tolist(), strict=True)
-    table = "\r\n".join(["anno_id,ttc", *(f"{key},{value!r}" for key, value in rows)]).encode()
-    json_text = write_predictions(manifest=manifest, ttc_s=ttc_s)
-    for data in (table, gzip.compress(table), gzip.compress(json_text)):
-        with opened(data) as source:
-            assert read(source, digest=sha256_digest(data)).ttc_s.tolist() == ttc_s.tolist()
-    # 300 MB in 300 kB: a child that unpacked all of it would take long, and end of too little memory.
-    with opened(gzip.compress(bytes(1_000_000)) * 300) as source, pytest.raises(Rejected) as caught:
-        read(source)
-    assert [problem.code for problem in caught.value.problems] == ["too-large"]

@@ -6,7 +6,6 @@ import signal
 from collections import deque
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 from django.db import InterfaceError, OperationalError
@@ -174,23 +173,6 @@ def test_cancelled_run_is_dropped_without_a_strike(
     assert run_next()
     assert strikes(submission) == (0, 0)
     assert evaluation_of(submission).status == Status.CANCELLED
-
-
-def test_claim_whose_answer_was_lost_is_found_by_its_token(
-    edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    submission = builders.submit(owner, builders.predictions(edition))
-    real = lifecycle.claim
-
-    def claim_and_hear_nothing(**how: Any) -> list[Lease]:
-        real(**how)
-        raise OperationalError("server closed the connection unexpectedly")
-
-    monkeypatch.setattr(lifecycle, "claim", claim_and_hear_nothing)
-    monkeypatch.setattr(worker.connection, "close", lambda: None)
-    assert run_next()
-    assert evaluation_of(submission).attempt == 1
-    assert submissions.progress(submission).state == Status.SCORED
 
 
 # --- the heartbeat ---------------------------------------------------------------------------------------

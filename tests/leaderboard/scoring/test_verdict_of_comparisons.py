@@ -25,7 +25,7 @@ A, B, C = (
 
 def with_range(entry: Entry, low: int, high: int) -> Entry:
     """The entry with a rank range on the board, and its mark."""
-    found = Interval(rank_low=low, rank_high=high, is_with_best=low == 1)
+    found = Interval(rank_low=low, rank_high=high)
     return replace(entry, intervals={"mid": found})
 
 

@@ -60,12 +60,6 @@ def test_a_worker_with_another_ground_truth_does_what_it_can(
     assert state(waiting) == ("QUEUED", 0, 0, 0)
 
 
-def test_what_a_process_holds_is_what_it_can_read(edition: Edition, settings: Settings) -> None:
-    assert truth_values.readable_digests() == {edition.ground_truth_id}
-    take_away(settings)
-    assert truth_values.readable_digests() == frozenset()
-
-
 @pytest.mark.django_db(transaction=True)
 def test_the_sweep_says_so_in_the_log_and_healthy_to_whoever_watches(
     waiting: Submission, settings: Settings, caplog: pytest.LogCaptureFixture

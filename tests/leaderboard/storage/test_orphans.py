@@ -182,7 +182,7 @@ def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path,
     half.write_bytes(b'{"0": 1')
     age(half, hours=2)
     with capture_logs() as lines:
-        queue.clean_if_due(rng=random.Random(0), stopping=threading.Event())
+        queue.keep_up(rng=random.Random(0), stopping=threading.Event())
     [line] = [line for line in lines if line["event"] == "cleaned"]
     assert (line["n_files"], line["n_bytes"], line["n_leftovers"]) == (1, 10, 1)
     assert not orphan.exists()

@@ -27,7 +27,7 @@ from leaderboard.models import (
 )
 from leaderboard.people import teams
 from leaderboard.submissions import forgetting, moderation
-from leaderboard.workers import upkeep
+from leaderboard.workers import queue
 from tests import builders
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -264,7 +264,7 @@ def test_what_is_written_into_a_blank_account_is_deleted_with_the_next_cleaning(
     EmailAddress.objects.create(user=owner, email="late@example.org")
     Authenticator.objects.create(user=owner, type=Authenticator.Type.TOTP, data={})
     SocialAccount.objects.create(user=owner, provider="github", uid="42")
-    upkeep.clean(now=timezone.now())
+    queue.clean(now=timezone.now())
     assert list(EmailAddress.objects.values_list("email", flat=True)) == ["stays@example.org"]
     assert not Authenticator.objects.exists()
     assert not SocialAccount.objects.exists()

@@ -19,7 +19,7 @@ from leaderboard.people import teams
 from leaderboard.quotas import quotas
 from leaderboard.storage import files, orphans
 from tests import builders
-from tests.interlocking import Meeting
+from tests.interlocking import meet
 from tests.leaderboard.db.test_races import at_once
 from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
@@ -160,7 +160,7 @@ class TestAtOnce:
             teams.team_of(user=user)
         # Of the same name as the other's method, so only the owner's is refused, and under the lock.
         builders.submit(owner, b"first", method="Foo")
-        with crowd_on_postgres(), Meeting(1) as meeting:
+        with crowd_on_postgres():
             number, was_held = 0, True
             while was_held:
                 number += 1
@@ -170,7 +170,7 @@ class TestAtOnce:
                     "accepted": partial(builders.send, stranger, file_of(data)),
                 }
                 first, second = deeds.pop(held), *deeds.values()
-                outcome = meeting.of(first, second, at=partial(is_number, number))
+                outcome = meet(first, second, at=lambda at, _, number=number: at == number)
                 was_held = outcome.was_held
                 assert outcome.faults == (None, None)
                 [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)
@@ -195,11 +195,6 @@ def test_a_method_that_another_request_makes_meanwhile_is_the_same_method(
     assert not first
     assert set(Submission.objects.values_list("method", flat=True)) == {second.submission.method_id}
     assert Submission.objects.count() == 2
-
-
-def is_number(wanted: int, found: int, sql: str) -> bool:
-    """Whether this is the statement of that number."""
-    return found == wanted
 
 
 def refused(user: User, data: bytes) -> None:

@@ -17,8 +17,7 @@ from django.utils import timezone
 from leaderboard import versions
 from leaderboard.models import Edition, Evaluation, Status, SweepBeat, User
 from leaderboard.ops import health
-from leaderboard.scoring import worker
-from leaderboard.workers import backlog, queue, upkeep
+from leaderboard.workers import queue
 from leaderboard.workers.queue import Poller
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
@@ -36,12 +35,12 @@ def test_sweep_takes_back_what_dead_workers_hold(edition: Edition, owner: User) 
     assert queue_rows.row(lease).status == Status.QUEUED
 
 
-def begun(n: int, act: Callable[..., None], *, hours_ago: float = 0.0) -> None:
+def keep_up(n: int, *, hours_ago: float) -> None:
     """Let `n` workers ask whether it is their turn, after the last time was so long ago."""
     before = timezone.now() - timedelta(hours=hours_ago)
-    SweepBeat.objects.update(sweep_begun_at=before, clean_begun_at=before)
+    SweepBeat.objects.update(sweep_begun_at=before, clean_begun_at=before, mails_begun_at=before)
     for _ in range(n):
-        act(rng=random.Random(0), stopping=threading.Event())
+        queue.keep_up(rng=random.Random(0), stopping=threading.Event())
 
 
 @pytest.fixture
@@ -49,41 +48,35 @@ def done(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The times that something was swept, and cleaned."""
     done: list[str] = []
     monkeypatch.setattr(queue, "sweep", lambda *, rng: done.append("swept"))
-    monkeypatch.setattr(upkeep, "clean", lambda *, now: done.append("cleaned"))
+    monkeypatch.setattr(queue, "clean", lambda *, now: done.append("cleaned"))
     return done
 
 
 def test_of_many_workers_one_sweeps_and_one_cleans_when_it_is_time(db: None, done: list[str]) -> None:
-    begun(3, queue.sweep_if_due)
-    begun(3, queue.clean_if_due)
-    assert done == ["swept"], "the first of all; cleaning was not due then"
-    begun(3, queue.sweep_if_due, hours_ago=1)
-    begun(3, queue.clean_if_due, hours_ago=1)
-    assert done == ["swept"] * 2
-    begun(3, queue.clean_if_due, hours_ago=7)
-    assert done == ["swept"] * 2 + ["cleaned"]
-
-
-def test_a_new_installation_is_cleaned_at_once(db: None, done: list[str]) -> None:
-    begun(3, queue.clean_if_due)
-    assert done == ["cleaned"]
+    keep_up(3, hours_ago=0)
+    assert done == ["swept", "cleaned"], "the first of all"
+    keep_up(3, hours_ago=0)
+    keep_up(3, hours_ago=1)
+    assert done[2:] == ["swept"]
+    keep_up(3, hours_ago=7)
+    assert done[3:] == ["swept", "cleaned"]
 
 
 @pytest.mark.django_db(transaction=True)
 def test_workers_that_ask_at_the_same_moment_sweep_once(done: list[str]) -> None:
-    begun(1, queue.sweep_if_due, hours_ago=1)
+    keep_up(1, hours_ago=1)
     done.clear()
     SweepBeat.objects.update(sweep_begun_at=timezone.now() - timedelta(hours=1))
     all_have_looked = threading.Barrier(6)
 
     def after_all_looks(execute: Callable[..., Any], sql: str, *rest: Any) -> Any:
-        if sql.startswith("UPDATE") and SweepBeat._meta.db_table in sql:
+        if sql.startswith("UPDATE") and "sweep_begun_at" in sql:
             all_have_looked.wait(PATIENCE_S)
         return execute(sql, *rest)
 
     def ask() -> None:
         with connection.execute_wrapper(after_all_looks):
-            queue.sweep_if_due(rng=random.Random(0), stopping=threading.Event())
+            queue.keep_up(rng=random.Random(0), stopping=threading.Event())
         connections.close_all()
 
     asking = [threading.Thread(target=ask) for _ in range(6)]
@@ -94,14 +87,18 @@ def test_workers_that_ask_at_the_same_moment_sweep_once(done: list[str]) -> None
     assert done == ["swept"]
 
 
-def test_a_sweep_that_breaks_is_not_written_down(db: None, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_sweep_that_breaks_is_not_written_down_and_keeps_nothing_else_waiting(
+    db: None, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def break_off(*, now: datetime) -> int:
         raise OSError("no space left on device")
 
     monkeypatch.setattr(versions, "times_passed", break_off)
     with pytest.raises(OSError, match="no space"):
-        queue.sweep_if_due(rng=random.Random(0), stopping=threading.Event())
+        queue.keep_up(rng=random.Random(0), stopping=threading.Event())
     assert health.sweep_age_s() is None, "so that /readyz goes on saying that nobody sweeps"
+    queue.keep_up(rng=random.Random(0), stopping=threading.Event())
+    assert SweepBeat.objects.exclude(cleaned_at=None).exists()
 
 
 @pytest.mark.parametrize(
@@ -179,26 +176,8 @@ def polling(act: Callable[..., object]) -> Iterator[Poller]:
     assert not poller.is_alive()
 
 
-def test_what_waits_behind_submissions_lets_the_other_thread_finish(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker, "run_next", lambda **_: False)
-    steps: list[str] = []
-
-    def go_on() -> None:
-        backlog._yield_to_live_work(rng=random.Random(0), is_stopping=lambda: False)
-        steps.append("gone on")
-
-    behind = threading.Thread(target=go_on)
-    with worker._in_hand:
-        behind.start()
-        behind.join(2 * backlog.PATIENCE_S)
-        steps.append("decided")
-    behind.join(30)
-    assert steps == ["decided", "gone on"]
-
-
-def test_poller_looks_again_after_a_look_that_broke(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_poller_looks_again_after_a_look_that_broke() -> None:
     looked_again = threading.Event()
-    broken: list[str] = []
     faults: Iterator[Exception] = iter([KeyError("a fault that nobody foresaw"), OSError("no route to host")])
 
     def look(*, rng: random.Random, stopping: threading.Event) -> None:
@@ -206,10 +185,8 @@ def test_poller_looks_again_after_a_look_that_broke(monkeypatch: pytest.MonkeyPa
             raise fault
         looked_again.set()
 
-    monkeypatch.setattr(threading, "excepthook", lambda hook: broken.append(repr(hook.exc_value)))
     with polling(look):
         assert looked_again.wait(PATIENCE_S)
-    assert broken == ["KeyError('a fault that nobody foresaw')"]
 
 
 def test_poller_finishes_what_is_in_hand_before_it_stops() -> None:
