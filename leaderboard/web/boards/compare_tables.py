@@ -6,6 +6,7 @@ from typing import Any, Final
 from uuid import UUID
 
 from django.utils.html import format_html
+from django.utils.text import get_text_list
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
@@ -18,9 +19,7 @@ from leaderboard.boards.rows import Entry, Interval
 from leaderboard.scoring.comparisons import Compared, Pair
 from leaderboard.web.boards import profile_chart, svg
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
-from leaderboard.web.boards.svg import Scale
 
-_DIFFERENCE_PX: Final = 150.0
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
@@ -57,7 +56,7 @@ def verdict(compared: Compared) -> str:
         few = in_words(compared.edition.unit)
         return f"{head} There are too few {few} for confidence intervals and p-values."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
-    parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
+    parts = [f"{relation} {get_text_list(names, 'and')}" for relation, names in relations if names]
     together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
     said = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
     return " ".join([*said, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
@@ -84,15 +83,6 @@ def _told_apart(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[st
     return worse, alike
 
 
-def _listed(names: Sequence[str]) -> str:
-    """Names in a sentence.
-
-    >>> _listed(["A"]), _listed(["A", "B", "C"])
-    ('A', 'A, B and C')
-    """
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-
-
 def _pair_table(pair: Pair) -> dict[str, Any]:
     """Two methods and their differences, in words and as a table; no groups while they are computed."""
     differences = pair.differences or {}
@@ -115,18 +105,16 @@ def _pair_table(pair: Pair) -> dict[str, Any]:
 def _difference_group(
     group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
 ) -> dict[str, Any]:
-    """One of the metrics: its rows on one scale."""
     found = [differences[name] for name in names]
     ends = [end for each in found for end in (each.low, each.high, each.difference) if end is not None]
-    scale = svg.zero_scale(ends, width_px=_DIFFERENCE_PX)
+    scale_end = svg.scale_end(ends)
     # Both ends as wide as the widest, so that points stand in line.
     css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
-    rows = [_difference_row(name, pair, differences[name], scale, css) for name in names]
-    return {"group": group, "axis": svg.axis(scale), "rows": rows}
+    rows = [_difference_row(name, pair, differences[name], scale_end, css) for name in names]
+    return {"group": group, "axis": svg.axis(scale_end), "rows": rows}
 
 
-def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css: str) -> dict[str, Any]:
-    """One column of the board: both values, and first minus second."""
+def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, css: str) -> dict[str, Any]:
     decimals = pair.first.decimals  # both are of one edition
     return {
         "heading": score_heading(name),
@@ -145,7 +133,7 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css:
         # why there is neither interval nor p
         "reason": "" if found.p_below is not None else too_few_units(found.n_effective, unit=found.unit),
         "is_significant": found.is_significant,
-        "drawn": svg.difference(scale, found.difference, found.low, found.high),
+        "drawn": svg.difference(scale_end, found.difference, found.low, found.high),
     }
 
 

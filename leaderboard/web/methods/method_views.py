@@ -97,13 +97,14 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
     now = timezone.now()
     form = ShowForm.of_method(request, method=found)
     preview = None
-    if form.is_bound:
+    if form.is_valid():
         with form.refusals():
-            wanted = form.wanted(now=now)
+            wanted = form.wanted()
             visibility.require_possible(found, now=now, **wanted)
             preview = visibility_preview.preview(method=found, visibility=wanted["visibility"], now=now)
-            if request.method == "POST":
-                form.require_confirmation()
+            if request.method == "POST" and not form.cleaned_data["confirm"]:
+                form.add_error("confirm", "Confirm that this cannot be undone: tick the box.")
+            elif request.method == "POST":
                 visibility.change(method=found, actor=cast("User", request.user), now=now, **wanted)
                 messages.success(request, _published_sentence(found.pk))
                 return redirect("method", found.pk)
@@ -117,7 +118,6 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 
 def _published_sentence(method_id: UUID) -> str:
-    """What has just become of a method."""
     method = Method.objects.get(pk=method_id)
     if method.visibility == Visibility.PUBLIC:
         return f"{method.name} is now public."

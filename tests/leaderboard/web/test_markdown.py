@@ -62,15 +62,10 @@ def test_a_column_without_a_name_has_no_head_and_numbers_stand_right() -> None:
 
 def test_a_part_has_the_text_below_its_heading() -> None:
     drawn = markdown.page("Before\n\n## A `b`\n\nOne *two*\nthree.\n\n```sh\nls -l\n```\n")
-    assert [(part.heading.text, part.text, part.code) for part in drawn.parts] == [
-        ("", "Before", ""),
-        ("A b", "One two three.", "ls -l\n"),
+    assert [(part.heading.text, part.text) for part in drawn.parts] == [
+        ("", "Before"),
+        ("A b", "One two three. ls -l\n"),
     ]
-
-
-def test_cells_of_a_table_stand_apart_in_its_text_and_those_without_a_word_are_left_out() -> None:
-    (part,) = markdown.page("## A\n\n| peer | price |\n|---|---|\n| B | ? |\n| C | 3 |\n").parts
-    assert part.text == "peer · price · B · C · 3 ·"
 
 
 def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
