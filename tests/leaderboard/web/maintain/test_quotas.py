@@ -23,10 +23,10 @@ RULES_OF_TEST = (
     "3 submissions within 30 days, at least 24 hours apart; 20 rejected or cancelled files within 24 hours"
 )
 RULES = {
-    "limit": "9",
-    "window": "2 days",
-    "min_gap": "90 minutes",
-    "rejected_limit": "",
+    "quota_limit": "9",
+    "quota_window": "2 days",
+    "quota_min_gap": "90 minutes",
+    "quota_rejected_limit": "",
     "reason": "The camera-ready <b>deadline</b> is tomorrow.",
 }
 
@@ -218,7 +218,9 @@ def test_form_begins_with_the_rules_that_hold(keeper: Client, team: Team, mainta
         root = get(keeper, address(team, "test"))
         inputs = root.one("main").all("input")
         fields = {field.attributes["name"]: field.attributes.get("value", "") for field in inputs}
-        return [fields[name] for name in ("limit", "window", "min_gap", "rejected_limit")]
+        return [
+            fields[name] for name in ("quota_limit", "quota_window", "quota_min_gap", "quota_rejected_limit")
+        ]
 
     assert filled() == ["3", "30 days", "24 hours", "20"]
     give(team, maintainer)
@@ -242,7 +244,7 @@ def test_override_is_set_for_its_team_on_its_split_and_on_the_record(
 
 
 def test_override_is_changed_in_its_place(keeper: Client, team: Team, override: QuotaOverride) -> None:
-    changed = {**RULES, "min_gap": "", "rejected_limit": "0", "limit": ""}
+    changed = {**RULES, "quota_min_gap": "", "quota_rejected_limit": "0", "quota_limit": ""}
     assert keeper.post(address(team, "test"), changed).status_code == 302
     row = QuotaOverride.objects.get()
     assert (row.quota_limit, row.quota_min_gap, row.quota_rejected_limit) == (None, timedelta(0), 0)
@@ -259,26 +261,26 @@ def test_override_is_changed_in_its_place(keeper: Client, team: Team, override: 
     ],
 )
 def test_spans_are_written_in_words(keeper: Client, team: Team, text: str, span: timedelta) -> None:
-    assert keeper.post(address(team, "test"), {**RULES, "window": text}).status_code == 302
+    assert keeper.post(address(team, "test"), {**RULES, "quota_window": text}).status_code == 302
     assert QuotaOverride.objects.get().quota_window == span
 
 
 @pytest.mark.parametrize(
     ("field", "text", "sentence"),
     [
-        ("limit", "many", "That is not a whole number"),
-        ("limit", "-1", "The number is negative"),
-        ("limit", "1000001", "The limit is 1000001 submissions; expected at most 1,000,000, or none."),
-        ("rejected_limit", "2.5", "That is not a whole number"),
-        ("window", "", "No window was given"),
-        ("window", "3 fortnights", "'3 fortnights' is not a span of time"),
-        ("window", "1.5 days", "'1.5 days' is not a span of time"),
-        ("window", ", days", "', days' is not a span of time"),
-        ("window", "٣ days", "is not a span of time"),
-        ("window", "0 days", "The window is empty"),
-        ("window", "3651 days", "That is longer than ten years"),
-        ("min_gap", "-1 hours", "'-1 hours' is not a span of time"),
-        ("min_gap", "999,999,999 seconds", "That is longer than ten years"),
+        ("quota_limit", "many", "That is not a whole number"),
+        ("quota_limit", "-1", "The number is negative"),
+        ("quota_limit", "1000001", "The limit is 1000001 submissions; expected at most 1,000,000, or none."),
+        ("quota_rejected_limit", "2.5", "That is not a whole number"),
+        ("quota_window", "", "No window was given"),
+        ("quota_window", "3 fortnights", "'3 fortnights' is not a span of time"),
+        ("quota_window", "1.5 days", "'1.5 days' is not a span of time"),
+        ("quota_window", ", days", "', days' is not a span of time"),
+        ("quota_window", "٣ days", "is not a span of time"),
+        ("quota_window", "0 days", "The window is empty"),
+        ("quota_window", "3651 days", "That is longer than ten years"),
+        ("quota_min_gap", "-1 hours", "'-1 hours' is not a span of time"),
+        ("quota_min_gap", "999,999,999 seconds", "That is longer than ten years"),
         ("reason", " ", "No reason was given"),
         ("reason", "x" * 501, "at most 500 characters"),
     ],
