@@ -15,7 +15,7 @@ from django.utils import timezone
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard.methods import visibility
 from leaderboard.methods.details import DETAILS
-from leaderboard.models import Method, Split, Submission, Team, User
+from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
 from leaderboard.quotas import admissions, quotas
 from leaderboard.submissions import search
@@ -29,27 +29,22 @@ class SplitChoice:
     split: Split
     is_open: bool
     sentence: str
-    announcement: str = ""
+    announcement: str
 
 
 def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
     """Every split as this person finds it."""
     team = teams.current_team_of(user=user)
-    return [
-        _offer(split, team=team, user=user, now=now)
-        for split in Split.objects.shown().select_related("published_edition__ground_truth")
-    ]
-
-
-def _offer(split: Split, *, team: Team | None, user: User, now: datetime) -> SplitChoice:
-    refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
-    if refusal is not None:
-        return SplitChoice(
-            split, is_open=False, sentence=str(refusal), announcement=split.announcement_at(now)
-        )
-    quota = quotas.state(team=team, user=user, split=split, now=now)
-    sentence = f"{quota.sentence} {admissions.closing_of(split)}".strip()
-    return SplitChoice(split, is_open=True, sentence=sentence, announcement=split.announcement_at(now))
+    offers = []
+    for split in Split.objects.shown().select_related("published_edition__ground_truth"):
+        refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
+        if refusal is None:
+            quota = quotas.state(team=team, user=user, split=split, now=now)
+            sentence = f"{quota.sentence} {admissions.closing_of(split)}".strip()
+        else:
+            sentence = str(refusal)
+        offers.append(SplitChoice(split, refusal is None, sentence, split.announcement_at(now)))
+    return offers
 
 
 class SubmissionForm(DetailsForm):
