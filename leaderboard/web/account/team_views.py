@@ -46,7 +46,6 @@ class SignupNameForm(forms.Form):
             raise forms.ValidationError(str(refusal)) from None
 
     def signup(self, request: HttpRequest, user: User) -> None:
-        """Called once the account exists."""
         user.name = self.cleaned_data["name"]
         user.save(update_fields=["name"])
 
@@ -82,12 +81,10 @@ def _team_page(user: User, *, now: datetime) -> dict[str, Any]:
 
 
 def _own_team(request: HttpRequest) -> Team:
-    """The reader's team; somebody without one has none to act for."""
     return get_object_or_404(Team, memberships__user=cast("User", request.user))
 
 
 def _member(request: HttpRequest, handle: UUID) -> tuple[Team, User]:
-    """The reader's team and one of its members."""
     own = _own_team(request)
     return own, get_object_or_404(User, membership__team=own, membership__handle=handle)
 
@@ -101,7 +98,6 @@ def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpRes
 
 
 def _done(request: HttpRequest, deed: Callable[[], object], *, told: str) -> HttpResponse:
-    """Do it and show the team and what was done, or show why not."""
     try:
         deed()
     except Refused as refusal:

@@ -49,7 +49,6 @@ class AuditFilter(SiteForm):
     until = _day("To")
 
     def wanted(self) -> dict[str, Any]:
-        """What was filled in, under the domain function's names."""
         fields = {name: value for name, value in self.cleaned_data.items() if value}
         if "since" in fields:
             fields["since"] = _midnight(fields["since"])
@@ -102,7 +101,6 @@ def _rows(asked: AuditFilter) -> Iterator[dict[str, Any]]:
 
 
 def _named(event: AuditEvent, names: Mapping[str, str]) -> dict[str, str]:
-    """What stands for a name among the details, and the name."""
     texts = {name: value for name, value in event.details.items() if isinstance(value, str)}
     return {name: names[value] for name, value in texts.items() if value in names}
 

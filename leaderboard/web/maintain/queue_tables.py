@@ -89,7 +89,6 @@ def _until(evaluation: Evaluation, *, now: datetime) -> datetime | None:
 
 
 def _tags(evaluation: Evaluation) -> Iterable[str]:
-    """Why scoring it may matter less, and that others do not see its method."""
     if evaluation.submission.method.visibility != Visibility.PUBLIC:
         yield evaluation.submission.method.get_visibility_display()
     if evaluation.submission.withdrawn_at:
@@ -112,7 +111,6 @@ def strike_words(evaluation: Evaluation) -> str:
 
 
 def _faults() -> Iterable[str]:
-    """Why what waits may go on waiting."""
     age_s = health.sweep_age_s()
     if age_s is None or age_s > health.MAX_SWEEP_AGE_S:
         yield f"There was no sweep in the last {health.MAX_SWEEP_AGE_S:.0f} s: every worker is gone."

@@ -22,8 +22,6 @@ def _splits() -> list[tuple[str, str]]:
 
 
 class QueueFilter(SiteForm):
-    """Which of the lists, and of which split."""
-
     state = forms.ChoiceField(
         required=False,
         choices=[("", "all"), *((name, state.heading) for name, state in STATES.items())],
@@ -96,7 +94,6 @@ def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpRespon
 
 
 def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
-    """What was asked for, ready to be drawn, and how to ask for it again."""
     found = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
     number = found["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
     return {

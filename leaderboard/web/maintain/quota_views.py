@@ -134,7 +134,6 @@ def _form(
     own: QuotaOverride | None,
     words: dict[str, str],
 ) -> HttpResponse:
-    """The form below the rules of the split, those of the team, and what is used of them."""
     quota = quotas.state(team=team, user=maintainer_of(request), split=split, now=timezone.now())
     about = {
         "team": team,

@@ -105,7 +105,6 @@ class PolicyForm(QuotaRulesForm):
 
     @staticmethod
     def filled_with(policy: Policy) -> dict[str, Any]:
-        """What stands in the form at first."""
         gap = policy.quota_min_gap
         return asdict(policy) | {
             "opens_at": moments.written(policy.opens_at),
@@ -116,7 +115,6 @@ class PolicyForm(QuotaRulesForm):
         }
 
     def policy(self) -> Policy:
-        """What was filled in."""
         return Policy(**{name: self.cleaned_data[name] for name in NAMES})
 
 

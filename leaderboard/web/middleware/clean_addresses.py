@@ -22,7 +22,6 @@ class CleanAddressMiddleware:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Redirect, or answer."""
         query = request.META.get("QUERY_STRING", "")
         if not _EMPTY.search(query) or not _is_of_a_page(request):
             return self._get_response(request)

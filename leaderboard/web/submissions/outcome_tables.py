@@ -69,7 +69,6 @@ def _order_words(names: Iterable[str]) -> str:
 def _comparison_rows(
     submission: Submission, progress: Progress, place: BoardPlace, entry: Entry, *, is_mine: bool
 ) -> list[dict[str, Any]]:
-    """The team's best other submission and the nearest row from a paper, where there are."""
     rows = []
     own = outcomes.teams_best_other(submission, place)
     if own is not None:
