@@ -33,7 +33,6 @@ MAINTAINED_EDITION = [
     path("", maintainer_views.edition, name="maintain_edition"),
     path("progress/", maintainer_views.edition_progress, name="maintain_progress"),
     path("preview.csv", maintainer_views.preview_csv, name="maintain_preview_csv"),
-    path("preview.json", maintainer_views.preview_json, name="maintain_preview_json"),
     path("publish/", maintainer_views.publish, name="maintain_publish"),
     path("roll-back/", maintainer_views.roll_back, name="maintain_roll_back"),
     path("discard/", maintainer_views.discard, name="maintain_discard"),

@@ -159,7 +159,6 @@ LINES: dict[str, Line] = {
     "maintain_edition": line(GET=KEEPERS),
     "maintain_progress": line(GET="in 404 404 404 286 in in"),
     "maintain_preview_csv": line(GET=KEEPERS),
-    "maintain_preview_json": line(GET=KEEPERS),
     "maintain_publish": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_roll_back": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_discard": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),

@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from django.contrib import messages
 from django.contrib.auth.views import redirect_to_login
-from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
@@ -126,17 +126,7 @@ def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
     return HttpResponse(
         "".join(csv_lines(preview.rows(found), columns=found.columns)),
         content_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": _attachment(split, number, "csv")},
-    )
-
-
-@maintainers_only
-@require_safe
-def preview_json(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """The comparison as the API gives it."""
-    return JsonResponse(
-        preview.document(preview.preview(_edition(split, number))),
-        headers={"Content-Disposition": _attachment(split, number, "json")},
+        headers={"Content-Disposition": f'attachment; filename="tsttc-{split}-edition-{number}-preview.csv"'},
     )
 
 
@@ -213,7 +203,3 @@ def _comparison(found: Edition) -> dict[str, Any]:
 
 def form_page(request: HttpRequest, template: str, form: SiteForm, **context: Any) -> HttpResponse:
     return render(request, template, {"form": form, **context}, status=422 if form.errors else 200)
-
-
-def _attachment(split: str, number: int, kind: str) -> str:
-    return f'attachment; filename="tsttc-{split}-edition-{number}-preview.{kind}"'

@@ -35,8 +35,7 @@ from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, board_
 pytestmark = pytest.mark.slow
 
 PAGES = (HUB, OPEN, SECOND, f"{SECOND}publish/", f"{SECOND}discard/", f"{FIRST}roll-back/")
-FILES = (f"{SECOND}preview.csv", f"{SECOND}preview.json")
-ROUTES = (*PAGES, *FILES, f"{SECOND}progress/")
+ROUTES = (*PAGES, f"{SECOND}preview.csv", f"{SECOND}progress/")
 OTHERS = tuple(f"/maintain/{name}/" for name in ("queue", "queue/state", "queue/retry", "quotas", "audit"))
 ABSENT = ("/maintain/nowhere/", "/maintain/test/editions/9/", "/maintain/nowhere/open/")
 
@@ -319,13 +318,6 @@ def test_csv_has_every_number_and_guards_texts(keeper: Client, rescored: Edition
             for name, value in plain.items()
             if name.startswith(("old_mid", "new_mid", "delta_"))
         }
-
-
-def test_json_is_what_the_api_gives(keeper: Client, rescored: Edition) -> None:
-    response = keeper.get(f"{SECOND}preview.json")
-    document = json.loads(response.content)
-    assert document == json.loads(keeper.get("/api/v1/splits/test/editions/2/preview").content)
-    assert (document["edition"], document["replaces"], len(document["changes"])) == (2, 1, 4)
 
 
 def test_number_of_queries_does_not_grow_with_the_entries(
