@@ -184,21 +184,6 @@ def test_tokens_that_end_and_splits_that_close_are_told_to_those_whom_it_concern
     assert "closes on" in Mail.objects.get(kind="deadline").subject
 
 
-def test_an_announcement_reaches_the_teams_of_a_split_once(
-    edition: Edition, owner: User, stranger: User
-) -> None:
-    builders.submit(owner, builders.predictions(edition))
-    announcement = announcements.written(
-        split=Split.objects.get(pk="test"),
-        subject="Maintenance\nBcc: x@example.org",
-        text="The server moves.",
-    )
-    for n_people in (1, 0):
-        assert announcements.announce(announcement, now=timezone.now(), actor=None) == n_people
-    assert told() == [(owner.email, "announcement")]
-    assert "\n" not in Mail.objects.get().subject
-
-
 def test_a_maintainer_previews_an_announcement_and_sends_it_once(
     edition: Edition, owner: User, keeper: Client
 ) -> None:
