@@ -174,7 +174,6 @@ def test_every_missing_field_is_named_at_once(signed_in: Client, edition: Editio
         ("split", "nowhere", "There is no split 'nowhere'"),
         ("method", "x" * 81, "has 81 characters; expected at most 80"),
         ("paper_url", "javascript:alert(1)", "expected an address that begins with http:// or https://"),
-        ("latency_ms", "5", "Enter the hardware on which the latency was measured"),
     ],
 )
 def test_refusals_stand_at_their_field(
