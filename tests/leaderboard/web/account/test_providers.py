@@ -326,13 +326,6 @@ def test_a_provider_that_fails_or_hangs_ends_in_a_sentence(
     assert_told(arrive(Client()), "GitHub did not answer in time.")
 
 
-def test_a_provider_that_is_away_ends_in_a_sentence(
-    provider: Provider, db: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(providers.GitHubViews, "access_token_url", "http://127.0.0.1:1/token")
-    assert_told(arrive(Client()), "GitHub could not be reached, or failed.")
-
-
 def test_who_says_no_or_comes_from_nowhere_is_told_so(provider: Provider, client: Client, db: None) -> None:
     denied = come_back(client, error="access_denied", state=begin(client))
     assert denied.headers["Location"] == "/accounts/3rdparty/login/cancelled/"

@@ -2,15 +2,11 @@
 
 import csv
 import io
-import random
-import re
-from datetime import timedelta
 from pathlib import Path
 
 import pytest
 from django.http import HttpResponseBase
 from django.test import Client
-from django.utils import timezone
 
 from evaluator.metrics.protocol import SCORE_NAMES
 from leaderboard.editions import preview
@@ -22,43 +18,17 @@ from leaderboard.models import (
     Submission,
     Team,
 )
-from leaderboard.scoring import worker
 from tests import builders, pages
 from tests.editions import extended, open_edition, publish
-from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, board_number, get, said, totals
+from tests.leaderboard.web.maintain.desk import FIRST, HUB, OPEN, SECOND, get, said, totals
 
 pytestmark = pytest.mark.slow
 
 PAGES = (HUB, OPEN, SECOND, f"{SECOND}publish/", f"{SECOND}discard/", f"{FIRST}roll-back/")
 ROUTES = (*PAGES, f"{SECOND}preview.csv", f"{SECOND}progress/")
-OTHERS = tuple(f"/maintain/{name}/" for name in ("queue", "queue/state", "queue/retry", "quotas", "audit"))
-ABSENT = ("/maintain/nowhere/", "/maintain/test/editions/9/", "/maintain/nowhere/open/")
 
 
 # --- who gets in -----------------------------------------------------------------------------------------
-
-
-def without_tokens(content: bytes) -> list[bytes]:
-    return [line for line in content.splitlines() if b"csrfmiddlewaretoken" not in line]
-
-
-def headers(response: HttpResponseBase) -> dict[str, str]:
-    return {name: value for name, value in response.headers.items() if name != "X-Request-ID"}
-
-
-@pytest.mark.parametrize("method", ["get", "post", "put", "head"])
-@pytest.mark.parametrize("who", ["owner", "stranger"])
-def test_to_others_the_pages_do_not_exist(
-    client: Client, rescored: Edition, who: str, method: str, request: pytest.FixtureRequest
-) -> None:
-    client.force_login(request.getfixturevalue(who))
-    absent = getattr(client, method)("/nowhere/")
-    for address in (*ROUTES, *OTHERS, *ABSENT):
-        response = getattr(client, method)(address)
-        assert response.status_code == absent.status_code == 404, address
-        assert without_tokens(response.content) == without_tokens(absent.content)
-        assert headers(response) == headers(absent)
-    assert board_number() == 1
 
 
 def test_a_visitor_signs_in_first_and_an_open_page_is_led_there_as_a_whole(
@@ -133,14 +103,6 @@ def test_progress_is_told_when_it_changes_and_ends_with_the_comparison(
     root = pages.page(last)
     assert "Finished: 4 of 4." in root.text
     assert root.one("div", id="comparison").one("table", class_="changes")
-
-
-def test_rate_and_time_left_are_told_while_it_runs(keeper: Client, second: Edition) -> None:
-    assert worker.run_next(rng=random.Random(0))
-    Evaluation.objects.filter(edition=second).update(started_at=timezone.now() - timedelta(seconds=50))
-    first = Evaluation.objects.filter(edition=second)[:1].values("pk")
-    Evaluation.objects.filter(edition=second).exclude(pk__in=first).update(status=Status.QUEUED)
-    assert re.search(r"25 %: 1 of 4\. 1 per minute, about 3 min left\.", said(keeper, SECOND))
 
 
 # --- the comparison --------------------------------------------------------------------------------------

@@ -1,7 +1,6 @@
 """Quotas as maintainers see them: the rules, teams with rules of their own, and what a team has left."""
 
 from datetime import timedelta
-from uuid import uuid4
 
 import pytest
 from django.test import Client
@@ -125,12 +124,6 @@ def test_team_is_found_by_name_by_look_and_by_its_people(
     assert address(team) in [a.attributes["href"] for a in root.all("a")]
 
 
-def test_nobody_found_has_a_sentence(keeper: Client, team: Team) -> None:
-    answer = keeper.get(QUOTAS, {"team": "<i>nobody</i>"})
-    assert "No results." in assert_sound(answer).one("main").text
-    assert "<i>nobody" not in answer.text
-
-
 @pytest.mark.parametrize("text", ["x" * 255, "\0"])
 def test_what_cannot_be_looked_up_is_said_at_its_field(keeper: Client, team: Team, text: str) -> None:
     answer = keeper.get(QUOTAS, {"team": text})
@@ -232,9 +225,3 @@ def test_override_ends_with_a_reason_and_on_the_record(
 
 
 # --- the hub, the price ----------------------------------------------------------------------------------
-
-
-def test_what_is_not_there_is_not_found(keeper: Client, team: Team) -> None:
-    absent = f"{QUOTAS}{uuid4()}/"
-    parts = (absent, f"{absent}test/", address(team, "nowhere"), address(team, "test", "end"))
-    assert [keeper.get(where).status_code for where in parts] == [404] * 4

@@ -155,17 +155,6 @@ def test_problems_are_numbered_with_place_and_total(signed_in: Client, edition: 
         assert problem["where"] in item.text
 
 
-def test_list_of_problems_ends_after_twenty_points(signed_in: Client, edition: Edition, owner: User) -> None:
-    values = [*(f'"fast{i}"' for i in range(25)), "NaN", *["1.0"] * (builders.N_SEQUENCES - 26)]
-    text = ", ".join(f'"{i}": {value}' for i, value in enumerate(values))
-    bad = builders.submit(owner, f"{{{text}}}".encode())
-    builders.score_all()
-    root = get(signed_in, PAGE, bad)
-    assert "26 problems in the file" in root.one("main").text
-    assert len(root.one("ol", class_="problems").all("li")) == 20
-    assert "at most 20 points are listed" in root.one("main").text
-
-
 def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submission) -> None:
     strike_out(submission)
     root = get(signed_in, PAGE, submission)
@@ -215,18 +204,3 @@ def test_after_the_score_the_next_steps_are_buttons(signed_in: Client, edition: 
     assert main.one("code", id="latex-row").text
     copied = {button.attributes["data-copy"] for button in main.all("button", class_="copy")}
     assert copied == {"latex-row", "digest"}
-
-
-def test_there_is_nothing_to_withdraw_of_a_rejected_or_cancelled_file(
-    signed_in: Client, edition: Edition, owner: User
-) -> None:
-    bad = builders.submit(owner, b"[]")
-    builders.score_all()
-    waiting = builders.submit(owner, builders.predictions(edition))
-    assert "Cancel this submission…" in get(signed_in, PAGE, waiting).one("main").text
-    signed_in.post(f"/submissions/{waiting.pk}/withdraw/")
-    for sent in (bad, waiting):
-        said = get(signed_in, PAGE, sent).one("main").text
-        assert "this submission…" not in said
-        assert "no longer show its values" not in said
-        assert signed_in.get(f"/submissions/{sent.pk}/withdraw/").status_code == 302

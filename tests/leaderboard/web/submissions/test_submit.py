@@ -160,6 +160,17 @@ def test_a_script_that_follows_the_upload_is_told_where_the_submission_is(
     assert response.json() == {"page": f"/submissions/{Submission.objects.get().pk}/"}
 
 
+def test_an_exhausted_quota_stands_at_the_split_before_and_after_the_file_is_sent(
+    signed_in: Client, owner: User, edition: Edition
+) -> None:
+    Split.objects.filter(pk="test").update(quota_limit=1)
+    builders.submit(owner, builders.predictions(edition))
+    assert "the next slot opens at" in pages.page(signed_in.get("/submit/")).one("main").text
+    response = send(signed_in, builders.predictions(edition, factor=1.2))
+    assert error_at(response, "split").startswith("Your team has used 1 submission to test")
+    assert Submission.objects.count() == 1
+
+
 def test_every_missing_field_is_named_at_once(signed_in: Client, edition: Edition) -> None:
     response = send(signed_in, None, split="", method="")
     assert error_at(response, "split") == "No split was chosen; expected one of those listed."
@@ -182,14 +193,6 @@ def test_refusals_stand_at_their_field(
     response = send(signed_in, builders.predictions(edition), **{field: value})
     assert said in error_at(response, field)
     assert not Submission.objects.exists()
-
-
-def test_what_was_typed_is_kept_when_something_is_wrong(signed_in: Client, edition: Edition) -> None:
-    response = send(signed_in, None, method="Foo & Sons", paper_url="https://example.org/p")
-    root = pages.page(response)
-    assert root.one("input", name="method").attributes["value"] == "Foo & Sons"
-    assert root.one("input", name="paper_url").attributes["value"] == "https://example.org/p"
-    assert "open" in root.one("details").attributes
 
 
 def test_announced_excess_is_answered_413_without_reading(
