@@ -7,7 +7,7 @@ const view = () => document.getElementById("view");
 
 const isEmpty = ([, value]) => value === "";
 
-// Addresses name only what is set, also where the form is sent without htmx.
+// Addresses name only what is set.
 document.addEventListener("formdata", (event) => {
   for (const [name] of [...event.formData].filter(isEmpty)) event.formData.delete(name);
 });

@@ -1,4 +1,1 @@
-"""Mails that may fail: sent at once or kept and sent later, and notices that people can switch off.
-
-Pages, workers and commands import this room; it reads the tables alone.
-"""
+"""Mails that may fail: sent at once or kept and sent later, and notices that people can switch off."""

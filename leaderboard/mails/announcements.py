@@ -1,8 +1,4 @@
-"""Announcements: a text of the maintainers by mail to the people whose teams have sent a file to a split.
-
-Who they are is told to nobody, only how many. Whoever has switched announcements off gets none, and nobody
-gets the same text twice, however often it is sent.
-"""
+"""Announcements: a text of the maintainers by mail to the people whose teams sent a file to a split."""
 
 import hashlib
 from dataclasses import dataclass
@@ -55,10 +51,7 @@ def left(announcement: Announcement) -> list[User]:
 
 
 def announce(announcement: Announcement, *, now: datetime, actor: User | None) -> int:
-    """Queue it for everybody who has not got it, and return for how many; `actor` None is the command line.
-
-    Two at the same time are one after the other. Raises `NotMaintainer`.
-    """
+    """Queue it for everybody who has not got it; returns for how many. Raises `NotMaintainer`."""
     require_maintainer(actor, to="mail the teams of a split")
     with transaction.atomic():
         split = Split.objects.select_for_update(no_key=True).filter(pk=announcement.split.pk).first()

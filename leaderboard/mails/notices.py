@@ -1,8 +1,7 @@
-"""Notices: what people are told by mail, unless they have switched it off.
+"""Notices: what people are told by mail, once, unless they have switched it off.
 
-They are found in the tables, as all other work of workers is, and each is told once: nothing that happens on
-a page or in a run has to know of mails. A notice goes to members of the team that owns what it is about, and
-names nothing of any other team, so a private or anonymous method is told to nobody else.
+Workers find them in the tables. A notice goes to members of the team that owns what it is about, and names
+nothing of any other team.
 """
 
 from collections import defaultdict

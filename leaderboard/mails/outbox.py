@@ -1,8 +1,7 @@
 """The outbox: a mail that the server does not take is kept, and sent later.
 
-A mail that somebody waits for, as the link that opens an account, is tried at once, within the time-out of
-`TSTTC_EMAIL_TIMEOUT_S`. Everything else waits for the workers' sweep, or for `manage.py send_mails`. A mail
-is sent at least once: who dies between sending and writing it down sends it again.
+Mails of accounts are tried at once; all others wait for the workers' sweep, or for `manage.py send_mails`. A
+mail is sent at least once: who dies between sending and writing it down sends it again.
 """
 
 import smtplib
@@ -12,16 +11,14 @@ from typing import Final
 
 import structlog
 from django.core.mail import EmailMessage
-from django.db.models import F, Q
+from django.db.models import F
 
 from leaderboard.models import Mail, MailKind, User
-from leaderboard.ops.broker import CircuitBreaker
 
 log = structlog.get_logger(__name__)
 
+# What a mail server that is away, or does not want a mail, raises.
 FAULTS: Final = (OSError, smtplib.SMTPException)
-"""What a mail server that is away, or does not want a mail, raises."""
-REST_S: Final = 30.0
 MAX_AT_ONCE: Final = 50
 PATIENCE: Final = timedelta(days=3)
 _FIRST_WAIT: Final = timedelta(seconds=30)
@@ -29,26 +26,20 @@ _LONGEST_WAIT: Final = timedelta(hours=1)
 # Kept so long to know what was told already.
 KEPT: Final = timedelta(days=30)
 
-_rest = CircuitBreaker(rest_s=REST_S)
 
-
-def send_or_keep(*, message: EmailMessage, now: datetime) -> bool:
-    """Send a mail to one person now, or keep it for later. Returns whether it was sent; never fails for it.
-
-    After a failure the server is left alone for half a minute, so that nobody else waits for it in turn.
-    """
-    is_sent = not _rest and _sent(message)
-    if not is_sent:
-        [recipient] = message.to
-        Mail.objects.create(
-            kind=MailKind.ACCOUNT,
-            recipient=recipient,
-            subject=message.subject[:250],
-            text=str(message.body),
-            queued_at=now,
-            due_at=now + _FIRST_WAIT,
-        )
-    return is_sent
+def send_or_keep(*, message: EmailMessage, now: datetime) -> None:
+    """Send a mail to one person now, or keep it for later; never fails for it."""
+    if _sent(message):
+        return
+    [recipient] = message.to
+    Mail.objects.create(
+        kind=MailKind.ACCOUNT,
+        recipient=recipient,
+        subject=message.subject[:250],
+        text=str(message.body),
+        queued_at=now,
+        due_at=now + _FIRST_WAIT,
+    )
 
 
 def tell(*, kind: MailKind, user: User, key: str, subject: str, text: str, now: datetime) -> Mail:
@@ -76,11 +67,7 @@ def waiting() -> int:
 
 
 def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) -> int:
-    """Send what is due, the oldest first. Returns how many were sent.
-
-    After the first that fails, the rest waits for the next time. What could not be sent for three days is
-    given up.
-    """
+    """Send what is due until one fails, the oldest first. Returns how many were sent."""
     n_sent = 0
     for mail in Mail.objects.filter(ended_at=None, due_at__lte=now).order_by("due_at")[:MAX_AT_ONCE]:
         if is_stopping():
@@ -100,7 +87,7 @@ def work_off(*, now: datetime, is_stopping: Callable[[], bool] = lambda: False) 
 
 def purge(*, now: datetime) -> int:
     """Forget what was told long ago. Returns how many."""
-    return Mail.objects.filter(Q(ended_at__lt=now - KEPT)).delete()[0]
+    return Mail.objects.filter(ended_at__lt=now - KEPT).delete()[0]
 
 
 def _end(mail: Mail, *, now: datetime, is_sent: bool) -> None:
@@ -115,7 +102,6 @@ def _sent(message: EmailMessage) -> bool:
     try:
         message.send()
     except FAULTS as fault:
-        _rest.begin()
         log.warning("mail_not_sent", reason=f"{type(fault).__name__}: {fault}"[:200])
         return False
     return True

@@ -4,7 +4,6 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from django.conf import settings
-from django.core.exceptions import DisallowedHost
 from django.http import Http404, HttpRequest
 from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
@@ -51,7 +50,6 @@ _PREFIXES = {
 
 
 def split_or_404(request: HttpRequest, name: str) -> Split:
-    """The split of that name."""
     found = next((split for split in splits_of(request) if split.pk == name), None)
     if found is None:
         raise Http404(f"There is no split {name!r}.")
@@ -75,7 +73,6 @@ def site(request: HttpRequest) -> dict[str, Any]:
         "providers": [(name, set_["APP"]["name"]) for name, set_ in settings.SOCIALACCOUNT_PROVIDERS.items()],
         "splits": SimpleLazyObject(lambda: splits_of(request)),
         "announcements": _announcements(request),
-        # Only the pages of errors ask for it, which nobody remembers.
         "came_from": SimpleLazyObject(lambda: _came_from(request)),
         # Views of pages that are about a board without its name in their address say it themselves.
         "board_split": _board_split(request),
@@ -85,19 +82,17 @@ def site(request: HttpRequest) -> dict[str, Any]:
 def _announcements(request: HttpRequest) -> list[tuple[str, str]]:
     """The lines to show: that of the site without a title, and those of splits with the title of theirs.
 
-    Only pages that are about splits have them: no other page asks the database for it. A page of one split
-    has the line of that one; the form has the line of each split beside it.
+    A page of one split has the line of that one; the form has the line of each split beside it.
     """
-    is_form = _section(request) == "submit"
-    if not hasattr(request, "splits") and not is_form:
-        return []
     now, only = timezone.now(), _board_split(request)
-    if is_form:
+    if _section(request) == "submit":
         lines = [("", SiteAnnouncement.line_at(now))]
-    else:
+    elif hasattr(request, "splits"):
         splits = splits_of(request)
         own = [(each.title, each.announcement_at(now)) for each in splits if only in {"", each.pk}]
         lines = [("", site_line_of(splits, now=now)), *own]
+    else:  # no other page asks the database for it
+        lines = []
     return [(title, line) for title, line in lines if line]
 
 
@@ -110,7 +105,6 @@ def _section(request: HttpRequest) -> str:
 
 
 def _came_from(request: HttpRequest) -> str:
-    """The page of this site whose link or form led here; empty for any other, and for the page itself."""
     path = page_before(request)
     return "" if path == request.get_full_path() else path
 
@@ -118,17 +112,9 @@ def _came_from(request: HttpRequest) -> str:
 def page_before(request: HttpRequest) -> str:
     """The address, without a host, of the page of this site that the request names as its origin."""
     address = request.headers.get("Referer", "")
-    is_ours = url_has_allowed_host_and_scheme(address, allowed_hosts=_our_hosts(request))
-    parts = urlsplit(address if is_ours else "")
+    # The settings' host, and the one that was asked for, whatever it is: a demo also answers as localhost.
+    hosts = {urlsplit(settings.SITE_URL).netloc, request.headers.get("Host", "")}
+    parts = urlsplit(address if url_has_allowed_host_and_scheme(address, allowed_hosts=hosts) else "")
     path = f"{parts.path}?{parts.query}" if parts.query else parts.path
     # A path that begins with two slashes would name another site where it is linked.
     return "" if path.startswith("//") else path
-
-
-def _our_hosts(request: HttpRequest) -> set[str]:
-    """The host that the settings name, and the one that was asked for: a demo also answers as localhost."""
-    hosts = {urlsplit(settings.SITE_URL).netloc}
-    try:
-        return hosts | {request.get_host()}
-    except DisallowedHost:  # the host itself may be the fault that the page tells of
-        return hosts

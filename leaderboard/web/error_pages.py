@@ -12,10 +12,7 @@ SORRY = "This was an error on our side. We logged it; try again later."
 
 
 def server_error(request: HttpRequest) -> HttpResponse:
-    """Django's handler of what no view has handled: 503 or 507 where the cause is known, else 500.
-
-    Rendered without the request: the usual frame asks the database who is reading.
-    """
+    """Answer 503 or 507 where the cause is known, else 500; rendered without asking the database."""
     outage = outages.outage_of(sys.exception())
     status, code, sentence, headers = (
         (outage.status, outage.code, outage.sentence, outage.headers)

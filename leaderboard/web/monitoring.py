@@ -55,9 +55,7 @@ def healthy(request: HttpRequest) -> HttpResponse:
 def exposition(request: HttpRequest) -> HttpResponse:
     """Figures, for whoever may read them."""
     if not may_read_metrics(request):
-        return HttpResponse(
-            "Metrics are for the operator's monitoring.\n", status=403, content_type="text/plain"
-        )
+        return _sentence("Metrics are for the operator's monitoring.", status=403)
     try:
         return HttpResponse(prometheus.exposition(), content_type=CONTENT_TYPE_LATEST)
     except DatabaseProblem as fault:
@@ -81,10 +79,7 @@ def _sentence(text: str, *, status: int) -> HttpResponse:
 
 
 def may_read_metrics(request: HttpRequest) -> bool:
-    """With a token set, the token decides; without one, only a direct connection from a listed network may.
-
-    What a request says of its origin is never believed: a forwarding header can only take the right away.
-    """
+    """Whether the token says so; without one set, a direct connection from a listed network."""
     if settings.METRICS_TOKEN:
         sent = request.headers.get("Authorization", "").removeprefix("Bearer ").encode()
         return secrets.compare_digest(sent, settings.METRICS_TOKEN.encode())

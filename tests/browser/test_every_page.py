@@ -169,12 +169,12 @@ def test_without_scripts_every_public_page_fits_and_nothing_on_it_is_dead(
     assert {where: faults for where, faults in found.items() if faults != (0, [])} == {}
 
 
-def test_without_scripts_a_search_leads_to_a_clean_address(new_page: NewPage, known: dict[str, str]) -> None:
+def test_without_scripts_a_search_is_answered(new_page: NewPage, known: dict[str, str]) -> None:
     page = new_page(java_script_enabled=False)
     page.goto("/board/val/")
     page.get_by_role("searchbox").fill("flow")
     page.get_by_role("button", name="Search").click()
-    page.wait_for_url("**/board/val/?q=flow")
+    page.wait_for_url(lambda url: "q=flow" in url)
     expect(page.locator("table.board tbody tr")).to_have_count(1)
 
 

@@ -133,7 +133,6 @@ LINES: dict[str, Line] = {
     # Without a text there is nothing to save.
     "maintain_page": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"page_name": "rules"}),
     "maintain_audit": line(GET=KEEPERS),
-    "maintain_audit_csv": line(GET=KEEPERS),
     "maintain_audit_json": line(GET=KEEPERS),
     "maintain_queue": line(GET=KEEPERS),
     "maintain_queue_state": line(GET=KEEPERS),
@@ -159,7 +158,6 @@ LINES: dict[str, Line] = {
     "maintain_edition": line(GET=KEEPERS),
     "maintain_progress": line(GET="in 404 404 404 286 in in"),
     "maintain_preview_csv": line(GET=KEEPERS),
-    "maintain_preview_json": line(GET=KEEPERS),
     "maintain_publish": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_roll_back": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_discard": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),

@@ -157,7 +157,7 @@ def _start(sent: list[str]) -> list[str]:
         *("/", "/board/test/", "/submissions/", "/team/", "/maintain/", "/admin/"),
         *("/api/v1/splits", "/api/v1/schema", f"{split}/board", f"{split}/manifest"),
         *(f"{split}/editions/{n}/{what}" for n in (1, 2) for what in ("board", "preview")),
-        *("/maintain/test/editions/2/", "/maintain/audit/events.csv"),
+        *("/maintain/test/editions/2/", "/maintain/audit/events.json"),
         *(f"/submissions/{pk}/" for pk in sent),
     ]
 

@@ -1,10 +1,8 @@
 """Accounts where allauth's own way says too much or locks out the wrong person.
 
-Mails: every link begins with the configured address of the site, whatever `Host` a request names.
-Wrong passwords are counted three ways (`ACCOUNT_RATE_LIMITS`): by address; by account and address, so that
-somebody who guesses from one address never locks out the owner at another; and slowly by account alone, for
-guesses from many addresses. The last count does not hold where the account has signed in from before.
-Sign-up hashes the password also where the address has an account, so that both take the same time.
+Wrong passwords are counted by address, by account and address, and slowly by account alone, for guesses from
+many addresses. The last count does not hold where the account has signed in from before, so nobody locks out
+the owner. Sign-up hashes the password also where the address has an account, so that both take the same time.
 """
 
 import hashlib
@@ -36,7 +34,7 @@ KNOWN_ADDRESS_S = 90 * 24 * 3600
 
 
 class ConfiguredSite(RequestSite):
-    """The site that mails speak of: the configured one, not the one that a request names."""
+    """The site as the settings name it, whatever `Host` a request names."""
 
     def __init__(self) -> None:
         self.name = settings.SITE_NAME
@@ -45,8 +43,6 @@ class ConfiguredSite(RequestSite):
 
 
 class AccountAdapter(DefaultAccountAdapter):
-    """Sends mails, and decides whether somebody may try a password."""
-
     error_messages = {
         **DefaultAccountAdapter.error_messages,
         "incorrect_code": "The code is wrong; expected the code of the last mail that we sent for this.",
@@ -82,7 +78,6 @@ class AccountAdapter(DefaultAccountAdapter):
         self._login_failed_rl_usage.usage.extend(usage.usage)
 
     def authenticate(self, request: HttpRequest, **credentials: Any) -> Any:
-        """The account that these credentials open, or None. The address is known to it from now on."""
         user = super().authenticate(request, **credentials)
         if user:
             address = ratelimit.get_ip(request)
@@ -90,26 +85,20 @@ class AccountAdapter(DefaultAccountAdapter):
         return user
 
     def is_login_by_code_required(self, login: Login) -> bool:
-        """Whether the sign-in also asks for a mailed code: of a maintainer who has to set up an app first.
-
-        Otherwise somebody who knows only the password would set up an app of their own.
-        """
+        """Whether a mailed code is needed: else who knows a maintainer's password sets up their own app."""
         user = login.user
         if not isinstance(user, User) or not second_factor.is_required(user):
             return False
         return not second_factor.is_set_up(user)
 
     def confirm_email(self, request: HttpRequest, email_address: EmailAddress) -> bool:
-        """Whether the address is proved now. Its account may have given way meanwhile."""
+        """Prove the address, unless its account has given way meanwhile."""
         with transaction.atomic():
             is_there = User.objects.select_for_update(no_key=True).filter(pk=email_address.user_id)
             return is_there.exists() and bool(super().confirm_email(request, email_address))
 
     def get_reauthentication_methods(self, user: User | AnonymousUser) -> list[dict[str, Any]]:
-        """How somebody confirms that it is them: with a code if they have a second factor, else by password.
-
-        So a password that somebody else knows shows no recovery codes in a session that was left open.
-        """
+        """By code alone where there is one: a known password shows no recovery codes."""
         methods: list[dict[str, Any]] = super().get_reauthentication_methods(user)
         return [each for each in methods if each["id"] == "mfa_reauthenticate"] or methods
 
@@ -125,10 +114,9 @@ class AccountAdapter(DefaultAccountAdapter):
 
 
 class OwnersAddress(forms.BaseSignupForm):
-    """Of a form that signs up: an address that somebody else has not proved is free."""
+    """A sign-up form for which an address that somebody else has not proved is free."""
 
     def validate_unique_email(self, value: str) -> str:
-        """The address. Only an account that it belongs to counts as there."""
         if addresses.accounts_of(value).exists():
             return str(super().validate_unique_email(value))
         return value
@@ -142,10 +130,8 @@ class OwnersAddress(forms.BaseSignupForm):
 
 
 class SignupForm(OwnersAddress, forms.SignupForm):
-    """Signs up; an address that has an account already gets a mail, and the same answer."""
-
     def clean(self) -> dict[str, Any]:
-        """Tell of a bad password and of two that differ at once; a rule that is broken is told once."""
+        """Tell of a bad password and of two that differ at once."""
         cleaned: dict[str, Any] = super().clean()
         typed = [self.data.get(name) for name in ("password1", "password2")]
         if all(typed) and typed[0] != typed[1] and "password2" not in self.errors:
@@ -163,8 +149,6 @@ class SignupForm(OwnersAddress, forms.SignupForm):
 
 
 class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
-    """The mailed code that proves an address."""
-
     def clean_code(self) -> Any:
         """The code. With the right one, nobody who has not proved the address keeps the owner from it."""
         forms.BaseConfirmCodeForm.clean_code(self)
@@ -175,8 +159,6 @@ class ConfirmAddressForm(forms.ConfirmEmailVerificationCodeForm):
 
 
 class ResetPasswordForm(forms.ResetPasswordForm):
-    """Mails a link to an address that belongs to an account."""
-
     def clean_email(self) -> Any:
         """The address. An account that nobody confirmed is none: whoever made it may have another way in."""
         address = super().clean_email()
@@ -205,8 +187,6 @@ def _on_our_site(address: str) -> str:
 
 
 class SecondFactorAdapter(DefaultMFAAdapter):
-    """The names and the words of this site."""
-
     error_messages = {
         **DefaultMFAAdapter.error_messages,
         "cannot_delete_authenticator": "Maintainers of this site must have a second factor.",
@@ -221,5 +201,4 @@ class SecondFactorAdapter(DefaultMFAAdapter):
         return str(settings.SITE_NAME)
 
     def can_delete_authenticator(self, authenticator: Authenticator) -> bool:
-        """Whether somebody may go on without it."""
         return not (settings.REQUIRE_SECOND_FACTOR and authenticator.user.is_maintainer)

@@ -25,10 +25,8 @@ from leaderboard.web.account.accounts import KNOWN_ADDRESS_S, known_address_key
 
 
 class _CountedCode(forms.BaseAuthenticateForm):
-    """A code of the app or a recovery code."""
-
     def clean_code(self) -> str:
-        """The code, used up. Raises allauth's validation error for a wrong one, and after too many."""
+        """Use the code up."""
         usage = _count_one(context.request, self.user)
         code: str = self.cleaned_data["code"]
         for each in Authenticator.objects.filter(user=self.user):
@@ -51,10 +49,8 @@ class ReauthenticateForm(_CountedCode, forms.ReauthenticateForm):
 
 
 class ActivateForm(ActivateTOTPForm):
-    """Sets up the app with a code that then signs nobody in."""
-
     def clean_code(self) -> Any:
-        """The code, used up. allauth marks those of sign-ins alone."""
+        """Use the code up, which allauth does with those of sign-ins alone."""
         code = super().clean_code()
         app = Authenticator(user=self.user, type=Authenticator.Type.TOTP)
         if not TOTP(app)._mark_code_used(code):

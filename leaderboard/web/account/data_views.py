@@ -31,7 +31,6 @@ class DeleteForm(SiteForm):
     )
 
     def require(self, user: User) -> None:
-        """Raise `Refused` for another address."""
         if self.cleaned_data["email"].strip().lower() != user.email:
             raise Refused(
                 "bad-value", "That is another address; expected the address of this account.", field="email"
@@ -64,7 +63,6 @@ def _forget(request: HttpRequest) -> HttpResponse:
 
 @own_page
 def download(request: HttpRequest) -> HttpResponse:
-    """All of it as JSON."""
     return JsonResponse(
         forgetting.export(user=cast("User", request.user)),
         json_dumps_params={"indent": 1, "ensure_ascii": False},
@@ -76,14 +74,11 @@ _CHOICES: Final = [(kind.value, kind.label) for kind in MailKind if kind is not 
 
 
 class MailsForm(SiteForm):
-    """A tick for each kind of mail that is wanted."""
-
     wanted = forms.MultipleChoiceField(label="Send me a mail about", choices=_CHOICES, required=False)
 
 
 @own_form
 def mails(request: HttpRequest) -> HttpResponse:
-    """Choose the kinds of mail."""
     user = cast("User", request.user)
     wanted = [kind for kind, _ in _CHOICES if kind not in notices.muted_by(user)]
     form = MailsForm.asked(request, initial={"wanted": wanted})

@@ -68,15 +68,13 @@ def _malformed_answers() -> Iterator[None]:
 
 
 class _ProviderViews(OAuth2Adapter):
-    """The exchange with a provider. Its answers are a stranger's: none of them is a failure of ours."""
+    """The exchange with a provider, whose answers may have any shape."""
 
     def get_access_token_data(self, *args: Any, **kwargs: Any) -> Any:
-        """The provider's answer to the code that the browser brought."""
         with _malformed_answers():
             return super().get_access_token_data(*args, **kwargs)
 
     def parse_token(self, data: Any) -> Any:
-        """The token in it."""
         with _malformed_answers():
             return super().parse_token(data)
 
@@ -95,35 +93,28 @@ class _ProviderViews(OAuth2Adapter):
         raise NotImplementedError
 
     def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """What of the provider's words is kept."""
-        raise NotImplementedError
+        """What of the provider's words is kept, beside its number of the person."""
+        return {}
 
 
 class OrcidViews(_ProviderViews, OrcidOAuth2Adapter):
     """ORCID tells the iD, and addresses that the person has made public."""
 
     def verified(self, login: SocialLogin) -> list[EmailAddress]:
-        """Those of the public record."""
         person = login.account.extra_data.get("person") or {}
         rows = (person.get("emails") or {}).get("email") or []
         rows = [row for row in rows if row.get("verified") is True and row.get("email")]
         return _sorted(_address(row["email"], is_primary=row.get("primary") is True) for row in rows)
-
-    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """Nothing: the iD is the account's number, and the record is the person's own."""
-        return {}
 
 
 class GitHubViews(_ProviderViews, GitHubOAuth2Adapter):
     """GitHub tells a number, the login name, and the addresses of the account."""
 
     def verified(self, login: SocialLogin) -> list[EmailAddress]:
-        """Those that GitHub has verified; the one on the profile may be any text."""
         rows = [row for row in login.email_addresses if row.verified is True]
         return _sorted(_address(row.email, is_primary=row.primary is True) for row in rows)
 
     def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """The login name, by which the person knows the account."""
         return {"login": str(said.get("login", ""))[:100]}
 
 

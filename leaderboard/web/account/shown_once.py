@@ -1,9 +1,7 @@
 """A secret that is shown once: on the page that a browser is led to after the form that made it.
 
-Between the two it is with the browser alone, which is about to show it anyway: in a cookie that scripts
-cannot read, that goes to this one page, is signed for this account, and ends when it was shown or after two
-minutes. So nothing here stores it, no address names it and no log has it; a page that is reloaded makes no
-second secret and shows none.
+Until then it is in a cookie that no script reads, that goes to this one page, is signed for this account, and
+ends when it was shown or after two minutes. Nothing here stores it, no address names it and no log has it.
 """
 
 from typing import Any, Final, cast

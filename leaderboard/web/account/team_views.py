@@ -1,7 +1,6 @@
 """The pages of a team: its name, its members, its invitations."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, cast
 from uuid import UUID
@@ -17,7 +16,7 @@ from django.views.decorators.debug import sensitive_variables
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.http import asks_first, own_deed, own_form
-from leaderboard.models import Invitation, Membership, Team, User
+from leaderboard.models import Invitation, Team, User
 from leaderboard.people import invitations, names, teams
 from leaderboard.web.account import shown_once
 from leaderboard.web.forms import SiteForm
@@ -47,7 +46,6 @@ class SignupNameForm(forms.Form):
             raise forms.ValidationError(str(refusal)) from None
 
     def signup(self, request: HttpRequest, user: User) -> None:
-        """Called once the account exists."""
         user.name = self.cleaned_data["name"]
         user.save(update_fields=["name"])
 
@@ -63,60 +61,43 @@ class NameForm(SiteForm):
     )
 
 
-@dataclass(frozen=True)
-class TeamPage:
-    """Everything that the page of a team places."""
-
-    team: Team | None
-    members: tuple[Membership, ...]
-    is_owner: bool
-    is_alone: bool
-    invitations: list[tuple[Invitation, str]]  # each with its state, and without its secret
-
-    @property
-    def would_be_lost(self) -> bool:
-        """Whether methods would be left to nobody if this person left."""
-        return self.is_alone and self.team is not None and self.team.methods.filter(deleted_at=None).exists()
-
-
-def team_page(user: User, *, now: datetime) -> TeamPage:
+def _team_page(user: User, *, now: datetime) -> dict[str, Any]:
     """The person's team, as they see it. Invitations are the owner's to see."""
     team = teams.current_team_of(user=user)
-    if team is None:
-        return TeamPage(team=None, members=(), is_owner=False, is_alone=True, invitations=[])
-    members = tuple(team.memberships.select_related("user").order_by("-is_owner", "joined_at", "pk"))
+    members = team.memberships.select_related("user").order_by("-is_owner", "joined_at", "pk") if team else ()
     is_owner = any(member.is_owner and member.user_id == user.pk for member in members)
-    rows = team.invitations.select_related("created_by", "accepted_by") if is_owner else ()
-    return TeamPage(
-        team=team,
-        members=members,
-        is_owner=is_owner,
-        is_alone=len(members) == 1,
-        invitations=[(row, invitations.state_of(row, now=now)) for row in rows],
-    )
+    is_alone = len(members) <= 1
+    rows = team.invitations.select_related("created_by", "accepted_by") if team and is_owner else ()
+    return {
+        "team": team,
+        "members": members,
+        "is_owner": is_owner,
+        "is_alone": is_alone,
+        # Each with its state, and without its secret.
+        "invitations": [(row, invitations.state_of(row, now=now)) for row in rows],
+        # Methods would be left to nobody if this person left.
+        "would_be_lost": is_alone and team and team.methods.filter(deleted_at=None).exists(),
+    }
 
 
 def _own_team(request: HttpRequest) -> Team:
-    """The reader's team; somebody without one has none to act for."""
     return get_object_or_404(Team, memberships__user=cast("User", request.user))
 
 
 def _member(request: HttpRequest, handle: UUID) -> tuple[Team, User]:
-    """The reader's team and one of its members."""
     own = _own_team(request)
     return own, get_object_or_404(User, membership__team=own, membership__handle=handle)
 
 
 def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpResponse:
     user = cast("User", request.user)
-    page = team_page(user, now=timezone.now())
-    form = NameForm(initial={"name": page.team.name if page.team else user.name})
+    page = _team_page(user, now=timezone.now())
+    form = NameForm(initial={"name": page["team"].name if page["team"] else user.name})
     context = {"page": page, "form": form, **context}
     return shown_once.render_with(request, "account/team.html", context, at="team", status=status)
 
 
 def _done(request: HttpRequest, deed: Callable[[], object], *, told: str) -> HttpResponse:
-    """Do it and show the team and what was done, or show why not."""
     try:
         deed()
     except Refused as refusal:
@@ -142,13 +123,6 @@ def team(request: HttpRequest) -> HttpResponse:
             messages.success(request, f"The team {'is now called' if own else 'is created:'} {name}.")
             return redirect("team")
     return _page(request, form=form, status=422)
-
-
-def _invited(request: HttpRequest, invitation: Invitation) -> HttpResponse:
-    """Who invites, for somebody who is not signed in; then the way in leads back here."""
-    if request.method == "POST":
-        return redirect_to_login(request.get_full_path())
-    return render(request, "account/invited.html", {"invitation": invitation})
 
 
 @own_deed
@@ -180,7 +154,7 @@ def leave(request: HttpRequest) -> HttpResponse:
     """Go out of one's team. Whoever would leave methods to nobody says that they know."""
     _own_team(request)
     user = cast("User", request.user)
-    if team_page(user, now=timezone.now()).would_be_lost and not request.POST.get("confirm"):
+    if _team_page(user, now=timezone.now())["would_be_lost"] and not request.POST.get("confirm"):
         sentence = "Confirm that the private methods become inaccessible; expected a tick."
         return _page(request, refusal=sentence, status=422)
     return _done(request, lambda: teams.leave(user=user), told="You left the team.")
@@ -219,7 +193,9 @@ def join(request: HttpRequest, secret: str) -> HttpResponse:
         if found is None:
             raise Http404
         if not user.is_authenticated:
-            return _invited(request, found)
+            if request.method == "POST":
+                return redirect_to_login(request.get_full_path())
+            return render(request, "account/invited.html", {"invitation": found})
         if request.method == "POST":
             own = invitations.accept(secret=secret, user=user, now=now)
             messages.success(request, f"You are now in the team {own.name}.")

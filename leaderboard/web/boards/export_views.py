@@ -4,7 +4,7 @@ They hold what everybody sees, whoever takes them, since they end up in papers. 
 one's own that others do not see, or not under their name, each marked.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, Final
 from urllib.parse import urlencode
 

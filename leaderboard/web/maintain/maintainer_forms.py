@@ -12,7 +12,6 @@ _STALE: Final = "The form lacks the current edition; reload the page."
 
 
 def reason_field(help_text: str, *, at: str = "audit log", max_length: int = 1000) -> forms.CharField:
-    """A sentence that says why, and where it stands."""
     return forms.CharField(
         max_length=max_length,
         widget=forms.Textarea(attrs={"rows": 3}),
@@ -40,7 +39,6 @@ class OpenForm(SiteForm):
     )
 
     def __init__(self, data: Any = None, *, split: Split) -> None:
-        """`split` decides what there is to choose from."""
         published = split.published_edition
         self.truths = list(GroundTruth.objects.filter(split=split.truth_split_id).order_by("-imported_at"))
         initial = {"digest": published.ground_truth_id, "protocol": published.protocol} if published else {}
@@ -49,8 +47,6 @@ class OpenForm(SiteForm):
 
 
 class ReasonForm(SiteForm):
-    """A sentence that says why."""
-
     reason = reason_field(
         "One or two sentences, for the public changelog and the audit log.", at="public changelog"
     )
@@ -71,6 +67,4 @@ class PublishForm(RollBackForm):
 
 
 class DiscardForm(ReasonForm):
-    """A reason for those who look after the benchmark; nothing public changes."""
-
     reason = reason_field("One sentence for the audit log.")

@@ -1,8 +1,4 @@
-"""The maintainers' pages of editions: open, preview, publish, roll back, discard.
-
-A visitor signs in first. To everybody else they are not there: the answer is the one for an address that does
-not exist.
-"""
+"""The maintainers' pages of editions: open, preview, publish, roll back, discard."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -10,7 +6,7 @@ from typing import Any, cast
 
 from django.contrib import messages
 from django.contrib.auth.views import redirect_to_login
-from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase, JsonResponse
+from django.http import Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import get_object_or_404, redirect, render
 from django.utils import timezone
 from django.views.decorators.cache import never_cache
@@ -60,7 +56,6 @@ def maintainers_only(view: View) -> View:
 
 
 def maintainers_form(view: View) -> View:
-    """The same for a page with a form."""
     return maintainers_only(asks_first(view))
 
 
@@ -113,7 +108,6 @@ def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
 @maintainers_only
 @require_safe
 def edition_progress(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """What a waiting page asks for: nothing new, how far it is, or at the end not to ask any more."""
     found = _edition(split, number)
     running = edition_tables.running(found, corrections.progress(found))
     if request.GET.get("seen") == running["seen"] and not running["is_final"]:
@@ -128,22 +122,11 @@ def edition_progress(request: HttpRequest, split: str, number: int) -> HttpRespo
 @maintainers_only
 @require_safe
 def preview_csv(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """The comparison as a table for spreadsheets."""
     found = preview.preview(_edition(split, number))
     return HttpResponse(
         "".join(csv_lines(preview.rows(found), columns=found.columns)),
         content_type="text/csv; charset=utf-8",
-        headers={"Content-Disposition": _attachment(split, number, "csv")},
-    )
-
-
-@maintainers_only
-@require_safe
-def preview_json(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """The comparison as the API gives it."""
-    return JsonResponse(
-        preview.document(preview.preview(_edition(split, number))),
-        headers={"Content-Disposition": _attachment(split, number, "json")},
+        headers={"Content-Disposition": f'attachment; filename="tsttc-{split}-edition-{number}-preview.csv"'},
     )
 
 
@@ -200,7 +183,6 @@ def discard(request: HttpRequest, split: str, number: int) -> HttpResponse:
 
 
 def maintainer_of(request: HttpRequest) -> User:
-    """Who asks: `maintainers_only` has let them in."""
     return cast("User", request.user)
 
 
@@ -210,7 +192,6 @@ def _edition(split: str, number: int) -> Edition:
 
 
 def _comparison(found: Edition) -> dict[str, Any]:
-    """A draft edition, ready for its template."""
     compared = preview.preview(found)
     return {
         "edition": found,
@@ -221,9 +202,4 @@ def _comparison(found: Edition) -> dict[str, Any]:
 
 
 def form_page(request: HttpRequest, template: str, form: SiteForm, **context: Any) -> HttpResponse:
-    """A page with this form in it, empty or refused."""
     return render(request, template, {"form": form, **context}, status=422 if form.errors else 200)
-
-
-def _attachment(split: str, number: int, kind: str) -> str:
-    return f'attachment; filename="tsttc-{split}-edition-{number}-preview.{kind}"'

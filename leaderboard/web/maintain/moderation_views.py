@@ -32,8 +32,6 @@ from leaderboard.web.submissions.forms import parse_uuid
 
 
 class DeedForm(SiteForm):
-    """Why."""
-
     reason = reason_field(
         "One sentence for the audit log, without names and addresses. The team does not see it.",
         max_length=MAX_REASON,
@@ -41,8 +39,6 @@ class DeedForm(SiteForm):
 
 
 class RenameForm(DeedForm):
-    """Another name, or none."""
-
     name = forms.CharField(
         label="New name",
         required=False,
@@ -55,8 +51,6 @@ class RenameForm(DeedForm):
 
 
 class MoveForm(DeedForm):
-    """Which team."""
-
     name = forms.CharField(
         label="New team",
         max_length=MAX_NAME,
@@ -215,7 +209,6 @@ def team(request: HttpRequest, team_id: UUID) -> HttpResponse:
 
 
 def _with_states(sent: Iterable[Submission]) -> list[Submission]:
-    """Each with the status that it has in the edition of the board, in words."""
     rows = list(sent)
     decided = Evaluation.objects.filter(
         submission__in=rows, edition=F("submission__split__published_edition")

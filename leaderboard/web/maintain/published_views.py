@@ -22,8 +22,6 @@ from leaderboard.web.maintain.maintainer_views import (
 
 
 class PaperForm(SiteForm):
-    """A document with the rows of a paper."""
-
     file = forms.FileField(
         label="Document",
         help_text="JSON with source, columns, methods and results.",
@@ -40,7 +38,6 @@ class PaperForm(SiteForm):
     )
 
     def __init__(self, request: HttpRequest) -> None:
-        """The form with what this request sends."""
         sent: tuple[Any, Any] = (None, None)
         super().__init__(*((request.POST, request.FILES) if request.method == "POST" else sent))
 
@@ -57,8 +54,6 @@ class PaperForm(SiteForm):
 
 
 class RemovalForm(SiteForm):
-    """Why."""
-
     reason = reason_field("One sentence for the audit log.", max_length=splits.MAX_REASON)
 
 

@@ -16,28 +16,22 @@ from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_views import maintainer_of, maintainers_only
 from leaderboard.web.maintain.queue_tables import STATES, queue_table
 
-_NONE_CHOSEN = "No evaluation was chosen; expected evaluations with a system error."
+
+def _splits() -> list[tuple[str, str]]:
+    return [("", "all"), *((name, name) for name in Split.objects.values_list("pk", flat=True))]
 
 
 class QueueFilter(SiteForm):
-    """Which of the lists, and of which split."""
-
     state = forms.ChoiceField(
         required=False,
         choices=[("", "all"), *((name, state.heading) for name, state in STATES.items())],
         error_messages={"invalid_choice": f"There is no such state; expected one of {', '.join(STATES)}."},
     )
-    split = forms.ChoiceField(required=False)
-
-    def __init__(self, *args: Any, **options: Any) -> None:
-        """The splits to choose from are those that there are."""
-        super().__init__(*args, **options)
-        names = list(Split.objects.values_list("name", flat=True))
-        split = self.fields["split"]
-        split.choices = [("", "all"), *((name, name) for name in names)]  # type: ignore[attr-defined]  # a ChoiceField
-        split.error_messages["invalid_choice"] = (
-            f"There is no such split; expected one of {', '.join(names)}."
-        )
+    split = forms.ChoiceField(
+        required=False,
+        choices=_splits,
+        error_messages={"invalid_choice": "There is no such split; expected one of those listed."},
+    )
 
 
 class RetryForm(forms.Form):
@@ -46,7 +40,7 @@ class RetryForm(forms.Form):
     evaluation = forms.ModelMultipleChoiceField(
         queryset=Evaluation.objects.defer("report", "problems"),
         error_messages={
-            "required": _NONE_CHOSEN,
+            "required": "No evaluation was chosen; expected evaluations with a system error.",
             "invalid_choice": "There is no evaluation %(value)s; expected evaluations with a system error.",
         },
     )
@@ -100,7 +94,6 @@ def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpRespon
 
 
 def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
-    """What was asked for, ready to be drawn, and how to ask for it again."""
     found = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
     number = found["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
     return {

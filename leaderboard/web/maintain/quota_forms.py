@@ -23,30 +23,22 @@ class TeamLookup(SiteForm):
 class SpanField(forms.CharField):
     """A span of time in the words in which `quotas.span` says it."""
 
-    default_error_messages = {
-        "too_short": "The window is empty; expected one like 30 days or 24 hours.",
-    }
-
-    def __init__(self, *, may_be_none: bool, **options: Any) -> None:
-        """With `may_be_none`, nothing filled in is no time at all."""
-        super().__init__(required=not may_be_none, max_length=40, **options)
-        self._may_be_none = may_be_none
+    def __init__(self, **options: Any) -> None:
+        super().__init__(max_length=40, **options)
 
     def clean(self, value: Any) -> timedelta:
-        """The span. Raises `ValidationError`."""
+        """The span; none at all where nothing may be filled in. Raises `ValidationError`."""
         text: str = super().clean(value)
-        if not text:
-            return timedelta(0)
         try:
-            span = quotas.parse_span(text)
+            span = quotas.parse_span(text) if text else timedelta(0)
         except Refused as refusal:
             raise forms.ValidationError(str(refusal)) from refusal
-        if not span and not self._may_be_none:
-            raise forms.ValidationError(self.error_messages["too_short"])
+        if self.required and not span:
+            raise forms.ValidationError("The window is empty; expected one like 30 days or 24 hours.")
         return span
 
 
-def count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
+def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
     """A limit that may be left out; `name` is its field in `QuotaRules`."""
     return forms.IntegerField(
         label=label,
@@ -63,34 +55,45 @@ def count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
     )
 
 
-class OverrideForm(SiteForm):
-    """Four limits and why this team has them. The names are those of `quotas.override`."""
+class QuotaRulesForm(SiteForm):
+    """Four limits of a team. The names are those of `QuotaRules`."""
 
-    limit = count_field("quota_limit", "Submissions", "Within the window. Empty: no limit; 0: none.")
-    window = SpanField(
-        may_be_none=False,
+    quota_limit = _count_field(
+        "quota_limit", "Submissions", "Of a team, within the window. Empty: no limit; 0: none."
+    )
+    quota_window = SpanField(
+        label="Window",
         help_text="Length of the rolling window, for example 30 days or 24 hours.",
         error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
     )
-    min_gap = SpanField(
+    quota_min_gap = SpanField(
         label="Min. interval",
-        may_be_none=True,
-        help_text="Minimum time between two submissions. Empty: none.",
+        required=False,
+        help_text="Minimum time between two submissions of a team. Empty: none.",
     )
-    rejected_limit = count_field(
+    quota_rejected_limit = _count_field(
         "quota_rejected_limit", "Rejected or cancelled files", "Within 24 hours. Empty: no limit."
     )
+
+
+class OverrideForm(QuotaRulesForm):
+    """The limits of one team on a split, and why it has them."""
+
     reason = reason_field(_FOR_MAINTAINERS, max_length=500)
 
     @staticmethod
     def filled_with(rules: QuotaRules) -> dict[str, Any]:
         """What stands in the form at first: rules as they are, without their reason."""
         return {
-            "limit": rules.quota_limit,
-            "window": quotas.span(rules.quota_window),
-            "min_gap": quotas.span(rules.quota_min_gap) if rules.quota_min_gap else "",
-            "rejected_limit": rules.quota_rejected_limit,
+            "quota_limit": rules.quota_limit,
+            "quota_window": quotas.span(rules.quota_window),
+            "quota_min_gap": quotas.span(rules.quota_min_gap) if rules.quota_min_gap else "",
+            "quota_rejected_limit": rules.quota_rejected_limit,
         }
+
+    def rules(self) -> dict[str, Any]:
+        """What was filled in, under the names of `quotas.override`."""
+        return {name.removeprefix("quota_"): value for name, value in self.cleaned_data.items()}
 
 
 class EndForm(SiteForm):

@@ -54,10 +54,7 @@ def overrides() -> QuerySet[QuotaOverride]:
 
 
 def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]]:
-    """The team on every split: the rules that hold for it, and what it has left of them.
-
-    Whose the question is (`viewer`) makes no difference to a team.
-    """
+    """The team on every split: the rules that hold for it, and what it has left of them."""
     own = {row.split_id: row for row in team.quota_overrides.select_related("set_by")}
     admitted = {row.split_id: row for row in team.admissions.all()}
     return [

@@ -66,7 +66,7 @@ def override(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     if form.is_valid():
         actor, now = maintainer_of(request), timezone.now()
         try:
-            quotas.override(team=team, split=found, actor=actor, now=now, **form.cleaned_data)
+            quotas.override(team=team, split=found, actor=actor, now=now, **form.rules())
         except Team.DoesNotExist:
             raise Http404 from None  # it has just ended
         messages.success(request, f"{team.name} now has an override on {split}.")
@@ -134,11 +134,13 @@ def _form(
     own: QuotaOverride | None,
     words: dict[str, str],
 ) -> HttpResponse:
-    """The form below the rules of the split, those of the team, and what is used of them."""
     quota = quotas.state(team=team, user=maintainer_of(request), split=split, now=timezone.now())
-    told = {
+    about = {
+        "team": team,
+        "split": split,
+        "own": own,
+        "quota": quota,
         "rules": quota_tables.sentence_of(split),
         "own_rules": quota_tables.sentence_of(own) if own else "",
     }
-    about = {"team": team, "split": split, "own": own, "quota": quota}
-    return form_page(request, "maintain/quota_form.html", form, **about, **told, **words)
+    return form_page(request, "maintain/quota_form.html", form, **about, **words)

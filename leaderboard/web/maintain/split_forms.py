@@ -13,7 +13,7 @@ from leaderboard.models import Split
 from leaderboard.models.benchmark import Listing
 from leaderboard.quotas import quotas
 from leaderboard.web.forms import SiteForm
-from leaderboard.web.maintain.quota_forms import SpanField, count_field
+from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
 _LISTINGS: Final = [
     (Listing.LISTED, "listed"),
@@ -51,7 +51,7 @@ class MomentField(forms.CharField):
             raise forms.ValidationError(str(refusal)) from refusal
 
 
-class PolicyForm(SiteForm):
+class PolicyForm(QuotaRulesForm):
     """What maintainers decide about a split. The names are those of `Policy`."""
 
     title = forms.CharField(
@@ -85,23 +85,6 @@ class PolicyForm(SiteForm):
         coerce=int,
         help_text="Decimals of its next edition. Each decimal reveals more of hidden values.",
     )
-    quota_limit = count_field(
-        "quota_limit", "Submissions", "Of a team, within the window. Empty: no limit; 0: none."
-    )
-    quota_window = SpanField(
-        label="Window",
-        may_be_none=False,
-        help_text="Length of the rolling window, for example 30 days or 24 hours.",
-        error_messages={"required": "No window was given; expected one like 30 days or 24 hours."},
-    )
-    quota_min_gap = SpanField(
-        label="Min. interval",
-        may_be_none=True,
-        help_text="Minimum time between two submissions of a team. Empty: none.",
-    )
-    quota_rejected_limit = count_field(
-        "quota_rejected_limit", "Rejected or cancelled files", "Within 24 hours. Empty: no limit."
-    )
     needs_admission = forms.BooleanField(
         label="By admission", required=False, help_text="Only admitted teams submit to it."
     )
@@ -122,7 +105,6 @@ class PolicyForm(SiteForm):
 
     @staticmethod
     def filled_with(policy: Policy) -> dict[str, Any]:
-        """What stands in the form at first."""
         gap = policy.quota_min_gap
         return asdict(policy) | {
             "opens_at": moments.written(policy.opens_at),
@@ -133,7 +115,6 @@ class PolicyForm(SiteForm):
         }
 
     def policy(self) -> Policy:
-        """What was filled in."""
         return Policy(**{name: self.cleaned_data[name] for name in NAMES})
 
 

@@ -1,1 +1,1 @@
-"""Middleware of all requests: logging, limits, sessions, uploads, headers, addresses, the page cache."""
+"""Middleware of all requests: logging, limits, sessions, uploads, headers, the page cache."""

@@ -14,8 +14,6 @@ MIDDLEWARE: Final = [
     "whitenoise.middleware.WhiteNoiseMiddleware",
     "csp.middleware.CSPMiddleware",
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
-    # Before what is kept, which knows clean addresses alone.
-    "leaderboard.web.middleware.clean_addresses.CleanAddressMiddleware",
     # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
     "leaderboard.api.middleware.ApiHeadersMiddleware",
     # Before sessions and accounts, which somebody without either should not pay for.

@@ -1,15 +1,10 @@
 """Answers to anybody: what is the same for all readers without an account, kept while no board changes.
 
-Whoever brings neither a session nor a token is anybody. What such a reader is shown changes only with the
-numbers of the boards (`leaderboard/versions.py`) and with the day (rows are new for some days), so both are
-part of the key: the number is read from the database for each request, and a kept answer is never old. A view
-says with `http.cacheable` that this is so of its answer. The middleware stands before sessions and accounts,
-and sees whether one of them leaves a cookie with the answer's first reader.
+What such a reader is shown changes only with the numbers of the boards (`leaderboard/versions.py`) and with
+the day, so both are part of the key: a kept answer is never old. A view says so with `http.cacheable`.
 
-Each process has two caches, each of a bounded number of answers: one for plain addresses, and one for those
-with a query, so that what anybody can make up, as a text to find, pushes out no plain page. Answers are kept
-compressed, which takes an eighth of the memory. There is no secret of the reader in them, so that their
-compressed length betrays none.
+Each process has two bounded caches: one for plain addresses, and one for those with a query, so that what
+anybody can make up pushes out no plain page. Answers are kept compressed, an eighth of the memory.
 """
 
 import gzip
@@ -75,7 +70,6 @@ class PublicAnswersMiddleware:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponseBase:
-        """Answer, or ask the view."""
         path = request.path_info
         if not (path == "/" or path.startswith(PREFIXES)) or not is_anybodys(request):
             return self._get_response(request)
@@ -121,7 +115,6 @@ def _is_ours(request: HttpRequest) -> bool:
 
 
 def _known_query(request: HttpRequest) -> str:
-    """What the address names of `KNOWN`, in one order."""
     return urlencode([(name, text) for name in sorted(KNOWN) for text in request.GET.getlist(name)])
 
 

@@ -28,7 +28,6 @@ class UploadLimitMiddleware:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Let small requests pass."""
         announced = request.META.get("CONTENT_LENGTH") or "0"
         if announced.isdecimal() and int(announced) <= settings.MAX_PREDICTIONS_BYTES + FORM_BYTES:
             return self.get_response(request)
@@ -44,7 +43,6 @@ class SendThrottle(rate_limits.Throttle):
     rates, scope, cache = "PAGE_RATES", "send", cache
 
     def identity(self, request: HttpRequest) -> object | None:
-        """The account, else the address."""
         return rate_limits.account_or_address(request)
 
 
@@ -60,7 +58,6 @@ class DrawAsOfThrottle(rate_limits.Throttle):
     rates, scope = "PAGE_RATES", "as_of"
 
     def identity(self, request: HttpRequest) -> object | None:
-        """The address, if it asks for a time."""
         return super().identity(request) if "at" in request.GET else None
 
 
@@ -74,7 +71,6 @@ class RateLimitMiddleware:
         self.get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Let those pass who come now and then."""
         if not request.path.startswith(self.ELSEWHERE):
             is_reading = request.method in {"GET", "HEAD"}
             for throttle in (DrawAsOfThrottle(), DrawThrottle()) if is_reading else (SendThrottle(),):
@@ -84,7 +80,6 @@ class RateLimitMiddleware:
 
 
 def _too_many(request: HttpRequest, *, wait_s: float) -> HttpResponse:
-    """The page that says so, when to come back, and where to go on."""
     context = {"sentence": rate_limits.refusal(wait_s), "back": page_before(request)}
     response = render(request, "429.html", context, status=429)
     response["Retry-After"] = str(max(1, math.ceil(wait_s)))

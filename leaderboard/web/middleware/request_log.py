@@ -18,13 +18,9 @@ SECRET_PATH = re.compile(r"^(/team/join/).+", re.DOTALL)
 
 
 class RequestLogMiddleware(RequestMiddleware):
-    """Binds `request_id` to every line, says nothing of what people type, and never asks the database.
-
-    Outermost, so it also counts every answer.
-    """
+    """Binds `request_id` to every line, and counts every answer; it never asks the database."""
 
     def prepare(self, request: HttpRequest) -> None:
-        """Begin, and note when."""
         request.META["tsttc.begun_s"] = time.perf_counter()
         super().prepare(request)
 

@@ -40,7 +40,6 @@ class HeadersMiddleware:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Answer, then label the answer."""
         response = self._get_response(request)
         response.headers.setdefault("Permissions-Policy", PERMISSIONS)
         # A view whose picture others show, as a badge, says `cross-origin`.

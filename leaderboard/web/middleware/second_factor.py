@@ -26,12 +26,7 @@ _SIGN_IN_AGAIN: Final = (
 
 
 class SecondFactorMiddleware:
-    """Leads from `/maintain/` and `/admin/` to the page that sets up the second factor, or asks for it.
-
-    Who has none yet signs in with a mailed code first (`AccountAdapter.is_login_by_code_required`).
-
-    On all other pages and in the API, a session without a code sees and does no more than other people.
-    """
+    """Leads from the pages of maintainers to the missing step; elsewhere such a session is anybody's."""
 
     def __init__(self, get_response: Callable[[HttpRequest], HttpResponse]) -> None:
         self._get_response = get_response
@@ -95,12 +90,7 @@ def _marked(request: HttpRequest, user: User | AnonymousUser) -> User | Anonymou
 
 
 def _missing_step(request: HttpRequest, user: User) -> str:
-    """The name of the page that a maintainer has to pass first; empty where nothing is missing.
-
-    It is the session that has to be opened with a code: one that was opened by a password alone, before the
-    app was set up, is no better for it. Only a session that was opened with a mailed code sets up the app:
-    somebody who knows the password alone would set up their own.
-    """
+    """The route that a maintainer's session has to pass first; empty where nothing is missing."""
     if not second_factor.is_required(user):
         return ""
     given = {each.get("method") for each in get_authentication_records(request, user)}

@@ -9,27 +9,19 @@ from contextlib import suppress
 from typing import Any
 
 from django.core.files.uploadedfile import UploadedFile
-from django.core.files.uploadhandler import FileUploadHandler
+from django.core.files.uploadhandler import FileUploadHandler, TemporaryFileUploadHandler
 
 
-class UnnamedFileUploadHandler(FileUploadHandler):
+class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
     """Streams an upload to the disk. Gives back its room at once if the disk is full."""
-
-    file: UploadedFile
-    is_open = False
 
     def new_file(self, *args: Any, **kwargs: Any) -> None:
         """Begin a file."""
-        super().new_file(*args, **kwargs)
+        FileUploadHandler.new_file(self, *args, **kwargs)
+        file = tempfile.TemporaryFile()  # noqa: SIM115 - the request closes it, or else this handler
         self.file = UploadedFile(
-            tempfile.TemporaryFile(),  # noqa: SIM115 - the request closes it, or else this handler
-            self.file_name,
-            self.content_type,
-            0,
-            self.charset,
-            self.content_type_extra,
+            file, self.file_name, self.content_type, 0, self.charset, self.content_type_extra
         )
-        self.is_open = True
 
     def receive_data_chunk(self, raw_data: bytes, start: int) -> None:
         """Write a part of it. Raises `OSError` if there is no room."""
@@ -39,25 +31,11 @@ class UnnamedFileUploadHandler(FileUploadHandler):
             self.upload_interrupted()
             raise
 
-    def file_complete(self, file_size: int) -> UploadedFile:
-        """The whole file, from its beginning. Raises `OSError` if there is no room."""
-        try:
-            self.file.seek(0)
-        except OSError:
-            self.upload_interrupted()
-            raise
-        self.file.size = file_size
-        self.is_open = False  # the request closes it
-        return self.file
-
     def upload_interrupted(self) -> None:
         """Forget what has come so far."""
         # Closing writes what is still in memory, for which there may be no room either.
-        with suppress(OSError):
+        with suppress(OSError, AttributeError):
             self.file.close()
-        self.is_open = False
 
-    def __del__(self) -> None:
-        """Close what nobody else does: of a request that could not be read on, no handler is told."""
-        if self.is_open:
-            self.upload_interrupted()
+    # Of a request that could not be read on, no handler is told.
+    __del__ = upload_interrupted

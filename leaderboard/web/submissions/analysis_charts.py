@@ -101,13 +101,12 @@ def curve(bins: Sequence[Row], errors: Sequence[Metric]) -> Chart:
 
 
 def _interval(row: Row, metric: Metric) -> tuple[float, float] | None:
-    """The confidence interval of a bin's mean; analyses of former versions have none."""
+    """The confidence interval of a bin's mean, if it has one."""
     found = row.get("intervals", {}).get(metric.name)
     return (found[0], found[1]) if found else None
 
 
 def _ends(bins: Sequence[Row], metric: Metric) -> list[float]:
-    """Every mean, and both ends of its interval."""
     return [value for row in bins for value in (row[metric.name], *(_interval(row, metric) or ()))]
 
 

@@ -15,7 +15,7 @@ from django.utils import timezone
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard.methods import visibility
 from leaderboard.methods.details import DETAILS
-from leaderboard.models import Method, Split, Submission, Team, User
+from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
 from leaderboard.quotas import admissions, quotas
 from leaderboard.submissions import search
@@ -29,34 +29,26 @@ class SplitChoice:
     split: Split
     is_open: bool
     sentence: str
-    announcement: str = ""
+    announcement: str
 
 
 def offers_for(user: User, *, now: datetime) -> list[SplitChoice]:
     """Every split as this person finds it."""
     team = teams.current_team_of(user=user)
-    return [
-        _offer(split, team=team, user=user, now=now)
-        for split in Split.objects.shown().select_related("published_edition__ground_truth")
-    ]
-
-
-def _offer(split: Split, *, team: Team | None, user: User, now: datetime) -> SplitChoice:
-    refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
-    if refusal is not None:
-        return SplitChoice(
-            split, is_open=False, sentence=str(refusal), announcement=split.announcement_at(now)
-        )
-    quota = quotas.state(team=team, user=user, split=split, now=now)
-    sentence = f"{quota.sentence} {admissions.closing_of(split)}".strip()
-    return SplitChoice(split, is_open=True, sentence=sentence, announcement=split.announcement_at(now))
+    offers = []
+    for split in Split.objects.shown().select_related("published_edition__ground_truth"):
+        refusal = admissions.refusal_for_all(split, now=now) or admissions.refusal_of(team=team, split=split)
+        if refusal is None:
+            quota = quotas.state(team=team, user=user, split=split, now=now)
+            sentence = f"{quota.sentence} {admissions.closing_of(split)}".strip()
+        else:
+            sentence = str(refusal)
+        offers.append(SplitChoice(split, refusal is None, sentence, split.announcement_at(now)))
+    return offers
 
 
 class SubmissionForm(DetailsForm):
-    """A prediction file, the split it is for and the method that made it, with its details.
-
-    Only presence is checked here; the domain function refuses everything else, in its words.
-    """
+    """A prediction file, its split and its method. The domain function refuses all but missing fields."""
 
     split = forms.CharField(error_messages={"required": "No split was chosen; expected one of those listed."})
     method = forms.CharField(
@@ -85,7 +77,6 @@ class SubmissionForm(DetailsForm):
     )
 
     def __init__(self, user: User, request: HttpRequest) -> None:
-        """The form as this person sees it, filled with what this request sends."""
         sent = (request.POST, request.FILES) if request.method == "POST" else (None, None)
         super().__init__(sent[0], sent[1], initial={"split": self._split_to_mark})
         self._user = user
@@ -95,26 +86,21 @@ class SubmissionForm(DetailsForm):
     # Asked for by whoever draws the form: a file that is taken is answered without any of it.
     @cached_property
     def offers(self) -> list[SplitChoice]:
-        """All splits there are, with what is left there at this moment."""
         return offers_for(self._user, now=timezone.now())
 
     @cached_property
     def methods(self) -> list[Method]:
-        """The team's own, to choose from."""
         return list(Method.objects.of(self._user).order_by("name"))
 
     @property
     def open_offers(self) -> list[SplitChoice]:
-        """The splits to choose from."""
         return [offer for offer in self.offers if offer.is_open]
 
     @property
     def closed_offers(self) -> list[SplitChoice]:
-        """The splits that take nothing now, each with the reason."""
         return [offer for offer in self.offers if not offer.is_open]
 
     def _split_to_mark(self) -> str:
-        """The split that was asked for, else the only open one."""
         open_names = [offer.split.name for offer in self.open_offers]
         return self._preferred or (open_names[0] if len(open_names) == 1 else "")
 
@@ -154,7 +140,6 @@ class SubmissionForm(DetailsForm):
 
 
 def parse_uuid(text: str) -> UUID | None:
-    """The id that a text is, if it is one."""
     try:
         return UUID(text)
     except ValueError:
@@ -201,7 +186,6 @@ class SearchForm(forms.Form):
 
     @property
     def is_asking(self) -> bool:
-        """Whether anything is looked for."""
         return any(self.wanted().values()) or bool(self.errors)
 
     @property

@@ -69,62 +69,38 @@ def _order_words(names: Iterable[str]) -> str:
 def _comparison_rows(
     submission: Submission, progress: Progress, place: BoardPlace, entry: Entry, *, is_mine: bool
 ) -> list[dict[str, Any]]:
-    """The team's best other submission and the nearest row from a paper, where there are."""
     rows = []
     own = outcomes.teams_best_other(submission, place)
     if own is not None:
-        whose = "your" if is_mine else "its"
+        # Nothing is told of two methods of one team where values are hidden.
+        is_compared = is_mine and place.rank is not None and not submission.split.is_hidden
+        query = [("split", submission.split_id), ("m", submission.method_id), ("m", own.method_id)]
         rows.append(
-            _comparison_row(
-                entry,
-                own,
-                href=reverse("submission", args=[own.submission_id]),
-                about=f"{whose} team’s best other method, {own.date_text}",
-                compare_href=_compare_href(submission, place, own) if is_mine else "",
-            )
+            _comparison_row(entry, own)
+            | {
+                "href": reverse("submission", args=[own.submission_id]),
+                "about": f"{'your' if is_mine else 'its'} team’s best other method, {own.date_text}",
+                "compare_href": f"{reverse('compare')}?{urlencode(query)}"
+                if is_compared and own.method_id != submission.method_id
+                else "",
+            }
         )
     printed = outcomes.nearest_published(progress, place)
     if printed is not None:
         about = f"nearest row from a paper, {tables.team_of(printed)} {printed.date_text}"
-        rows.append(_comparison_row(entry, printed, href=printed.paper_url, about=about))
+        rows.append(_comparison_row(entry, printed) | {"href": printed.paper_url, "about": about})
     return rows
 
 
-def _comparison_row(
-    entry: Entry, other: Entry, *, href: str, about: str, compare_href: str = ""
-) -> dict[str, Any]:
+def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
     """One row to compare with. Differences are this submission minus the row: below 0 it is better."""
-    return {
-        "label": other.method,
-        "href": href,
-        "about": about,
-        "errors": [
-            (format_published(other.scores[name], decimals=other.decimals), _gap(entry, other, name))
-            for name, *_ in grouped_names(entry.scores).values()
-        ],
-        "css": "" if other.decimals >= entry.decimals else f" d{other.decimals}",
-        "compare_href": compare_href,  # to what the differences mean, where recordings can be compared
-    }
-
-
-def _gap(entry: Entry, other: Entry, name: str) -> str:
-    mine, theirs = entry.scores[name], other.scores[name]
-    return (
-        ""
-        if mine is None or theirs is None
-        else signed(mine - theirs, decimals=max(entry.decimals, other.decimals))
-    )
-
-
-def _compare_href(submission: Submission, place: BoardPlace, other: Entry) -> str:
-    """To the comparison of both methods; empty unless each is represented on the board by this submission.
-
-    Empty as well where nothing is told of two methods of one team.
-    """
-    if place.rank is None or other.method_id == submission.method_id or submission.split.is_hidden:
-        return ""
-    query = urlencode([("split", submission.split_id), ("m", submission.method_id), ("m", other.method_id)])
-    return f"{reverse('compare')}?{query}"
+    decimals, errors = max(entry.decimals, other.decimals), []
+    for name, *_ in grouped_names(entry.scores).values():
+        mine, theirs = entry.scores[name], other.scores[name]
+        gap = "" if mine is None or theirs is None else signed(mine - theirs, decimals=decimals)
+        errors.append((format_published(theirs, decimals=other.decimals), gap))
+    css = "" if other.decimals >= entry.decimals else f" d{other.decimals}"
+    return {"label": other.method, "errors": errors, "css": css}
 
 
 def rejected_sentence(quota: Quota | None) -> str:

@@ -48,13 +48,15 @@ class StateLine:
 def state_line(progress: Progress, *, awaits_intervals: bool = False) -> StateLine:
     """A progress, ready to be drawn. `awaits_intervals`: scored, and its intervals are about to come."""
     more = "-intervals" if awaits_intervals else ""
+    problems = tuple(progress.problems[:MAX_POINTS])
+    is_whole = len(problems) == progress.n_problems
     return StateLine(
         steps=steps(progress, awaits_intervals=awaits_intervals),
         seen=f"{progress.state}-{progress.n_ahead}-{progress.started_at}-{progress.is_late}{more}",
         is_moving=awaits_intervals or not progress.is_final,
         truncation=truncation(progress.truncated),
-        problems=tuple(progress.problems[:MAX_POINTS]),
-        listing=listing(n_problems=progress.n_problems, n_points=len(progress.problems)),
+        problems=problems,
+        listing="" if is_whole else f"Equal problems share a point; at most {MAX_POINTS} points are listed.",
     )
 
 
@@ -65,7 +67,8 @@ def steps(progress: Progress, *, awaits_intervals: bool = False) -> tuple[Step, 
     is_queued, is_running = progress.state == Status.QUEUED, progress.state == Status.RUNNING
     received = Step("Received", "done", progress.received_at)
     if is_queued:
-        queued = Step("Queued", "now", progress.queued_at, waiting(progress))
+        place = f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
+        queued = Step("Queued", "now", progress.queued_at, LATE if progress.is_late else place)
         return received, queued, Step("Running", "ahead"), Step("Scored", "ahead")
     queued = Step("Queued", "done", progress.queued_at)
     late = LATE if is_running and progress.is_late else ""
@@ -95,15 +98,6 @@ def _again(progress: Progress, first: Evaluation, *, awaits_intervals: bool) -> 
     return received, before, Step(label, "now", progress.finished_at, note)
 
 
-def waiting(progress: Progress) -> str:
-    """How many go first."""
-    if progress.is_late:
-        return LATE
-    if progress.n_ahead is None:
-        return ""
-    return f"{progress.n_ahead} ahead" if progress.n_ahead else "next in line"
-
-
 def truncation(truncated: Mapping[str, int]) -> str:
     """Which predictions were moved to a boundary of the allowed range, in a sentence.
 
@@ -120,14 +114,3 @@ def truncation(truncated: Mapping[str, int]) -> str:
     subject = "1 prediction" if n_moved == 1 else f"{grouped(n_moved)} predictions"
     verb = "was" if n_moved == 1 else "were"
     return f"{subject} lay outside the allowed range and {verb} truncated: {where}."
-
-
-def listing(*, n_problems: int, n_points: int) -> str:
-    """Why the list has fewer points than there are problems, in a sentence.
-
-    >>> listing(n_problems=3, n_points=3)
-    ''
-    """
-    if n_points == n_problems <= MAX_POINTS:
-        return ""
-    return f"Equal problems share a point; at most {MAX_POINTS} points are listed."

@@ -107,10 +107,7 @@ def submission(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 
 @own_page
 def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more.
-
-    The end is the result with its intervals, or without them where none are about to come.
-    """
+    """What a waiting page asks for: nothing new, the new state, or at the end not to ask any more."""
     found, progress, now_shown = _looked_at(request, submission_id)
     if request.GET.get("seen") == now_shown.seen:
         return HttpResponse(status=204)
@@ -121,7 +118,6 @@ def submission_state(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 
 @own_form
 def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
-    """Say what withdrawing does, and do it; for the submission's own team."""
     user = cast("User", request.user)
     own = Submission.objects.filter(method__team__memberships__user=user)
     found = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
@@ -136,7 +132,7 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
 
 
 def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, Progress, StateLine]:
-    """A submission that the reader may see and its line of state: all that a page asks for while it waits."""
+    """A submission that the reader may see, and its line of state."""
     evaluations = Evaluation.objects.select_related("edition__ground_truth").prefetch_related("scores")
     rows = (
         Submission.objects.visible_to(request.user)
@@ -150,7 +146,6 @@ def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, P
 
 
 def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dict[str, Any]:
-    """What came of it, for the templates."""
     now = timezone.now()
     is_mine = found.method.team.memberships.filter(user=cast("User", request.user)).exists()
     rescored = edition_tables.rescored_notice(history.rescored(found))

@@ -97,7 +97,6 @@ def test_every_door_counts_the_sequences_that_have_another_anno_id(
     [row, *_] = csv.DictReader(io.StringIO(keeper.get(f"{page}preview.csv").content.decode()))
     assert row["n_renumbered"] == "120"
     assert "120 sequences renumbered" in keeper.get(page).content.decode()
-    assert keeper.get(f"{page}preview.json").json()["n_renumbered"] == 120
     found = keeper.get("/api/v1/splits/test/editions/2/preview").json()
     assert (found["n_renumbered"], found["n_changed_sequences"], found["n_changed"]) == (120, 0, 0)
 

@@ -7,7 +7,6 @@ import pytest
 from django.contrib.auth.hashers import MD5PasswordHasher
 from django.core import mail
 from django.test import Client
-from django.urls import reverse
 from pytest_django import Settings
 
 from leaderboard.models import User
@@ -117,16 +116,3 @@ def test_sign_up_with_a_taken_address_answers_and_works_as_with_a_free_one(
     assert taken == free
     assert taken[2] == 1
     assert [message.to for message in mail.outbox] == [[owner.email], ["free@example.org"]]
-
-
-@pytest.mark.parametrize(
-    ("page", "sentence"),
-    [
-        ("account_email_verification_sent", "Open the link to finish the sign-up."),
-        ("account_inactive", "Nobody can sign in with it."),
-    ],
-)
-def test_pages_after_sign_up_and_of_closed_accounts_speak_as_the_site_does(
-    page: str, sentence: str, client: Client, db: None
-) -> None:
-    assert sentence in client.get(reverse(page)).content.decode()

@@ -234,7 +234,7 @@ def test_an_address_that_nobody_proved_here_is_its_owners(
     assert User.objects.filter(email=NEW).count() == 1
 
 
-@pytest.mark.parametrize("verified", [False, None, "true", 1])
+@pytest.mark.parametrize("verified", [False, "true"])
 def test_an_address_that_the_provider_has_not_verified_counts_for_nothing(
     provider: Provider, owner: User, verified: Any
 ) -> None:
@@ -269,18 +269,6 @@ def test_connecting_needs_a_sign_in_and_the_password_once_more(provider: Provide
     assert not SocialAccount.objects.exists()
 
 
-def test_an_account_elsewhere_opens_one_account_alone(
-    provider: Provider, owner: User, stranger: User
-) -> None:
-    connected(stranger)
-    client = Client()
-    client.force_login(owner)
-    arrive(client, process="connect")
-    client.post("/accounts/reauthenticate/", {"password": PASSWORD})
-    assert SocialAccount.objects.get().user == stranger
-    assert "connected with another account of this site" in client.get("/accounts/3rdparty/").text
-
-
 def test_a_closed_account_stays_closed_and_a_forgotten_person_is_unknown(
     provider: Provider, owner: User
 ) -> None:
@@ -303,28 +291,17 @@ def assert_told(answer: HttpResponse, sentence: str) -> None:
     assert "secret" not in answer.text
 
 
+RECORD = f"/v3.0/{IID}/record"
 MALFORMED: tuple[tuple[str, str, Any], ...] = (
-    ("github", "/login/oauth/access_token", (200, b"")),
     ("github", "/login/oauth/access_token", (200, b"{")),
-    ("github", "/login/oauth/access_token", []),
     ("github", "/login/oauth/access_token", {"error": "bad_verification_code"}),
-    ("github", "/login/oauth/access_token", {"access_token": "x", "expires_in": "soon"}),
     ("github", "/login/oauth/access_token", {"access_token": "x", "expires_in": 10**30}),
-    ("github", "/user", []),
-    ("github", "/user", {}),
     ("github", "/user", {"id": "9" * 300}),
-    ("github", "/user", (200, b"<html>")),
-    ("github", "/user/emails", {"message": "no"}),
     ("github", "/user/emails", [1]),
     ("github", "/user/emails", [{"email": 5, "primary": True, "verified": True}]),
     ("orcid", "/oauth/token", {"access_token": "x"}),
-    ("orcid", f"/v3.0/{IID}/record", {}),
-    ("orcid", f"/v3.0/{IID}/record", [[]]),
-    (
-        "orcid",
-        f"/v3.0/{IID}/record",
-        {"orcid-identifier": {"path": IID}, "person": {"emails": {"email": [3]}}},
-    ),
+    ("orcid", RECORD, [[]]),
+    ("orcid", RECORD, {"orcid-identifier": {"path": IID}, "person": {"emails": {"email": [3]}}}),
 )
 
 
@@ -347,13 +324,6 @@ def test_a_provider_that_fails_or_hangs_ends_in_a_sentence(
     assert_told(arrive(Client()), "The fault is not yours")
     provider.answers[place] = HANGS
     assert_told(arrive(Client()), "GitHub did not answer in time.")
-
-
-def test_a_provider_that_is_away_ends_in_a_sentence(
-    provider: Provider, db: None, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(providers.GitHubViews, "access_token_url", "http://127.0.0.1:1/token")
-    assert_told(arrive(Client()), "GitHub could not be reached, or failed.")
 
 
 def test_who_says_no_or_comes_from_nowhere_is_told_so(provider: Provider, client: Client, db: None) -> None:

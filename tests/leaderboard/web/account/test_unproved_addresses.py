@@ -87,42 +87,6 @@ def test_an_address_that_somebody_else_added_is_free_for_its_owner(attacker: Cli
     assert EmailAddress.objects.get(email=VICTIM).user.email == VICTIM
 
 
-def test_addresses_that_somebody_adds_come_to_one_at_a_time_and_end(
-    attacker: Client, settings: Settings
-) -> None:
-    for n in range(5):
-        attacker.post("/accounts/email/", {"action_add": "", "email": f"victim{n}@example.org"})
-    assert EmailAddress.objects.count() == 1
-    first, last = code_in(mail.outbox[0]), code_in(mail.outbox[4])
-    assert attacker.post(CONFIRM, {"code": first}).status_code == 200
-    settings.ACCOUNT_EMAIL_VERIFICATION_BY_CODE_TIMEOUT = -1
-    assert attacker.post(CONFIRM, {"code": last}).headers["Location"] == "/accounts/email/"
-    assert EmailAddress.objects.count() == 1
-
-
-def test_a_second_address_counts_once_it_is_proved(attacker: Client) -> None:
-    attacker.post("/accounts/email/", {"action_add": "", "email": "second@example.org"})
-    assert prove(attacker).headers["Location"] == "/accounts/email/"
-    assert "second@example.org" in assert_sound(attacker.get("/accounts/email/")).text
-    assert signs_in("second@example.org", EVIL)
-
-
-@pytest.mark.parametrize("by", ["sign-up", "adding"])
-def test_an_unproved_address_of_an_older_version_gives_way(attacker: Client, by: str) -> None:
-    evil = User.objects.get(email="attacker@example.org")
-    EmailAddress.objects.create(user=evil, email=VICTIM, verified=False, primary=False)
-    client = Client()
-    if by == "sign-up":
-        sign_up(client, VICTIM)
-    else:
-        sign_up(client, "owner@example.org")
-        prove(client)
-        client.post("/accounts/email/", {"action_add": "", "email": VICTIM})
-    assert prove(client).status_code == 302
-    assert EmailAddress.objects.get(email=VICTIM).verified
-    assert signs_in(VICTIM, PASSWORD)
-
-
 # --- an account that somebody signed up with it ----------------------------------------------------------
 
 
@@ -156,16 +120,6 @@ def test_who_is_displaced_before_proving_signs_up_once_more() -> None:
     sign_up(victim, VICTIM)
     assert prove(victim).headers["Location"] == "/submit/"
     assert signs_in(VICTIM, PASSWORD)
-
-
-def test_another_code_is_mailed_to_who_asks() -> None:
-    client = Client()
-    sign_up(client, VICTIM)
-    assert "Send another code" in assert_sound(client.get(CONFIRM)).text
-    client.post(CONFIRM, {"action": "resend"})
-    first, second = mail.outbox
-    assert "The code is wrong" in client.post(CONFIRM, {"code": code_in(first)}).text
-    assert client.post(CONFIRM, {"code": code_in(second)}).headers["Location"] == "/submit/"
 
 
 def test_a_reset_password_opens_no_account_that_nobody_confirmed() -> None:

@@ -11,7 +11,7 @@ from django.utils import timezone
 
 from leaderboard.models import Edition, Evaluation, Submission, User
 from leaderboard.scoring import lifecycle
-from leaderboard.submissions import outcomes, submissions
+from leaderboard.submissions import outcomes
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 
@@ -63,20 +63,6 @@ def test_waiting_submission_says_its_place_and_keeps_asking(
     assert state.attributes["aria-live"] == "polite"
 
 
-def test_place_in_the_queue_counts_those_before(
-    signed_in: Client, submission: Submission, edition: Edition, owner: User
-) -> None:
-    second = builders.submit(owner, builders.predictions(edition, factor=1.2))
-    assert "1 ahead" in current_step(get(signed_in, PAGE, second))
-
-
-def test_running_submission_says_since_when(signed_in: Client, submission: Submission) -> None:
-    claim()
-    root = get(signed_in, PAGE, submission)
-    assert current_step(root).startswith("Running")
-    assert len(root.one("ol", class_="steps").all("time")) == 3
-
-
 def test_nothing_is_sent_while_nothing_moved(signed_in: Client, submission: Submission) -> None:
     seen = get(signed_in, PAGE, submission).one("input", name="seen").attributes["value"]
     same = signed_in.get(STATE.format(submission.pk), {"seen": seen})
@@ -117,16 +103,6 @@ def intervals(root: pages.Element) -> list[str]:
     return [cell.text for cell in root.all("td", class_="span") if cell.text != "–"]
 
 
-def test_page_of_a_result_without_intervals_yet_keeps_asking(
-    signed_in: Client, submission: Submission
-) -> None:
-    builders.score_all()
-    root = get(signed_in, PAGE, submission)
-    assert root.one("div", id="state").attributes["hx-get"] == STATE.format(submission.pk)
-    assert root.one("noscript").one("a").text == "reload the page"
-    assert "moving" in root.one("li", **{"aria-current": "step"}).classes
-
-
 def stops(client: Client, submission: Submission) -> str:
     """What a page says whose polling has come to its end, from whatever state it was in."""
     assert client.get(STATE.format(submission.pk), {"seen": "SCORED"}).status_code == 286
@@ -134,12 +110,6 @@ def stops(client: Client, submission: Submission) -> str:
     assert "hx-get" not in root.one("div", id="state").attributes
     assert root.one("main").all("script") == []
     return root.one("main").text
-
-
-def test_final_page_asks_for_nothing_more(signed_in: Client, submission: Submission) -> None:
-    builders.score_all()
-    builders.infer_all()
-    assert "no intervals" not in stops(signed_in, submission)
 
 
 def test_polling_ends_though_no_worker_ever_makes_intervals(
@@ -150,31 +120,6 @@ def test_polling_ends_though_no_worker_ever_makes_intervals(
     Evaluation.objects.update(finished_at=F("finished_at") - outcomes.AWAITED_FOR)
     assert signed_in.get(STATE.format(submission.pk), {"seen": seen}).status_code == 286
     assert "There are no confidence intervals yet" in stops(signed_in, submission)
-
-
-def test_polling_ends_at_once_where_there_are_too_few_recordings(
-    signed_in: Client, benchmark: None, owner: User, tmp_path: Path
-) -> None:
-    few = builders.import_truth(tmp_path, n_recordings=6)
-    sent = builders.submit(owner, builders.predictions(few))
-    builders.score_all()
-    assert "too few recordings (effective number 6.0; at least 8 needed)" in stops(signed_in, sent)
-
-
-def test_polling_ends_at_once_for_what_was_withdrawn(
-    signed_in: Client, submission: Submission, owner: User
-) -> None:
-    builders.score_all()
-    submissions.withdraw(submission=submission, actor=owner, now=timezone.now())
-    assert "intervals" not in stops(signed_in, submission)
-
-
-def test_a_private_result_gets_intervals_as_well(signed_in: Client, edition: Edition, owner: User) -> None:
-    sent = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
-    builders.score_all()
-    builders.infer_all()
-    stops(signed_in, sent)
-    assert intervals(get(signed_in, PAGE, sent))
 
 
 def test_result_has_the_papers_columns_the_counts_and_the_truncations(
@@ -210,33 +155,6 @@ def test_problems_are_numbered_with_place_and_total(signed_in: Client, edition: 
         assert problem["where"] in item.text
 
 
-def test_list_of_problems_ends_after_twenty_points(signed_in: Client, edition: Edition, owner: User) -> None:
-    values = [*(f'"fast{i}"' for i in range(25)), "NaN", *["1.0"] * (builders.N_SEQUENCES - 26)]
-    text = ", ".join(f'"{i}": {value}' for i, value in enumerate(values))
-    bad = builders.submit(owner, f"{{{text}}}".encode())
-    builders.score_all()
-    root = get(signed_in, PAGE, bad)
-    assert "26 problems in the file" in root.one("main").text
-    assert len(root.one("ol", class_="problems").all("li")) == 20
-    assert "at most 20 points are listed" in root.one("main").text
-
-
-def test_problems_page_shows_how_to_check_locally(signed_in: Client, edition: Edition, owner: User) -> None:
-    bad = builders.submit(owner, b"[]")
-    builders.score_all()
-    root = get(signed_in, PAGE, bad)
-    assert "tsttc check predictions.json --manifest tsttc-test-manifest.csv" in root.one("pre").text
-    assert "/api/v1/splits/test/manifest" in [a.attributes["href"] for a in root.all("a")]
-
-
-def test_problems_quote_hostile_keys_as_text(signed_in: Client, edition: Edition, owner: User) -> None:
-    bad = builders.submit(owner, b'{"<script>alert(1)</script>": 1}')
-    builders.score_all()
-    root = get(signed_in, PAGE, bad)
-    assert "<script>" in root.one("ol", class_="problems").text
-    assert root.one("main").all("script") == []
-
-
 def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submission) -> None:
     strike_out(submission)
     root = get(signed_in, PAGE, submission)
@@ -244,13 +162,6 @@ def test_our_own_failure_is_called_ours(signed_in: Client, submission: Submissio
     assert "error on our side" in root.one("main").text
     assert "You do not need to submit it again" in root.one("main").text
     assert "your quota is not used" in root.one("main").text
-
-
-def test_cancelled_submission_says_so(signed_in: Client, submission: Submission, owner: User) -> None:
-    lifecycle.cancel(submission=submission, actor=owner)
-    root = get(signed_in, PAGE, submission)
-    assert current_step(root).startswith("Cancelled")
-    assert "cancelled before it was scored" in root.one("main").text
 
 
 def test_one_that_waits_far_too_long_is_told_so_and_that_nothing_is_lost(
@@ -293,18 +204,3 @@ def test_after_the_score_the_next_steps_are_buttons(signed_in: Client, edition: 
     assert main.one("code", id="latex-row").text
     copied = {button.attributes["data-copy"] for button in main.all("button", class_="copy")}
     assert copied == {"latex-row", "digest"}
-
-
-def test_there_is_nothing_to_withdraw_of_a_rejected_or_cancelled_file(
-    signed_in: Client, edition: Edition, owner: User
-) -> None:
-    bad = builders.submit(owner, b"[]")
-    builders.score_all()
-    waiting = builders.submit(owner, builders.predictions(edition))
-    assert "Cancel this submission…" in get(signed_in, PAGE, waiting).one("main").text
-    signed_in.post(f"/submissions/{waiting.pk}/withdraw/")
-    for sent in (bad, waiting):
-        said = get(signed_in, PAGE, sent).one("main").text
-        assert "this submission…" not in said
-        assert "no longer show its values" not in said
-        assert signed_in.get(f"/submissions/{sent.pk}/withdraw/").status_code == 302

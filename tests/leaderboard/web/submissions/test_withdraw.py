@@ -6,8 +6,7 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Publication, Status, Submission, User
-from leaderboard.scoring import lifecycle
+from leaderboard.models import AuditEvent, Edition, Evaluation, Status, Submission, User
 from leaderboard.submissions import submissions
 from tests import builders, pages
 from tests.editions import changed_on, corrected, extended, open_edition, publish, roll_back
@@ -41,13 +40,6 @@ def notices(client: Client, submission: Submission) -> list[str]:
 # --- the board was corrected -------------------------------------------------------------------------------
 
 
-def test_without_a_correction_there_is_no_notice(signed_in: Client, sent: Submission, tmp_path: Path) -> None:
-    assert notices(signed_in, sent) == []
-    open_edition(corrected(tmp_path, factor=1.3))
-    builders.score_all()
-    assert notices(signed_in, sent) == []
-
-
 def test_team_is_told_what_a_correction_did_to_its_entry(
     signed_in: Client, sent: Submission, tmp_path: Path
 ) -> None:
@@ -69,14 +61,6 @@ def test_team_is_told_that_a_correction_was_taken_back(
     roll_back()
     (notice,) = notices(signed_in, sent)
     assert notice.startswith(f"Rolled back to edition 1 on {changed_on()}: A mistake. MiD {mid(sent, 2)} → ")
-
-
-def test_value_that_stays_is_said_to_stay(signed_in: Client, sent: Submission) -> None:
-    second = open_edition(None, protocol="toolkit")
-    builders.score_all()
-    publish(second)
-    (notice,) = notices(signed_in, sent)
-    assert f"Labels corrected. MiD stays {mid(sent, 1)}." in notice
 
 
 def test_team_is_told_that_the_new_truth_cannot_score_its_file(
@@ -112,32 +96,6 @@ def test_team_is_told_when_its_file_is_not_scored_in_the_new_edition(
     assert f"Labels corrected. {words} Its result in edition 1 stays: MiD {mid(sent, 1)}." in notice
 
 
-def test_file_that_no_edition_could_score_needs_no_notice(
-    signed_in: Client, edition: Edition, owner: User, tmp_path: Path
-) -> None:
-    bad = builders.submit(owner, b'{"0": 0}')
-    second = open_edition(corrected(tmp_path, factor=1.3))
-    builders.score_all()
-    publish(second)
-    assert notices(signed_in, bad) == []
-
-
-def test_what_came_after_the_correction_is_not_told_of_it(
-    signed_in: Client, sent: Submission, owner: User, tmp_path: Path
-) -> None:
-    second = open_edition(corrected(tmp_path, factor=1.3))
-    publish(second, leave_out=True)
-    late = builders.submit(owner, builders.predictions(second), method="Late")
-    assert notices(signed_in, late) == []
-
-
-def test_reason_in_the_notice_is_text(signed_in: Client, sent: Submission, tmp_path: Path) -> None:
-    publish(open_edition(corrected(tmp_path, factor=1.3)), leave_out=True)
-    Publication.objects.update(reason="<b>bold</b>")
-    (notice,) = notices(signed_in, sent)
-    assert "<b>bold</b>" in notice
-
-
 # --- withdrawing -------------------------------------------------------------------------------------------
 
 
@@ -151,33 +109,14 @@ def test_page_says_what_withdrawing_does_and_that_it_stays_done(signed_in: Clien
     assert sent.withdrawn_at is None
 
 
-@pytest.mark.parametrize("who", ["owner", "teammate"])
-def test_team_withdraws_and_is_told_when(
-    client: Client, sent: Submission, who: str, request: pytest.FixtureRequest
-) -> None:
-    user = request.getfixturevalue(who)
-    client.force_login(user)
+def test_team_withdraws_and_is_told_when(client: Client, sent: Submission, teammate: User) -> None:
+    client.force_login(teammate)
     response = client.post(address(sent, "withdraw/"), follow=True)
     assert response.redirect_chain == [(address(sent), 302)]
     assert "The submission is withdrawn." in pages.page(response).one("div", class_="messages").text
     sent.refresh_from_db()
     assert notices(client, sent)[0].startswith(f"Withdrawn by its team on {sent.withdrawn_at:%Y-%m-%d}")
-    assert AuditEvent.objects.get(verb="withdrawn").actor == user
-
-
-def test_withdrawn_result_offers_no_row_for_a_paper_and_is_said_to_be_on_no_board(
-    signed_in: Client, sent: Submission
-) -> None:
-    Method.objects.filter(pk=sent.method_id).update(visibility="PRIVATE")
-    before = pages.page(signed_in.get(address(sent))).one("main")
-    assert [each.attributes["id"] for each in before.all("code") if each.attributes.get("id")] == [
-        "latex-row"
-    ]
-    assert "only your team sees this result, here and on the" in before.text
-    signed_in.post(address(sent, "withdraw/"))
-    after = assert_sound(signed_in.get(address(sent))).one("main")
-    assert [each for each in after.all("code") if each.attributes.get("id")] == []
-    assert "only your team sees this result" not in after.text
+    assert AuditEvent.objects.get(verb="withdrawn").actor == teammate
 
 
 def test_what_waits_or_failed_is_cancelled_in_words_of_its_own(
@@ -197,27 +136,6 @@ def test_what_waits_or_failed_is_cancelled_in_words_of_its_own(
         assert f"The submission is {told}." in pages.page(done).one("div", class_="messages").text
 
 
-def test_next_best_of_the_method_stands_for_it(signed_in: Client, sent: Submission, owner: User) -> None:
-    edition = sent.evaluations.get().edition
-    builders.submit(owner, builders.predictions(edition, factor=1.5), method=sent.method.name)
-    builders.score_all()
-    signed_in.post(address(sent, "withdraw/"))
-    (row,) = [
-        row
-        for row in pages.board_rows(pages.page(signed_in.get("/board/test/")))
-        if row[1].startswith(sent.method.name)
-    ]
-    assert "withdrawn" not in row[1]
-    assert row[2] != "–"
-
-
-def test_what_waits_is_not_scored_once_withdrawn(signed_in: Client, edition: Edition, owner: User) -> None:
-    waiting = builders.submit(owner, builders.predictions(edition))
-    signed_in.post(address(waiting, "withdraw/"))
-    assert builders.score_all() == 0
-    assert waiting.evaluations.get().status == Status.CANCELLED
-
-
 def test_withdrawing_twice_is_withdrawing_once(signed_in: Client, sent: Submission) -> None:
     for _ in range(2):
         assert signed_in.post(address(sent, "withdraw/")).status_code == 302
@@ -225,21 +143,6 @@ def test_withdrawing_twice_is_withdrawing_once(signed_in: Client, sent: Submissi
     assert signed_in.get(address(sent, "withdraw/")).headers["Location"] == address(sent)
     links = [a.text for a in pages.page(signed_in.get(address(sent))).all("a")]
     assert not [text for text in links if text.startswith("Withdraw")]
-
-
-def test_maintainers_see_a_submission_without_the_way_to_withdraw_it(
-    client: Client, sent: Submission, maintainer: User
-) -> None:
-    client.force_login(maintainer)
-    assert "Withdraw" not in pages.page(client.get(address(sent))).one("main").text
-
-
-def test_state_of_a_withdrawn_submission_is_still_told(
-    signed_in: Client, sent: Submission, owner: User
-) -> None:
-    lifecycle.cancel(submission=sent, actor=owner)
-    signed_in.post(address(sent, "withdraw/"))
-    assert signed_in.get(address(sent, "state/")).status_code == 286
 
 
 def test_an_edition_in_preparation_says_nothing_of_what_was_withdrawn_under_a_former_board(
