@@ -151,15 +151,13 @@ class QuotaSerializer(SlotsSerializer):
 
     split = serializers.CharField(help_text=SPLIT)
     is_open = serializers.BooleanField(help_text="Whether the split and the quota accept a submission now.")
-    window_s = serializers.FloatField(source="rules.window_s", help_text="Length of the rolling window.")
-    min_gap_s = serializers.FloatField(
-        source="rules.min_gap_s", help_text="Minimum time between submissions."
-    )
+    window_s = serializers.FloatField(help_text="Length of the rolling window.")
+    min_gap_s = serializers.FloatField(help_text="Minimum time between submissions.")
     rejected_used = serializers.IntegerField(
         source="n_rejected", help_text="Files rejected, or cancelled by the team, in the last 24 hours."
     )
     rejected_limit = serializers.IntegerField(
-        source="rules.rejected_limit",
+        source="rules.quota_rejected_limit",
         allow_null=True,
         help_text="Rejected and cancelled files accepted per 24 hours; null: no limit.",
     )

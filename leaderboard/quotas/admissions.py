@@ -68,7 +68,7 @@ def end(*, row: Admission, reason: str, actor: User | None) -> None:
 def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
     """Why a split takes nothing from anybody now; None if it does."""
     code, sentence = "", ""
-    opens_at, closes_at = split.times
+    opens_at, closes_at = split.opens_at, split.closes_at
     if split.is_archived:
         code, sentence = "split-closed", "are closed: the split is archived."
     elif not split.has_ground_truth:
@@ -95,8 +95,8 @@ def sentence_of(split: Split, *, now: datetime) -> str:
 
 def closing_of(split: Split) -> str:
     """Until when a split that takes submissions does so; empty where nothing limits it."""
-    closes_at = split.times[1]
-    return f"Submissions to {split.pk} close at {closes_at:%Y-%m-%d %H:%M} UTC." if closes_at else ""
+    at = split.closes_at
+    return f"Submissions to {split.pk} close at {at:%Y-%m-%d %H:%M} UTC." if at else ""
 
 
 def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quotas.Quota:
@@ -108,6 +108,6 @@ def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quota
         return replace(quota, is_open=False, next_slot_at=None, sentence=str(not_admitted))
     if refusal is None:
         return quota
-    opens_at = split.times[0]
+    opens_at = split.opens_at
     is_to_come = opens_at is not None and opens_at > now and split.has_ground_truth
     return replace(quota, is_open=False, next_slot_at=opens_at if is_to_come else None, sentence=str(refusal))

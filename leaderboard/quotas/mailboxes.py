@@ -1,8 +1,7 @@
 """What a mailbox has sent stays sent when its account is deleted.
 
-The submissions stay with the blank account. Beside it stays a keyed hash of each of its mailboxes, so that
-the next account of the same mailbox has spent what this one has. It is deleted once no window of any rule
-reaches back to the last file. The key comes from `SECRET_KEY`: with another one, the hashes match nothing.
+A keyed hash of each mailbox stays until no window reaches back to its last file. The key comes from
+`SECRET_KEY`: with another one, the hashes match nothing.
 """
 
 from datetime import datetime, timedelta
@@ -14,7 +13,6 @@ from django.utils.crypto import salted_hmac
 
 from leaderboard.models import QuotaOverride, SpentMailbox, Split, Submission, User
 from leaderboard.models.people import MAILBOX
-from leaderboard.quotas.rules import BYTES_WINDOW, REJECTED_WINDOW, rules_of
 
 
 def are_proved() -> bool:
@@ -47,14 +45,9 @@ def delete_expired(*, now: datetime) -> None:
 
 
 def longest_window() -> timedelta:
-    """How far back the rules of any split and team look."""
-    own = QuotaOverride.objects.select_related("team", "split")
-    rules = [
-        *(rules_of(team=None, split=split) for split in Split.objects.all()),
-        *(rules_of(team=row.team, split=row.split) for row in own),
-    ]
-    spans = [span for each in rules for span in (each.window, each.min_gap)]
-    return max(REJECTED_WINDOW, BYTES_WINDOW, *spans)
+    """How far back the rules of any split and team look, a day at least."""
+    rules = [*Split.objects.all(), *QuotaOverride.objects.all()]
+    return max(timedelta(days=1), *(span for row in rules for span in (row.quota_window, row.quota_min_gap)))
 
 
 def _digests(people: QuerySet[User]) -> set[str]:

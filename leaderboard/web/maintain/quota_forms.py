@@ -7,7 +7,7 @@ from django import forms
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.models.quotas import EXCESS, MAX_COUNT, QuotaRules
-from leaderboard.quotas import quotas
+from leaderboard.quotas.spans import parse_span, span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 
@@ -21,7 +21,7 @@ class TeamLookup(SiteForm):
 
 
 class SpanField(forms.CharField):
-    """A span of time in the words in which `quotas.span` says it."""
+    """A span of time in the words in which `spans.span` says it."""
 
     default_error_messages = {
         "too_short": "The window is empty; expected one like 30 days or 24 hours.",
@@ -38,12 +38,12 @@ class SpanField(forms.CharField):
         if not text:
             return timedelta(0)
         try:
-            span = quotas.parse_span(text)
+            time = parse_span(text)
         except Refused as refusal:
             raise forms.ValidationError(str(refusal)) from refusal
-        if not span and not self._may_be_none:
+        if not time and not self._may_be_none:
             raise forms.ValidationError(self.error_messages["too_short"])
-        return span
+        return time
 
 
 def count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
@@ -87,8 +87,8 @@ class OverrideForm(SiteForm):
         """What stands in the form at first: rules as they are, without their reason."""
         return {
             "limit": rules.quota_limit,
-            "window": quotas.span(rules.quota_window),
-            "min_gap": quotas.span(rules.quota_min_gap) if rules.quota_min_gap else "",
+            "window": span(rules.quota_window),
+            "min_gap": span(rules.quota_min_gap) if rules.quota_min_gap else "",
             "rejected_limit": rules.quota_rejected_limit,
         }
 

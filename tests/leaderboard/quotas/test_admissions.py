@@ -75,12 +75,6 @@ def test_an_admitted_team_submits_until_its_admission_ends(
     ]
 
 
-def test_without_a_word_on_how_to_ask_the_maintainers_are_named(by_admission: Edition, owner: User) -> None:
-    Split.objects.update(how_to_be_admitted="")
-    with pytest.raises(admissions.NotAdmitted, match="ask the maintainers of this site for access"):
-        builders.submit(owner, builders.predictions(by_admission))
-
-
 def test_maintainers_admit_from_the_page_of_a_team_and_nobody_else_does(
     keeper: Client, by_admission: Edition, owner: User, maintainer: User
 ) -> None:

@@ -99,20 +99,3 @@ def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> No
 
 
 # --- what filters leave -----------------------------------------------------------------------------------
-
-
-def test_a_filter_does_not_make_the_board_say_that_nobody_has_submitted(
-    edition: Edition, owner: User, client: Client
-) -> None:
-    submission = builders.submit(owner, builders.predictions(edition), method="Foo")
-    builders.score_all()
-    for query in ("?q=shi", "?q=nothing-like-it"):
-        text = pages.page(client.get(f"/board/test/{query}")).one("main").text
-        assert "no submissions yet" not in text
-        assert "being computed" not in text
-    submission.refresh_from_db()
-    client.force_login(owner)
-    assert client.post(f"/submissions/{submission.pk}/withdraw/", {"confirm": "on"}).status_code == 302
-    text = pages.page(client.get("/board/test/?q=Foo")).one("main").text
-    assert "withdrawn" in text
-    assert "being computed" not in text
