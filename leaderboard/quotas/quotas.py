@@ -213,7 +213,7 @@ def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int,
 def weigh(
     *, split: Split, rules: QuotaRules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
 ) -> Quota:
-    """The quota of a team that sent at these times, oldest first, what costs a slot and what was `rejected`."""
+    """The quota of a team that sent at these times, oldest first: what costs a slot, what was rejected."""
     in_window = [at for at in spent if at > now - rules.quota_window]
     rejected = [at for at in rejected if at > now - DAY]
     full_until = _until(in_window, limit=rules.quota_limit, window=rules.quota_window)
@@ -227,8 +227,8 @@ def weigh(
         sentence = _left(rules, n_used=len(in_window))
     else:
         said = {
-            full_until: f"Your team has used {_n(rules.quota_limit)} to {split.pk}, its quota for "
-            f"{span(rules.quota_window)}",
+            full_until: f"Your team has used {counted(rules.quota_limit or 0, 'submission')} to {split.pk}, "
+            f"its quota for {span(rules.quota_window)}",
             gap_until: f"Submissions of a team to {split.pk} must be at least "
             f"{span(rules.quota_min_gap)} apart",
             rejected_until: f"Your team has reached its limit for {split.pk}: within 24 hours, "
@@ -259,12 +259,9 @@ def _left(rules: QuotaRules, *, n_used: int) -> str:
         said = "No limit"
     else:
         n_left = max(0, rules.quota_limit - n_used)
-        said = f"{n_left} of {_n(rules.quota_limit)} left within {span(rules.quota_window)}"
+        limit = counted(rules.quota_limit, "submission")
+        said = f"{n_left} of {limit} left within {span(rules.quota_window)}"
     return f"{said}, at least {span(rules.quota_min_gap)} apart." if rules.quota_min_gap else f"{said}."
-
-
-def _n(count: int | None) -> str:
-    return "1 submission" if count == 1 else f"{count} submissions"
 
 
 def _minute_after(at: datetime) -> datetime:
