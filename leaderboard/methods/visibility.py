@@ -19,12 +19,11 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.methods.methods import require_team
 from leaderboard.models import Method, PublishedResult, Team, User, Visibility
 from leaderboard.people import teams
-from leaderboard.people.names import MAX_NAME, confusable_with
+from leaderboard.people.names import confusable_with, numbered
 
 log = structlog.get_logger(__name__)
 
 MAX_ANONYMITY = timedelta(days=730)
-_ROOM_FOR_A_NUMBER = 10
 
 
 def choices(method: Method) -> tuple[Visibility, ...]:
@@ -154,17 +153,15 @@ def _require_name_of_its_own(method: Method) -> None:
 
 
 def _number_taken_name(method: Method) -> None:
-    """Add a number to the name of a method that becomes public by itself, where the name is taken.
-
-    The new name is not that of another method of the team either: nobody is there to choose one.
-    """
-    before, number = method.name, 1
+    """Add a number to the name of a method that becomes public by itself, where the name is taken."""
+    before = method.name
     own = Method.objects.existing().filter(team=method.team_id).exclude(pk=method.pk)
     names_of_team = list(own.values_list("name", flat=True))
-    while _public_twin(method.name, but=method) or confusable_with(method.name, names_of_team):
-        number += 1
-        method.name = f"{before[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
-    if number > 1:
+    method.name = numbered(
+        before,
+        is_taken=lambda name: _public_twin(name, but=method) or confusable_with(name, names_of_team),
+    )
+    if method.name != before:
         method.save(update_fields=["name"])
         details = {"reason": "another method used this name on the boards first"}
         names = {"from": before, "to": method.name}

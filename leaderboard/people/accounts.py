@@ -1,4 +1,4 @@
-"""Accounts, held while something is written that belongs to one: nobody deletes the account meanwhile."""
+"""Accounts, locked while something is written that belongs to one."""
 
 from django.db import transaction
 

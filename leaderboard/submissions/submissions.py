@@ -15,7 +15,7 @@ from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, versions
 from leaderboard.boards.rows import Interval, scored_of
 from leaderboard.db import clock
-from leaderboard.errors.refusals import Refused, clean_text
+from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
 from leaderboard.people import teams
@@ -211,14 +211,7 @@ def _queue(submission: Submission, *, split: Split) -> None:
 
 
 def _open_split(name: str, *, now: datetime) -> Split:
-    # Looked up here and not there: not every text is one that a database can be asked for.
-    rows = Split.objects.shown().select_related("published_edition__ground_truth")
-    split = (splits := {split.name: split for split in rows}).get(name)
-    if split is None:
-        known = ", ".join(splits)
-        raise Refused(
-            "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
-        )
+    split = shown_split(name)
     refusal = admissions.refusal_for_all(split, now=now)
     if refusal is not None:
         raise refusal

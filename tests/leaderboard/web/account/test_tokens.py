@@ -76,7 +76,7 @@ def test_the_list_tells_name_use_and_end(signed_in: Client, benchmark: None) -> 
     [
         ({"name": ""}, "name", "The token has no name"),
         ({"name": "x" * 81}, "name", "has 81 characters; expected at most 80"),
-        ({"name": "a\x07b"}, "name", "has characters that cannot be shown"),
+        ({"name": "a\x07b"}, "name", "has the character U+0007"),
         ({"scopes": []}, "scopes", "The token has no scope"),
         ({"scopes": ["read", "admin"]}, "scopes", "admin is not one of the available choices"),
         ({"days": "0"}, "days", "expires after 0 days; expected 1 to 365"),
