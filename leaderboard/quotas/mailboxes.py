@@ -7,23 +7,18 @@ A keyed hash of each mailbox stays until no window reaches back to its last file
 from datetime import datetime, timedelta
 
 from allauth.account.models import EmailAddress
-from django.conf import settings
 from django.db.models import Max, QuerySet
 from django.utils.crypto import salted_hmac
 
 from leaderboard.models import QuotaOverride, SpentMailbox, Split, Submission, User
 from leaderboard.models.people import MAILBOX
-
-
-def are_proved() -> bool:
-    """Whether addresses are proved here. Where they are not, an address says nothing of who has it."""
-    return bool(settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory")
+from leaderboard.people import addresses
 
 
 def keep(*, user: User, now: datetime) -> None:
     """Keep the hashes of an account's mailboxes if it has sent files lately; call it before it is blanked."""
     sent_at = Submission.objects.filter(submitted_by=user).aggregate(at=Max("submitted_at"))["at"]
-    if sent_at is None or not are_proved():
+    if sent_at is None or not addresses.are_proved():
         return
     kept_until = sent_at + longest_window()
     if kept_until > now:

@@ -23,7 +23,7 @@ from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
 from leaderboard.models.quotas import QuotaRules, excess
-from leaderboard.people import accounts
+from leaderboard.people import accounts, addresses
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.spans import span
 
@@ -179,7 +179,7 @@ def _accounts(team: Team | None, user: User) -> QuerySet[User]:
     """The accounts of the team's people, or of this person without a team."""
     # Where addresses are not proved, anybody could spend somebody else's quota under an address like theirs.
     people = User.objects.filter(membership__team=team) if team else User.objects.filter(pk=user.pk)
-    if not mailboxes.are_proved():
+    if not addresses.are_proved():
         return people
     same = Q(mailbox__in=people.values("mailbox"))
     deleted = mailboxes.deleted_accounts(people)

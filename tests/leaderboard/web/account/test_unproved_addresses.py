@@ -107,22 +107,6 @@ def test_a_second_address_counts_once_it_is_proved(attacker: Client) -> None:
     assert signs_in("second@example.org", EVIL)
 
 
-@pytest.mark.parametrize("by", ["sign-up", "adding"])
-def test_an_unproved_address_of_an_older_version_gives_way(attacker: Client, by: str) -> None:
-    evil = User.objects.get(email="attacker@example.org")
-    EmailAddress.objects.create(user=evil, email=VICTIM, verified=False, primary=False)
-    client = Client()
-    if by == "sign-up":
-        sign_up(client, VICTIM)
-    else:
-        sign_up(client, "owner@example.org")
-        prove(client)
-        client.post("/accounts/email/", {"action_add": "", "email": VICTIM})
-    assert prove(client).status_code == 302
-    assert EmailAddress.objects.get(email=VICTIM).verified
-    assert signs_in(VICTIM, PASSWORD)
-
-
 # --- an account that somebody signed up with it ----------------------------------------------------------
 
 
