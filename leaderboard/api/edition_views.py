@@ -50,11 +50,9 @@ class EditionSerializer(serializers.Serializer[Edition]):
     url = serializers.SerializerMethodField(help_text="URL of its permanent page.")
 
     def get_is_board(self, edition: Edition) -> bool:
-        """Whether the split points to it."""
         return edition.split.published_edition_id == edition.pk
 
     def get_url(self, edition: Edition) -> str:
-        """URL of its permanent page."""
         return absolute("edition", edition.split_id, edition.number)
 
 
@@ -73,7 +71,6 @@ class PublicationSerializer(serializers.Serializer[Publication]):
     )
 
     def get_n_left_out(self, publication: Publication) -> int:
-        """Number of submissions knowingly left out."""
         return len(publication.left_out)
 
 
@@ -122,7 +119,6 @@ class PreviewSerializer(serializers.Serializer[preview.Preview]):
     changes = serializers.SerializerMethodField(help_text="One flat row for each submission.")
 
     def get_changes(self, found: preview.Preview) -> list[dict[str, Any]]:
-        """One flat row for each submission."""
         return preview.rows(found)
 
 

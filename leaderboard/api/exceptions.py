@@ -112,7 +112,6 @@ def _domain_error(exc: Exception) -> Response | None:
 
 
 def _not_yet(exc: quotas.QuotaExceeded | questions.AskedTooOften) -> Response:
-    """A request that will be accepted later."""
     if isinstance(exc, quotas.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:

@@ -126,7 +126,6 @@ def complete(result: Node, generator: Any, **kwargs: Any) -> Node:
 
 
 def _describe_path_parameter(parameter: Node) -> None:
-    """Path parameters have no serializer and no `OpenApiParameter` that could describe them."""
     if parameter["in"] == "path":
         parameter["description"] = PATH_PARAMETERS[parameter["name"]]
         _add_example(parameter["schema"], parameter["name"])

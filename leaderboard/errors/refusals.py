@@ -9,8 +9,8 @@ from leaderboard.models import Split, User
 
 _is_web_address = URLValidator(schemes=["http", "https"])
 MAX_URL = 500
-# Of how many characters one may be composed: α with three marks. Telling composed ones apart takes time that
-# grows with the square of a run of marks, so a text that is too long in any case is refused before.
+# Of how many characters one may be composed. Normalizing takes time that grows with the square of a run of
+# marks, so a text that is too long in any case is refused before.
 _MOST_COMPOSED = 4
 
 

@@ -1,9 +1,4 @@
-"""Score receipts: what a submission scored, signed with the site's key, for its team to hand on.
-
-A receipt names its method as the team does, whoever else may see the method: it is given to the team alone,
-and the team decides who reads it. Beside the name, which is that of the day of signing, stands the method's
-id, which never changes. It attests to one edition for ever, also once a later one is the board.
-"""
+"""Score receipts: what a submission scored in one edition, signed with the site's key."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -29,10 +24,7 @@ class NoReceipt(Exception):
 
 
 def receipt(*, submission: Submission, edition_number: int | None = None) -> str:
-    """The signed receipt of what a submission scored, in the edition of that number or in the present one.
-
-    The same every time, unless its method was renamed. Raises `NoReceipt`.
-    """
+    """The signed receipt of a submission, in that edition or the present one. Raises `NoReceipt`."""
     evaluation = _scored(submission, edition_number)
     edition, rules = evaluation.edition, evaluation.edition.rules
     scores = flat_scores(evaluation)
@@ -103,7 +95,7 @@ def _key(name: str, text: str) -> bytes:
 
 
 def check_keys(app_configs: Sequence[Any] | None = None, **kwargs: Any) -> list[CheckMessage]:
-    """Django's system check of the keys: a typing error is found at the start, not at the first receipt."""
+    """Django's system check of the keys."""
     try:
         public_keys()
     except ImproperlyConfigured as fault:
