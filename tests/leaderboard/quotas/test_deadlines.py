@@ -65,14 +65,6 @@ def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client
     assert (quota["next_slot_at"] is not None) is (kind == FUTURE)
 
 
-def test_nobody_is_asked_to_be_the_first_where_nothing_is_taken(edition: Edition, client: Client) -> None:
-    notice = "to be the first"
-    assert notice in pages.page(client.get("/board/test/")).one("main").text
-    set_times(LATE)
-    client.cookies["sessionid"] = "drawn anew"
-    assert notice not in pages.page(client.get("/board/test/")).one("main").text
-
-
 def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
     opens_at = timezone.now() + HOUR
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
