@@ -142,8 +142,6 @@ RETRY_AFTER_S = 2
 
 
 class CompareView(APIView):
-    """Methods of one board, compared pair by pair."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(

@@ -126,8 +126,6 @@ EDITIONS = Edition.objects.select_related("split__published_edition", "ground_tr
 
 
 class EditionsView(APIView):
-    """All editions that were ever published."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(
@@ -145,8 +143,6 @@ class EditionsView(APIView):
 
 
 class ChangelogView(APIView):
-    """The public changelog of a split."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(
@@ -164,8 +160,6 @@ class ChangelogView(APIView):
 
 
 class ProgressView(APIView):
-    """Progress of the re-scoring of an edition; for maintainers."""
-
     permission_classes = [IsMaintainer]
 
     @extend_schema(operation_id="edition_progress", responses={200: RescoringSerializer, **errors(404)})
@@ -176,8 +170,6 @@ class ProgressView(APIView):
 
 
 class PreviewView(APIView):
-    """What publishing an edition would change; for maintainers."""
-
     permission_classes = [IsMaintainer]
 
     @extend_schema(operation_id="edition_preview", responses={200: PreviewSerializer, **errors(404)})

@@ -186,8 +186,6 @@ def _fields(request: Request) -> dict[str, Any]:
 
 
 class MethodsView(APIView):
-    """The methods of your team."""
-
     @extend_schema(
         operation_id="list_methods",
         parameters=pagination.PARAMETERS,
@@ -201,8 +199,6 @@ class MethodsView(APIView):
 
 
 class MethodView(APIView):
-    """One method."""
-
     parser_classes = [LimitedJSONParser]
     permission_classes = [IsAuthenticatedOrReadOnly]
 
@@ -234,8 +230,6 @@ AS = OpenApiParameter(
 
 
 class VisibilityView(APIView):
-    """The visibility of a method."""
-
     parser_classes = [LimitedJSONParser]
 
     @extend_schema(

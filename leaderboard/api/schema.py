@@ -96,8 +96,6 @@ def _complete(responses: Node, *, has_body: bool) -> None:
 
 
 class SchemaView(SpectacularAPIView):
-    """The schema as OpenAPI 3.1, as YAML or as JSON. It is the same for everybody."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(exclude=True)
