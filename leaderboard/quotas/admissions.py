@@ -11,18 +11,14 @@ from leaderboard.models import Admission, Split, Team, User
 from leaderboard.quotas import quotas
 
 
-class NotAdmitted(Refused):
-    """The split takes files of admitted teams alone, and this team is not one of them."""
-
-
-def refusal_of(*, team: Team | None, split: Split) -> NotAdmitted | None:
+def refusal_of(*, team: Team | None, split: Split) -> Refused | None:
     """Why the split takes nothing from this team; None if it does, as far as admission goes."""
     if not split.needs_admission:
         return None
     if team is not None and Admission.objects.filter(team=team, split=split).exists():
         return None
     ask = split.how_to_be_admitted.rstrip(". ") or "ask the maintainers of this site for access"
-    return NotAdmitted(
+    return Refused(
         "not-admitted",
         f"Only admitted teams can submit to {split.pk}, and your team is not one of them; {ask}.",
         field="split",
@@ -30,7 +26,7 @@ def refusal_of(*, team: Team | None, split: Split) -> NotAdmitted | None:
 
 
 def require(*, team: Team | None, split: Split) -> None:
-    """Raise `NotAdmitted` unless the split takes files of this team."""
+    """Raise `Refused` unless the split takes files of this team."""
     refusal = refusal_of(team=team, split=split)
     if refusal is not None:
         raise refusal

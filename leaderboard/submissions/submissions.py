@@ -30,14 +30,6 @@ log = structlog.get_logger(__name__)
 LATE_AFTER = timedelta(minutes=1)
 
 
-class TooLarge(Refused):
-    """The file is over the size limit."""
-
-
-class TokenSplit(Refused):
-    """A token for one split may not change a method, which stands on every split."""
-
-
 @dataclass(frozen=True)
 class Submitted:
     """The answer to a submission; `is_new` is False when the same bytes had come before."""
@@ -209,9 +201,9 @@ def _open_split(name: str, *, now: datetime) -> Split:
     return split
 
 
-def _token_split(method: Method, changes: Mapping[str, str]) -> TokenSplit:
+def _token_split(method: Method, changes: Mapping[str, str]) -> Refused:
     first = next(iter(changes))
-    return TokenSplit(
+    return Refused(
         "token-split",
         f"The token is valid for one split only, and the field{'s' if len(changes) > 1 else ''} "
         f"{', '.join(map(repr, changes))} would change the method {method.name!r} on every split; expected "
@@ -238,7 +230,7 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload.size == 0:
         raise Refused("not-json", EMPTY_MESSAGE, field="file")
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
-        raise TooLarge("too-large", too_large(found_bytes=upload.size), field="file")
+        raise Refused("too-large", too_large(found_bytes=upload.size), field="file")
     return upload
 
 

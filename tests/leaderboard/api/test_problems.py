@@ -157,7 +157,7 @@ def test_other_lists_come_in_pages_too(edition: Edition, name: str) -> None:
 
 # A refusal's first text, or `code=`.
 GIVEN = re.compile(
-    r"\b(?:Refused|TooLarge|TokenSplit|NotAdmitted|BadValue|NoReceipt|NotVerified|Unusable\w*|add|reject)"
+    r"\b(?:Refused|BadValue|NotVerified|Unusable\w*|add|reject)"
     r'\(\s*"([a-z]+(?:-[a-z]+)+)"|\bcode="([a-z-]+)"'
 )
 # Codes that no answer of the API bears: of forms on pages alone, and of the command line's own checks.

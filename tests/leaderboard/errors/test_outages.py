@@ -83,17 +83,6 @@ def test_full_disk_is_a_507_problem_and_leaves_nothing(
     assert api(builders.predictions(edition)).status_code == 201
 
 
-def test_full_disk_is_a_507_page_and_leaves_nothing(
-    edition: Edition, page: Callable[[bytes], HttpResponse], settings: Settings
-) -> None:
-    with full_disk():
-        answer = page(builders.predictions(edition))
-    assert answer.status_code == 507
-    assert "The file store is full" in answer.content.decode()
-    assert_nothing_kept(settings)
-    assert page(builders.predictions(edition)).status_code == 302
-
-
 @contextmanager
 def database_away(fault: type[Exception]) -> Iterator[None]:
     """Every question to the database is answered by the loss of the connection."""

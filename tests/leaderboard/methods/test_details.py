@@ -205,16 +205,6 @@ def test_nonsense_is_refused_in_words(
     assert (status, told["code"]) == ({"parse-error": 400, "too-large": 413}.get(code, 422), code)
 
 
-def test_all_that_can_be_said_fits_into_a_document(client: Client, method: Method, owner: User) -> None:
-    whole = {
-        "description": "\N{GRINNING FACE}" * 2000,
-        **dict.fromkeys(("paper_url", "code_url"), "https://example.org/" + "x" * 480),
-        **dict.fromkeys(("pretraining", "hardware"), "ü" * 120),
-    }
-    body = json.dumps(whole, indent=8)
-    assert (patch(client, method, owner, body)[0], len(body) > 20_000) == (200, True)
-
-
 # --- filters -----------------------------------------------------------------------------------------------
 
 

@@ -5,7 +5,6 @@ import logging
 from datetime import timedelta
 
 import pytest
-from django.db import connection
 from django.test import Client
 from django.utils import timezone
 
@@ -75,22 +74,6 @@ def test_links_of_who_is_not_in_the_team_any_more_open_nothing(
     with refused("invitation-revoked"):
         accept(third, stranger)
     assert not Membership.objects.filter(team=team).exists()
-
-
-def test_a_team_that_ends_between_reading_and_accepting_is_a_refusal(owner: User, stranger: User) -> None:
-    team = teams.team_of(user=owner)
-    secret = invite(team, owner)
-    has_ended: list[bool] = []
-
-    def end_meanwhile(execute, sql, params, many, context):
-        if "leaderboard_user" in sql and not has_ended:
-            has_ended.append(True)
-            Team.objects.filter(pk=team.pk).delete()
-        return execute(sql, params, many, context)
-
-    with connection.execute_wrapper(end_meanwhile), refused("no-invitation"):
-        accept(secret, stranger)
-    assert has_ended
 
 
 def test_owner_alone_invites_and_not_without_end(

@@ -205,21 +205,6 @@ def test_a_team_without_people_and_methods_is_forgotten_and_one_with_methods_sta
     assert Team.objects.filter(pk=kept.pk).exists()
 
 
-def test_who_left_sees_nothing_private_of_the_team_any_more(
-    client: Client, edition: Edition, owner: User, teammate: User
-) -> None:
-    sent = builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
-    client.force_login(teammate)
-    addresses = [
-        f"/submissions/{sent.pk}/",
-        f"/methods/{sent.method_id}/",
-        f"/api/v1/methods/{sent.method_id}",
-    ]
-    assert [client.get(address).status_code for address in addresses] == [200] * 3
-    teams.leave(user=teammate)
-    assert [client.get(address).status_code for address in addresses] == [404] * 3
-
-
 # --- the page ----------------------------------------------------------------------------------------------
 
 

@@ -5,7 +5,7 @@ from django.core.files.base import ContentFile
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.errors.refusals import NotMaintainer
+from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import Admission, AuditEvent, Edition, Split, Submission, Team, User
 from leaderboard.people import teams
 from leaderboard.quotas import admissions
@@ -62,10 +62,10 @@ def test_an_admitted_team_submits_until_its_admission_ends(
     team = teams.team_of(user=owner)
     row = admit(team, maintainer)
     builders.submit(teammate, builders.predictions(by_admission))
-    with pytest.raises(admissions.NotAdmitted):
+    with pytest.raises(Refused, match="Only admitted teams"):
         builders.submit(stranger, builders.predictions(by_admission))
     admissions.end(row=row, reason="Left.", actor=maintainer)
-    with pytest.raises(admissions.NotAdmitted):
+    with pytest.raises(Refused, match="Only admitted teams"):
         builders.submit(owner, builders.predictions(by_admission, factor=1.2))
     assert Submission.objects.count() == 1
     events = AuditEvent.objects.filter(noun_id=str(team.pk), verb__in=["admitted", "admission_ended"])
