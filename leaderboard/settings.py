@@ -206,9 +206,6 @@ RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
-# Files of a team in 24 hours, on all splits together, that are rejected, are cancelled, or stop the process
-# that reads them; 0: any number.
-MAX_TEAM_REJECTED_PER_DAY = env.int("TSTTC_MAX_TEAM_REJECTED_PER_DAY", default=30)
 
 # --- the life of an evaluation (seconds; see leaderboard/scoring/lifecycle.py) ------------------------------
 

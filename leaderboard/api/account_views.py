@@ -26,8 +26,6 @@ from leaderboard.quotas import admissions
 
 
 class AccountView(APIView):
-    """The token and its team."""
-
     token_scopes = (Scope.READ, Scope.SUBMIT)
 
     @extend_schema(operation_id="account", responses=AccountSerializer)
@@ -38,8 +36,6 @@ class AccountView(APIView):
 
 
 class QuotaView(APIView):
-    """The remaining quota of the user's team."""
-
     # A token that can only submit needs to know when it may.
     token_scopes = (Scope.READ, Scope.SUBMIT)
 
@@ -57,8 +53,6 @@ class QuotaView(APIView):
 
 
 class RevokeView(APIView):
-    """The revocation of a leaked token by whoever found it."""
-
     authentication_classes = ()
     permission_classes = [AllowAny]
     parser_classes = [LimitedJSONParser]

@@ -15,10 +15,9 @@ from leaderboard.people import second_factor, tokens
 
 
 class BearerAuthentication(TokenAuthentication):
-    """`Authorization: Bearer tsttc_…`, and nowhere else.
+    """`Authorization: Bearer tsttc_…`, and nowhere else. Checks the token's limits before any view.
 
-    A token's limits are checked here, before any view, so that no view can forget them. Safe methods need the
-    scope `read` and all others `submit`, unless the view's `token_scopes` names the accepted ones.
+    Safe methods need the scope `read` and all others `submit`, unless the view has `token_scopes`.
     """
 
     def authenticate(self, request: Request) -> tuple[User, ApiToken] | None:
@@ -46,7 +45,6 @@ class IsMaintainer(BasePermission):
     """Lets maintainers in, where they must give a code with a session that has given one."""
 
     def has_permission(self, request: Request, view: Any) -> bool:
-        """Whether it may be answered."""
         return isinstance(request.user, User) and request.user.acts_as_maintainer
 
 
@@ -81,7 +79,6 @@ class BearerScheme(OpenApiAuthenticationExtension):
     name = "bearer"
 
     def get_security_definition(self, auto_schema: Any) -> dict[str, str]:
-        """The scheme in OpenAPI's terms."""
         return {
             "type": "http",
             "scheme": "bearer",

@@ -56,8 +56,6 @@ def _board(
 
 
 class BoardView(APIView):
-    """The board of a split."""
-
     permission_classes = [AllowAny]
     throttle_classes = [*APIView.throttle_classes, AsOfThrottle]
 
@@ -74,8 +72,6 @@ class BoardView(APIView):
 
 
 class EditionBoardView(APIView):
-    """The permanent board of one edition."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(

@@ -73,11 +73,9 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
 
     def get_detectable_difference(self, found: Difference) -> float | None:
-        """Rounded like the differences."""
         return published(found.detectable_difference, decimals=self.context["decimals"])
 
     def get_sentence(self, found: Difference) -> str:
-        """The sentence for this column."""
         return sentences.sentence(
             **self.context["names"],
             name=self.field_name or "",
@@ -91,7 +89,6 @@ class DifferencesSerializer(NamedSerializer):
     """A difference for each score."""
 
     def child(self, name: str, **options: Any) -> DifferenceSerializer:
-        """The difference of one score."""
         text = "Null: one of the two has no score in this column."
         return DifferenceSerializer(allow_null=True, help_text=text, **options)
 
@@ -114,7 +111,6 @@ class PairSerializer(serializers.Serializer[Pair]):
 
     @extend_schema_field(DifferencesSerializer(allow_null=True))
     def get_differences(self, pair: Pair) -> dict[str, Any] | None:
-        """All scores, once computed."""
         if pair.differences is None:
             return None
         found = {name: pair.differences.get(name) for name in pair.first.scores}
@@ -123,7 +119,6 @@ class PairSerializer(serializers.Serializer[Pair]):
         return dict(DifferencesSerializer(found, context=context).data)
 
     def get_sentence(self, pair: Pair) -> str:
-        """The sentence for the overall MiD."""
         return pair.sentence()
 
 
@@ -147,8 +142,6 @@ RETRY_AFTER_S = 2
 
 
 class CompareView(APIView):
-    """Methods of one board, compared pair by pair."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(

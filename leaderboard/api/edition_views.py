@@ -50,11 +50,9 @@ class EditionSerializer(serializers.Serializer[Edition]):
     url = serializers.SerializerMethodField(help_text="URL of its permanent page.")
 
     def get_is_board(self, edition: Edition) -> bool:
-        """Whether the split points to it."""
         return edition.split.published_edition_id == edition.pk
 
     def get_url(self, edition: Edition) -> str:
-        """URL of its permanent page."""
         return absolute("edition", edition.split_id, edition.number)
 
 
@@ -73,7 +71,6 @@ class PublicationSerializer(serializers.Serializer[Publication]):
     )
 
     def get_n_left_out(self, publication: Publication) -> int:
-        """Number of submissions knowingly left out."""
         return len(publication.left_out)
 
 
@@ -122,7 +119,6 @@ class PreviewSerializer(serializers.Serializer[preview.Preview]):
     changes = serializers.SerializerMethodField(help_text="One flat row for each submission.")
 
     def get_changes(self, found: preview.Preview) -> list[dict[str, Any]]:
-        """One flat row for each submission."""
         return preview.rows(found)
 
 
@@ -130,8 +126,6 @@ EDITIONS = Edition.objects.select_related("split__published_edition", "ground_tr
 
 
 class EditionsView(APIView):
-    """All editions that were ever published."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(
@@ -149,8 +143,6 @@ class EditionsView(APIView):
 
 
 class ChangelogView(APIView):
-    """The public changelog of a split."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(
@@ -168,8 +160,6 @@ class ChangelogView(APIView):
 
 
 class ProgressView(APIView):
-    """Progress of the re-scoring of an edition; for maintainers."""
-
     permission_classes = [IsMaintainer]
 
     @extend_schema(operation_id="edition_progress", responses={200: RescoringSerializer, **errors(404)})
@@ -180,8 +170,6 @@ class ProgressView(APIView):
 
 
 class PreviewView(APIView):
-    """What publishing an edition would change; for maintainers."""
-
     permission_classes = [IsMaintainer]
 
     @extend_schema(operation_id="edition_preview", responses={200: PreviewSerializer, **errors(404)})

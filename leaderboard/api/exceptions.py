@@ -17,9 +17,8 @@ from leaderboard.boards import boards, filters
 from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
-from leaderboard.quotas import admissions, quotas
+from leaderboard.quotas import quotas
 from leaderboard.scoring import comparisons, questions
-from leaderboard.submissions import receipts, submissions
 
 UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
 
@@ -76,6 +75,15 @@ def _outage(exc: Exception) -> Response | None:
     return problem(status=outage.status, code=outage.code, detail=outage.sentence, headers=outage.headers)
 
 
+# Of a `Refused` by its code; else 422.
+REFUSED_STATUS: dict[str, int] = {
+    "account-closed": 401,
+    "token-split": 403,
+    "not-admitted": 403,
+    "edition-unknown": 404,
+    **dict.fromkeys(("split-not-open", "split-closed", "edition-refused", "withdrawn", "not-scored"), 409),
+    "too-large": 413,
+}
 # What the domain raises besides `Refused`: status, code, and the input at fault.
 DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
     boards.UnknownColumn: (400, "unknown-column", "sort"),
@@ -90,21 +98,12 @@ DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
 def _domain_error(exc: Exception) -> Response | None:
     match exc:
         case Refused():
-            status = 413 if isinstance(exc, submissions.TooLarge) else 422
-            if exc.code == "account-closed":
-                status = 401
-            if exc.code in {"split-not-open", "split-closed", "edition-refused"}:
-                status = 409
-            if isinstance(exc, submissions.TokenSplit | admissions.NotAdmitted):
-                status = 403
+            status = REFUSED_STATUS.get(exc.code, 422)
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
         case quotas.QuotaExceeded() | questions.AskedTooOften():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
-        case receipts.NoReceipt():
-            status = 404 if exc.code == "edition-unknown" else 409
-            return problem(status=status, code=exc.code, detail=str(exc))
     if type(exc) not in DOMAIN_ERRORS:
         return None
     status, code, where = DOMAIN_ERRORS[type(exc)]
@@ -112,7 +111,6 @@ def _domain_error(exc: Exception) -> Response | None:
 
 
 def _not_yet(exc: quotas.QuotaExceeded | questions.AskedTooOften) -> Response:
-    """A request that will be accepted later."""
     if isinstance(exc, quotas.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:

@@ -1,8 +1,4 @@
-"""Headers of every response of the API: rate limits and ETag.
-
-`RateLimit-Policy` and `RateLimit` follow draft-ietf-httpapi-ratelimit-headers, with one limit for each
-throttle that counted the request.
-"""
+"""Headers of every response of the API: ETag, and rate limits by draft-ietf-httpapi-ratelimit-headers."""
 
 import hashlib
 import math
@@ -44,13 +40,8 @@ def _remaining(throttle: ApiThrottle) -> str:
 
 
 def _conditional(request: HttpRequest, response: HttpResponse) -> HttpResponse:
-    """The response with an ETag, or 304 if the client has that already.
-
-    Cached responses have an ETag of their own, and so have files, which are streamed.
-    """
-    if request.method not in {"GET", "HEAD"} or response.status_code != 200:
-        return response
-    if response.streaming:
+    """The response with an ETag, or 304 if the client has that already; files have an ETag of their own."""
+    if request.method not in {"GET", "HEAD"} or response.status_code != 200 or response.streaming:
         return response
     if not response.has_header("ETag"):
         response["ETag"] = f'"{hashlib.sha256(response.content).hexdigest()[:32]}"'

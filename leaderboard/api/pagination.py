@@ -38,10 +38,7 @@ class Page(Generic[Row]):
 
 
 def page_of(rows: QuerySet[Row], request: Request, *, order: str) -> Page[Row]:
-    """The page of `rows` that the request asks for, in the order of a column (descending with `-`).
-
-    Raises `BadValue`.
-    """
+    """The page of `rows` that is asked for, ordered by a column (descending with `-`). Raises `BadValue`."""
     limit = whole_number(
         request.query_params.get("limit", str(MOST)),
         name="limit",

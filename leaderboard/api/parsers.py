@@ -21,10 +21,7 @@ class BodyTooLarge(exceptions.APIException):
 
 
 class LimitedJSONParser(JSONParser):
-    """JSON as the framework reads it; a document nested too deeply is malformed like any other.
-
-    Its size is limited: as Python objects a document can take thirty times its bytes.
-    """
+    """JSON of limited size and depth: as Python objects a document can take thirty times its bytes."""
 
     def parse(
         self,
@@ -46,4 +43,4 @@ class UniformJSONRenderer(JSONRenderer):
     """JSON in one form, whatever indent `Accept` asks for: responses are cached for all clients."""
 
     def get_indent(self, accepted_media_type: str, renderer_context: Mapping[str, Any]) -> None:
-        """Always None."""
+        """None."""

@@ -52,8 +52,6 @@ class PublishedTableSerializer(serializers.Serializer[dict[str, Any]]):
 
 
 class PublishedTablesView(APIView):
-    """All tables of the paper."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(operation_id="list_published_tables", responses=PublishedTableSerializer(many=True))
@@ -64,8 +62,6 @@ class PublishedTablesView(APIView):
 
 
 class PublishedTableView(APIView):
-    """One table of the paper."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(operation_id="published_table", responses={200: PublishedTableSerializer, **errors(404)})

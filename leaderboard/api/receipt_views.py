@@ -18,8 +18,6 @@ from leaderboard.submissions import receipts
 
 
 class ReceiptView(APIView):
-    """The signed receipt of a score."""
-
     @extend_schema(
         operation_id="receipt",
         parameters=[
@@ -41,8 +39,6 @@ class ReceiptView(APIView):
 
 
 class FileView(APIView):
-    """The prediction file of a submission."""
-
     @extend_schema(
         operation_id="submission_file", responses={(200, "application/octet-stream"): bytes, **errors(404)}
     )

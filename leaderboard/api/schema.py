@@ -1,4 +1,4 @@
-"""The schema, and what all operations share in it: errors and headers, path parameters, examples."""
+"""The schema, and what all operations share in it: errors, headers and path parameters."""
 
 from collections.abc import Mapping
 from functools import cache
@@ -13,11 +13,9 @@ from rest_framework.renderers import BaseRenderer
 from rest_framework.request import Request
 from rest_framework.response import Response
 
-from evaluator.metrics.protocol import known_names
 from leaderboard.api.parsers import UniformJSONRenderer
 from leaderboard.api.serializers import ErrorSerializer
 from leaderboard.errors import problem_codes
-from leaderboard.methods.details import DETAILS
 
 Node = dict[str, Any]
 
@@ -49,49 +47,6 @@ PATH_PARAMETERS: Mapping[str, str] = {
     "method_id": "Id of the method.",
     "name": "Name of the table.",
 }
-# What a value looks like: by the format of its field, else by the field's type and name.
-FORMATS: Mapping[str, str] = {
-    "uuid": "0f8b1c2d-3e4f-4a5b-8c6d-7e8f9a0b1c2d",
-    "date-time": "2026-11-21T10:00:00Z",
-    "uri": "https://leaderboard.example.org/",
-}
-DIGEST = "sha256:" + "5de94cec" * 8
-EXAMPLES: Mapping[str, Mapping[str, Any]] = {
-    "string": {
-        "split": "test",
-        "protocol": "tsttc-1",
-        "ground_truth": DIGEST,
-        "manifest": DIGEST,
-        "digest": DIGEST,
-        "method": "Deep Scale",
-        "team": "Owls",
-        "description": "Scale regression on six frames.",
-        "paper_url": "https://example.org/paper",
-        "code_url": "https://example.org/code",
-        "date": "2026-11-21",
-        "sort": "rank",
-        "reason": "Corrected labels of three recordings.",
-        "type": "https://leaderboard.example.org/docs/api/#problem-quota-exceeded",
-        "code": "quota-exceeded",
-        "where": "/predictions/12",
-        "note": "learning rate 1e-4",
-        "commit": "0a1b2c3",
-    },
-    "integer": {
-        "number": 1,
-        "edition": 3,
-        "n_sequences": 28600,
-        "n_recordings": 120,
-        "size_bytes": 600_000,
-        "status": 429,
-    },
-    "number": {
-        **dict.fromkeys(known_names(), 15.03),
-        "rate_per_s": 3.6,
-    },
-    "object": {"truncated": {"20": 3}},
-}
-DETAIL_EXAMPLES: Mapping[str, Any] = {detail.name: detail.example for detail in DETAILS}
 
 
 def errors(*statuses: int) -> dict[tuple[int, str], type[ErrorSerializer]]:
@@ -105,7 +60,7 @@ def response_header(name: str, of: type, description: str, *, statuses: list[int
 
 
 def complete(result: Node, generator: Any, **kwargs: Any) -> Node:
-    """A drf-spectacular hook: add the answers, headers and examples that no view declares."""
+    """A drf-spectacular hook: add the answers and headers that no view declares."""
     components = result["components"]
     components["headers"] = {
         name: {"description": about, "schema": {"type": "string"}} for name, about in HEADERS.items()
@@ -118,28 +73,9 @@ def complete(result: Node, generator: Any, **kwargs: Any) -> Node:
         for operation in path.values():
             _complete(operation["responses"], has_body="requestBody" in operation)
             for parameter in operation.get("parameters", []):
-                _describe_path_parameter(parameter)
-    for schema in components["schemas"].values():
-        for name, field in schema.get("properties", {}).items():
-            _add_example(field, name)
+                if parameter["in"] == "path":
+                    parameter["description"] = PATH_PARAMETERS[parameter["name"]]
     return result
-
-
-def _describe_path_parameter(parameter: Node) -> None:
-    """Path parameters have no serializer and no `OpenApiParameter` that could describe them."""
-    if parameter["in"] == "path":
-        parameter["description"] = PATH_PARAMETERS[parameter["name"]]
-        _add_example(parameter["schema"], parameter["name"])
-
-
-def _add_example(field: Node, name: str) -> None:
-    if name in DETAIL_EXAMPLES:
-        field["examples"] = [DETAIL_EXAMPLES[name]]
-    types = field.get("type", [])
-    for each in [types] if isinstance(types, str) else types:
-        example = FORMATS.get(field.get("format", "")) or EXAMPLES.get(each, {}).get(name)
-        if example is not None and "enum" not in field:
-            field["examples"] = [example]
 
 
 def _headers(status: str) -> Node:
@@ -160,8 +96,6 @@ def _complete(responses: Node, *, has_body: bool) -> None:
 
 
 class SchemaView(SpectacularAPIView):
-    """The schema as OpenAPI 3.1, as YAML or as JSON. It is the same for everybody."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(exclude=True)

@@ -1,6 +1,7 @@
 """Serializers of boards, splits, quotas and errors. A field once here stays."""
 
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from typing import Any, Final
 
 from django.conf import settings
@@ -53,15 +54,12 @@ class NamedSerializer(serializers.Serializer[Any]):
 
     @staticmethod
     def names_of(rules: Protocol) -> Iterable[str]:
-        """Those of the known names that a protocol has."""
         return rules.score_names
 
     def child(self, name: str, **options: Any) -> serializers.Field[Any, Any, Any, Any]:
-        """The field of one name."""
         raise NotImplementedError
 
     def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
-        """A field for each known name."""
         common = set.intersection(*(set(self.names_of(rules)) for rules in PROTOCOLS.values()))
         return {name: self.child(name, required=name in common) for name in self.known()}
 
@@ -82,7 +80,6 @@ class ScoresSerializer(NamedSerializer):
     """The published scores: MiD in 10⁻⁴, RTE in percent."""
 
     def child(self, name: str, **options: Any) -> serializers.FloatField:
-        """The number of one score."""
         metric, of = metric_of(name), _sequences(interval_of(name))
         text = f"{metric.title} ({metric.unit}), mean over {of}; lower is better; null: there are none."
         return serializers.FloatField(allow_null=True, help_text=text, **options)
@@ -95,11 +92,9 @@ class CountsSerializer(NamedSerializer):
 
     @staticmethod
     def names_of(rules: Protocol) -> Iterable[str]:
-        """Overall, and its TTC ranges."""
         return rules.interval_names
 
     def child(self, name: str, **options: Any) -> serializers.IntegerField:
-        """One count."""
         text = f"Number of sequences: {_sequences(known_intervals().get(name))}."
         return serializers.IntegerField(help_text=text, **options)
 
@@ -151,15 +146,13 @@ class QuotaSerializer(SlotsSerializer):
 
     split = serializers.CharField(help_text=SPLIT)
     is_open = serializers.BooleanField(help_text="Whether the split and the quota accept a submission now.")
-    window_s = serializers.FloatField(source="rules.window_s", help_text="Length of the rolling window.")
-    min_gap_s = serializers.FloatField(
-        source="rules.min_gap_s", help_text="Minimum time between submissions."
-    )
+    window_s = serializers.FloatField(help_text="Length of the rolling window.")
+    min_gap_s = serializers.FloatField(help_text="Minimum time between submissions.")
     rejected_used = serializers.IntegerField(
         source="n_rejected", help_text="Files rejected, or cancelled by the team, in the last 24 hours."
     )
     rejected_limit = serializers.IntegerField(
-        source="rules.rejected_limit",
+        source="rules.quota_rejected_limit",
         allow_null=True,
         help_text="Rejected and cancelled files accepted per 24 hours; null: no limit.",
     )
@@ -246,13 +239,11 @@ class SplitSerializer(serializers.Serializer[Split]):
     )
 
     def get_announcement(self, split: Split) -> str:
-        """The lines that have not ended."""
         now = timezone.now()
         lines = (snapshots.site_line_of([split], now=now), split.announcement_at(now))
         return " ".join(line for line in lines if line)
 
     def get_is_open(self, split: Split) -> bool:
-        """Whether there is ground truth and now is between opening and closing."""
         return admissions.is_open(split, now=timezone.now())
 
 
@@ -268,27 +259,11 @@ class DetailsSerializer(serializers.Serializer[Details]):
     """What a method uses and costs, as stated by its team; null or empty: not specified."""
 
     def get_fields(self) -> dict[str, serializers.Field[Any, Any, Any, Any]]:
-        """One field for each detail of the registry."""
         fields = {}
         for detail in details.DETAILS:
             empty: dict[str, Any] = {"allow_null" if detail.kind.empty is None else "allow_blank": True}
             fields[detail.name] = FIELD_OF[detail.kind.type](**empty, help_text=detail.meaning)
         return fields
-
-    def to_representation(self, instance: Details) -> dict[str, Any]:
-        """Every detail, as it is stated."""
-        return {name: _value(field, instance[name]) for name, field in self.fields.items()}
-
-
-# A row has values of these fields' types already. There are thousands of rows, and the framework's own way
-# takes twice as long for each.
-_AS_IT_IS: Final = frozenset(
-    {serializers.CharField, serializers.ChoiceField, serializers.IntegerField, serializers.BooleanField}
-)
-
-
-def _value(field: "serializers.Field[Any, Any, Any, Any]", value: Any) -> Any:
-    return value if value is None or type(field) in _AS_IT_IS else field.to_representation(value)
 
 
 class UncertaintySerializer(serializers.Serializer[Interval]):
@@ -356,18 +331,12 @@ class EntrySerializer(serializers.Serializer[Entry]):
     )
 
     def get_pseudonym(self, entry: Entry) -> str | None:
-        """The pseudonym, or null in rows that everybody sees under the same name."""
         return entry.pseudonym or None
 
     def to_representation(self, instance: Entry) -> dict[str, Any]:
-        """The row, with its confidence intervals (most of its bytes) only if requested."""
-        told = {}
-        for name, field in self.fields.items():
-            # A field that belongs to a serializer has a source; "*" is the whole row.
-            source = instance if field.source == "*" else getattr(instance, str(field.source))
-            is_left_out = name == "intervals" and not self.context.get("has_intervals")
-            told[name] = _value(field, {} if is_left_out else source)
-        return told
+        """The row; its confidence intervals, most of its bytes, only if requested."""
+        row = instance if self.context.get("has_intervals") else replace(instance, intervals={})
+        return super().to_representation(row)
 
 
 class BoardSerializer(serializers.Serializer[Board]):

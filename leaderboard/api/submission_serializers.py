@@ -108,7 +108,6 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
     n_problems = serializers.IntegerField(help_text="Number of problems, equal and unlisted ones included.")
 
     def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
-        """The submission with its progress, and its rank if it has one."""
         submission, progress, place = instance.submission, instance.progress, instance.place
         method = submission.method
         is_waiting = progress.n_ahead is not None
@@ -159,7 +158,6 @@ class SubmittedSerializer(SubmissionSerializer):
     quota = SlotsSerializer(help_text="The team's remaining quota after this submission.")
 
     def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
-        """The submission, and the `quota` of the context."""
         return {
             **super().to_representation(instance),
             "quota": SlotsSerializer(self.context["quota"]).data,

@@ -38,8 +38,6 @@ EVALUATIONS = Evaluation.objects.select_related("edition__ground_truth").prefetc
 
 
 class SubmissionsView(APIView):
-    """Submit a prediction file; list one's own submissions."""
-
     parser_classes = [MultiPartParser]
     throttle_classes = [*APIView.throttle_classes, SubmitThrottle]
 
@@ -87,8 +85,6 @@ class SubmissionsView(APIView):
 
 
 class SubmissionView(APIView):
-    """One submission."""
-
     @extend_schema(
         operation_id="submission",
         parameters=[

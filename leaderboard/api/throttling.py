@@ -1,8 +1,4 @@
-"""Throttles: requests per account, else per address; see leaderboard/ops/rate_limits.py.
-
-The address is that of the connection, or with `TSTTC_TRUSTED_PROXIES` the one that our own proxy wrote down;
-whatever a client puts into X-Forwarded-For is ignored.
-"""
+"""Throttles: requests per account, else per address; see leaderboard/ops/rate_limits.py."""
 
 from typing import TYPE_CHECKING
 
@@ -26,7 +22,6 @@ class ApiThrottle(rate_limits.Throttle):
     """A rate of `settings.API_RATES`, told in the headers of the response."""
 
     def allow_request(self, request: Request, view: "APIView | None" = None) -> bool:
-        """Count this request."""
         is_allowed = super().allow_request(request, view)
         if self.key is not None:
             counted(request._request).append(self)
@@ -39,7 +34,6 @@ class SignedInThrottle(ApiThrottle):
     scope = "signed_in"
 
     def identity(self, request: Request) -> object | None:
-        """The account."""
         return request.user.pk if request.user.is_authenticated else None
 
 
@@ -49,7 +43,6 @@ class VisitorThrottle(ApiThrottle):
     scope = "visitor"
 
     def identity(self, request: Request) -> object | None:
-        """The address."""
         return None if request.user.is_authenticated else super().identity(request)
 
 
@@ -60,7 +53,6 @@ class SubmitThrottle(SignedInThrottle):
     cache = cache
 
     def identity(self, request: Request) -> object | None:
-        """The account, if it sends something."""
         return super().identity(request) if request.method == "POST" else None
 
 
@@ -70,7 +62,6 @@ class AsOfThrottle(ApiThrottle):
     scope = "as_of"
 
     def identity(self, request: Request) -> object | None:
-        """The account, else the address, if it asks for a time."""
         return rate_limits.account_or_address(request) if request.query_params.get("at") else None
 
 

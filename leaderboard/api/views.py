@@ -46,8 +46,6 @@ def published_edition(split: str | Split, number: int) -> Edition:
 
 
 class WithdrawView(APIView):
-    """Withdraw a submission."""
-
     @extend_schema(
         operation_id="withdraw",
         request=None,
@@ -63,8 +61,6 @@ class WithdrawView(APIView):
 
 
 class SplitsView(APIView):
-    """The splits."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(operation_id="list_splits", responses=SplitSerializer(many=True))
@@ -75,8 +71,6 @@ class SplitsView(APIView):
 
 
 class ManifestView(APIView):
-    """The public manifest of a split's ground truth, of the board or of a former edition."""
-
     permission_classes = [AllowAny]
 
     @extend_schema(

@@ -1,7 +1,4 @@
-"""Outages: the words for a database or file store that does not answer, the same on pages and in the API.
-
-Neither is the asker's fault, and neither is a reason for a bare 500: both pass, and asking again is safe.
-"""
+"""Outages: the words for a database or file store that does not answer, the same on pages and in the API."""
 
 import errno
 from dataclasses import dataclass

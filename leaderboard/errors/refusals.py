@@ -5,12 +5,12 @@ import unicodedata
 from django.core.exceptions import ValidationError
 from django.core.validators import URLValidator
 
-from leaderboard.models import User
+from leaderboard.models import Split, User
 
 _is_web_address = URLValidator(schemes=["http", "https"])
 MAX_URL = 500
-# Of how many characters one may be composed: α with three marks. Telling composed ones apart takes time that
-# grows with the square of a run of marks, so a text that is too long in any case is refused before.
+# Of how many characters one may be composed. Normalizing takes time that grows with the square of a run of
+# marks, so a text that is too long in any case is refused before.
 _MOST_COMPOSED = 4
 
 
@@ -35,6 +35,17 @@ def require_maintainer(actor: User | None, *, to: str) -> None:
     """Raise `NotMaintainer` for anybody else; None is the command line. `to` ends "Only maintainers may"."""
     if actor is not None and not actor.acts_as_maintainer:
         raise NotMaintainer(f"Only maintainers may {to}.")
+
+
+def shown_split(name: str) -> Split:
+    """The split of that name, with its published edition and ground truth. Raises `Refused`."""
+    # Looked up here and not there: not every text is one that a database can be asked for.
+    rows = Split.objects.shown().select_related("published_edition__ground_truth")
+    splits = {split.name: split for split in rows}
+    if name not in splits:
+        sentence = f"There is no split {name[:80]!r}; expected one of {', '.join(splits)}."
+        raise Refused("unknown-split", sentence, field="split")
+    return splits[name]
 
 
 def clean_text(name: str, text: str, *, limit: int, required: bool = True) -> str:

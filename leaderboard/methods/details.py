@@ -1,33 +1,33 @@
 """The registry of method details: what a team states of a method in fields of its own, one row each.
 
-The field of the form, the filter of boards, the fields of the API, the columns of exports and the words on
-pages follow from the row. To add a detail: a field of `Method`, its migration, and a row in `DETAILS`.
-
-What others see of an anonymous method's details is decided by their kind: never a free text.
+Forms, filters, API, exports and pages follow from the row. Free texts of an anonymous method are hidden.
 """
 
 import math
+import re
 import unicodedata
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from typing import Any, ClassVar, Final, NamedTuple
 
 from django.db.models import TextChoices
 
 from leaderboard.errors.refusals import Refused, clean_text
-from leaderboard.methods.quantities import count_of, measure_of
 from leaderboard.models import BoxSource, Cameras, Method
 
 MAX_MEASURED: Final = 1e9
 MAX_FILTER_TEXT: Final = 80
-_IN_MS: Final = {"ms": 1.0, "millisecond": 1.0, "milliseconds": 1.0, "s": 1e3, "us": 1e-3, "µs": 1e-3}
+_COUNT: Final = re.compile(
+    r"((?:[0-9]{1,3}(?:,[0-9]{3})+|[0-9]{1,16})(?:\.[0-9]{1,15})?) ?([kmb]?)", re.ASCII | re.IGNORECASE
+)
+_TIMES: Final = {"": 1, "k": 10**3, "m": 10**6, "b": 10**9}
 
 Details = Mapping[str, Any]
 """A method's details by name: each of the registry, an empty text or None where it is not specified."""
 
 
 def bad_value(name: str, found: object, expected: str, *, advice: str = "") -> Refused:
-    """The refusal of what a field cannot be."""
     message = f"The field '{name}' is {str(found)[:60]!r}; expected {expected}."
     return Refused("bad-value", message, field=name, advice=advice)
 
@@ -45,7 +45,7 @@ def text_of(name: str, value: object) -> str:
 
 
 class Option(NamedTuple):
-    """A value to choose: as forms and addresses have it, as it is stored, and in words."""
+    """A value to choose: in forms and addresses, as it is stored, and in words."""
 
     text: str
     value: object
@@ -145,11 +145,8 @@ class Whole(Number):
         return value
 
 
-@dataclass(frozen=True, kw_only=True)
 class Measured(Number):
-    """A finite number above 0; a text may name one of the units, each of so many of the detail's own."""
-
-    units: Mapping[str, float] = field(default_factory=dict)
+    """A finite number above 0."""
 
     def read(self, value: object) -> float:
         number = self.wanted(value)
@@ -163,7 +160,7 @@ class Measured(Number):
     def wanted(self, text: object) -> float:
         if isinstance(text, bool) or not isinstance(text, str | int | float):
             raise ValueError(text)
-        number = measure_of(text, self.units) if isinstance(text, str) else float(text)
+        number = float(text)
         if not math.isfinite(number) or number <= 0:
             raise ValueError(text)
         return number
@@ -184,6 +181,18 @@ class FreeText(Kind):
         return wanted in _folded(stated)
 
 
+def count_of(text: str) -> Decimal:
+    """The number that a text means, which may have a part behind the point. Raises `ValueError`.
+
+    >>> [int(count_of(text)) for text in ("25M", "25,000,000", "0.4 m", "7")]
+    [25000000, 25000000, 400000, 7]
+    """
+    match = _COUNT.fullmatch(text.strip())
+    if match is None:
+        raise ValueError(text)
+    return Decimal(match[1].replace(",", "")) * _TIMES[match[2].lower()]
+
+
 def _folded(text: str) -> str:
     return unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", text).casefold())
 
@@ -195,13 +204,11 @@ def _listed(type_: type, options: Iterable[Option], *, expected: str, **limits: 
 
 
 def choice(choices: type[TextChoices]) -> Listed:
-    """One of the choices of a field of the model."""
     options = (Option(str(each.value), str(each.value), str(each.label)) for each in choices)
     return _listed(str, options, expected=f"one of {', '.join(choices.values)},", choices=choices.choices)
 
 
 def few(low: int, high: int) -> Listed:
-    """One of a few whole numbers."""
     options = (Option(str(n), n, str(n)) for n in range(low, high + 1))
     expected = f"a whole number from {low} to {high},"
     return _listed(int, options, expected=expected, min_value=low, max_value=high)
@@ -211,7 +218,6 @@ YES_NO: Final = _listed(bool, (Option("yes", True, "yes"), Option("no", False, "
 
 
 def whole(low: int, high: int) -> Whole:
-    """A whole number of many."""
     return Whole(
         type=int,
         limits={"min_value": low, "max_value": high},
@@ -221,19 +227,17 @@ def whole(low: int, high: int) -> Whole:
     )
 
 
-def measured(unit: str, units: Mapping[str, float]) -> Measured:
-    """A number of some unit, named in the plural; texts may name one of `units`."""
+def measured(unit: str) -> Measured:
+    """A number of some unit, named in the plural."""
     return Measured(
         type=float,
-        units=units,
         expected=f"{unit} above 0, or nothing",
-        advice=f"Enter a number of {unit} above 0, e.g. 12.5 or 50 ms.",
+        advice=f"Enter a number of {unit} above 0, e.g. 12.5.",
         takes=f"a number of {unit} above 0",
     )
 
 
 def free_text(limit: int) -> FreeText:
-    """A text of at most so many characters."""
     takes = f"a text of at most {MAX_FILTER_TEXT} characters, whatever the case"
     return FreeText(type=str, limits={"max_length": limit}, takes=takes)
 
@@ -329,7 +333,7 @@ DETAILS: tuple[Detail, ...] = (
     ),
     Detail(
         name="latency_ms",
-        kind=measured("milliseconds", _IN_MS),
+        kind=measured("milliseconds"),
         label="Latency (ms)",
         help="Milliseconds per prediction, above 0; needs the hardware.",
         filter="latency",

@@ -11,12 +11,7 @@ from django.utils import timezone
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused, clean_url
 from leaderboard.methods.details import DETAILS, free_text, text_of
-from leaderboard.models import (
-    Method,
-    Team,
-    User,
-    Visibility,
-)
+from leaderboard.models import Method, Team, User, Visibility
 from leaderboard.people import teams
 from leaderboard.people.names import clean_name, confusable_with, require_rename_possible
 
@@ -26,11 +21,7 @@ UUID_CHARACTERS = 36
 def edit(
     *, method: Method, changes: Mapping[str, object], actor: User, now: datetime | None = None
 ) -> Method:
-    """Say something else of a method; what `changes` does not name stays. Returns it as it is now.
-
-    Values are texts as people fill them in, or what they mean; None or an empty text takes back what was
-    said. The name stays once it is public. Raises `Refused`.
-    """
+    """Change a method's fields; None or an empty text clears one. Raises `Refused`."""
     clean = cleaned(changes)
     with transaction.atomic():
         teams.locked(method.team)
@@ -84,10 +75,9 @@ def require_team(method: Method, actor: User) -> None:
 def require_distinct_name(
     name: str, *, team: Team, field: str, but: Method | None = None, may_exist: bool = False
 ) -> None:
-    """Raise `Refused` for a name that would be taken for another one of the team's methods.
+    """Raise `Refused` for a name that looks like that of another of the team's methods.
 
-    It stays true for whoever has the team's row locked. Nobody else knows whether another request is making
-    a method of this very name: with `may_exist` that one is no other method.
+    With `may_exist`, a method of this very name is no other one: another request may just be making it.
     """
     others = Method.objects.existing().filter(team=team)
     if but is not None:
@@ -117,7 +107,7 @@ def _require_sound(method: Method, changed: Mapping[str, Any]) -> None:
 
 
 def require_hardware(changed: Mapping[str, Any], *, method: Method | None) -> None:
-    """Raise `Refused` for a latency of nobody knows what hardware; `method` is what it stands on, if any."""
+    """Raise `Refused` for a latency without hardware; `method` is what the changes stand on, if any."""
     before = method or Method()
     latency_ms = changed.get("latency_ms", before.latency_ms)
     if latency_ms is not None and not changed.get("hardware", before.hardware):
@@ -144,10 +134,7 @@ FIELDS = tuple(_CLEANERS)
 
 
 def name_meant(*, user: User, text: str) -> str:
-    """The name of the person's own method that a text means, which is its name, new or not, or its id.
-
-    Raises `Refused` for an id that is none of theirs: nobody calls a method so.
-    """
+    """The name of the person's own method that a name or id means. Raises `Refused` for another's id."""
     text = text.strip()
     try:
         pk = UUID(text) if len(text) == UUID_CHARACTERS else None

@@ -4,8 +4,7 @@
     private  -> public      everybody sees everything, for good
     anonymous -> public     at once, or at a moment that was named
 
-There is no way back. What everybody has seen cannot be unseen, and whoever could hide bad numbers again would
-show good ones only.
+There is no way back: whoever could hide bad numbers again would show good ones only.
 """
 
 from collections.abc import Mapping
@@ -19,12 +18,11 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.methods.methods import require_team
 from leaderboard.models import Method, PublishedResult, Team, User, Visibility
 from leaderboard.people import teams
-from leaderboard.people.names import MAX_NAME, confusable_with
+from leaderboard.people.names import confusable_with, numbered
 
 log = structlog.get_logger(__name__)
 
 MAX_ANONYMITY = timedelta(days=730)
-_ROOM_FOR_A_NUMBER = 10
 
 
 def choices(method: Method) -> tuple[Visibility, ...]:
@@ -37,10 +35,9 @@ def choices(method: Method) -> tuple[Visibility, ...]:
 def change(
     *, method: Method, visibility: str, actor: User, now: datetime, reveal_at: datetime | None = None
 ) -> Method:
-    """Show a method to everybody, under its pseudonym or its name. It cannot be taken back.
+    """Show a method to everybody, under its pseudonym or its name, which cannot be taken back.
 
-    An anonymous one turns public by itself at `reveal_at`, if that is given, and can be given another such
-    moment, or none. Raises `Refused`.
+    An anonymous one turns public by itself at `reveal_at`, if that is given. Raises `Refused`.
     """
     with transaction.atomic():
         teams.locked(method.team)
@@ -72,7 +69,7 @@ def change(
 
 
 def require_possible(method: Method, *, visibility: str, reveal_at: datetime | None, now: datetime) -> None:
-    """Raise `Refused` for what a method cannot become any more, and for a moment that is none."""
+    """Raise `Refused` for what a method cannot become."""
     if visibility not in (Visibility.ANONYMOUS, Visibility.PUBLIC):
         raise Refused(
             "bad-value",
@@ -105,10 +102,7 @@ def require_possible(method: Method, *, visibility: str, reveal_at: datetime | N
 
 
 def notice_of(method: Method) -> str:
-    """Who sees the results of a method, in a sentence, for whoever is about to send one; empty if private.
-
-    A method is shown on every split at once, so a file for another split is seen as soon as it is scored.
-    """
+    """Who sees the results of a method, in a sentence; empty if private."""
     if method.visibility == Visibility.PUBLIC:
         return f"{method.name} is public: everyone sees its results on every split."
     if method.visibility == Visibility.ANONYMOUS:
@@ -139,10 +133,6 @@ def reveal_due(*, now: datetime) -> int:
 
 
 def _require_name_of_its_own(method: Method) -> None:
-    """Raise `Refused` where readers would take the method for another row of the boards.
-
-    CI jobs name the method that they compare with: a second row of that name would break them.
-    """
     twin = _public_twin(method.name, but=method)
     if twin is not None:
         raise Refused(
@@ -154,17 +144,15 @@ def _require_name_of_its_own(method: Method) -> None:
 
 
 def _number_taken_name(method: Method) -> None:
-    """Add a number to the name of a method that becomes public by itself, where the name is taken.
-
-    The new name is not that of another method of the team either: nobody is there to choose one.
-    """
-    before, number = method.name, 1
+    """Add a number to the name of a method that becomes public by itself, where the name is taken."""
+    before = method.name
     own = Method.objects.existing().filter(team=method.team_id).exclude(pk=method.pk)
     names_of_team = list(own.values_list("name", flat=True))
-    while _public_twin(method.name, but=method) or confusable_with(method.name, names_of_team):
-        number += 1
-        method.name = f"{before[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
-    if number > 1:
+    method.name = numbered(
+        before,
+        is_taken=lambda name: _public_twin(name, but=method) or confusable_with(name, names_of_team),
+    )
+    if method.name != before:
         method.save(update_fields=["name"])
         details = {"reason": "another method used this name on the boards first"}
         names = {"from": before, "to": method.name}
@@ -172,7 +160,6 @@ def _number_taken_name(method: Method) -> None:
 
 
 def _public_twin(name: str, *, but: Method) -> str | None:
-    """A public method or a quoted row whose name looks like this one."""
     quoted = PublishedResult.objects.filter(replaced_at=None).values_list("method_name", flat=True)
     public = Method.objects.filter(visibility=Visibility.PUBLIC).exclude(pk=but.pk)
     return confusable_with(name, [*quoted, *public.values_list("name", flat=True)])

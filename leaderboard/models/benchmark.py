@@ -151,13 +151,6 @@ class Split(QuotaRules):
             )
         return found
 
-    @property
-    def times(self) -> tuple[datetime | None, datetime | None]:
-        """When it opens and closes; neither where the two make no sense together."""
-        if self.opens_at and self.closes_at and self.opens_at >= self.closes_at:
-            return None, None
-        return self.opens_at, self.closes_at
-
     def announcement_at(self, now: datetime) -> str:
         """The line that its pages show at this moment; empty if there is none, or if it has ended."""
         ends_at = self.announcement_ends_at

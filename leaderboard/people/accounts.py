@@ -1,4 +1,4 @@
-"""Accounts, held while something is written that belongs to one: nobody deletes the account meanwhile."""
+"""Accounts, locked while something is written that belongs to one."""
 
 from django.db import transaction
 
@@ -10,7 +10,7 @@ MAX_REASON = 500
 
 
 def hold(user: User) -> User:
-    """The account as it is, which stays so until the transaction ends."""
+    """The account, locked."""
     return User.objects.select_for_update(no_key=True).get(pk=user.pk)
 
 
@@ -22,16 +22,13 @@ def hold_open(user: User) -> User:
 
 
 def require_open(row: User) -> None:
-    """Raise `Refused` for an account that is closed or deleted; certain for whoever holds it."""
+    """Raise `Refused` for an account that is closed or deleted."""
     if not row.is_active:
         raise Refused("account-closed", "This account is closed or deleted.")
 
 
 def set_maintainer(*, user: User, is_maintainer: bool, reason: str) -> User:
-    """Give the role of a maintainer to an account, or end it.
-
-    Raises `Refused` without a reason, and for a closed account that would get the role.
-    """
+    """Give the role of a maintainer to an account, or end it. Raises `Refused`."""
     reason = clean_text("reason", reason, limit=MAX_REASON)
     with transaction.atomic():
         row = hold_open(user) if is_maintainer else hold(user)

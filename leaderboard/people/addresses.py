@@ -1,7 +1,6 @@
 """Email addresses where the site proves them: one that nobody has proved takes nothing from its owner.
 
-An account that somebody signed up and never confirmed gives way to the next sign-up with its address, and is
-deleted after a day. So does an unproved address beside the primary one, which only older versions kept.
+An account that was never confirmed gives way to the next sign-up, and is deleted after a day.
 """
 
 from datetime import datetime, timedelta
@@ -9,7 +8,7 @@ from datetime import datetime, timedelta
 from allauth.account.models import EmailAddress
 from django.conf import settings
 from django.db import transaction
-from django.db.models import Exists, F, OuterRef, Q, QuerySet
+from django.db.models import Exists, OuterRef, Q, QuerySet
 
 from leaderboard.models import User
 
@@ -17,12 +16,9 @@ UNCONFIRMED_FOR = timedelta(days=1)
 
 
 def accounts_of(address: str) -> QuerySet[User]:
-    """The accounts that this address belongs to: at most one, where it is proved.
-
-    Where the site proves no addresses, also those that have it unproved.
-    """
+    """The accounts with this address; where the site proves addresses, those that have proved it."""
     has_it = Q(email__iexact=address)
-    if not _are_proved():
+    if not are_proved():
         return User.objects.filter(has_it | Exists(_rows().filter(email__iexact=address)))
     has_proved_it = Exists(_rows().filter(email__iexact=address, verified=True))
     return User.objects.filter(has_it | has_proved_it).exclude(_is_unconfirmed())
@@ -30,18 +26,15 @@ def accounts_of(address: str) -> QuerySet[User]:
 
 def release(*, address: str, to: User | None = None) -> None:
     """Take the address from everybody who has not proved it, but not from the person who does so now."""
-    if not _are_proved():
+    if not are_proved():
         return
-    kept = User.objects.filter(pk=to.pk) if to else User.objects.none()
-    with transaction.atomic():
-        EmailAddress.objects.filter(_is_spare(), email__iexact=address).exclude(user__in=kept).delete()
-        _delete_unconfirmed(User.objects.filter(email__iexact=address).exclude(pk__in=kept))
+    others = User.objects.filter(email__iexact=address)
+    _delete_unconfirmed(others.exclude(pk=to.pk) if to else others)
 
 
 def delete_unproved(*, now: datetime) -> None:
-    """Delete accounts that nobody confirmed within a day, and spare addresses."""
-    if _are_proved():
-        EmailAddress.objects.filter(_is_spare()).delete()
+    """Delete accounts that nobody confirmed within a day."""
+    if are_proved():
         _delete_unconfirmed(User.objects.filter(date_joined__lt=now - UNCONFIRMED_FOR))
 
 
@@ -52,7 +45,8 @@ def _delete_unconfirmed(people: QuerySet[User]) -> None:
         User.objects.filter(_is_unconfirmed(), pk__in=[user.pk for user in locked]).delete()
 
 
-def _are_proved() -> bool:
+def are_proved() -> bool:
+    """Whether addresses are proved here. Where they are not, an address says nothing of who has it."""
     return bool(settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory")
 
 
@@ -61,11 +55,5 @@ def _rows() -> QuerySet[EmailAddress]:
 
 
 def _is_unconfirmed() -> Q:
-    """Somebody signed it up, and nobody has ever been in it."""
     is_unused = Q(last_login=None, is_staff=False, membership=None, submissions=None)
     return is_unused & Q(Exists(_rows())) & ~Q(Exists(_rows().filter(verified=True)))
-
-
-def _is_spare() -> Q:
-    """An unproved address that is not the one of the account."""
-    return Q(verified=False) & ~Q(email__iexact=F("user__email"))

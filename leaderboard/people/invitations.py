@@ -1,7 +1,4 @@
-"""Invitations: links that let one person into a team, once, for a while.
-
-The secret of a link is shown when it is made and kept as its hash alone; whoever has it may come in.
-"""
+"""Invitations: links that let one person into a team, once, for a while. Only their hashes are kept."""
 
 import hashlib
 import re
@@ -19,7 +16,7 @@ from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, Team, User, Visibility
 from leaderboard.people import accounts, teams
-from leaderboard.people.names import MAX_NAME, confusable_with
+from leaderboard.people.names import confusable_with, numbered
 
 LIFETIME = timedelta(days=7)
 MAX_STANDING = 20
@@ -32,17 +29,13 @@ class UnusableInvitation(Refused):
 
 @dataclass(frozen=True)
 class Meaning:
-    """What accepting an invitation would do to whoever asks.
-
-    `left` is the team that they would leave. Where they are alone in it, its methods come along, `renamed`
-    being those whose names would look like one that is there; else what they sent stays where it is.
-    """
+    """What accepting would do: the team left, and the methods of a team of one that come along."""
 
     invitation: Invitation
     left: Team | None
     n_methods: int
     n_private: int
-    renamed: tuple[tuple[str, str], ...]
+    renamed: tuple[tuple[str, str], ...]  # names that look like one that is there, and the new ones
     comes_along: bool
     refusal: str = ""
 
@@ -137,10 +130,7 @@ def meaning(*, invitation: Invitation, user: User) -> Meaning:
 
 
 def accept(*, secret: str, user: User, now: datetime) -> Team:
-    """Come into the team, which uses the link up. Of two who do it at once, one comes in.
-
-    Whoever was alone in a team brings its methods along. Raises `Refused`.
-    """
+    """Join the team by a link, once. Whoever was alone in a team brings its methods. Raises `Refused`."""
     seen = find(secret=secret, now=now)
     if seen is None:
         raise _nothing()
@@ -234,7 +224,6 @@ def _enter(team: Team, user: User, *, now: datetime) -> None:
 
 
 def _bring_methods(former: Team, team: Team) -> dict[str, str]:
-    """Move every method of one team into the other. Returns their names there, by id."""
     methods = list(Method.objects.select_for_update(no_key=True).filter(team=former).order_by("name"))
     there = Method.objects.existing().filter(team=team).values_list("name", flat=True)
     names = _names_there([method.name for method in methods if method.deleted_at is None], there)
@@ -246,15 +235,9 @@ def _bring_methods(former: Team, team: Team) -> dict[str, str]:
 
 
 def _names_there(names: Iterable[str], taken: Iterable[str]) -> dict[str, str]:
-    """What methods of these names are called among others: numbered where they would be taken for one."""
     found: dict[str, str] = {}
     others = list(taken)
     for name in names:
-        new, number = name, 1
-        while confusable_with(new, others):
-            number += 1
-            ending = f" {number}"
-            new = f"{name[: MAX_NAME - len(ending)]}{ending}"
-        found[name] = new
-        others.append(new)
+        found[name] = numbered(name, is_taken=lambda new: confusable_with(new, others))
+        others.append(found[name])
     return found

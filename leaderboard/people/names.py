@@ -1,11 +1,7 @@
-"""Names that people choose: which are taken, and which look alike (UTS 39).
-
-What looks alike is Unicode's list of confusable characters (UTS 39, through `confusable-homoglyphs`), each
-folded to what it is taken for. The list says nothing of case, and has a few gaps that this fills.
-"""
+"""Names that people choose: which are taken, and which look alike (UTS 39)."""
 
 import unicodedata
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta
 from functools import cache
 from typing import Any
@@ -33,7 +29,7 @@ _MAX_MARKS = 2
 
 
 def skeleton(name: str) -> str:
-    """What a name looks like, as a key: names with the same one are taken for each other.
+    """What a name looks like, as a key of at most `MAX_LOOK` characters: equal ones are taken for each other.
 
     >>> skeleton("Foo  Lab") == skeleton("ｆｏｏ lab") == skeleton("Fоο Lаb")
     True
@@ -41,7 +37,7 @@ def skeleton(name: str) -> str:
     False
     """
     folded = "".join(_folded(character) for character in unicodedata.normalize("NFKD", name))
-    return " ".join(folded.casefold().translate(_ONE_LOOK).split())
+    return " ".join(folded.casefold().translate(_ONE_LOOK).split())[:MAX_LOOK]
 
 
 def clean_name(field: str, text: str) -> str:
@@ -62,14 +58,7 @@ def clean_name(field: str, text: str) -> str:
         raise Refused(
             "bad-name", f"The name in '{field}' is {text!r}; expected a letter or a digit in it.", field=field
         )
-    found = skeleton(text)
-    if len(found) > MAX_LOOK:
-        raise Refused(
-            "text-too-long",
-            f"The name in '{field}' is shown with {len(found)} characters; expected at most {MAX_LOOK}.",
-            field=field,
-        )
-    if found.startswith(skeleton(RESERVED)):
+    if skeleton(text).startswith(skeleton(RESERVED)):
         raise Refused(
             "reserved-name",
             f"The name in '{field}' looks like {RESERVED!r}, which is reserved for methods without a name; "
@@ -80,12 +69,11 @@ def clean_name(field: str, text: str) -> str:
 
 
 def require_rename_possible(*, renamed_at: datetime | None, now: datetime) -> None:
-    """Raise `Refused` for what was renamed lately: each new name voids what is remembered."""
+    """Raise `Refused` for what was renamed lately."""
     if renamed_at is None or now >= renamed_at + settings.RENAME_AFTER:
         return
     again_at = renamed_at + settings.RENAME_AFTER
-    # The minute that has begun by then, so that whoever comes back at it is in time.
-    again_at += timedelta(minutes=1) - timedelta(seconds=again_at.second, microseconds=again_at.microsecond)
+    again_at += timedelta(minutes=1)  # the minute that has begun by then
     raise Refused(
         "renamed-lately",
         f"The name was changed at {renamed_at:%Y-%m-%d %H:%M} UTC; expected the next change after "
@@ -98,6 +86,16 @@ def confusable_with(name: str, others: Iterable[str]) -> str | None:
     """The first of the other names that this one would be taken for."""
     wanted = skeleton(name)
     return next((other for other in others if skeleton(other) == wanted), None)
+
+
+def numbered(wanted: str, *, is_taken: Callable[[str], object]) -> str:
+    """The name, with the first number under which it is not taken."""
+    name, number = wanted, 1
+    while is_taken(name):
+        number += 1
+        ending = f" {number}"
+        name = f"{wanted[: MAX_NAME - len(ending)]}{ending}"
+    return name
 
 
 def _with_plain_spaces(text: str) -> str:
@@ -128,16 +126,13 @@ def _folded(character: str) -> str:
 
 @cache
 def _prototypes() -> Mapping[str, str]:
-    """Each confusable character and what it is taken for, without what is too small to be seen.
-
-    The library lists pairs both ways round. The list that it was made from gives every character one target,
-    which itself has none: what stands alone with one partner is the character, what has many is the target.
-    """
+    """Each confusable character and what it is taken for, without marks."""
     from confusable_homoglyphs.confusables import (  # noqa: PLC0415 - a list of 0.9 MB, which few processes need
         confusables_data,
     )
 
     data: Mapping[str, list[dict[str, Any]]] = confusables_data
+    # The library lists pairs both ways round: what has many partners is the target.
     found = {}
     for character, partners in data.items():
         if len(character) != 1 or character.isascii() or len(partners) != 1:

@@ -1,7 +1,4 @@
-"""The second factor of an account: codes of an app, and recovery codes for the day when the app is lost.
-
-allauth keeps both and asks for them at sign-in; here is what the site itself asks and does.
-"""
+"""The second factor of an account, which allauth keeps and asks for: who must have one, and its reset."""
 
 from allauth.mfa.models import Authenticator
 from django.conf import settings
@@ -23,9 +20,8 @@ def is_set_up(user: User) -> bool:
 
 
 def reset(*, user: User, reason: str) -> AuditEvent:
-    """Take the second factor off an account whose owner lost it, and its recovery codes with it.
+    """Delete the second factor and recovery codes of an account. Returns the audit event.
 
-    Only the command line does this: who asks has shown a maintainer who they are. Returns the audit event.
     Raises `Refused` without a reason, and for an account without a second factor.
     """
     reason = clean_text("reason", reason, limit=500)

@@ -1,8 +1,6 @@
 """Teams: who competes. A person is in one team at a time; somebody alone is a team of one.
 
-What changes who is in a team locks, in this order: the person, the teams by their ids, the invitation. A
-submission locks the person and the team as well, so nobody leaves while a slot of the quota is being counted.
-Whatever writes a row that belongs to a person locks the account (see `accounts`), as its deletion does.
+What changes who is in a team locks, in this order: the person, the teams by their ids, the invitation.
 """
 
 import secrets
@@ -15,9 +13,7 @@ from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Invitation, Membership, Method, QuotaOverride, Team, User
 from leaderboard.people import accounts
-from leaderboard.people.names import MAX_NAME, clean_name, require_rename_possible, skeleton
-
-_ROOM_FOR_A_NUMBER = 10
+from leaderboard.people.names import MAX_NAME, clean_name, numbered, require_rename_possible, skeleton
 
 
 def current_team_of(*, user: User) -> Team | None:
@@ -35,7 +31,7 @@ def team_of(*, user: User) -> Team:
         wanted = clean_name("name", user.name)
     except Refused:
         wanted = f"Team {secrets.token_hex(3)}"
-    name = _numbered(wanted[: MAX_NAME - _ROOM_FOR_A_NUMBER])
+    name = numbered(wanted[:MAX_NAME], is_taken=_public_twin)
     return _created(Team.objects.create(name=name, look=skeleton(name)), user)
 
 
@@ -46,7 +42,8 @@ def create(*, user: User, name: str, now: datetime) -> Team:
         accounts.hold_open(user)
         if current_team_of(user=user) is not None:
             raise Refused("in-a-team", "You are in a team already; expected somebody who is in none.")
-        _require_free(name)
+        if _public_twin(name):
+            raise _taken(name)
         return _created(Team.objects.create(name=name, look=skeleton(name), created_at=now), user)
 
 
@@ -70,7 +67,8 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
 
 def set_name(*, team: Team, name: str, now: datetime) -> None:
     """Give a team that the caller has locked a clean name. Raises `Refused` for one that is taken."""
-    _require_free(name, but=team)
+    if _public_twin(name, but=team):
+        raise _taken(name)
     team.name, team.look, team.renamed_at = name, skeleton(name), now
     try:
         with transaction.atomic():
@@ -80,10 +78,7 @@ def set_name(*, team: Team, name: str, now: datetime) -> None:
 
 
 def show_name(team: Team) -> None:
-    """Note that everybody reads the team's name from now on, for good; for whoever has its row locked.
-
-    Until then others may be called the same. Raises `Refused` where one of them was shown first.
-    """
+    """Note that everybody reads the locked team's name from now on. Raises `Refused` where it is taken."""
     if team.is_shown:
         return
     require_showable(team)
@@ -95,8 +90,8 @@ def show_name(team: Team) -> None:
 
 
 def show_name_in_any_case(team: Team) -> None:
-    """The same where nobody is there to choose another name: a number is added to a name that is taken."""
-    name = _numbered(team.name, but=team)
+    """The same, with a number added to a name that is taken."""
+    name = numbered(team.name, is_taken=lambda name: _public_twin(name, but=team))
     if name != team.name:
         Team.objects.filter(pk=team.pk).update(name=name, look=skeleton(name))
     before, team.name = team.name, name
@@ -108,16 +103,13 @@ def show_name_in_any_case(team: Team) -> None:
 
 
 def require_showable(team: Team) -> None:
-    """Raise `Refused` where everybody would take the team's name for that of another team."""
+    """Raise `Refused` where another team on the boards looks like this one."""
     if not team.is_shown and _public_twin(team.name, but=team):
         raise _taken_first(team.name)
 
 
 def leave(*, user: User) -> Team:
-    """Go out of one's team. What was sent from it stays with it. Returns the team that was left.
-
-    An owner hands over first, unless nobody else is there. Raises `Refused`.
-    """
+    """Leave one's team, which keeps what was sent from it. Returns that team. Raises `Refused`."""
     with transaction.atomic():
         membership = current_membership(user)
         if membership is None:
@@ -137,7 +129,7 @@ def leave(*, user: User) -> Team:
 
 
 def remove(*, team: Team, member: User, actor: User) -> None:
-    """Put somebody out of the team. Its owner does, and leaves by leaving. Raises `Refused`."""
+    """Remove a member, as the owner. Raises `Refused`."""
     with transaction.atomic():
         row = locked(team)[0]
         require_owner(row, actor, doing="removes members")
@@ -209,8 +201,7 @@ def current_membership(user: User, *also: Team) -> Membership | None:
 
 
 def end_if_empty(team: Team) -> bool:
-    """Forget a team that nobody is in and that has nothing. Returns whether it is gone."""
-    # Rules that a maintainer gave it are a reason to keep it: they say something of those who were in it.
+    """Delete a team without members, methods and quota overrides. Returns whether it is gone."""
     rests = (
         team.memberships.exists()
         or Method.objects.filter(team=team).exists()
@@ -222,7 +213,7 @@ def end_if_empty(team: Team) -> bool:
 
 
 def end_invitations(team: Team, *, of: User) -> None:
-    """End the links that somebody made who is not in the team any more: they would still open its door."""
+    """Revoke the links that a former member made."""
     links = Invitation.objects.filter(team=team, created_by=of, accepted_at=None, revoked_at=None)
     links.update(revoked_at=Now())
 
@@ -255,20 +246,6 @@ def _public_twin(name: str, *, but: Team | None = None) -> bool:
     """Whether a team that everybody sees has a name like it. Other teams take no name."""
     shown = Team.objects.filter(look=skeleton(name), is_shown=True)
     return (shown.exclude(pk=but.pk) if but is not None else shown).exists()
-
-
-def _require_free(name: str, *, but: Team | None = None) -> None:
-    if _public_twin(name, but=but):
-        raise _taken(name)
-
-
-def _numbered(wanted: str, *, but: Team | None = None) -> str:
-    """The name, with a number if a team that everybody sees has it."""
-    name, number = wanted, 1
-    while _public_twin(name, but=but):
-        number += 1
-        name = f"{wanted[: MAX_NAME - _ROOM_FOR_A_NUMBER]} {number}"
-    return name
 
 
 def _created(team: Team, user: User) -> Team:

@@ -13,8 +13,8 @@ from knox.settings import CONSTANTS
 
 from evaluator.counting import counted
 from leaderboard import audit
-from leaderboard.errors.refusals import Refused, require_maintainer
-from leaderboard.models import ApiToken, Scope, Split, User
+from leaderboard.errors.refusals import Refused, clean_text, require_maintainer, shown_split
+from leaderboard.models import ApiToken, Scope, User
 from leaderboard.people import accounts
 
 DAYS = 90
@@ -44,13 +44,13 @@ def create(
     days: int = DAYS,
     actor: User | None = None,
 ) -> str:
-    """A new token of that person. The return value is the only place where it ever stands.
+    """A new token of that person, which is kept nowhere. Without `split_name` it is good for every split.
 
-    Without `split_name` it is good for every split. Raises `Refused`.
+    Raises `Refused`.
     """
-    name = _name(name)
+    name = clean_text("name", name, limit=80)
     _check(scopes=scopes, days=days)
-    split = _split(split_name)
+    split = shown_split(split_name) if split_name else None
     with transaction.atomic():
         # Two at once would both find room for the last one.
         accounts.hold_open(user)
@@ -82,21 +82,6 @@ def create(
     return secret
 
 
-def _name(text: str) -> str:
-    name = text.strip()
-    if not name:
-        raise Refused("missing-field", "The token has no name; expected what it is for.", field="name")
-    if len(name) > 80:
-        raise Refused(
-            "text-too-long", f"The name has {len(name)} characters; expected at most 80.", field="name"
-        )
-    if not name.isprintable():
-        raise Refused(
-            "bad-character", "The name has characters that cannot be shown; expected text.", field="name"
-        )
-    return name
-
-
 def _check(*, scopes: Collection[str], days: int) -> None:
     unknown = [scope for scope in scopes if scope not in Scope.values]
     if unknown or not scopes:
@@ -108,18 +93,6 @@ def _check(*, scopes: Collection[str], days: int) -> None:
             f"The token expires after {counted(days, 'day')}; expected 1 to {MAX_DAYS}.",
             field="days",
         )
-
-
-def _split(name: str) -> Split | None:
-    if not name:
-        return None
-    split = Split.objects.shown().filter(pk=name).first()
-    if split is None:
-        known = ", ".join(Split.objects.shown().values_list("pk", flat=True))
-        raise Refused(
-            "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
-        )
-    return split
 
 
 # --- using one -------------------------------------------------------------------------------------------

@@ -11,18 +11,14 @@ from leaderboard.models import Admission, Split, Team, User
 from leaderboard.quotas import quotas
 
 
-class NotAdmitted(Refused):
-    """The split takes files of admitted teams alone, and this team is not one of them."""
-
-
-def refusal_of(*, team: Team | None, split: Split) -> NotAdmitted | None:
+def refusal_of(*, team: Team | None, split: Split) -> Refused | None:
     """Why the split takes nothing from this team; None if it does, as far as admission goes."""
     if not split.needs_admission:
         return None
     if team is not None and Admission.objects.filter(team=team, split=split).exists():
         return None
     ask = split.how_to_be_admitted.rstrip(". ") or "ask the maintainers of this site for access"
-    return NotAdmitted(
+    return Refused(
         "not-admitted",
         f"Only admitted teams can submit to {split.pk}, and your team is not one of them; {ask}.",
         field="split",
@@ -30,7 +26,7 @@ def refusal_of(*, team: Team | None, split: Split) -> NotAdmitted | None:
 
 
 def require(*, team: Team | None, split: Split) -> None:
-    """Raise `NotAdmitted` unless the split takes files of this team."""
+    """Raise `Refused` unless the split takes files of this team."""
     refusal = refusal_of(team=team, split=split)
     if refusal is not None:
         raise refusal
@@ -68,7 +64,7 @@ def end(*, row: Admission, reason: str, actor: User | None) -> None:
 def refusal_for_all(split: Split, *, now: datetime) -> Refused | None:
     """Why a split takes nothing from anybody now; None if it does."""
     code, sentence = "", ""
-    opens_at, closes_at = split.times
+    opens_at, closes_at = split.opens_at, split.closes_at
     if split.is_archived:
         code, sentence = "split-closed", "are closed: the split is archived."
     elif not split.has_ground_truth:
@@ -95,8 +91,8 @@ def sentence_of(split: Split, *, now: datetime) -> str:
 
 def closing_of(split: Split) -> str:
     """Until when a split that takes submissions does so; empty where nothing limits it."""
-    closes_at = split.times[1]
-    return f"Submissions to {split.pk} close at {closes_at:%Y-%m-%d %H:%M} UTC." if closes_at else ""
+    at = split.closes_at
+    return f"Submissions to {split.pk} close at {at:%Y-%m-%d %H:%M} UTC." if at else ""
 
 
 def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quotas.Quota:
@@ -108,6 +104,6 @@ def left(*, team: Team | None, user: User, split: Split, now: datetime) -> quota
         return replace(quota, is_open=False, next_slot_at=None, sentence=str(not_admitted))
     if refusal is None:
         return quota
-    opens_at = split.times[0]
+    opens_at = split.opens_at
     is_to_come = opens_at is not None and opens_at > now and split.has_ground_truth
     return replace(quota, is_open=False, next_slot_at=opens_at if is_to_come else None, sentence=str(refusal))

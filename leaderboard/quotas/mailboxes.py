@@ -1,31 +1,24 @@
 """What a mailbox has sent stays sent when its account is deleted.
 
-The submissions stay with the blank account. Beside it stays a keyed hash of each of its mailboxes, so that
-the next account of the same mailbox has spent what this one has. It is deleted once no window of any rule
-reaches back to the last file. The key comes from `SECRET_KEY`: with another one, the hashes match nothing.
+A keyed hash of each mailbox stays until no window reaches back to its last file. The key comes from
+`SECRET_KEY`: with another one, the hashes match nothing.
 """
 
 from datetime import datetime, timedelta
 
 from allauth.account.models import EmailAddress
-from django.conf import settings
 from django.db.models import Max, QuerySet
 from django.utils.crypto import salted_hmac
 
 from leaderboard.models import QuotaOverride, SpentMailbox, Split, Submission, User
 from leaderboard.models.people import MAILBOX
-from leaderboard.quotas.rules import BYTES_WINDOW, REJECTED_WINDOW, rules_of
-
-
-def are_proved() -> bool:
-    """Whether addresses are proved here. Where they are not, an address says nothing of who has it."""
-    return bool(settings.ACCOUNT_EMAIL_VERIFICATION == "mandatory")
+from leaderboard.people import addresses
 
 
 def keep(*, user: User, now: datetime) -> None:
     """Keep the hashes of an account's mailboxes if it has sent files lately; call it before it is blanked."""
     sent_at = Submission.objects.filter(submitted_by=user).aggregate(at=Max("submitted_at"))["at"]
-    if sent_at is None or not are_proved():
+    if sent_at is None or not addresses.are_proved():
         return
     kept_until = sent_at + longest_window()
     if kept_until > now:
@@ -47,14 +40,9 @@ def delete_expired(*, now: datetime) -> None:
 
 
 def longest_window() -> timedelta:
-    """How far back the rules of any split and team look."""
-    own = QuotaOverride.objects.select_related("team", "split")
-    rules = [
-        *(rules_of(team=None, split=split) for split in Split.objects.all()),
-        *(rules_of(team=row.team, split=row.split) for row in own),
-    ]
-    spans = [span for each in rules for span in (each.window, each.min_gap)]
-    return max(REJECTED_WINDOW, BYTES_WINDOW, *spans)
+    """How far back the rules of any split and team look, a day at least."""
+    rules = [*Split.objects.all(), *QuotaOverride.objects.all()]
+    return max(timedelta(days=1), *(span for row in rules for span in (row.quota_window, row.quota_min_gap)))
 
 
 def _digests(people: QuerySet[User]) -> set[str]:

@@ -1,17 +1,12 @@
 """Quotas: how much a team may still send to a split, and when the next slot opens.
 
-Nothing is counted up or down. What is spent follows from the submissions and what came of them, so no counter
-can drift: a submission costs a slot while it waits or runs, and for good once it is scored. Rejected,
-cancelled or failed by our fault it costs none. Rejected and cancelled files have a limit of their own: all of
-them are kept, and whoever could send any number of them would fill the disk. So have files that stopped the
-process that read them, until a maintainer has had them read again: that is our fault, and each costs seconds
-of a reader. Both have another limit for all splits together. All files that a team sends within a day,
-whatever came of them, have a number of bytes in common.
+Nothing is counted up or down: what is spent follows from the submissions and what came of them. A submission
+costs a slot while it waits or runs, and for good once it is scored. Rejected and cancelled files, and those
+that stopped the process that read them, cost none, but have a limit of their own. All files that a team sends
+within a day have a number of bytes in common.
 
 Quota follows people: a team has spent what its methods got, from whomever, and what those who are in it now
-have sent, from wherever. So nobody gets more by changing teams, nor a team by changing people. One person
-has one account: what is sent from several accounts of one mailbox is sent by one person, also where they
-have deleted one of them (see `mailboxes`).
+have sent, from wherever. Accounts of one mailbox are one person's, deleted ones included (see `mailboxes`).
 """
 
 import math
@@ -27,24 +22,13 @@ from evaluator.counting import counted
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Evaluation, Membership, QuotaOverride, Split, Status, Submission, Team, User
-from leaderboard.models.quotas import excess
-from leaderboard.people import accounts
+from leaderboard.models.quotas import QuotaRules, excess
+from leaderboard.people import accounts, addresses
 from leaderboard.quotas import mailboxes
-from leaderboard.quotas.rules import BYTES_WINDOW, REJECTED_WINDOW, UNLIMITED, Rules, rules_of
-from leaderboard.quotas.spans import parse_span, span
+from leaderboard.quotas.spans import span
 
-__all__ = [
-    "UNLIMITED",
-    "Quota",
-    "QuotaExceeded",
-    "Rules",
-    "override",
-    "parse_span",
-    "require",
-    "rules_of",
-    "span",
-    "state",
-]
+DAY = timedelta(days=1)
+UNLIMITED = QuotaOverride(quota_limit=None, quota_rejected_limit=None)
 
 
 class QuotaExceeded(Exception):
@@ -66,7 +50,7 @@ class Quota:
     """
 
     split: str
-    rules: Rules
+    rules: QuotaRules
     used: int
     n_rejected: int
     is_open: bool
@@ -76,12 +60,22 @@ class Quota:
     @property
     def limit(self) -> int | None:
         """Submissions within the window; None is without limit."""
-        return self.rules.limit
+        return self.rules.quota_limit
 
     @property
     def left(self) -> int | None:
         """How many of them are not spent."""
         return None if self.limit is None else max(0, self.limit - self.used)
+
+    @property
+    def window_s(self) -> float:
+        """The rolling window in seconds."""
+        return self.rules.quota_window.total_seconds()
+
+    @property
+    def min_gap_s(self) -> float:
+        """The least time between two submissions in seconds."""
+        return self.rules.quota_min_gap.total_seconds()
 
     def retry_after_s(self, *, now: datetime) -> int | None:
         """Whole seconds until the next slot; None where none opens by itself."""
@@ -90,30 +84,32 @@ class Quota:
         return max(1, math.ceil((self.next_slot_at - now).total_seconds()))
 
 
+def rules_of(*, team: Team | None, split: Split) -> QuotaRules:
+    """The team's own rules on a split, else the split's."""
+    if not settings.QUOTAS:
+        return UNLIMITED
+    return QuotaOverride.objects.filter(team=team, split=split).first() or split
+
+
 def state(*, team: Team | None, user: User, split: Split, now: datetime) -> Quota:
     """What the team has left on the split; of somebody without a team, what they themselves have."""
     rules = rules_of(team=team, split=split)
-    return _state(team=team, user=user, split=split, rules=rules, now=now)
+    spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
+    return weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
 
 
 def lock(*, team: Team) -> bool:
-    """Let what else the team does wait until this transaction ends, so that two cannot take one slot.
-
-    To be called before anything is looked up that `require` or an answer depends on. Returns whether the team
-    is still there.
-    """
-    # The teams of other accounts of its people spend the same quota. SQLite has one writer at a time, and
-    # takes no notice.
+    """Lock the team's quota until this transaction ends. Returns whether the team is still there."""
+    # The teams of other accounts of its people spend the same quota.
     others = Membership.objects.filter(user__mailbox__in=team.members.values("mailbox")).values("team")
     rows = Team.objects.select_for_update(no_key=True).filter(Q(pk=team.pk) | Q(pk__in=others))
     return team.pk in {row.pk for row in rows.order_by("pk")}
 
 
 def hold_accounts(*, user: User) -> None:
-    """Let no account of this mailbox enter a team, and nobody delete this one, until the transaction ends.
+    """Lock the accounts of this mailbox, so that two of them cannot take one slot.
 
-    Else two of them could each get a team, and both a slot of the quota that they have in common. Raises
-    `Refused` for an account that is closed or deleted.
+    Raises `Refused` for an account that is closed or deleted.
     """
     same = Q(pk=user.pk) | Q(mailbox__in=User.objects.filter(pk=user.pk).values("mailbox"))
     rows = User.objects.select_for_update(no_key=True).filter(same).order_by("pk")
@@ -121,10 +117,7 @@ def hold_accounts(*, user: User) -> None:
 
 
 def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now: datetime) -> None:
-    """Raise `QuotaExceeded` unless a slot is open for a file of this size.
-
-    What it says is certain for whoever has called `lock`.
-    """
+    """Raise `QuotaExceeded` unless a slot is open for a file of this size; certain after `lock`."""
     if not settings.QUOTAS:
         return
     quota = state(team=team, user=user, split=split, now=now)
@@ -132,30 +125,6 @@ def require(*, team: Team | None, user: User, split: Split, size_bytes: int, now
         quota = _with_bytes(quota, team=team, user=user, size_bytes=size_bytes, now=now)
     if not quota.is_open:
         raise QuotaExceeded(quota)
-
-
-def _state(*, team: Team | None, user: User, split: Split, rules: Rules, now: datetime) -> Quota:
-    spent, rejected = _spent(team=team, user=user, split=split, rules=rules, now=now)
-    quota = weigh(split=split, rules=rules, spent=spent, rejected=rejected, now=now)
-    # Rules without this limit are those of a team that somebody trusts with any number.
-    if quota.is_open and rules.rejected_limit is not None and settings.MAX_TEAM_REJECTED_PER_DAY:
-        quota = _with_rejected(quota, team=team, user=user, now=now)
-    return quota
-
-
-def _with_rejected(quota: Quota, *, team: Team | None, user: User, now: datetime) -> Quota:
-    """The quota, closed if too many of the team's files were rejected on all splits together."""
-    rows = Submission.objects.filter(_theirs(team, user), submitted_at__gt=now - REJECTED_WINDOW)
-    times = rows.filter(_is_rejected()).order_by("submitted_at").values_list("submitted_at", flat=True)
-    opens_at = _until(list(times), limit=settings.MAX_TEAM_REJECTED_PER_DAY, window=REJECTED_WINDOW)
-    if opens_at is None:
-        return quota
-    sentence = (
-        "Your team has reached its limit for all splits together: within 24 hours, "
-        f"{counted(len(times), 'file')} that were rejected, were cancelled, or stopped the process "
-        f"that read them; the next slot opens at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC."
-    )
-    return replace(quota, is_open=False, next_slot_at=opens_at, sentence=sentence)
 
 
 def _is_rejected() -> Q:
@@ -169,10 +138,10 @@ def _is_rejected() -> Q:
 
 
 def _spent(
-    *, team: Team | None, user: User, split: Split, rules: Rules, now: datetime
+    *, team: Team | None, user: User, split: Split, rules: QuotaRules, now: datetime
 ) -> tuple[list[datetime], list[datetime]]:
     """When the team and its people sent what costs a slot, and what was rejected or cancelled, in order."""
-    since = now - max(rules.window, rules.min_gap, REJECTED_WINDOW)
+    since = now - max(rules.quota_window, rules.quota_min_gap, DAY)
     evaluations = Evaluation.objects.filter(submission=OuterRef("pk"))
     # Scoring anew after a correction costs nothing. It gives a slot back where the board cannot score what
     # another edition has scored: the team has to send another file, and for no fault of its own.
@@ -207,13 +176,10 @@ def _theirs(team: Team | None, user: User) -> Q:
 
 
 def _accounts(team: Team | None, user: User) -> QuerySet[User]:
-    """The accounts of the team's people, or of this person without a team.
-
-    Where addresses are proved, accounts of one mailbox are one person's, also those that they have deleted.
-    Where they are not, anybody could spend somebody else's quota under an address that looks like theirs.
-    """
+    """The accounts of the team's people, or of this person without a team."""
+    # Where addresses are not proved, anybody could spend somebody else's quota under an address like theirs.
     people = User.objects.filter(membership__team=team) if team else User.objects.filter(pk=user.pk)
-    if not mailboxes.are_proved():
+    if not addresses.are_proved():
         return people
     same = Q(mailbox__in=people.values("mailbox"))
     deleted = mailboxes.deleted_accounts(people)
@@ -223,7 +189,7 @@ def _accounts(team: Team | None, user: User) -> QuerySet[User]:
 def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int, now: datetime) -> Quota:
     """The quota, closed if this file is more than the team's bytes of a day leave room for."""
     limit: int = settings.MAX_TEAM_BYTES_PER_DAY
-    rows = Submission.objects.filter(_theirs(team, user), submitted_at__gt=now - BYTES_WINDOW)
+    rows = Submission.objects.filter(_theirs(team, user), submitted_at__gt=now - DAY)
     sent = list(rows.order_by("submitted_at").values_list("submitted_at", "size_bytes"))
     n_sent = sum(n_bytes for _, n_bytes in sent)
     if n_sent + size_bytes <= limit:
@@ -232,7 +198,7 @@ def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int,
     for submitted_at, n_bytes in sent:
         n_excess -= n_bytes
         if n_excess <= 0:
-            opens_at = submitted_at + BYTES_WINDOW
+            opens_at = submitted_at + DAY
             break
     then = f"; there is room for it at {_minute_after(opens_at):%Y-%m-%d %H:%M} UTC" if opens_at else ""
     return replace(
@@ -245,29 +211,26 @@ def _with_bytes(quota: Quota, *, team: Team | None, user: User, size_bytes: int,
 
 
 def weigh(
-    *, split: Split, rules: Rules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
+    *, split: Split, rules: QuotaRules, spent: Sequence[datetime], rejected: Sequence[datetime], now: datetime
 ) -> Quota:
-    """The quota of a team that sent at these times, oldest first, what costs a slot and what was `rejected`.
-
-    Among these are those that the team cancelled before they were scored, and those that stopped the process
-    that read them.
-    """
-    in_window = [at for at in spent if at > now - rules.window]
-    rejected = [at for at in rejected if at > now - REJECTED_WINDOW]
-    full_until = _until(in_window, limit=rules.limit, window=rules.window)
-    gap_until = spent[-1] + rules.min_gap if spent and rules.min_gap else None
-    rejected_until = _until(rejected, limit=rules.rejected_limit, window=REJECTED_WINDOW)
+    """The quota of a team that sent at these times, oldest first: what costs a slot, what was rejected."""
+    in_window = [at for at in spent if at > now - rules.quota_window]
+    rejected = [at for at in rejected if at > now - DAY]
+    full_until = _until(in_window, limit=rules.quota_limit, window=rules.quota_window)
+    gap_until = spent[-1] + rules.quota_min_gap if spent and rules.quota_min_gap else None
+    rejected_until = _until(rejected, limit=rules.quota_rejected_limit, window=DAY)
     opens_at = max((at for at in (full_until, gap_until, rejected_until) if at and at > now), default=None)
-    is_never = 0 in {rules.limit, rules.rejected_limit}
+    is_never = 0 in {rules.quota_limit, rules.quota_rejected_limit}
     if is_never:
         sentence = f"Your team may not submit to {split.pk}."
     elif opens_at is None:
         sentence = _left(rules, n_used=len(in_window))
     else:
         said = {
-            full_until: f"Your team has used {_n(rules.limit)} to {split.pk}, its quota for "
-            f"{span(rules.window)}",
-            gap_until: f"Submissions of a team to {split.pk} must be at least {span(rules.min_gap)} apart",
+            full_until: f"Your team has used {counted(rules.quota_limit or 0, 'submission')} to {split.pk}, "
+            f"its quota for {span(rules.quota_window)}",
+            gap_until: f"Submissions of a team to {split.pk} must be at least "
+            f"{span(rules.quota_min_gap)} apart",
             rejected_until: f"Your team has reached its limit for {split.pk}: within 24 hours, "
             f"{counted(len(rejected), 'file')} that were rejected, were cancelled, or stopped the process "
             "that read them",
@@ -291,17 +254,14 @@ def _until(times: Sequence[datetime], *, limit: int | None, window: timedelta) -
     return times[len(times) - limit] + window
 
 
-def _left(rules: Rules, *, n_used: int) -> str:
-    if rules.limit is None:
+def _left(rules: QuotaRules, *, n_used: int) -> str:
+    if rules.quota_limit is None:
         said = "No limit"
     else:
-        n_left = max(0, rules.limit - n_used)
-        said = f"{n_left} of {_n(rules.limit)} left within {span(rules.window)}"
-    return f"{said}, at least {span(rules.min_gap)} apart." if rules.min_gap else f"{said}."
-
-
-def _n(count: int | None) -> str:
-    return "1 submission" if count == 1 else f"{count} submissions"
+        n_left = max(0, rules.quota_limit - n_used)
+        limit = counted(rules.quota_limit, "submission")
+        said = f"{n_left} of {limit} left within {span(rules.quota_window)}"
+    return f"{said}, at least {span(rules.quota_min_gap)} apart." if rules.quota_min_gap else f"{said}."
 
 
 def _minute_after(at: datetime) -> datetime:

@@ -1,8 +1,4 @@
-"""Deletion of a method of which nothing was ever scored, as one that a rejected file or a typing slip made.
-
-Its files stay, since submissions are kept for ever and rejected ones count; they are withdrawn, so that no
-later edition scores them. The method is in no list any more, and its name is free.
-"""
+"""Deletion of a method of which nothing was ever scored. Its submissions are withdrawn; its name is free."""
 
 from datetime import datetime
 
@@ -17,7 +13,7 @@ from leaderboard.submissions import submissions
 
 
 def can_be_deleted(method: Method) -> bool:
-    """Whether nobody else has seen the method, nothing of it was scored, and nothing can be."""
+    """Whether nobody else has seen the method, and nothing of it was or can be scored."""
     if method.visibility != Visibility.PRIVATE or method.deleted_at is not None:
         return False
     others = Evaluation.objects.exclude(status__in=[Status.REJECTED, Status.CANCELLED])

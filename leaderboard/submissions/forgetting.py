@@ -1,8 +1,4 @@
-"""A person's data: their own export, and the deletion of everything that names them.
-
-Scores and files stay, since ranks and receipts of others rest on them; nothing that is left says whose they
-were. The audit log has the number of the account, which names nobody once the account is blank.
-"""
+"""A person's data: their own export, and the deletion of what names them. Scores and files stay."""
 
 from datetime import datetime
 from typing import Any
@@ -10,8 +6,6 @@ from typing import Any
 from allauth.account.models import EmailAddress
 from allauth.mfa.models import Authenticator
 from allauth.socialaccount.models import SocialAccount
-from django.contrib.admin.models import LogEntry
-from django.contrib.contenttypes.models import ContentType
 from django.db import transaction
 from django.db.models import Q
 
@@ -106,8 +100,8 @@ def export(*, user: User) -> dict[str, Any]:
 def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> None:
     """Delete everything that names a person, for good. `actor` is the person, a maintainer, or None.
 
-    Other members keep the team; if the person owned it, the member who joined first owns it then. A team
-    without other members loses its name. Raises `NotMaintainer`, and `Refused` for a maintainer.
+    The member who joined first owns the team then; a team without other members loses its name. Raises
+    `NotMaintainer`, and `Refused` for a maintainer.
     """
     if actor is None or actor.pk != user.pk:
         require_maintainer(actor, to="delete accounts of others")
@@ -151,7 +145,6 @@ def delete_late_rows() -> None:
 
 
 def _delete_rows(user: User) -> None:
-    """The rows that are the person's alone."""
     ApiToken.objects.filter(user=user).delete()
     Invitation.objects.filter(created_by=user).delete()
     addresses = [user.email, *EmailAddress.objects.filter(user=user).values_list("email", flat=True)]
@@ -161,12 +154,9 @@ def _delete_rows(user: User) -> None:
     Authenticator.objects.filter(user=user).delete()
     SocialAccount.objects.filter(user=user).delete()
     Membership.objects.filter(user=user).delete()
-    accounts = Q(content_type=ContentType.objects.get_for_model(User), object_id=str(user.pk))
-    LogEntry.objects.filter(accounts | Q(user=user)).update(object_repr="", change_message="")
 
 
 def _blank(user: User) -> None:
-    """The texts of rows that stay: the account's, its submissions' and the audit log's names."""
     user.email = _nowhere(user)
     user.name, user.is_active, user.last_login = "", False, None
     # Sessions rest on the password: they all end with it.
@@ -177,7 +167,6 @@ def _blank(user: User) -> None:
 
 
 def _nowhere(user: User) -> str:
-    """What stands in a blank account instead of its address."""
     return f"{user.pk}@{NOWHERE}"
 
 

@@ -1,8 +1,4 @@
-"""Moderation: what maintainers do to names, entries and accounts of others, each with a reason.
-
-All of it is on the audit log. Names go from everything that is drawn, because boards are drawn anew from
-present names; boards as of earlier times show present names too.
-"""
+"""Moderation: what maintainers do to names, entries and accounts of others, each with a reason."""
 
 from datetime import datetime
 from uuid import UUID
@@ -78,10 +74,7 @@ def clear_texts(*, method: Method, reason: str, actor: User | None) -> Method:
 
 
 def move_method(*, method: Method, to: Team, reason: str, actor: User | None) -> Method:
-    """Let another team have a method and its submissions. Raises `Refused`.
-
-    A public method shows the name of its new team from now on.
-    """
+    """Let another team have a method and its submissions. Raises `Refused`."""
     require_maintainer(actor, to="move methods between teams")
     reason = _reason(reason)
     with transaction.atomic():
@@ -136,10 +129,7 @@ def withdraw_entry(
 
 
 def set_active(*, user: User, is_active: bool, reason: str, actor: User | None) -> User:
-    """Close an account, or open it again. Nobody signs in to a closed one, also not with a token.
-
-    Raises `Refused` for one's own account.
-    """
+    """Close an account, or open it again. Raises `Refused` for one's own."""
     require_maintainer(actor, to="close accounts")
     reason = _reason(reason)
     if actor is not None and actor.pk == user.pk:
@@ -168,7 +158,7 @@ def masked(noun: str, pk: UUID) -> str:
 
 
 def _locked_teams(*wanted: Team) -> list[Team]:
-    """These teams, which stay so until the transaction ends. Raises `Refused` where one has ended."""
+    """These teams, locked. Raises `Refused` where one has ended."""
     found = teams.locked(*wanted)
     if len(found) < len({team.pk for team in wanted}):
         raise Refused(
@@ -179,7 +169,7 @@ def _locked_teams(*wanted: Team) -> list[Team]:
 
 
 def _locked(method: Method) -> Method:
-    """The method as it is, with its team, which stay so until the transaction ends."""
+    """The method with its team, both locked."""
     teams.locked(method.team)
     rows = Method.objects.select_for_update(of=("self",), no_key=True).select_related("team")
     return rows.get(pk=method.pk)

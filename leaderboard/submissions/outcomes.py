@@ -1,8 +1,4 @@
-"""The outcome of a submission for a reader: progress, rank on the current board, comparison with others.
-
-A place is read from what is kept of the boards, so it is the one that everybody sees at that moment. A
-private method takes nobody's place; its own people are told the rank that it would have.
-"""
+"""The outcome of a submission for a reader: progress, rank on the current board, comparison with others."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -21,24 +17,19 @@ from leaderboard.scoring import verdicts
 from leaderboard.submissions import submissions
 from leaderboard.submissions.submissions import Progress
 
-# For so long somebody is told to wait for intervals. They take a second or two where no submission waits, and
-# a minute more while a board is re-scored; what lasts longer is not worth watching.
+# For so long somebody is told to wait for intervals, which usually take a second or two.
 AWAITED_FOR = timedelta(minutes=5)
 
 
 @dataclass(frozen=True)
 class BoardPlace:
-    """Where a standing, scored submission is on the present board.
-
-    `rank` is None where another submission of its method stands there. `is_supposed`: the method is private,
-    and this is the rank that it would have among the `n_ranked`.
-    """
+    """Where a scored submission is on the present board."""
 
     edition: Edition
     rows: tuple[Entry, ...]  # everybody's
-    rank: int | None = None
+    rank: int | None = None  # None where another submission of its method is the row
     n_ranked: int = 0
-    is_supposed: bool = False
+    is_supposed: bool = False  # the method is private, and this is the rank that it would have
     intervals: Mapping[str, Interval] = field(default_factory=dict)
     best: frozenset[str] = frozenset()
     second: frozenset[str] = frozenset()
@@ -55,15 +46,11 @@ class SubmissionResult:
 
     @property
     def intervals(self) -> Mapping[str, Interval]:
-        """The confidence intervals and rank ranges of its values."""
         return published_intervals(self.progress, self.place)
 
 
 def of(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionResult, ...]:
-    """What came of each of these submissions. Boards are read once for all of them, and only if one needs it.
-
-    Their evaluations with editions and scores are best fetched with them.
-    """
+    """What came of these submissions, best fetched with their evaluations, editions and scores."""
     told = [(submission, submissions.progress(submission)) for submission in rows]
     places = _places([each for each in told if _is_on_board(*each)])
     return tuple(
@@ -85,7 +72,7 @@ def place_of(submission: Submission, progress: Progress) -> BoardPlace | None:
 
 
 def can_be_withdrawn(submission: Submission) -> bool:
-    """Whether withdrawing it changes anything: it has values to take from boards, or may get some."""
+    """Whether withdrawing it changes anything."""
     ends = {each.status for each in submission.evaluations.all()}
     return submission.withdrawn_at is None and not ends <= {Status.REJECTED, Status.CANCELLED}
 
@@ -109,7 +96,7 @@ def awaits_intervals(submission: Submission, progress: Progress, *, now: datetim
 
 
 def why_no_intervals(submission: Submission, progress: Progress, *, now: datetime) -> str:
-    """Why a scored submission's values stand without intervals, in a sentence; empty where they do not."""
+    """Why a scored submission has no confidence intervals, in a sentence; else empty."""
     if not _is_on_board(submission, progress) or has_intervals(progress):
         return ""
     if awaits_intervals(submission, progress, now=now):
@@ -140,7 +127,6 @@ def _is_on_board(submission: Submission, progress: Progress) -> bool:
 
 
 def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPlace]:
-    """The places of standing, scored submissions, by their ids."""
     if not told:
         return {}
     wanted = {submission.split_id for submission, _ in told}
@@ -189,7 +175,7 @@ def _place(
 
 
 def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
-    """The submission that stands for each of these methods in each of these editions: one query."""
+    """The best submission of each of these methods in each of these editions."""
     best: dict[tuple[int, UUID], UUID] = {}
     rows = _entry_in(editions).filter(evaluation__submission__method__in=methods)
     for edition, method, submission in rows.values_list(
@@ -200,7 +186,7 @@ def _best_of(methods: Iterable[UUID], editions: Iterable[Edition]) -> set[UUID]:
 
 
 def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
-    """The MiD of everything that stands in these editions, the best first, of two alike the earlier."""
+    """The MiD scores in these editions, best first, of two alike the earlier."""
     return Score.objects.filter(
         evaluation__edition__in=list(editions),
         evaluation__status=Status.SCORED,
@@ -214,7 +200,7 @@ def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
 
 
 def teams_best_other(submission: Submission, place: BoardPlace) -> Entry | None:
-    """The best that the same team has on the same board besides, private or not, as the team reads it."""
+    """The team's best other entry on the same board, private ones included."""
     others = _entry_in([place.edition]).filter(evaluation__submission__method__team=submission.method.team_id)
     found = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
     if found is None:

@@ -1,9 +1,4 @@
-"""Score receipts: what a submission scored, signed with the site's key, for its team to hand on.
-
-A receipt names its method as the team does, whoever else may see the method: it is given to the team alone,
-and the team decides who reads it. Beside the name, which is that of the day of signing, stands the method's
-id, which never changes. It attests to one edition for ever, also once a later one is the board.
-"""
+"""Score receipts: what a submission scored in one edition, signed with the site's key."""
 
 from collections.abc import Sequence
 from typing import Any, Final
@@ -14,25 +9,15 @@ from django.core.exceptions import ImproperlyConfigured
 
 from evaluator import receipts
 from leaderboard.boards.rows import flat_scores
+from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Status, Submission
 from leaderboard.submissions import submissions
 
 MEDIA_TYPE: Final = "application/jwt"
 
 
-class NoReceipt(Exception):
-    """There is no receipt for this; `code` is stable."""
-
-    def __init__(self, code: str, message: str) -> None:
-        super().__init__(message)
-        self.code = code
-
-
 def receipt(*, submission: Submission, edition_number: int | None = None) -> str:
-    """The signed receipt of what a submission scored, in the edition of that number or in the present one.
-
-    The same every time, unless its method was renamed. Raises `NoReceipt`.
-    """
+    """The signed receipt of a submission, in that edition or the present one. Raises `Refused`."""
     evaluation = _scored(submission, edition_number)
     edition, rules = evaluation.edition, evaluation.edition.rules
     scores = flat_scores(evaluation)
@@ -58,7 +43,7 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> str
 
 def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
     if submission.withdrawn_at:
-        raise NoReceipt("withdrawn", "The submission is withdrawn; expected one that is not.")
+        raise Refused("withdrawn", "The submission is withdrawn; expected one that is not.")
     if edition_number is None:
         evaluation = submissions.evaluation_of(submission)
     else:
@@ -66,7 +51,7 @@ def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
         published = submission.evaluations.exclude(edition__published_at=None)
         found = published.filter(edition__number=edition_number).first()
         if found is None:
-            raise NoReceipt(
+            raise Refused(
                 "edition-unknown",
                 f"The submission has no score in an edition {edition_number} of {submission.split_id}; "
                 "expected the number of an edition that was published.",
@@ -74,7 +59,7 @@ def _scored(submission: Submission, edition_number: int | None) -> Evaluation:
         evaluation = found
     if evaluation.status != Status.SCORED or evaluation.edition.published_at is None:
         state = evaluation.get_status_display()
-        raise NoReceipt("not-scored", f"The submission is {state}; expected one that is scored.")
+        raise Refused("not-scored", f"The submission is {state}; expected one that is scored.")
     return evaluation
 
 
@@ -103,7 +88,7 @@ def _key(name: str, text: str) -> bytes:
 
 
 def check_keys(app_configs: Sequence[Any] | None = None, **kwargs: Any) -> list[CheckMessage]:
-    """Django's system check of the keys: a typing error is found at the start, not at the first receipt."""
+    """Django's system check of the keys."""
     try:
         public_keys()
     except ImproperlyConfigured as fault:

@@ -15,7 +15,7 @@ from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, versions
 from leaderboard.boards.rows import Interval, scored_of
 from leaderboard.db import clock
-from leaderboard.errors.refusals import Refused, clean_text
+from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import methods
 from leaderboard.models import Evaluation, Method, SentFile, Split, Status, Submission, Team, User
 from leaderboard.people import teams
@@ -28,14 +28,6 @@ log = structlog.get_logger(__name__)
 
 # A file is scored within a second; one that has waited for longer than this has met a fault.
 LATE_AFTER = timedelta(minutes=1)
-
-
-class TooLarge(Refused):
-    """The file is over the size limit."""
-
-
-class TokenSplit(Refused):
-    """The token is good for one split, and details of a method stand on every split."""
 
 
 @dataclass(frozen=True)
@@ -65,11 +57,9 @@ def submit(
 ) -> Submitted:
     """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
 
-    The same bytes again, for the same split, method and manifest, are answered with the first submission,
-    cost nothing and change nothing. Once a correction has another manifest, the same bytes are another
-    submission: their keys may mean other sequences. With a new file, details that differ from the method's
-    own replace them, through `methods.edit`; without `may_edit` they are refused. `method_details` are those
-    of the registry. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
+    The same bytes again, for the same split, method and manifest, are answered with the first submission and
+    change nothing. Details that differ from the method's own replace them; without `may_edit` they are
+    refused. Raises `Refused` or `quotas.QuotaExceeded` (nothing is kept then).
     """
     split = _open_split(split_name, now=now)
     asked = _Asked(
@@ -115,7 +105,7 @@ def submit(
 
 @dataclass(frozen=True)
 class _Asked:
-    """A request to submit: who sends what for which method and split, its texts clean."""
+    """A request to submit, its texts clean."""
 
     user: User
     split: Split
@@ -127,7 +117,7 @@ class _Asked:
     may_edit: bool
 
     def changes_of(self, method: Method) -> dict[str, Any]:
-        """What the request changes of the method. Raises `Refused`; `TokenSplit` if it may change nothing."""
+        """What the request changes of the method. Raises `Refused`."""
         given = {name: value for name, value in self.details.items() if value not in (None, "")}
         changes = {name: value for name, value in given.items() if getattr(method, name) != value}
         if changes and not self.may_edit:
@@ -137,10 +127,9 @@ class _Asked:
 
 
 def _admit(asked: _Asked, file: files.StoredFile) -> Submission | None:
-    """Refuse what cannot be taken, before its bytes are written; certain it is only in `_record`.
+    """Refuse what cannot be taken, before its bytes are written; `_record` decides under locks.
 
-    Returns the submission that had the same bytes before, if there is one. Raises `Refused` or
-    `quotas.QuotaExceeded`.
+    Returns the submission that had the same bytes before. Raises `Refused` or `quotas.QuotaExceeded`.
     """
     team = teams.current_team_of(user=asked.user)
     admissions.require(team=team, split=asked.split)
@@ -159,10 +148,7 @@ def _admit(asked: _Asked, file: files.StoredFile) -> Submission | None:
 
 
 def _record(asked: _Asked, file: files.StoredFile) -> Submitted:
-    """Write the rows of a file that is stored, and queue it: in a transaction, in which all this is certain.
-
-    Raises `Refused` or `quotas.QuotaExceeded`.
-    """
+    """Write the rows of a stored file and queue it. Raises `Refused` or `quotas.QuotaExceeded`."""
     orphans.lock(file.digest)
     files.require_unchanged(asked.upload, digest=file.digest)
     # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
@@ -192,7 +178,7 @@ def _record(asked: _Asked, file: files.StoredFile) -> Submitted:
 
 
 def _held_team(user: User) -> Team:
-    """The person's team, new if there is none, for which nobody else submits until the transaction ends."""
+    """The person's team, new if there is none, locked until the transaction ends."""
     quotas.hold_accounts(user=user)
     team = teams.team_of(user=user)
     quotas.lock(team=team)
@@ -201,33 +187,23 @@ def _held_team(user: User) -> Team:
 
 
 def _queue(submission: Submission, *, split: Split) -> None:
-    """Queue the submission for the published edition, and for any that is being prepared beside it.
-
-    The caller holds the split.
-    """
+    """Queue the submission for the published edition and any draft; the caller has locked the split."""
     in_preparation = Q(published_at=None, discarded_at=None)
     for edition in split.editions.filter(in_preparation | Q(pk=split.published_edition_id)):
         lifecycle.enqueue(submission=submission, edition=edition)
 
 
 def _open_split(name: str, *, now: datetime) -> Split:
-    # Looked up here and not there: not every text is one that a database can be asked for.
-    rows = Split.objects.shown().select_related("published_edition__ground_truth")
-    split = (splits := {split.name: split for split in rows}).get(name)
-    if split is None:
-        known = ", ".join(splits)
-        raise Refused(
-            "unknown-split", f"There is no split {name[:80]!r}; expected one of {known}.", field="split"
-        )
+    split = shown_split(name)
     refusal = admissions.refusal_for_all(split, now=now)
     if refusal is not None:
         raise refusal
     return split
 
 
-def _token_split(method: Method, changes: Mapping[str, str]) -> TokenSplit:
+def _token_split(method: Method, changes: Mapping[str, str]) -> Refused:
     first = next(iter(changes))
-    return TokenSplit(
+    return Refused(
         "token-split",
         f"The token is valid for one split only, and the field{'s' if len(changes) > 1 else ''} "
         f"{', '.join(map(repr, changes))} would change the method {method.name!r} on every split; expected "
@@ -243,7 +219,6 @@ def _sent_before(file: files.StoredFile, *, split: Split, method: Method) -> Sub
 
 
 def _sent_file(file: files.StoredFile, split: Split) -> SentFile:
-    """The file as it is read: with the manifest that is public now."""
     assert split.published_edition is not None  # noqa: S101 - for the type checker: the split takes files
     return SentFile(file.digest, split.published_edition.ground_truth.manifest_digest)
 
@@ -255,12 +230,11 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload.size == 0:
         raise Refused("not-json", EMPTY_MESSAGE, field="file")
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
-        raise TooLarge("too-large", too_large(found_bytes=upload.size), field="file")
+        raise Refused("too-large", too_large(found_bytes=upload.size), field="file")
     return upload
 
 
 def too_large(*, found_bytes: int) -> str:
-    """The sentence for a file over the limit."""
     return (
         f"The file has {found_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
         f"({settings.MAX_PREDICTIONS_BYTES / 1e6:g} MB)."
@@ -268,10 +242,7 @@ def too_large(*, found_bytes: int) -> str:
 
 
 def _method(asked: _Asked, *, team: Team) -> Method:
-    """The team's method of that name, as it is; a new one is made with these details, and is private.
-
-    The caller holds the team. Raises `Refused` for a name that looks like another one of the team's.
-    """
+    """The team's method of that name, made if there is none, in a locked team. Raises `Refused`."""
     method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
     if method is None:
         methods.require_distinct_name(asked.method_name, team=team, field="method")
@@ -288,10 +259,7 @@ def _clean_filename(name: str) -> str:
 
 
 def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
-    """Withdraw a submission for its team: what waits is cancelled, what was published leaves a tombstone.
-
-    Returns False if it had been withdrawn before. Raises `Refused` for somebody outside the team.
-    """
+    """Withdraw a submission for its team. Returns False if it had been withdrawn. Raises `Refused`."""
     if not submission.method.team.memberships.filter(user=actor).exists():
         raise Refused("not-yours", "Only the team that sent a submission can withdraw it.")
     with transaction.atomic():
@@ -341,12 +309,8 @@ class Progress:
 
 
 def evaluation_of(submission: Submission) -> Evaluation:
-    """The evaluation that speaks for a submission: in the published edition, else in the latest.
-
-    Of an edition in preparation only where there is no other.
-    """
+    """The evaluation shown for a submission: in the published edition, else the latest, drafts last."""
     published = submission.split.published_edition_id
-    # Sorted here and not by the database, so that a list of submissions can fetch its evaluations at once.
     evaluations = sorted(submission.evaluations.all(), key=_place_of_edition)
     return next((e for e in evaluations if e.edition_id == published), evaluations[-1])
 
@@ -395,7 +359,6 @@ def progress(submission: Submission) -> Progress:
 
 
 def _n_ahead(evaluation: Evaluation) -> int:
-    """How many are claimed before this one; those that wait for another try are not in its way."""
     if evaluation.status != Status.QUEUED:
         return 0
     earlier = Q(priority__lt=evaluation.priority) | Q(

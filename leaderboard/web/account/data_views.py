@@ -14,7 +14,9 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.http import own_form, own_page
 from leaderboard.mails import notices
 from leaderboard.models import MailKind, User
-from leaderboard.quotas import mailboxes, quotas
+from leaderboard.people import addresses
+from leaderboard.quotas import mailboxes
+from leaderboard.quotas.spans import span
 from leaderboard.submissions import forgetting
 from leaderboard.web.forms import SiteForm
 
@@ -46,7 +48,7 @@ def data(request: HttpRequest) -> HttpResponse:
         with form.refusals():
             form.require(user)
             return _forget(request)
-    stays = quotas.span(mailboxes.longest_window()) if mailboxes.are_proved() else ""
+    stays = span(mailboxes.longest_window()) if addresses.are_proved() else ""
     context = {"form": form, "quota_stays": stays}
     return render(request, "account/data.html", context, status=422 if form.errors else 200)
 

@@ -19,7 +19,6 @@ from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.http import asks_first
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
 from leaderboard.pages import pages
-from leaderboard.quotas import rules
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain import queue_tables
@@ -76,7 +75,6 @@ def hub(request: HttpRequest) -> HttpResponse:
         "n_overrides": QuotaOverride.objects.count(),
         "n_events": AuditEvent.objects.count(),
         "has_imprint": pages.current(pages.IMPRINT) is not None,
-        "ignored": rules.ignored(),
     }
     return render(request, "maintain/hub.html", context)
 

@@ -7,7 +7,7 @@ from django import forms
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.models.quotas import EXCESS, MAX_COUNT, QuotaRules
-from leaderboard.quotas import quotas
+from leaderboard.quotas.spans import parse_span, span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 
@@ -21,7 +21,7 @@ class TeamLookup(SiteForm):
 
 
 class SpanField(forms.CharField):
-    """A span of time in the words in which `quotas.span` says it."""
+    """A span of time in the words in which `spans.span` says it."""
 
     def __init__(self, **options: Any) -> None:
         super().__init__(max_length=40, **options)
@@ -30,12 +30,12 @@ class SpanField(forms.CharField):
         """The span; none at all where nothing may be filled in. Raises `ValidationError`."""
         text: str = super().clean(value)
         try:
-            span = quotas.parse_span(text) if text else timedelta(0)
+            time = parse_span(text) if text else timedelta(0)
         except Refused as refusal:
             raise forms.ValidationError(str(refusal)) from refusal
-        if self.required and not span:
+        if self.required and not time:
             raise forms.ValidationError("The window is empty; expected one like 30 days or 24 hours.")
-        return span
+        return time
 
 
 def _count_field(name: str, label: str, help_text: str) -> forms.IntegerField:
@@ -86,13 +86,13 @@ class OverrideForm(QuotaRulesForm):
         """What stands in the form at first: rules as they are, without their reason."""
         return {
             "quota_limit": rules.quota_limit,
-            "quota_window": quotas.span(rules.quota_window),
-            "quota_min_gap": quotas.span(rules.quota_min_gap) if rules.quota_min_gap else "",
+            "quota_window": span(rules.quota_window),
+            "quota_min_gap": span(rules.quota_min_gap) if rules.quota_min_gap else "",
             "quota_rejected_limit": rules.quota_rejected_limit,
         }
 
     def rules(self) -> dict[str, Any]:
-        """What was filled in, under the names of `quotas.override`."""
+        """What was filled in, under the names of `rules.override`."""
         return {name.removeprefix("quota_"): value for name, value in self.cleaned_data.items()}
 
 

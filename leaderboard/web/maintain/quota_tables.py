@@ -9,6 +9,7 @@ from leaderboard.models import QuotaOverride, Split, Team, User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.people import names
 from leaderboard.quotas import quotas
+from leaderboard.quotas.spans import span
 from leaderboard.submissions import forgetting
 from leaderboard.templatetags.board import grouped
 
@@ -19,8 +20,8 @@ def rules_of(row: QuotaRules) -> dict[str, str]:
     """The rules of a split or of a team on it, in words, one by one and in a sentence."""
     return {
         "limit": _most(row.quota_limit),
-        "window": quotas.span(row.quota_window),
-        "min_gap": quotas.span(row.quota_min_gap) if row.quota_min_gap else "–",
+        "window": span(row.quota_window),
+        "min_gap": span(row.quota_min_gap) if row.quota_min_gap else "–",
         "rejected_limit": _most(row.quota_rejected_limit),
         "sentence": sentence_of(row),
     }
@@ -38,10 +39,10 @@ def sentence_of(row: QuotaRules) -> str:
     sent = turned_away = "any number of"
     within = within_a_day = ""
     if row.quota_limit is not None:
-        sent, within = grouped(row.quota_limit), f" within {quotas.span(row.quota_window)}"
+        sent, within = grouped(row.quota_limit), f" within {span(row.quota_window)}"
     if row.quota_rejected_limit is not None:
         turned_away, within_a_day = grouped(row.quota_rejected_limit), " within 24 hours"
-    apart = f", at least {quotas.span(row.quota_min_gap)} apart" if row.quota_min_gap else ""
+    apart = f", at least {span(row.quota_min_gap)} apart" if row.quota_min_gap else ""
     submissions = "submission" if row.quota_limit == 1 else "submissions"
     files = "file" if row.quota_rejected_limit == 1 else "files"
     return f"{sent} {submissions}{within}{apart}; {turned_away} rejected or cancelled {files}{within_a_day}"

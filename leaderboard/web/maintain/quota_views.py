@@ -11,7 +11,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from leaderboard.models import Admission, QuotaOverride, Split, Team
-from leaderboard.quotas import admissions, quotas, rules
+from leaderboard.quotas import admissions, quotas
 from leaderboard.web.maintain import quota_tables
 from leaderboard.web.maintain.maintainer_views import (
     form_page,
@@ -42,7 +42,6 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
         "page": page,
         "overrides": [(row, quota_tables.rules_of(row)) for row in page],
         "are_off": not settings.QUOTAS,
-        "ignored": rules.ignored(),
     }
     return render(request, "maintain/quotas.html", context, status=400 if lookup.errors else 200)
 

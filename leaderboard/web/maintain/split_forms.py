@@ -11,7 +11,7 @@ from leaderboard.benchmark.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, P
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Split
 from leaderboard.models.benchmark import Listing
-from leaderboard.quotas import quotas
+from leaderboard.quotas.spans import span
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.quota_forms import QuotaRulesForm
 
@@ -110,8 +110,8 @@ class PolicyForm(QuotaRulesForm):
             "opens_at": moments.written(policy.opens_at),
             "closes_at": moments.written(policy.closes_at),
             "announcement_ends_at": moments.written(policy.announcement_ends_at),
-            "quota_window": quotas.span(policy.quota_window),
-            "quota_min_gap": quotas.span(gap) if gap else "",
+            "quota_window": span(policy.quota_window),
+            "quota_min_gap": span(gap) if gap else "",
         }
 
     def policy(self) -> Policy:

@@ -106,15 +106,13 @@ def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
 def rejected_sentence(quota: Quota | None) -> str:
     """What a rejected file costs, and how many more are taken; `quota` None: it is no question of that.
 
-    >>> from datetime import timedelta
-    >>> from leaderboard.quotas.quotas import Rules
-    >>> rules = Rules(limit=3, window=timedelta(days=30), min_gap=timedelta(0), rejected_limit=20)
-    >>> rejected_sentence(Quota("test", rules, 0, 3, True, None, ""))
+    >>> from leaderboard.models import QuotaOverride
+    >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))
     'Your quota is not used. Up to 20 files may be rejected within 24 hours; 17 are left.'
     """
     if quota is None:
         return ""
-    limit = quota.rules.rejected_limit
+    limit = quota.rules.quota_rejected_limit
     if limit is None:
         return "Your quota is not used."
     n_left = max(0, limit - quota.n_rejected)

@@ -201,7 +201,7 @@ def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     found = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
     try:
         document = receipts.receipt(submission=found)
-    except receipts.NoReceipt as fault:
+    except submissions.Refused as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=409)
     response = HttpResponse(document, content_type=receipts.MEDIA_TYPE)
     response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{found.pk}.jwt"'

@@ -36,11 +36,6 @@ def test_board_of_a_closed_split_has_its_published_rows(benchmark: None, client:
     assert (body["edition"], body["is_open"], len(body["entries"])) == (None, False, 5)
 
 
-def test_board_sorts_by_any_column(benchmark: None, client: Client) -> None:
-    body = client.get("/api/v1/splits/test/board?sort=-rte").json()
-    assert [entry["method"] for entry in body["entries"]][:2] == ["Detection", "SOT"]
-
-
 @pytest.mark.parametrize(
     ("address", "status", "code"),
     [

@@ -1,10 +1,9 @@
 """Comparisons over the API: what is known at once, the rest a moment later."""
 
 import pytest
-from rest_framework.test import APIClient
 
 from evaluator.metrics.protocol import SCORE_NAMES
-from leaderboard.models import Edition, Method, Submission, User, Visibility
+from leaderboard.models import Edition, Submission, User
 from tests import builders
 from tests.leaderboard.api.test_submissions import client_of
 
@@ -50,16 +49,6 @@ def test_comparison_is_a_202_until_a_worker_has_computed_it(entries: list[Submis
     assert client.get(address(*ids, more="&edition=1")).json() == body
 
 
-def test_strangers_methods_are_not_there_until_they_are_shown(
-    entries: list[Submission], stranger: User
-) -> None:
-    ids = [entry.method_id for entry in entries[:2]]
-    Method.objects.update(visibility=Visibility.PRIVATE, shown_at=None)
-    for client in (APIClient(), client_of(stranger)):
-        response = client.get(address(*ids))
-        assert (response.status_code, response.json()["code"]) == (404, "unknown-method")
-
-
 @pytest.mark.parametrize(
     ("methods", "more", "status", "code"),
     [
@@ -81,9 +70,3 @@ def test_what_cannot_be_compared_is_a_problem_that_says_why(
 
 def _id(name: str) -> str:
     return f"00000000-0000-4000-8000-{sum(name.encode()):012d}"
-
-
-def test_a_split_that_there_is_not_is_a_404(benchmark: None) -> None:
-    assert APIClient().get(address("x", split="nope")).json()["code"] == "not-found"
-    assert APIClient().get("/api/v1/compare").status_code == 404
-    assert APIClient().get(address("x", split="te%00st")).json()["code"] == "not-found"

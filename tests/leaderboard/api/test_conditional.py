@@ -3,13 +3,10 @@
 from typing import Any
 
 import pytest
-from django.db import connection
 from django.test import Client
-from django.test.utils import CaptureQueriesContext
 
 from leaderboard.models import Edition, Submission, User
 from tests import builders
-from tests.caching import forget_boards
 from tests.openapi import schema
 
 pytestmark = pytest.mark.slow
@@ -85,18 +82,3 @@ def test_whatever_is_answered_has_a_tag_that_is_a_304_when_it_is_asked_with(
         head.getvalue()  # to its end, which closes what it would be sent from
         assert head["ETag"].startswith('"'), address
     assert n_answered >= n_least
-
-
-def test_the_tag_of_a_manifest_is_its_digest(edition: Edition) -> None:
-    response = asked(Client(), "/api/v1/splits/test/manifest")
-    assert response["ETag"] == f'"{edition.ground_truth.manifest_digest}"'
-
-
-def test_an_answer_is_remembered_whole_also_when_the_first_who_asks_has_it(shown: Submission) -> None:
-    address = "/api/v1/splits/test/board"
-    tag = Client().get(address)["ETag"]
-    forget_boards()
-    assert Client().get(address, headers={"If-None-Match": tag}).status_code == 304
-    with CaptureQueriesContext(connection) as captured:
-        assert Client().get(address)["ETag"] == tag
-    assert len(captured) == 1

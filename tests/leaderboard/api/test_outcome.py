@@ -4,15 +4,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from django.db import connection
 from django.db.models import F
-from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 from rest_framework.test import APIClient
 
-from leaderboard.models import Edition, Evaluation, Method, Submission, User
+from leaderboard.models import Edition, Evaluation, Submission, User
 from leaderboard.submissions import outcomes, submissions
-from tests import board_rows, builders
+from tests import builders
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of
 
@@ -57,23 +55,6 @@ def test_until_they_are_computed_intervals_are_awaited(client: APIClient, entrie
 def test_nobody_is_told_to_wait_for_ever(client: APIClient, entries: list[Submission]) -> None:
     Evaluation.objects.update(finished_at=F("finished_at") - outcomes.AWAITED_FOR)
     assert look(client, entries[0])["awaits_intervals"] is False
-
-
-def test_too_few_recordings_are_not_waited_for(
-    client: APIClient, benchmark: None, owner: User, tmp_path: Path
-) -> None:
-    few = builders.import_truth(tmp_path, n_recordings=6)
-    sent = builders.submit(owner, builders.predictions(few))
-    builders.score_all()
-    assert look(client, sent)["awaits_intervals"] is False
-
-
-def test_waiting_submission_has_neither(client: APIClient, edition: Edition, owner: User) -> None:
-    sent = builders.submit(owner, builders.predictions(edition))
-    with CaptureQueriesContext(connection) as queries:
-        body = look(client, sent)
-    assert (body["intervals"], body["awaits_intervals"], body["rank"]) == ({}, False, None)
-    assert not [each for each in queries.captured_queries if "snapshot" in each["sql"]], "no board is read"
 
 
 def test_private_one_has_intervals_no_range_and_the_rank_that_it_would_have(
@@ -140,23 +121,3 @@ def test_list_tells_of_each_what_its_own_address_tells(
     assert [row["rank"] is None for row in listed].count(True) == 1
     for row in listed:
         assert row == client.get(f"{LIST}/{row['id']}").json()
-
-
-def n_queries(client: APIClient, address: str) -> int:
-    with CaptureQueriesContext(connection) as queries:
-        assert client.get(address).status_code == 200
-    return len(queries)
-
-
-def test_list_asks_no_more_of_the_database_for_many_than_for_few(
-    client: APIClient, entries: list[Submission], edition: Edition, owner: User
-) -> None:
-    builders.submit(owner, builders.predictions(edition), method="Hidden", visibility="PRIVATE")
-    builders.score_all()
-    builders.infer_all()
-    client.get(LIST)
-    before = n_queries(client, LIST)
-    board_rows.score(edition, methods=list(Method.objects.filter(team=entries[0].method.team)), user=owner)
-    builders.board_changed("test")
-    client.get(LIST)
-    assert n_queries(client, LIST) == before

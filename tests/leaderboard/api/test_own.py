@@ -1,7 +1,6 @@
 """What only a team itself gets: whose token it is, and the bytes of a file."""
 
 import pytest
-from django.test import Client
 from rest_framework.test import APIClient
 
 from leaderboard.models import Edition, Scope, Submission, User
@@ -77,11 +76,3 @@ def test_every_token_may_ask_whose_it_is_and_no_person_is_named(
     }
     assert owner.email not in str(found)
     assert client_of(None).get("/api/v1/account").status_code == 401
-
-
-def test_a_session_of_a_browser_has_a_team_and_no_token(
-    client: Client, owner: User, submission: Submission
-) -> None:
-    client.force_login(owner)
-    found = client.get("/api/v1/account").json()
-    assert (found["team"], found["token"], found["scopes"]) == ("Owls", None, [])

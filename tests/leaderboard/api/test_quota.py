@@ -61,15 +61,3 @@ def test_an_exhausted_quota_is_a_429_that_says_when_to_come_back(edition: Editio
     assert 7190 <= int(response.headers["Retry-After"]) <= 7200
     assert Submission.objects.count() == 1
     assert not quota_of(client)["is_open"]
-
-
-def test_a_quota_of_none_names_no_time_to_come_back(edition: Edition, owner: User) -> None:
-    Split.objects.filter(pk="test").update(quota_limit=0)
-    response = post(client_of(owner), builders.predictions(edition))
-    assert response.status_code == 429
-    assert "Retry-After" not in response.headers
-
-
-def test_somebody_without_a_team_stays_without_one(edition: Edition, owner: User) -> None:
-    assert client_of(owner).get("/api/v1/quota").status_code == 200
-    assert not owner.teams.exists()

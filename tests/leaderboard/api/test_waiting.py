@@ -28,12 +28,6 @@ def test_who_asks_is_told_to_come_back_in_a_second_until_it_is_final(
     assert (running.json()["state"], running.headers["Retry-After"]) == ("RUNNING", "1")
 
 
-def test_what_is_final_need_not_be_asked_for_again(waiting_one: Submission, owner: User) -> None:
-    builders.score_all()
-    scored = client_of(owner).get(address(waiting_one))
-    assert (scored.json()["state"], scored.headers.get("Retry-After")) == ("SCORED", None)
-
-
 def test_an_answer_that_is_known_is_not_sent_again_and_says_when_to_come_back(
     waiting_one: Submission, owner: User
 ) -> None:
@@ -42,17 +36,5 @@ def test_an_answer_that_is_known_is_not_sent_again_and_says_when_to_come_back(
     again = client.get(address(waiting_one), headers=known)
     assert (again.status_code, again.content, again.headers["Retry-After"]) == (304, b"", "1")
     builders.score_all()
-    assert client.get(address(waiting_one), headers=known).json()["state"] == "SCORED"
-
-
-@pytest.mark.parametrize("wait", ["60", "-1", "x", ""])
-def test_an_older_client_that_asks_to_wait_is_answered_at_once(
-    waiting_one: Submission, owner: User, wait: str
-) -> None:
-    response = client_of(owner).get(address(waiting_one), {"wait": wait})
-    assert (response.status_code, response.json()["state"]) == (200, "QUEUED")
-
-
-def test_others_submissions_cannot_be_followed(waiting_one: Submission, stranger: User) -> None:
-    response = client_of(stranger).get(address(waiting_one))
-    assert (response.status_code, response.headers.get("Retry-After")) == (404, None)
+    scored = client.get(address(waiting_one), headers=known)
+    assert (scored.json()["state"], scored.headers.get("Retry-After")) == ("SCORED", None)

@@ -13,7 +13,7 @@ from typing import IO
 
 import psycopg
 import pytest
-from django.core.files.base import ContentFile, File
+from django.core.files.base import ContentFile
 from django.core.files.uploadedfile import SimpleUploadedFile
 from django.db import InterfaceError, OperationalError, connection
 from django.http import HttpResponse
@@ -81,17 +81,6 @@ def test_full_disk_is_a_507_problem_and_leaves_nothing(
     assert "file store is full" in body["detail"]
     assert_nothing_kept(settings)
     assert api(builders.predictions(edition)).status_code == 201
-
-
-def test_full_disk_is_a_507_page_and_leaves_nothing(
-    edition: Edition, page: Callable[[bytes], HttpResponse], settings: Settings
-) -> None:
-    with full_disk():
-        answer = page(builders.predictions(edition))
-    assert answer.status_code == 507
-    assert "The file store is full" in answer.content.decode()
-    assert_nothing_kept(settings)
-    assert page(builders.predictions(edition)).status_code == 302
 
 
 @contextmanager
@@ -241,21 +230,3 @@ def test_upload_whose_request_cannot_be_read_on_gives_its_room_back(
     del response
     gc.collect()
     assert [file.closed for file in made] == [True]
-
-
-def test_upload_has_no_name_that_a_killed_process_could_leave_behind(
-    edition: Edition, api: Callable[[bytes], HttpResponse], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    incoming = tmp_path / "incoming"
-    incoming.mkdir()
-    monkeypatch.setattr(tempfile, "tempdir", str(incoming))
-    seen: list[list[str]] = []
-    real = files.save_predictions
-
-    def keep(upload: "File[bytes]", **known: object) -> files.StoredFile:
-        seen.append([path.name for path in incoming.iterdir()])
-        return real(upload, **known)  # type: ignore[arg-type]  # as it was called
-
-    monkeypatch.setattr(files, "save_predictions", keep)
-    assert api(builders.predictions(edition)).status_code == 201
-    assert seen == [[]]

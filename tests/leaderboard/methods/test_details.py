@@ -37,19 +37,15 @@ def of(name: str, *values: object) -> list[tuple[str, object]]:
 
 
 BAD = [
-    *of("n_frames", 1, 7, "six", 2.5, True, [], "²", 10**30, float("inf")),
-    *of("cameras", "one", "THREE", 1, True, {}),
-    ("box_source", "MADE UP"),
-    *of("uses_nerf", "maybe", 1, [], "YES"),
-    *of("n_parameters", 0, -1, 10**16, "1e-9", "1.5", "25 apples", "9" * 5000, 1.5, True),
-    *of("latency_ms", 0, -1, "fast", float("nan"), float("inf"), 1e300, True, 10**400, []),
-    *of("paper_url", "javascript:alert(1)", "ftp://example.org", "example.org", 5),
-    ("description", "x" * 2001),
-    ("description", "a\x00b"),
-    ("description", "\ud800"),
-    ("hardware", "x" * 121),
+    *of("n_frames", 1, 7, "six", 2.5, True, [], "²", float("inf")),
+    *of("cameras", "one", 1, {}),
+    *of("uses_nerf", "maybe", 1, "YES"),
+    *of("n_parameters", 0, 10**16, "1.5", "25 apples", "1,5M", "9" * 5000, 1.5, True),
+    *of("latency_ms", 0, "fast", "50 ms", float("nan"), 1e300, True, 10**400, []),
+    *of("paper_url", "javascript:alert(1)", 5),
+    *of("description", "x" * 2001, "a\x00b", "\ud800"),
     ("pretraining", ["ImageNet"]),
-    *of("name", "", None, "Anonymous", "a\u202eb", 5, "x" * 81),
+    *of("name", "", None, "a\u202eb", 5),
 ]
 
 
@@ -97,11 +93,11 @@ def test_words_mean_what_values_do(method: Method, owner: User) -> None:
     assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
 
 
-@pytest.mark.parametrize("count", ["25M", "25 m", "25e6", "2.5e+7", "25,000,000", "25 000 000", "0.025b"])
+@pytest.mark.parametrize("count", ["25M", "25 m", "25,000,000", "0.025b"])
 def test_a_count_is_read_as_people_write_it(method: Method, owner: User, count: str) -> None:
-    changes = {"n_parameters": count, "latency_ms": "0.05 s", "hardware": "one GPU"}
-    kept = methods.edit(method=method, changes=changes, actor=owner)
-    assert (kept.n_parameters, kept.latency_ms) == (25_000_000, 50.0)
+    assert (
+        methods.edit(method=method, changes={"n_parameters": count}, actor=owner).n_parameters == 25_000_000
+    )
 
 
 @pytest.mark.parametrize(("name", "value"), BAD)
@@ -168,9 +164,6 @@ def test_page_takes_the_details_and_shows_them(client: Client, method: Method, o
     for words in ("Latency (ms)41.5", "31,000,000", "one camera", "provided", "ImageNet-1k"):
         assert words in shown
     client.force_login(owner)
-    response = client.post(address, {**sent, "n_frames": "9"})
-    assert response.status_code == 422
-    assert "expected a whole number from 2 to 6" in pages.page(response).one("main").text
     response = client.post(address, {**sent, "n_parameters": "25 apples", "latency_ms": "fast"})
     said = pages.page(response).one("div", id="id_n_parameters_error").text
     assert said == "Enter a whole number, e.g. 25,000,000 or 25M."
@@ -198,13 +191,8 @@ def test_program_says_and_reads_the_same(client: Client, method: Method, owner: 
     [
         ({"visibility": "PUBLIC"}, "unknown-field"),
         ({"\ud800": 1}, "unknown-field"),
-        ({"team": "x"}, "unknown-field"),
-        ([1], "bad-value"),
         ("null", "bad-value"),
         ('{"n_frames": 1e999}', "bad-value"),
-        ('{"n_parameters": ' + "9" * 4000 + "}", "bad-value"),
-        ('{"description": "\\ud800"}', "bad-character"),
-        ('{"description": "\\u0000"}', "bad-character"),
         ("{", "parse-error"),
         ('{"n_frames": ' + "9" * 6000 + "}", "parse-error"),
         (f"[{'{},' * 50_000}{{}}]", "too-large"),
@@ -215,16 +203,6 @@ def test_nonsense_is_refused_in_words(
 ) -> None:
     status, told = patch(client, method, owner, body)
     assert (status, told["code"]) == ({"parse-error": 400, "too-large": 413}.get(code, 422), code)
-
-
-def test_all_that_can_be_said_fits_into_a_document(client: Client, method: Method, owner: User) -> None:
-    whole = {
-        "description": "\N{GRINNING FACE}" * 2000,
-        **dict.fromkeys(("paper_url", "code_url"), "https://example.org/" + "x" * 480),
-        **dict.fromkeys(("pretraining", "hardware"), "ü" * 120),
-    }
-    body = json.dumps(whole, indent=8)
-    assert (patch(client, method, owner, body)[0], len(body) > 20_000) == (200, True)
 
 
 # --- filters -----------------------------------------------------------------------------------------------
@@ -252,27 +230,17 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     for query, expected in (
         ({}, both),
         ({"frames": "6"}, both),
-        ({"frames": "2"}, []),
         ({"cameras": "one"}, ["Foo"]),
-        ({"boxes": "given"}, ["Foo"]),
         ({"nerf": "no"}, ["Foo"]),
         ({"nerf": "yes"}, []),
         ({"extra": "yes", "frames": "6"}, ["Foo"]),
-        ({"code": "yes"}, ["Foo"]),
         ({"code": "no"}, [veiled.pseudonym]),
-        ({"paper": "yes"}, ["Foo"]),
         ({"latency": "41.5"}, ["Foo"]),
         ({"latency": "41"}, []),
         ({"pretraining": "IMAGEnet"}, ["Foo"]),
         ({"pretraining": "lark"}, []),
-        ({"hardware": "gpu"}, ["Foo"]),
-        ({"hardware": "the"}, []),
         ({"parameters": "31M"}, both),
-        ({"parameters": "31 m"}, both),
-        ({"parameters": "0.031b"}, both),
         ({"parameters": "30999999"}, [veiled.pseudonym]),
-        ({"parameters": "9k"}, [veiled.pseudonym]),
-        ({"parameters": "8999"}, []),
         ({"q": "OWL"}, ["Foo"]),
         ({"q": "veiled"}, []),
         ({"q": "anonymous"}, [veiled.pseudonym]),
@@ -310,11 +278,10 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
 @pytest.mark.parametrize(
     ("name", "value"),
     [
-        *(("frames", value) for value in ("1", "7", "x", "²")),
-        *(("cameras", "three"), ("boxes", "x"), ("nerf", "maybe"), ("code", "1"), ("paper", "\x00")),
-        *(("latency", value) for value in ("fast", "nan", "inf", "0", "-1", "1e999")),
-        *(("parameters", value) for value in ("many", "0", "0.0001", "-5", "1e-6", "25 GB", "٢٥M", "9" * 17)),
-        *((name, "x" * 81) for name in ("q", "pretraining", "hardware")),
+        *of("frames", "1", "²"),
+        *(("cameras", "three"), ("nerf", "maybe"), ("paper", "\x00"), ("q", "x" * 81)),
+        *of("latency", "fast", "nan", "0", "1e999"),
+        *of("parameters", "many", "0", "0.0001", "-5", "25 GB", "٢٥M", "9" * 17),
     ],
 )
 def test_a_filter_that_is_none_is_named(client: Client, benchmark: None, name: str, value: str) -> None:

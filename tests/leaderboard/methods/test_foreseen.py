@@ -62,15 +62,6 @@ def test_revealing_an_anonymous_method_moves_nobody(client: Client, method: Meth
     assert (sight["before"]["rank"], sight["after"]["rank"], sight["moved"]) == (1, 1, [])
 
 
-def test_numbers_of_the_preview_have_the_editions_decimals(
-    client: Client, method: Method, owner: User
-) -> None:
-    (sight,) = foresee(client, method, builders.token(owner), "?as=PUBLIC")[1]["splits"]
-    values = [value for value in sight["after"]["scores"].values() if value is not None]
-    assert len(values) == 10
-    assert values == [round(value, 1) for value in values]
-
-
 def test_what_a_method_cannot_become_is_not_foreseen(client: Client, method: Method, owner: User) -> None:
     token = builders.token(owner)
     for query in ("", "?as=", "?as=PRIVATE", "?as=public"):

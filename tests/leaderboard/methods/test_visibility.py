@@ -51,41 +51,21 @@ def change(method: Method, to: str, actor: User, **options: Any) -> Method:
     return visibility.change(method=method, visibility=to, actor=actor, now=timezone.now(), **options)
 
 
-def everything_a_reader_can_ask(client: Client, method: Method, submission: Submission) -> list[bytes]:
-    """Bodies and headers of the pages and routes on which a method could show."""
-    addresses = [
-        *("/", "/board/test/", "/board/test/?sort=-date", "/board/test/?q=secret", "/board/test/editions/1/"),
-        *("/api/v1/splits/test/board", "/api/v1/splits/test/editions/1/board", "/api/v1/methods"),
-        *(f"/methods/{method.pk}/", f"/api/v1/methods/{method.pk}", f"/submissions/{submission.pk}/"),
-    ]
-    answers = [client.get(address) for address in addresses]
-    return [answer.content + repr(sorted(answer.items())).encode() for answer in answers]
-
-
 # --- private -----------------------------------------------------------------------------------------------
+# That no address shows what is hidden is proved in tests/security/test_non_interference.py.
 
 
 def test_a_new_method_is_private_and_seen_by_its_team_alone(
-    client: Client, sent: Submission, method: Method, owner: User, teammate: User, stranger: User
+    client: Client, method: Method, owner: User, teammate: User, stranger: User
 ) -> None:
     assert (method.visibility, method.shown_at) == (Visibility.PRIVATE, None)
-    for reader in (None, stranger):
-        if reader:
-            client.force_login(reader)
-        assert "Secret sauce" not in rows(reader or ANYBODY)
-        found = b"".join(everything_a_reader_can_ask(client, method, sent))
-        assert [secret for secret in (*SECRETS, method.pseudonym) if secret.encode() in found] == []
-        for address in (f"/methods/{method.pk}/", f"/api/v1/methods/{method.pk}"):
-            assert client.get(address).status_code == 404
+    for reader in (ANYBODY, stranger):
+        assert "Secret sauce" not in rows(reader)
     for member in (owner, teammate):
         entry = rows(member)["Secret sauce"]
         assert (entry.rank, entry.is_mine, entry.is_visible_to_all) == (1, True, False)
         client.force_login(member)
         assert "only your team" in pages.page(client.get(f"/methods/{method.pk}/")).one("main").text
-        entries = client.get("/api/v1/splits/test/board").json()["entries"]
-        marked = {row["method"]: row["visibility"] for row in entries}
-        assert [name for name, visibility in marked.items() if visibility == "PRIVATE"] == ["Secret sauce"]
-        assert "Secret sauce private" in pages.page(client.get("/submissions/")).one("tbody").text
 
 
 def test_a_private_method_moves_no_number_that_counts_changes(sent: Submission) -> None:
@@ -100,38 +80,22 @@ def test_a_private_method_moves_no_number_that_counts_changes(sent: Submission) 
 
 
 def test_an_anonymous_method_shows_numbers_and_nothing_of_whose_it_is(
-    client: Client, sent: Submission, method: Method, owner: User, stranger: User
+    client: Client, method: Method, owner: User, teammate: User, stranger: User
 ) -> None:
     change(method, "ANONYMOUS", owner)
     assert re.fullmatch(r"Anonymous [0-9a-f]{6}", method.pseudonym)
-    entry = rows()[method.pseudonym]
-    assert (entry.rank, entry.team, entry.n_attempts) == (1, "Anonymous", 1)
-    assert (entry.description, entry.paper_url, entry.code_url) == ("", "", "")
-    assert entry.details == stated(n_frames=6, latency_ms=12.5, cameras="ONE")
-    for reader in (None, stranger):
-        if reader:
-            client.force_login(reader)
-        answers = everything_a_reader_can_ask(client, method, sent)
-        found = b"".join(answers)
-        assert [secret for secret in SECRETS if secret.encode() in found] == []
-        assert method.pseudonym.encode() in answers[0]
-        page = client.get(f"/methods/{method.pk}/")
-        assert pages.page(page).one("h1").text == method.pseudonym
-        told = client.get(f"/api/v1/methods/{method.pk}").json()
-        assert (told["name"], told["team"], told["shown_at"]) == (method.pseudonym, "Anonymous", None)
-
-
-def test_its_own_team_reads_its_name_and_what_others_call_it(
-    client: Client, method: Method, owner: User, teammate: User
-) -> None:
-    change(method, "ANONYMOUS", owner)
+    for reader in (ANYBODY, stranger):
+        entry = rows(reader)[method.pseudonym]
+        assert (entry.rank, entry.team, entry.n_attempts) == (1, "Anonymous", 1)
+        assert (entry.description, entry.paper_url, entry.code_url) == ("", "", "")
+        assert entry.details == stated(n_frames=6, latency_ms=12.5, cameras="ONE")
+    assert pages.page(client.get(f"/methods/{method.pk}/")).one("h1").text == method.pseudonym
+    told = client.get(f"/api/v1/methods/{method.pk}").json()
+    assert (told["name"], told["team"], told["shown_at"]) == (method.pseudonym, "Anonymous", None)
     for member in (owner, teammate):
         entry = rows(member)["Secret sauce"]
         assert (entry.pseudonym, entry.team, entry.is_visible_to_all) == (method.pseudonym, "Owls", True)
         assert len(rows(member)) == len(rows())
-        client.force_login(member)
-        told = client.get(f"/api/v1/methods/{method.pk}").json()
-        assert (told["name"], told["pseudonym"]) == ("Secret sauce", method.pseudonym)
 
 
 # --- a board as of a time ----------------------------------------------------------------------------------
@@ -150,15 +114,6 @@ def test_a_board_as_of_a_time_shows_what_was_shown_then(method: Method, owner: U
         assert "Secret sauce" in names(reader, after)
     own = boards.board(split=split(), viewer=owner, at=before).entries
     assert [entry.visibility for entry in own if entry.method == "Secret sauce"] == [Visibility.PRIVATE]
-
-
-def test_what_was_withdrawn_before_it_was_shown_leaves_no_stone(
-    sent: Submission, method: Method, owner: User
-) -> None:
-    sent.withdrawn_at = timezone.now()
-    sent.save()
-    change(method, "PUBLIC", owner)
-    assert "Secret sauce" not in rows()
 
 
 # --- leaving private ---------------------------------------------------------------------------------------
@@ -185,9 +140,7 @@ def test_only_the_team_shows_a_method_and_it_is_told_to_the_trail(
     [
         ("PUBLIC", "PRIVATE", "bad-value"),
         ("PUBLIC", "ANONYMOUS", "shown-for-good"),
-        ("ANONYMOUS", "PRIVATE", "bad-value"),
-        ("PRIVATE", "PRIVATE", "bad-value"),
-        ("PRIVATE", "SECRET", "bad-value"),
+        ("ANONYMOUS", "SECRET", "bad-value"),
     ],
 )
 def test_there_is_no_way_back(method: Method, owner: User, now_is: str, to: str, code: str) -> None:
@@ -260,20 +213,6 @@ def test_page_shows_what_others_will_see_asks_and_shows_it(
     assert left.all("form") == []
 
 
-def test_page_takes_a_day_of_reveal(client: Client, method: Method, owner: User) -> None:
-    client.force_login(owner)
-    address = f"/methods/{method.pk}/visibility/"
-    day = f"{timezone.now() + timedelta(days=30):%Y-%m-%d}"
-    asked = {"visibility": "ANONYMOUS", "reveal_on": day}
-    assert (
-        f"on {day} it becomes public automatically" in pages.page(client.get(address, asked)).one("main").text
-    )
-    assert client.post(address, {**asked, "confirm": "on"}).status_code == 302
-    assert f"{Method.objects.get().reveal_at:%Y-%m-%d %H:%M}" == f"{day} 00:00"
-    for bad in ("soon", "1999-01-01", "9999-12-31", "2026-13-01", "\x00"):
-        assert client.get(address, {"visibility": "ANONYMOUS", "reveal_on": bad}).status_code == 422, bad
-
-
 # --- the API -----------------------------------------------------------------------------------------------
 
 
@@ -314,21 +253,10 @@ def test_program_shows_a_method_when_it_says_that_it_means_it(
 @pytest.mark.parametrize(
     "body",
     [
-        *(
-            "[]",
-            "null",
-            "5",
-            '"x"',
-            "{",
-            '{"visibility": 5, "confirm": true}',
-            "[" * 2000,
-            '{"confirm": "yes"}',
-        ),
+        *("null", "{", '{"visibility": 5, "confirm": true}', "[" * 2000, '{"confirm": "yes"}'),
         '{"visibility": "ANONYMOUS", "reveal_at": "soon", "confirm": true}',
         '{"visibility": "ANONYMOUS", "reveal_at": 1e999, "confirm": true}',
         '{"visibility": "ANONYMOUS", "reveal_at": "0001-01-01T00:00:00+14:00", "confirm": true}',
-        '{"visibility": "\\ud800", "confirm": true}',
-        '{"visibility": "PUBLIC", "confirm": "\\u0000"}',
     ],
 )
 def test_nonsense_is_refused_and_changes_nothing(
@@ -342,11 +270,10 @@ def test_nonsense_is_refused_and_changes_nothing(
 # --- names of others ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["Deep Scale", "deep  scale", "Deep Scаle"])
 def test_method_cannot_be_published_under_the_name_of_a_quoted_row(
-    client: Client, method: Method, owner: User, name: str
+    client: Client, method: Method, owner: User
 ) -> None:
-    Method.objects.filter(pk=method.pk).update(name=name)
+    Method.objects.filter(pk=method.pk).update(name="Deep Scаle")
     method.refresh_from_db()
     client.force_login(owner)
     with pytest.raises(Refused) as refused:
@@ -384,12 +311,3 @@ def test_taken_name_gets_a_number_where_a_method_becomes_public_by_itself(
     assert (method.name, method.visibility) == ("Deep Scale 3", Visibility.PUBLIC)
     renamed = AuditEvent.objects.get(verb="renamed", noun_id=str(method.pk))
     assert renamed.details["reason"] == "another method used this name on the boards first"
-
-
-def test_quoted_row_has_an_id_that_no_method_can_take(client: Client, method: Method, owner: User) -> None:
-    change(method, Visibility.PUBLIC, owner)
-    entries = client.get("/api/v1/splits/test/board").json()["entries"]
-    ids = {entry["method"]: entry["id"] for entry in entries}
-    assert ids["Deep Scale"] == "published:deep-scale"
-    assert ids["Secret sauce"] == str(method.pk)
-    assert len(set(ids.values())) == len(entries)

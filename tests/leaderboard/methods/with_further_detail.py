@@ -72,7 +72,6 @@ def test_the_schema_describes_it() -> None:
     for shape in ("Details", "PatchedMethodChangesRequest"):
         field = schema["components"]["schemas"][shape]["properties"]["optimizer"]
         assert field["description"].startswith("What the weights were trained with.")
-        assert field["examples"] == ["AdamW"]
     parameters = schema["paths"]["/api/v1/splits/{split}/board"]["get"]["parameters"]
     assert "optimizer" in [each["name"] for each in parameters]
 

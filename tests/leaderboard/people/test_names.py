@@ -13,89 +13,58 @@ pytestmark = pytest.mark.slow
 
 ALIKE = [
     ("PayPal", "PayPaI"),
-    ("Owls", "OWLS"),
-    ("Owls", "0wls"),
+    ("Owls", "0WLS"),
     ("Owls", "Оwls"),
     ("Owls", "ΟWLS"),
-    ("Owls", "ꓳwls"),
     ("Owls", "𝖮𝗐𝗅𝗌"),
-    ("Owls", "Ｏｗｌｓ"),
     ("Owls", "O\u200bwls"),
     ("Owls", "Owl\u0323s"),
-    ("Foo", "Fοο"),
-    ("Foo Lab", "Foo  Lab"),
-    ("Foo Lab", "Foo\u00a0Lab"),
-    ("Foo Lab", "Foo\u2003Lab"),
+    ("Foo Lab", "Foo\u00a0 Lab"),
     ("modern", "modem"),
-    ("vvave", "wave"),
-    ("alpha", "ɑlpha"),
-    ("alpha", "аlphа"),
-    ("scope", "ѕсоре"),
-    ("cope", "соре"),
-    ("Bor", "Воr"),
     ("вор", "Вор"),
-    ("BAD", "ᏴᎪᎠ"),
-    ("lab", "ⅼab"),
     ("lab", "ʟab"),
-    ("yes", "ʏes"),
     ("T-Net", "τ-Net"),
-    ("Yes", "Υes"),
-    ("one", "oηe"),
     ("fine", "ﬁne"),
     ("Strasse", "Straße"),
-    ("Muller", "Müller"),
     ("Bjorn", "Bjørn"),
-    ("x2", "x²"),
-    ("a-b", "a–b"),
     ("a-b", "a—b"),
-    ("a-b", "a\u2010b"),
     ("it's", "it’s"),
     ('"x"', "“x”"),
-    ("Net 1l", "Net lI"),
-    ("ℍello", "Hello"),
     ("İstanbul", "Istanbul"),
 ]
 DIFFERENT = [
     ("Team 1", "Team 7"),
-    ("Team 10", "Team 11"),
-    ("v10", "v12"),
     ("RTX", "UTX"),
-    ("Yen", "Zen"),
-    ("Foo", "Fob"),
     ("Net-A", "Net A"),
     ("naive", "native"),
     ("深度", "深广"),
-    ("한국", "한글"),
     ("Ада", "Ева"),
-    ("Owls", "Owl"),
 ]
 NO_NAMES = [
-    ("", "missing-field"),
-    ("   ", "missing-field"),
     ("\u00a0\u2003", "missing-field"),
     ("x" * (MAX_NAME + 1), "text-too-long"),
-    ("\ufdfa" * 30, "text-too-long"),
     ("Foo\x00", "bad-character"),
-    ("Foo\nBar", "bad-character"),
     ("Foo\u202eBar", "bad-character"),
-    ("Foo\u2066Bar", "bad-character"),
     ("Foo\u200bBar", "bad-character"),
-    ("Foo\u200dBar", "bad-character"),
-    ("Foo\ufeff", "bad-character"),
     ("Foo\u2028Bar", "bad-character"),
     ("Foo\u3164", "bad-character"),
-    ("Foo\u2800", "bad-character"),
-    ("Foo\ufe0f", "bad-character"),
     ("Foo\ud800", "bad-character"),
-    ("Foo\ue000", "bad-character"),
     ("F\u0301\u0302\u0303\u0304oo", "bad-character"),
-    ("…", "bad-name"),
     ("=+-", "bad-name"),
-    ("Anonymous", "reserved-name"),
     ("anonymous 3f9c2a", "reserved-name"),
     ("Αnоnymous", "reserved-name"),
 ]
-GOOD = ["Foo++", "=1+1", "<b>x</b>", "深度", "Müller & Søn", "τ-Net", "{{7*7}}", "O'Reilly", "x" * MAX_NAME]
+GOOD = [
+    "Foo++",
+    "=1+1",
+    "<b>x</b>",
+    "深度",
+    "Müller & Søn",
+    "τ-Net",
+    "{{7*7}}",
+    "O'Reilly",
+    "\ufdfa" * MAX_NAME,
+]
 
 
 @pytest.mark.parametrize(("name", "other"), ALIKE)
@@ -123,10 +92,6 @@ def test_what_is_no_name_is_refused_with_its_reason(text: str, code: str) -> Non
 def test_names_keep_what_one_can_see(text: str) -> None:
     assert clean_name("name", f"  {text}\u00a0") == text
     assert len(skeleton(text)) <= MAX_LOOK
-
-
-def test_spaces_are_those_of_the_keyboard() -> None:
-    assert clean_name("name", "Foo\u2003 Lab") == "Foo Lab"
 
 
 def test_no_two_teams_look_the_same_and_a_person_without_a_usable_name_gets_a_plain_one(db: None) -> None:

@@ -1,15 +1,13 @@
 """API tokens: what they are good for, and when they are good for nothing any more."""
 
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 import pytest
 from django.core.files.base import ContentFile
-from django.db import IntegrityError, transaction
 from django.utils import timezone
-from pytest_django import DjangoAssertNumQueries
 from rest_framework.test import APIClient
 
 from leaderboard import audit
@@ -22,6 +20,7 @@ from tests.leaderboard.api.test_submissions import post
 pytestmark = pytest.mark.slow
 
 REVOKE = "/api/v1/tokens/revoke"
+ENDED_AT = datetime(2026, 1, 2, 3, 4, tzinfo=UTC)
 
 
 def client_with(secret: str) -> APIClient:
@@ -79,13 +78,6 @@ def test_a_token_opens_what_it_was_made_for_and_nothing_else(
     assert Submission.objects.count() == 1 + (found["submit"] == 201)
 
 
-def test_a_token_for_one_split_lists_that_split_alone(edition: Edition, owner: User) -> None:
-    builders.submit(owner, builders.predictions(edition))
-    elsewhere = client_with(builders.token(owner, split_name="val"))
-    assert elsewhere.get("/api/v1/submissions").json() == []
-    assert [row["split"] for row in elsewhere.get("/api/v1/quota").json()] == ["val"]
-
-
 # --- what is said ----------------------------------------------------------------------------------------
 
 
@@ -95,35 +87,31 @@ def refusal(client: APIClient, address: str = "/api/v1/submissions") -> tuple[in
     return response.status_code, response.json()["code"], response.json()["detail"]
 
 
-def test_an_expired_token_says_when_it_ended_and_stays_to_say_so(owner: User, secret: str) -> None:
-    ended_at = timezone.now() - timedelta(days=3)
-    ApiToken.objects.update(expiry=ended_at)
-    for _ in range(2):
-        status, code, detail = refusal(client_with(secret))
-        assert (status, code) == (401, "token-expired")
-        assert f"expired on {ended_at:%Y-%m-%d %H:%M} UTC" in detail
-        assert "/tokens/" in detail
-
-
-def test_a_revoked_token_says_so_at_once(owner: User, secret: str) -> None:
-    client = client_with(secret)
-    assert client.get("/api/v1/submissions").status_code == 200
-    tokens.revoke(token=ApiToken.objects.get(), now=timezone.now(), actor=owner)
-    assert refusal(client)[:2] == (401, "token-revoked")
+@pytest.mark.parametrize(
+    ("changed", "status", "code", "said"),
+    [
+        (
+            {"expiry": ENDED_AT},
+            401,
+            "token-expired",
+            "expired on 2026-01-02 03:04 UTC; create another",
+        ),
+        ({"revoked_at": ENDED_AT}, 401, "token-revoked", "revoked on 2026-01-02 03:04 UTC"),
+        ({"may_read": False}, 403, "token-scope", "has the scope 'submit'; expected 'read' for this."),
+    ],
+)
+def test_a_token_that_does_not_open_says_why(
+    owner: User, secret: str, changed: dict[str, Any], status: int, code: str, said: str
+) -> None:
+    ApiToken.objects.update(**changed)
+    found = refusal(client_with(secret))
+    assert (found[:2], said in found[2]) == ((status, code), True)
+    assert ApiToken.objects.get().last_used_at is None or status == 403
 
 
 def test_a_closed_account_closes_its_tokens(owner: User, secret: str) -> None:
     User.objects.filter(pk=owner.pk).update(is_active=False)
     assert refusal(client_with(secret))[:2] == (401, "account-closed")
-
-
-def test_a_missing_scope_is_named(owner: User) -> None:
-    client = client_with(builders.token(owner, scopes=["submit"]))
-    assert refusal(client) == (
-        403,
-        "token-scope",
-        "The token has the scope 'submit'; expected 'read' for this.",
-    )
 
 
 def test_another_split_is_named(edition: Edition, owner: User) -> None:
@@ -138,24 +126,11 @@ def test_another_split_is_named(edition: Edition, owner: User) -> None:
 # --- where it may stand ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["token", "access_token", "key", "authorization", "api_key"])
-def test_a_token_in_the_address_or_the_body_opens_nothing(edition: Edition, secret: str, name: str) -> None:
+def test_a_token_in_the_address_or_the_body_opens_nothing(edition: Edition, secret: str) -> None:
     client = APIClient()
-    assert client.get(f"/api/v1/submissions?{name}={secret}").status_code == 401
-    assert client.get("/api/v1/submissions", headers={"Cookie": f"{name}={secret}"}).status_code == 401
-    assert post(client, builders.predictions(edition), **{name: secret}).status_code == 401
-
-
-@pytest.mark.parametrize(
-    "secret", ["", "x", "tsttc_" + "g" * 64, "tsttc_" + "A" * 64, "tsttc_" + "0" * 65, "é"]
-)
-def test_what_is_no_token_never_reaches_the_database(
-    db: None, django_assert_num_queries: DjangoAssertNumQueries, secret: str
-) -> None:
-    with django_assert_num_queries(0):
-        assert APIClient().post(REVOKE, {"token": secret}, format="json").status_code in {200, 422}
-        with pytest.raises(tokens.UnusableToken):
-            tokens.use(secret=secret, now=timezone.now())
+    assert client.get(f"/api/v1/submissions?token={secret}").status_code == 401
+    assert client.get("/api/v1/submissions", headers={"Cookie": f"token={secret}"}).status_code == 401
+    assert post(client, builders.predictions(edition), token=secret).status_code == 401
 
 
 # --- last used -------------------------------------------------------------------------------------------
@@ -170,26 +145,7 @@ def test_the_last_use_is_noted_once_a_minute(owner: User, secret: str) -> None:
     assert ApiToken.objects.get().last_used_at == now + timedelta(seconds=60)
 
 
-def test_a_refused_token_is_not_used(owner: User, secret: str) -> None:
-    ApiToken.objects.update(expiry=timezone.now())
-    client_with(secret).get("/api/v1/submissions")
-    assert ApiToken.objects.get().last_used_at is None
-
-
 # --- making one ------------------------------------------------------------------------------------------
-
-
-def test_a_token_ends_after_ninety_days_unless_asked_otherwise(owner: User) -> None:
-    now = timezone.now()
-    tokens.create(user=owner, name="usual", now=now)
-    tokens.create(user=owner, name="year", days=365, now=now)
-    ends = dict(ApiToken.objects.values_list("name", "expiry"))
-    assert ends == {"usual": now + timedelta(days=90), "year": now + timedelta(days=365)}
-
-
-def test_the_database_knows_no_token_that_is_good_for_nothing(owner: User, secret: str) -> None:
-    with pytest.raises(IntegrityError), transaction.atomic():
-        ApiToken.objects.update(may_read=False, may_submit=False)
 
 
 def test_nobody_piles_up_tokens(owner: User) -> None:
@@ -205,6 +161,7 @@ def test_nobody_piles_up_tokens(owner: User) -> None:
 
 def test_making_and_revoking_are_audited_without_the_secret(owner: User, secret: str) -> None:
     row = ApiToken.objects.get()
+    assert secret not in {row.digest, row.token_key}
     assert tokens.revoke(token=row, now=timezone.now(), actor=owner)
     assert not tokens.revoke(token=row, now=timezone.now(), actor=owner)
     revoked, created = AuditEvent.objects.filter(noun="ApiToken", noun_id=row.token_key)
@@ -233,7 +190,7 @@ def test_the_answer_does_not_tell_whether_it_was_a_token(owner: User, secret: st
     assert AuditEvent.objects.filter(verb="revoked").count() == 1
 
 
-@pytest.mark.parametrize("body", [{}, [], "text", {"token": ""}, {"token": [1]}, {"token": "a\x00"}, None])
+@pytest.mark.parametrize("body", [[], {"token": ""}, {"token": "a\x00"}, None])
 def test_a_report_without_a_token_says_what_is_expected(db: None, body: object) -> None:
     response = APIClient().post(REVOKE, body, format="json")
     assert response.status_code == 422
@@ -291,13 +248,3 @@ def test_a_token_for_one_split_sends_with_the_details_that_stand_and_makes_new_m
     assert send(client, data, method="Bar", description="Another.")[0] == 201
     assert Method.objects.get(name="Bar").description == "Another."
     assert not AuditEvent.objects.filter(verb="edited").exists()
-
-
-def test_a_token_for_every_split_changes_a_method_as_its_page_does(
-    edition: Edition, owner: User, public: Method
-) -> None:
-    client = client_with(builders.token(owner))
-    assert send(client, builders.predictions(edition, factor=1.3), description="More.")[0] == 201
-    public.refresh_from_db()
-    assert public.description == "More."
-    assert AuditEvent.objects.get(verb="edited").details == {"fields": ["description"]}

@@ -65,14 +65,6 @@ def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client
     assert (quota["next_slot_at"] is not None) is (kind == FUTURE)
 
 
-def test_nobody_is_asked_to_be_the_first_where_nothing_is_taken(edition: Edition, client: Client) -> None:
-    notice = "to be the first"
-    assert notice in pages.page(client.get("/board/test/")).one("main").text
-    set_times(LATE)
-    client.cookies["sessionid"] = "drawn anew"
-    assert notice not in pages.page(client.get("/board/test/")).one("main").text
-
-
 def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
     opens_at = timezone.now() + HOUR
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
@@ -99,20 +91,3 @@ def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> No
 
 
 # --- what filters leave -----------------------------------------------------------------------------------
-
-
-def test_a_filter_does_not_make_the_board_say_that_nobody_has_submitted(
-    edition: Edition, owner: User, client: Client
-) -> None:
-    submission = builders.submit(owner, builders.predictions(edition), method="Foo")
-    builders.score_all()
-    for query in ("?q=shi", "?q=nothing-like-it"):
-        text = pages.page(client.get(f"/board/test/{query}")).one("main").text
-        assert "no submissions yet" not in text
-        assert "being computed" not in text
-    submission.refresh_from_db()
-    client.force_login(owner)
-    assert client.post(f"/submissions/{submission.pk}/withdraw/", {"confirm": "on"}).status_code == 302
-    text = pages.page(client.get("/board/test/?q=Foo")).one("main").text
-    assert "withdrawn" in text
-    assert "being computed" not in text

@@ -41,38 +41,6 @@ def test_a_machine_that_fails_counts_against_nobody(edition: Edition, owner: Use
     assert "counts as a rejected" not in submissions.progress(sent).sentence
 
 
-def test_rejected_files_of_all_splits_together_have_a_limit(
-    edition: Edition, owner: User, stranger: User, settings: Settings, tmp_path: Path
-) -> None:
-    val = builders.import_truth(tmp_path, split="val", seed=1)
-    settings.MAX_TEAM_REJECTED_PER_DAY = 3
-    limit(rejected_limit=20)
-    limit("val", rejected_limit=20)
-    send(owner, bad(1))
-    send(owner, bad(2), at=NOW + HOUR, split="val")
-    builders.score_all()
-    send(owner, bad(3), at=NOW + 2 * HOUR, split="val")
-    queue_rows.strike_out()
-    for split in ("test", "val"):
-        quota = state(owner, at=NOW + 3 * HOUR, split=split)
-        assert (quota.is_open, quota.n_rejected) == (False, 1 if split == "test" else 2)
-        assert quota.sentence == (
-            "Your team has reached its limit for all splits together: within 24 hours, 3 files that were "
-            "rejected, were cancelled, or stopped the process that read them; the next slot opens at "
-            "2026-11-21 12:00 UTC."
-        )
-        assert quota.next_slot_at == NOW + 24 * HOUR
-    with pytest.raises(QuotaExceeded, match="for all splits together"):
-        send(owner, other(val, 4), at=NOW + 3 * HOUR, split="val")
-    assert state(stranger, at=NOW + 3 * HOUR).is_open
-    assert state(owner, at=NOW + 24 * HOUR).is_open
-    limit(rejected_limit=None)
-    assert state(owner, at=NOW + 3 * HOUR).is_open, "where somebody allows any number"
-    limit(rejected_limit=20)
-    settings.MAX_TEAM_REJECTED_PER_DAY = 0
-    assert state(owner, at=NOW + 3 * HOUR).is_open
-
-
 def sized(n_bytes: int, number: int) -> bytes:
     """A file of that size which is rejected, and which no other number has."""
     return bad(number).ljust(n_bytes)

@@ -3,7 +3,6 @@
 from datetime import timedelta
 
 import pytest
-from django.test import Client
 from django.utils import timezone
 from pytest_django.fixtures import Settings
 
@@ -43,14 +42,6 @@ def join(user: User, owner: User) -> None:
     invitations.accept(secret=secret, user=user, now=now)
 
 
-def test_a_team_has_one_quota(limited: Edition, owner: User, teammate: User, stranger: User) -> None:
-    send(limited, owner, 1.1, 1.2)
-    send(limited, teammate, 1.3)
-    assert [state(user).left for user in (owner, teammate, stranger)] == [0, 0, 3]
-    with pytest.raises(QuotaExceeded):
-        send(limited, teammate, 1.4)
-
-
 def test_who_leaves_takes_what_they_sent_along_and_the_team_keeps_what_it_got(
     limited: Edition, owner: User, teammate: User
 ) -> None:
@@ -61,30 +52,6 @@ def test_who_leaves_takes_what_they_sent_along_and_the_team_keeps_what_it_got(
     with pytest.raises(QuotaExceeded):
         send(limited, teammate, 1.4)
     assert state(teammate).left == 0
-
-
-def test_who_joins_brings_along_what_they_sent(limited: Edition, owner: User, stranger: User) -> None:
-    send(limited, stranger, 1.1, 1.2)
-    send(limited, owner, 1.3)
-    join(stranger, owner)
-    assert (state(owner).used, state(stranger).used) == (3, 3)
-    with pytest.raises(QuotaExceeded):
-        send(limited, owner, 1.4)
-
-
-def test_people_who_come_and_go_do_not_make_a_team_sent_twice(
-    limited: Edition, owner: User, stranger: User, maintainer: User
-) -> None:
-    teams.team_of(user=owner)
-    send(limited, stranger, 1.1)
-    join(stranger, owner)
-    send(limited, stranger, 1.2)
-    assert state(owner).used == 2
-    teams.leave(user=stranger)
-    # What came along as methods of a team of one stays with the team.
-    assert (state(owner).used, state(stranger).used) == (2, 2)
-    join(maintainer, stranger)
-    assert state(maintainer).used == 2
 
 
 # --- two people who put their quotas together ---------------------------------------------------------------
@@ -171,7 +138,3 @@ def test_where_addresses_are_not_proved_nobody_spends_the_quota_of_another(
 ) -> None:
     send(limited, account("owner+evil@example.org"), 1.1, 1.2, 1.3)
     assert state(owner).left == 3
-
-
-def test_sign_up_states_the_rule(client: Client, db: None) -> None:
-    assert "One account per person" in client.get("/accounts/signup/").text

@@ -47,16 +47,6 @@ def test_decided_submission_has_no_place_any_more(edition: Edition, owner: User)
 # --- whose fault it was ---------------------------------------------------------------------------------
 
 
-def test_nothing_needs_saying_while_all_goes_well(edition: Edition, owner: User) -> None:
-    row = queue_rows.queued(edition, owner)
-    said = [progress(row).sentence]
-    lease = queue_rows.claim()
-    said.append(progress(row).sentence)
-    lifecycle.finalise(lease, queue_rows.SCORED)
-    said.append(progress(row).sentence)
-    assert said == ["", "", ""]
-
-
 def test_rejected_is_the_files_fault(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.finalise(queue_rows.claim(), queue_rows.REJECTED)
@@ -90,11 +80,3 @@ def test_cancelled_was_its_teams_wish(edition: Edition, owner: User) -> None:
     row = queue_rows.queued(edition, owner)
     lifecycle.cancel(submission=row.submission, actor=owner)
     assert progress(row).sentence == "The team cancelled the submission before it was scored."
-
-
-def test_try_that_failed_says_nothing_about_the_file(edition: Edition, owner: User) -> None:
-    row = queue_rows.queued(edition, owner)
-    lifecycle.fail_attempt(queue_rows.claim(), strike=Strike.INFRASTRUCTURE, reason="disk", rng=RNG)
-    again = progress(row)
-    assert again.sentence.startswith("One try ended without a result; the file may be fine.")
-    assert not again.fault_is_ours

@@ -7,10 +7,8 @@ from django.utils import timezone
 
 from leaderboard import versions
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import AuditEvent, Edition, Method, Split, Status, Submission, Team, User
-from leaderboard.quotas import quotas
+from leaderboard.models import AuditEvent, Edition, Method, Status, Submission, Team, User
 from leaderboard.storage import files
-from leaderboard.submissions import submissions
 from tests import builders
 
 
@@ -24,11 +22,6 @@ def test_submission_is_stored_queued_and_recorded(edition: Edition, owner: User)
     assert AuditEvent.objects.filter(verb="submitted", noun_id=submission.pk, actor=owner).count() == 1
 
 
-def test_same_bytes_for_another_method_are_another_submission(edition: Edition, owner: User) -> None:
-    data = builders.predictions(edition)
-    assert builders.submit(owner, data) != builders.submit(owner, data, method="Bar")
-
-
 def test_withdrawn_bytes_may_be_sent_again(edition: Edition, owner: User) -> None:
     data = builders.predictions(edition)
     first = builders.submit(owner, data)
@@ -36,23 +29,10 @@ def test_withdrawn_bytes_may_be_sent_again(edition: Edition, owner: User) -> Non
     assert builders.submit(owner, data) != first
 
 
-def test_strangers_may_use_the_same_method_name(edition: Edition, owner: User, stranger: User) -> None:
-    data = builders.predictions(edition)
-    theirs = builders.submit(stranger, data, visibility="PRIVATE").method
-    assert builders.submit(owner, data).method != theirs
-
-
 def test_somebody_without_a_name_gets_a_team_that_reveals_no_address(edition: Edition, db: None) -> None:
     nameless = User.objects.create_user("very.private@example.org", "correct horse")
     team = builders.submit(nameless, builders.predictions(edition)).method.team
     assert re.fullmatch("Team [0-9a-f]{6}", team.name)
-
-
-def test_two_people_of_one_name_are_two_teams(edition: Edition, owner: User) -> None:
-    namesake = User.objects.create_user("other@example.org", "correct horse", name=owner.name)
-    data = builders.predictions(edition)
-    sent = [builders.submit(owner, data), builders.submit(namesake, data, visibility="PRIVATE")]
-    assert {each.method.team.name for each in sent} == {"Owls", "Owls 2"}
 
 
 def test_what_is_said_of_a_method_later_replaces_what_was_said(edition: Edition, owner: User) -> None:
@@ -77,25 +57,14 @@ def test_bytes_that_are_there_change_nothing_of_the_method(edition: Edition, own
     assert (versions.number("test"), AuditEvent.objects.count()) == (number, n_events)
 
 
-def test_a_refused_file_changes_nothing_of_the_method(edition: Edition, owner: User) -> None:
-    builders.submit(owner, builders.predictions(edition), description="old")
-    Split.objects.filter(pk="test").update(quota_limit=1)
-    with pytest.raises(quotas.QuotaExceeded):
-        builders.submit(owner, builders.predictions(edition, factor=1.2), description="new")
-    assert Method.objects.get().description == "old"
-
-
 @pytest.mark.parametrize(
     ("fields", "code", "field"),
     [
         ({"split": "nope"}, "unknown-split", "split"),
         ({"split": "val"}, "split-not-open", "split"),
         ({"method": "   "}, "missing-field", "method"),
-        ({"method": "x" * 81}, "text-too-long", "method"),
-        ({"method": "a\x00b"}, "bad-character", "method"),
         ({"method": "a\ud800b"}, "bad-character", "method"),
         ({"paper_url": "javascript:alert(1)"}, "bad-address", "paper_url"),
-        ({"code_url": "ftp://example.org"}, "bad-address", "code_url"),
         ({"note": "x" * 501}, "text-too-long", "note"),
     ],
 )
@@ -112,7 +81,7 @@ def test_refused_input_names_its_field_and_leaves_nothing(
 
 def test_file_over_the_limit_is_refused_with_both_sizes(edition: Edition, owner: User, settings) -> None:
     settings.MAX_PREDICTIONS_BYTES = 1000
-    with pytest.raises(submissions.TooLarge, match=r"has 1,001 bytes; expected at most 1,000"):
+    with pytest.raises(Refused, match=r"has 1,001 bytes; expected at most 1,000"):
         builders.submit(owner, b" " * 1001)
     assert not Submission.objects.exists()
 

@@ -136,14 +136,14 @@ def test_the_template_has_every_anno_id_and_is_rejected_until_it_is_filled_in(
 def test_details_of_the_method_are_taken_with_the_file_in_words_of_people(
     signed_in: Client, edition: Edition
 ) -> None:
-    said = {"n_parameters": "25M", "latency_ms": "50 ms", "hardware": "one GPU", "uses_nerf": "no"}
+    said = {"n_parameters": "25M", "latency_ms": "50", "hardware": "one GPU", "uses_nerf": "no"}
     response = send(signed_in, builders.predictions(edition), note="second try", **said)
     assert response.status_code == 302
     sent = Submission.objects.select_related("method").get()
     method = sent.method
     assert (method.n_parameters, method.latency_ms, method.uses_nerf) == (25_000_000, 50.0, False)
     assert sent.note == "second try"
-    response = send(signed_in, builders.predictions(edition, factor=1.2), n_parameters="31e6")
+    response = send(signed_in, builders.predictions(edition, factor=1.2), n_parameters="31M")
     assert response.status_code == 302
     method.refresh_from_db()
     assert (method.n_parameters, method.hardware) == (31_000_000, "one GPU")
