@@ -10,8 +10,9 @@ from django.db import transaction
 
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
-from leaderboard.models import SiteAnnouncement, Split, User
+from leaderboard.models import PageVersion, Split, User
 from leaderboard.models.benchmark import NO_END, NO_TEXT, Listing
+from leaderboard.models.pages import ANNOUNCEMENT
 from leaderboard.models.quotas import excess
 
 MAX_DESCRIPTION: Final = 1000
@@ -112,9 +113,11 @@ def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User 
         )
     with transaction.atomic():
         if ends_at is None:
-            SiteAnnouncement.objects.all().delete()
+            PageVersion.announcement().delete()
         else:
-            SiteAnnouncement.objects.update_or_create(pk=1, defaults={"text": text, "ends_at": ends_at})
+            PageVersion.objects.update_or_create(
+                page=ANNOUNCEMENT, number=1, defaults={"text": text, "ends_at": ends_at, "written_at": now}
+            )
         audit.record(
             verb="announced",
             noun="SiteAnnouncement",

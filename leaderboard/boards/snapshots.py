@@ -27,8 +27,8 @@ from leaderboard.boards.rows import Entry
 from leaderboard.models import (
     Edition,
     Method,
+    PageVersion,
     Score,
-    SiteAnnouncement,
     Split,
     Status,
     Visibility,
@@ -88,7 +88,7 @@ def site_line_of(splits: Sequence[Split], *, now: datetime) -> str:
 
 def _all_splits() -> list[Split]:
     rows = Split.objects.order_by("position", "name").select_related("published_edition__ground_truth")
-    rows = rows.annotate(**SiteAnnouncement.of_every_row())
+    rows = rows.annotate(**PageVersion.announcement_of_every_row())
     return list(rows.annotate(board_number=F("board_version__number")))
 
 

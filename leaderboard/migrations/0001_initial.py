@@ -262,7 +262,8 @@ class Migration(migrations.Migration):
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
                 ('page', models.CharField(max_length=20)),
                 ('number', models.PositiveIntegerField()),
-                ('text', models.TextField(help_text='Markdown.')),
+                ('text', models.TextField(help_text='Markdown; of an announcement plain text.')),
+                ('ends_at', models.DateTimeField(help_text='Of an announcement.', null=True)),
                 ('written_at', models.DateTimeField(default=django.utils.timezone.now)),
                 ('written_by', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='+', to=settings.AUTH_USER_MODEL)),
             ],
@@ -320,17 +321,6 @@ class Migration(migrations.Migration):
                 ('high', models.FloatField(blank=True, null=True)),
                 ('evaluation', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='scores', to='leaderboard.evaluation')),
             ],
-        ),
-        migrations.CreateModel(
-            name='SiteAnnouncement',
-            fields=[
-                ('id', models.PositiveSmallIntegerField(default=1, editable=False, primary_key=True, serialize=False)),
-                ('text', models.CharField(max_length=300)),
-                ('ends_at', models.DateTimeField()),
-            ],
-            options={
-                'constraints': [models.CheckConstraint(condition=models.Q(('id', 1)), name='one_announcement_of_the_site')],
-            },
         ),
         migrations.CreateModel(
             name='SpentMailbox',

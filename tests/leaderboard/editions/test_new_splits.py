@@ -14,7 +14,7 @@ from leaderboard.benchmark import moments, policy
 from leaderboard.benchmark.policy import Policy
 from leaderboard.editions import corrections, new_splits
 from leaderboard.errors.refusals import NotMaintainer, Refused
-from leaderboard.models import AuditEvent, Edition, SiteAnnouncement, Split, Submission, User
+from leaderboard.models import AuditEvent, Edition, PageVersion, Split, Submission, User
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.web.maintain.desk import get
@@ -358,14 +358,14 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     # Its end comes: the next sweep tells remembered pages.
     later = timezone.now() - timedelta(seconds=1)
     Split.objects.filter(pk="val").update(announcement_ends_at=later)
-    SiteAnnouncement.objects.update(ends_at=later)
+    PageVersion.announcement().update(ends_at=later)
     assert versions.times_passed(now=timezone.now()) == 4
     assert "Val only" not in visitor.get("/board/val/").text
     assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
     assert keeper.post(page, sent | {"announcement": "Known error"}).status_code == 302
     assert "Known error" in visitor.get("/board/test/").text
     assert keeper.post(page, {}).status_code == 302
-    assert not SiteAnnouncement.objects.exists()
+    assert not PageVersion.announcement().exists()
     assert "Known error" not in visitor.get("/board/test/").text
 
 
