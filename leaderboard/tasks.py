@@ -1,7 +1,4 @@
-"""Celery tasks: each calls one function. A message carries no work, only the news that some is waiting.
-
-`_` takes the arguments that messages of a former version still bear while an installation is upgraded.
-"""
+"""Celery tasks: each calls one function. A message carries no work, only the news that some is waiting."""
 
 import random
 
@@ -17,14 +14,14 @@ from leaderboard.workers import backlog, queue  # noqa: F401 - only its errors a
 
 
 @shared_task(name="leaderboard.tasks.nudge")
-def nudge(*_: object) -> None:
+def nudge() -> None:
     """Decide the most urgent waiting evaluation."""
     close_old_connections()
     worker.run_next(rng=random.Random())  # noqa: S311 - jitter, not a secret
 
 
 @shared_task(name="leaderboard.tasks.work_off")
-def work_off(*_: object) -> None:
+def work_off() -> None:
     """Do what waits behind submissions: boards to draw, intervals, comparisons, analyses."""
     close_old_connections()
     backlog.work_off(now=timezone.now(), rng=random.Random())  # noqa: S311 - jitter, not a secret

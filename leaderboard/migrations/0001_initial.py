@@ -362,8 +362,6 @@ class Migration(migrations.Migration):
                 ('mails_begun_at', models.DateTimeField(blank=True, null=True)),
                 ('notices_at', models.DateTimeField(blank=True, null=True)),
                 ('cleaned_at', models.DateTimeField(blank=True, null=True)),
-                ('n_files_removed', models.PositiveBigIntegerField(default=0)),
-                ('n_bytes_removed', models.PositiveBigIntegerField(default=0)),
             ],
             options={
                 'constraints': [models.CheckConstraint(condition=models.Q(('id', 1)), name='one_sweep_beat')],

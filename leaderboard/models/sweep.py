@@ -22,10 +22,8 @@ class SweepBeat(models.Model):
     # Until when everything that people are told by mail is queued; see `mails.notices`.
     notices_at = models.DateTimeField(null=True, blank=True)
 
-    # What was removed because no submission named it, since the beginning; see `workers.upkeep`.
+    # When a worker last removed what no submission names; see `workers.upkeep`.
     cleaned_at = models.DateTimeField(null=True, blank=True)
-    n_files_removed = models.PositiveBigIntegerField(default=0)
-    n_bytes_removed = models.PositiveBigIntegerField(default=0)
 
     class Meta:
         constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from datetime import datetime
 
 import structlog
-from django.db.models import F
 
 from leaderboard.mails import outbox
 from leaderboard.models import SweepBeat
@@ -41,11 +40,7 @@ def clean(*, now: datetime) -> Cleaned:
     for path in orphans.leftovers():
         path.unlink(missing_ok=True)
         n_leftovers += 1
-    SweepBeat.objects.update(
-        cleaned_at=now,
-        n_files_removed=F("n_files_removed") + n_files,
-        n_bytes_removed=F("n_bytes_removed") + n_bytes,
-    )
+    SweepBeat.objects.update(cleaned_at=now)
     cleaned = Cleaned(n_files, n_bytes, n_leftovers)
     log.info("cleaned", **vars(cleaned))
     return cleaned
