@@ -212,7 +212,7 @@ def refused(user: User, data: bytes) -> None:
 
 
 def test_old_files_are_cleaned_by_the_same_rule(edition: Edition, owner: User, tmp_path: Path) -> None:
-    """What `orphans.remove` does is proved in test_clean_files.py; that it takes the same lock, here."""
+    """What `orphans.remove` does is proved in test_orphans.py; that it takes the same lock, here."""
     kept = files.save_predictions(file_of(DATA), now=timezone.now())
     orphan = orphans.Orphan(files.predictions_name(kept.digest), kept.digest, 10, timezone.now())
     assert orphans.remove(orphan, now=timezone.now() + timedelta(days=2))
