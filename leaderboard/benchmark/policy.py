@@ -13,7 +13,6 @@ from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
 from leaderboard.models import PageVersion, Split, User
 from leaderboard.models.benchmark import NO_END, NO_TEXT, Listing
 from leaderboard.models.pages import ANNOUNCEMENT
-from leaderboard.models.quotas import excess
 
 MAX_DESCRIPTION: Final = 1000
 MAX_POSITION: Final = 32767
@@ -140,8 +139,6 @@ def checked(split: Split, policy: Policy) -> Split:
     values["announcement"] = " ".join(
         clean_text("announcement", policy.announcement, limit=300, required=False).split()
     )
-    for field, fault in _out_of_range(policy).items():
-        raise Refused("bad-value", fault, field=field)
     for name, value in values.items():
         setattr(split, name, value)
     try:
@@ -164,13 +161,6 @@ def require_listable(split: Split) -> None:
             f"until its ground truth is imported (manage.py import_truth {split.pk} PATH).",
             field="listing",
         )
-
-
-def _out_of_range(policy: Policy) -> dict[str, str]:
-    faults = excess(quota_limit=policy.quota_limit, quota_rejected_limit=policy.quota_rejected_limit)
-    if not 0 <= policy.position <= MAX_POSITION:
-        faults["position"] = POSITION_FAULT % {"show_value": policy.position}
-    return faults
 
 
 def changed(before: Policy, after: Policy) -> Mapping[str, tuple[Any, Any]]:

@@ -294,8 +294,8 @@ def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: 
     said = []
     if waiting:
         said.append(
-            f"{edition} is not finished: {_are(waiting)} neither scored nor "
-            f"rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
+            f"{edition} is not finished: {counted(len(waiting), 'submission is', 'submissions are')} neither "
+            f"scored nor rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
         )
     if losing:
         said.append(
@@ -303,10 +303,6 @@ def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: 
             f"{_named(losing)}. Confirm that they are left out, or correct the ground truth."
         )
     return " ".join(said)
-
-
-def _are(rows: Sequence[Submission]) -> str:
-    return counted(len(rows), "submission is", "submissions are")
 
 
 def _named(rows: Sequence[Submission]) -> str:
