@@ -103,10 +103,6 @@ def test_every_sweep_seals(db: None) -> None:
     assert audit.verify().n_events == 3
 
 
-def test_an_empty_trail_holds(db: None) -> None:
-    assert verify_audit() == f"audit: 0 events, unbroken, last hash {GENESIS}"
-
-
 @pytest.mark.parametrize(
     "details",
     [
@@ -249,21 +245,15 @@ def test_a_changed_event_with_a_fitting_hash_is_betrayed_by_the_next(db: None) -
 
 
 @SQLITE_ONLY
-@pytest.mark.parametrize("index", [0, 1])
-def test_a_removed_event_is_missed(db: None, index: int) -> None:
+def test_a_removed_event_is_missed(db: None) -> None:
     sealed(3)
-    removed = AuditEvent.objects.order_by("pk")[index]
+    removed = AuditEvent.objects.order_by("pk")[1]
     in_sql("DELETE FROM leaderboard_auditevent WHERE id = %s", removed.pk)
-    [found] = audit.verify().breaks
-    assert found.event_id == removed.pk + 1
-    assert "something is missing" in found.what
-
-
-@SQLITE_ONLY
-def test_two_events_that_changed_places_are_found(db: None) -> None:
-    last = sealed(3).pk
-    in_sql("UPDATE leaderboard_auditevent SET seal_number = 0 WHERE id = %s", last)
-    assert [found.event_id for found in audit.verify().breaks] == [last, last - 2]
+    with pytest.raises(
+        CommandError, match=f"2 events is damaged:\n  event {removed.pk + 1}: .*missing"
+    ) as caught:
+        verify_audit()
+    assert caught.value.returncode == 1
 
 
 @SQLITE_ONLY
@@ -284,15 +274,6 @@ def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) 
     assert verify_audit().startswith("audit: 2 events, unbroken")
     with pytest.raises(CommandError, match=f"no event has the hash {noted}"):
         verify_audit("--expect", noted)
-
-
-@SQLITE_ONLY
-def test_the_command_says_where_and_exits_with_1(db: None) -> None:
-    event = sealed(2)
-    in_sql("UPDATE leaderboard_auditevent SET verb = 'other' WHERE id = %s", event.pk)
-    with pytest.raises(CommandError, match=f"2 events is damaged:\n  event {event.pk}: says") as caught:
-        verify_audit()
-    assert caught.value.returncode == 1
 
 
 # --- looking for events ----------------------------------------------------------------------------------

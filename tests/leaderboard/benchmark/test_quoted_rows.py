@@ -15,7 +15,6 @@ from leaderboard.benchmark import papers, splits
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, PublishedResult, Split
 from leaderboard.models.benchmark import SINCE_EVER
-from leaderboard.scoring import confidence
 from tests.caching import forget_boards
 from tests.editions import board_now, corrected, open_edition, paper, publish, quote, roll_back
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -98,15 +97,6 @@ def test_a_board_that_stands_has_every_row_and_a_former_one_those_of_its_time(
     second = client.get("/board/test/editions/2.csv").text
     assert "Second" in second
     assert "First-Again" not in second
-
-
-def test_ranges_of_a_former_edition_count_the_rows_of_its_time(former: Edition) -> None:
-    first, second = Edition.objects.order_by("number").select_related("split")
-    before = [confidence.digest_of(edition, []) for edition in (first, second)]
-    quote("later")
-    after = [confidence.digest_of(edition, []) for edition in (first, second)]
-    assert before[0] == after[0]
-    assert before[1] != after[1]
 
 
 @pytest.mark.usefixtures("benchmark")

@@ -16,12 +16,11 @@ import pytest
 from django.utils import timezone
 
 import evaluator
-from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import ground_truth, preview
 from leaderboard.editions.history import TruthChange
-from leaderboard.models import Edition, Evaluation, Status, Submission, User
+from leaderboard.models import Edition, Status, Submission, User
 from tests import builders
-from tests.editions import open_edition, publish, roll_back
+from tests.editions import open_edition
 from tests.services import REPOSITORY
 
 pytestmark = pytest.mark.slow
@@ -29,7 +28,6 @@ pytestmark = pytest.mark.slow
 ESTIMATORS = ("box-height", "box-sqrt-area", "box-area", "pointrcnn-height")
 FORMS = ("ttc", "scale_ratio")
 PERTURBED = "0005"
-DROPPED = "0003"
 
 
 @dataclass(frozen=True)
@@ -76,18 +74,12 @@ def sent(published: Edition, kitti: Path, owner: User) -> dict[Submission, Path]
     return made
 
 
-def correction(kitti: Path, tmp_path: Path, *, drop: str = "", is_renumbered: bool = False) -> Path:
-    """The truth with one recording a little farther in time, and without another."""
+def correction(kitti: Path, tmp_path: Path) -> Path:
+    """The truth with one recording a little farther in time."""
     head, *rows = [line.split(",") for line in (kitti / "truth.csv").read_text().splitlines()]
-    kept = [
-        [*key, repr(float(ttc_s) * 1.07) if key[1] == PERTURBED else ttc_s]
-        for *key, ttc_s in rows
-        if key[1] != drop
-    ]
-    if is_renumbered:
-        kept = [[str(number), *row[1:]] for number, row in enumerate(reversed(kept))]
-    path = tmp_path / f"corrected{drop}.csv"
-    path.write_text("\n".join(",".join(row) for row in [head, *kept]) + "\n")
+    changed = [[*key, repr(float(ttc_s) * 1.07) if key[1] == PERTURBED else ttc_s] for *key, ttc_s in rows]
+    path = tmp_path / "corrected.csv"
+    path.write_text("\n".join(",".join(row) for row in [head, *changed]) + "\n")
     return path
 
 
@@ -109,53 +101,3 @@ def test_preview_of_a_corrected_recording_has_the_figures_of_two_offline_runs(
         assert change.new == after.scores
         assert change.old != change.new
         assert (change.old_status, change.new_status) == (Status.SCORED, Status.SCORED)
-
-
-def test_what_a_correction_leaves_is_scored_by_natural_keys_whatever_the_numbers_are(
-    sent: dict[Submission, Path], kitti: Path, tmp_path: Path
-) -> None:
-    path = correction(kitti, tmp_path, drop=DROPPED, is_renumbered=True)
-    edition = open_edition(path)
-    builders.score_all()
-    found = preview.preview(edition)
-    assert found.truth is not None
-    n_kept = edition.ground_truth.n_sequences
-    assert (found.truth.n_added, found.truth.n_removed, found.truth.n_changed) == (0, 301, 900)
-    assert found.truth.n_renumbered in (n_kept - 1, n_kept)
-    assert found.n_newly_rejected == 0
-    old, new = (evaluator.read_manifest(table) for table in (kitti / "truth.csv", path))
-    former_id = dict(zip(old.natural_keys, old.anno_id_keys, strict=True))
-    files = {submission.pk: file for submission, file in sent.items()}
-    for change in found.changes:
-        document = json.loads(files[change.submission_id].read_text())
-        values = document.get("predictions", document)
-        kept = {key: values[former_id[key]] for key in new.natural_keys}
-        if isinstance(rates := document.get("fps"), dict):
-            document["fps"] = {key: rates[former_id[key]] for key in new.natural_keys}
-        file = tmp_path / "by-natural-key.json"
-        file.write_text(json.dumps({**document, "predictions": kept} if "predictions" in document else kept))
-        assert change.new == tsttc_score(file, truth=path).scores
-
-
-def test_a_file_for_the_new_manifest_is_scored_in_the_new_edition_as_offline(
-    published: Edition, kitti: Path, owner: User, tmp_path: Path
-) -> None:
-    path = correction(kitti, tmp_path, drop=DROPPED)
-    edition = open_edition(path)
-    publish(edition)
-    kept = {row.split(",")[0] for row in path.read_text().splitlines()[1:]}
-    file = tmp_path / "predictions.json"
-    values = json.loads((kitti / "predictions" / "box-height.ttc.json").read_text())
-    file.write_text(json.dumps({key: value for key, value in values.items() if key in kept}))
-
-    submission = builders.submit(owner, file.read_bytes(), method="For the new manifest")
-    roll_back()
-    builders.score_all()
-
-    states = dict(submission.evaluations.values_list("edition__number", "status"))
-    assert states == {1: Status.REJECTED, 2: Status.SCORED}
-    new = Evaluation.objects.get(submission=submission, edition=edition)
-    assert flat_scores(new) == tsttc_score(file, truth=path).scores
-    old = Evaluation.objects.get(submission=submission, edition=published)
-    assert old.n_problems == 301
-    assert old.problems[0]["message"].startswith("301 sequences have no value")

@@ -13,15 +13,12 @@ from django.utils import timezone
 from evaluator import read_truth
 from leaderboard.editions import preview
 from leaderboard.editions.history import TruthChange
-from leaderboard.errors.refusals import Refused
 from leaderboard.models import (
     Edition,
     Status,
     Submission,
-    User,
 )
 from leaderboard.storage import truth_values
-from leaderboard.submissions import submissions
 from leaderboard.workers import backlog
 from tests import builders
 from tests.editions import board_now, corrected, extended, offline, open_edition, publish
@@ -117,11 +114,6 @@ def test_changing_one_value_changes_exactly_the_values_that_it_must(
     for change in preview.preview(second).changes:
         changed = {name for name in change.old if change.old[name] != change.new[name]}
         assert changed == {"mid", "mid_small", "rte", "rte_small"}
-
-
-def test_only_the_team_withdraws_a_submission(entries: list[Submission], stranger: User) -> None:
-    with pytest.raises(Refused, match="Only the team"):
-        submissions.withdraw(submission=entries[0], actor=stranger, now=timezone.now())
 
 
 def test_the_command_opens_an_edition_follows_it_and_says_where_to_publish(
