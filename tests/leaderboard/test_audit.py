@@ -1,7 +1,6 @@
 """The audit log: append-only, and sealed into a chain that shows what was done to it."""
 
 import random
-import re
 from datetime import timedelta
 from io import StringIO
 from typing import Any
@@ -85,17 +84,6 @@ def test_an_event_that_is_committed_late_is_sealed_when_it_is_found(db: None) ->
     assert audit.seal() == 0
 
 
-def test_verifying_says_what_is_not_sealed_yet(db: None) -> None:
-    tip = sealed(2).hash
-    record()
-    AuditEvent.objects.create(
-        at=timezone.now() - timedelta(seconds=50), verb="tried", noun="Door", noun_id="late"
-    )
-    said = verify_audit().splitlines()
-    assert said[0] == f"audit: 2 events, unbroken, last hash {tip}"
-    assert re.fullmatch(r"not sealed yet: 2, the oldest for 5[0-9] s", said[1])
-
-
 def test_every_sweep_seals(db: None) -> None:
     record(3)
     queue.sweep(rng=random.Random(0))
@@ -107,8 +95,7 @@ def test_every_sweep_seals(db: None) -> None:
     "details",
     [
         {"text": "τ, “quoted”, 😀", "number": 10**25, "nothing": None, "yes": True, "list": [1, [], {}]},
-        {"b": 1, "a": 2, "": ""},
-        {"cut": "a\x00b\ud800c"},
+        {"b": 1, "a": 2, "": "", "cut": "a\x00b\ud800c"},
     ],
 )
 def test_details_come_back_as_they_were_hashed(db: None, details: dict[str, Any]) -> None:
@@ -214,8 +201,6 @@ def test_the_chain_cannot_fork(db: None, column: str) -> None:
     ("column", "value"),
     [
         ("verb", "other"),
-        ("noun", "Other"),
-        ("noun_id", "7"),
         ("details", '{"try": 8}'),
         ("at", "2020-01-01 00:00:00"),
         ("actor_id", None),
@@ -227,21 +212,6 @@ def test_a_changed_event_is_named(owner: User, column: str, value: str | None) -
     in_sql(f"UPDATE leaderboard_auditevent SET {column} = %s WHERE id = %s", value, second.pk)
     [found] = audit.verify().breaks
     assert (found.event_id, found.what) == (second.pk, "says something else than when it was written")
-
-
-@SQLITE_ONLY
-def test_a_changed_event_with_a_fitting_hash_is_betrayed_by_the_next(db: None) -> None:
-    sealed(3)
-    second = AuditEvent.objects.order_by("pk")[1]
-    second.verb = "other"
-    in_sql(
-        "UPDATE leaderboard_auditevent SET verb = %s, hash = %s WHERE id = %s",
-        second.verb,
-        second.hash_after(second.previous_hash or ""),
-        second.pk,
-    )
-    [found] = audit.verify().breaks
-    assert found.event_id == second.pk + 1
 
 
 @SQLITE_ONLY

@@ -87,16 +87,7 @@ def test_command_says_what_it_imported(tmp_path: Path) -> None:
     out = StringIO()
     call_command("import_truth", "test", str(builders.truth_csv(tmp_path / "t.csv")), stdout=out)
     assert "test edition 1: 120 sequences in 24 recordings" in out.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("split", "name", "message"),
-    [
-        ("nope", "t.csv", "There is no split 'nope'"),
-        ("test", "absent.csv", "was refused; nothing was changed"),
-    ],
-)
-def test_command_fails_in_words(tmp_path: Path, split: str, name: str, message: str) -> None:
-    builders.truth_csv(tmp_path / "t.csv")
-    with pytest.raises(CommandError, match=message):
-        call_command("import_truth", split, str(tmp_path / name))
+    with pytest.raises(CommandError, match="There is no split 'nope'"):
+        call_command("import_truth", "nope", str(tmp_path / "t.csv"))
+    with pytest.raises(CommandError, match="was refused; nothing was changed"):
+        call_command("import_truth", "test", str(tmp_path / "absent.csv"))

@@ -157,15 +157,6 @@ def test_the_ground_truths_own_units_are_public_and_taken(
     holds_offline(edition, filled(edition, owner), unit="given")
 
 
-def test_a_recording_in_two_units_is_refused_and_nothing_is_kept(tmp_path: Path) -> None:
-    path = dated(tmp_path, unit=True)
-    path.write_text(path.read_text().replace("trip3\n", "trip4\n", 1))
-    with pytest.raises(CommandError, match=r"line \d+: The recording .* has the unit") as refused:
-        call_command("import_truth", "test", str(path), stdout=StringIO())
-    assert "expected one unit for a recording" in str(refused.value)
-    assert not Edition.objects.exists()
-
-
 # --- who says it --------------------------------------------------------------------------------------------
 
 

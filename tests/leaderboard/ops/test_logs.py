@@ -10,16 +10,13 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import structlog
 from django.conf import settings
 from django.core.files.uploadedfile import SimpleUploadedFile
-from django.test import Client, RequestFactory
-from django.utils.functional import SimpleLazyObject
+from django.test import Client
 
 from leaderboard.models import Edition, User
 from leaderboard.ops import logs
 from leaderboard.storage import truth_values
-from leaderboard.web.middleware.request_log import RequestLogMiddleware
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -149,22 +146,6 @@ def test_every_handler_of_the_real_configurations_takes_secrets_out(
             assert isinstance(made, logs.CleanFormatter)
 
 
-def test_library_knows_of_no_submission_and_its_line_names_it_all_the_same(
-    opened: Edition, owner: User, lines: Lines, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def load_and_tell(digest: str) -> Any:
-        logging.getLogger("some.library").warning("reading %s", "slowly")
-        return read(digest)
-
-    read = truth_values.load
-    submission = builders.submit(owner, builders.predictions(opened))
-    monkeypatch.setattr(truth_values, "load", load_and_tell)
-    builders.score_all()
-    told = [line for line in lines() if line["logger"] == "some.library"]
-    assert {line["event"] for line in told} == {"reading slowly"}
-    assert {line["submission_id"] for line in told} == {str(submission.pk)}
-
-
 # --- the last step: what slips in -----------------------------------------------------------------------
 
 
@@ -222,16 +203,6 @@ def test_request_is_written_without_its_query(db: None, lines: Lines) -> None:
     Client().get("/healthzz", {"token": "swordfish"})
     [line] = lines()
     assert (line["request"], line["code"]) == ("GET /healthzz", 404)
-
-
-def test_line_is_no_reason_to_look_up_who_asks(rf: RequestFactory) -> None:
-    def look_up() -> User:
-        raise AssertionError("the database was asked")
-
-    request = rf.get("/")
-    request.user = SimpleLazyObject(look_up)  # type: ignore[assignment]  # as the middleware leaves it
-    RequestLogMiddleware.bind_user_id(request)
-    assert "user_id" not in structlog.contextvars.get_contextvars()
 
 
 def test_failure_of_a_page_is_one_line_with_its_traceback(

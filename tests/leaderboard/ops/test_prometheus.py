@@ -75,21 +75,6 @@ def test_runs_are_counted_by_what_came_of_them(edition: Edition, owner: User) ->
     assert found['tsttc_strikes{kind="poison"}'] == 0
 
 
-def test_system_errors_are_visible_until_they_are_retried(
-    edition: Edition, owner: User, maintainer: User
-) -> None:
-    evaluation = queue_rows.queued(edition, owner)
-    queue_rows.strike_out()
-    found = figures()
-    assert found['tsttc_evaluations{status="SYSTEM_ERROR"}'] == 1
-    assert found['tsttc_strikes{kind="poison"}'] == lifecycle.MAX_POISON_STRIKES
-    lifecycle.retry(evaluation=evaluation, actor=maintainer)
-    found = figures()
-    assert found['tsttc_evaluations{status="SYSTEM_ERROR"}'] == 0
-    assert found['tsttc_evaluations{status="QUEUED"}'] == 1
-    assert found["tsttc_runs_started_total"] == lifecycle.MAX_POISON_STRIKES, "counters never go back"
-
-
 # --- who may read them ----------------------------------------------------------------------------------
 
 
