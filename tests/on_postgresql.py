@@ -39,7 +39,6 @@ SAME_ON_BOTH = {
     "tests/leaderboard/scoring/test_sandbox.py": "a child process that reads a file",
     "tests/leaderboard/scoring/test_warnings.py": "words about a file",
     "tests/leaderboard/scoring/test_confidence_on_real_driving.py": "figures; a journey has its own",
-    "tests/leaderboard/editions/test_corrections_on_real_driving.py": "figures; other files correct",
 }
 WHOLE = [
     *("-q", "-n", str(N_PROCESSES), *spread.OPTIONS),

@@ -76,15 +76,15 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
         if before.listing == Listing.OFF:
             require_listable(split)
         after = policy_of(split)
-        changes = changed(before, after)
-        if changes:
+        if after != before:
+            pairs = {name: (getattr(before, name), getattr(after, name)) for name in NAMES}
             split.save(update_fields=list(NAMES))
             audit.record(
                 verb="changed",
                 noun="Split",
                 noun_id=split.pk,
                 actor=actor,
-                details={name: f"{old} → {new}" for name, (old, new) in changes.items()},
+                details={name: f"{old} → {new}" for name, (old, new) in pairs.items() if old != new},
             )
             versions.changed(split.pk)
     return split
@@ -161,9 +161,3 @@ def require_listable(split: Split) -> None:
             f"until its ground truth is imported (manage.py import_truth {split.pk} PATH).",
             field="listing",
         )
-
-
-def changed(before: Policy, after: Policy) -> Mapping[str, tuple[Any, Any]]:
-    """What differs between two policies: by name, the old value and the new one."""
-    pairs = {name: (getattr(before, name), getattr(after, name)) for name in NAMES}
-    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}

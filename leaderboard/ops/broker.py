@@ -43,11 +43,7 @@ _rest = CircuitBreaker(rest_s=REST_S)
 
 
 def nudge() -> bool:
-    """Tell the workers that a submission waits; False if the broker did not take it.
-
-    A lost nudge costs seconds: workers also look by themselves. It takes about two seconds at most, and none
-    right after one was lost.
-    """
+    """Tell the workers that a submission waits; False if the broker did not take it within two seconds."""
     return _sent("nudge")
 
 

@@ -175,12 +175,8 @@ def save_predictions(
 ) -> StoredFile:
     """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
 
-    `measured` is what `measure` has found, where somebody has asked already.
-
-    Bytes that have been there for long are written again all the same: whoever cleans up looks for old files
-    that no row names, and this one's row is only about to be written.
-
-    Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
+    Bytes that have been there for long are written again: whoever cleans up looks for old files that no row
+    names. Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
     """
     kept = measured or measure(upload)
     name = predictions_name(kept.digest)
@@ -216,9 +212,6 @@ def save_aligned(predictions: Predictions) -> None:
     """Keep a file's values in seconds as little-endian float64, in ascending anno_id of the file's manifest.
 
     Before them stands their SHA-256, so that values that were changed or cut off are never scored.
-
-    They were checked when the file was read, so scoring them again needs neither its bytes nor a child. The
-    order is the manifest's own: two tables of the same sequences may have their rows in another order.
     """
     manifest = predictions.manifest
     name = aligned_name(manifest_digest=manifest.digest, digest=predictions.digest)

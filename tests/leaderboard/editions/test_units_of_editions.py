@@ -97,17 +97,6 @@ def holds_offline(edition: Edition, sent: list[Submission], *, unit: str) -> Non
     assert pair == compare_predictions(first, second, truth, decimals=1, unit=unit)
 
 
-@pytest.mark.parametrize(
-    ("n_days", "unit", "n_units", "words"),
-    [(29, "recording", None, "87 recordings"), (30, "day", 30, "30 days")],
-)
-def test_an_edition_takes_days_from_30_on(
-    tmp_path: Path, n_days: int, unit: str, n_units: int | None, words: str
-) -> None:
-    edition = imported(dated(tmp_path, n_days=n_days))
-    assert (edition.unit, edition.n_units, edition.units) == (unit, n_units, words)
-
-
 def test_intervals_ranges_and_tests_of_an_edition_of_days_are_over_days(tmp_path: Path, owner: User) -> None:
     edition = imported(dated(tmp_path))
     sent = filled(edition, owner)

@@ -1,7 +1,6 @@
 """The file store in an S3-compatible service: everything through it, and nothing beside it."""
 
 import json
-import random
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,7 +20,6 @@ from pytest_django import Settings
 
 from leaderboard.backups import contents
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
-from leaderboard.scoring import worker
 from leaderboard.storage import files, orphans, s3
 from tests import builders
 from tests.prepared import REPOSITORY, put_sqlite
@@ -142,34 +140,6 @@ def test_upload_while_the_store_is_away_is_answered_503_and_leaves_no_row(
     assert int(response.headers["Retry-After"]) > 0
     assert "127.0.0.1:1/" not in response.text  # where the store is, is nobody's business
     assert not Submission.objects.exists()
-
-
-def test_worker_without_its_store_blames_the_machine_and_tries_again(
-    stored: s3.S3FileStore,
-    benchmark: None,
-    owner: User,
-    tmp_path: Path,
-    settings: Settings,
-    server: str,
-    request: pytest.FixtureRequest,
-) -> None:
-    edition = builders.import_truth(tmp_path)
-    builders.submit(owner, builders.predictions(edition))
-    there = settings.STORAGES
-    request.getfixturevalue("nobody_answers")
-    settings.BACKOFF_S = 0.0
-    assert worker.run_next(rng=random.Random(0))
-    evaluation = Evaluation.objects.get()
-    assert (evaluation.status, evaluation.n_infrastructure_strikes, evaluation.n_poison_strikes) == (
-        Status.QUEUED,
-        1,
-        0,
-    )
-    assert "does not answer" in evaluation.last_error
-    settings.STORAGES = there
-    builders.score_all()
-    evaluation.refresh_from_db()
-    assert evaluation.status == Status.SCORED
 
 
 # --- faults are told as a disk would tell them ------------------------------------------------------------
