@@ -32,7 +32,7 @@ demo: $(READY) ## the leaderboard with simulated data on http://127.0.0.1:8000 (
 	@exec $(PY) manage.py demo --host $(HOST) --port $(PORT)
 
 demo-runs: $(DEV_STAMP) ## make the submissions of the demo anew from rendered frames (RUNS="tracking pixel-mse" for some)
-	nice -n 10 $(PY) -m leaderboard.demo.make_runs --jobs 2 $(if $(RUNS),--only $(RUNS))
+	PATH="$(abspath $(VENV))/bin:$$PATH" nice -n 10 $(PY) -m leaderboard.demo.runs build/demo-runs $(RUNS)
 
 test: lint ## lint, then the whole test suite; parts that lack a service say so
 	@$(PY) -m tests.everything

@@ -14,7 +14,7 @@ from django.db.models import F, Sum
 from leaderboard.models import (
     BoardVersion,
     Evaluation,
-    SiteAnnouncement,
+    PageVersion,
     Split,
     Submission,
     Visibility,
@@ -75,7 +75,7 @@ def times_passed(*, now: datetime) -> int:
     Its pages say so. Returns how many had.
     """
     n_told = 0
-    site_ends_at = SiteAnnouncement.objects.values_list("ends_at", flat=True).first()
+    site_ends_at = PageVersion.announcement().values_list("ends_at", flat=True).first()
     for split in Split.objects.all():
         times = (split.opens_at, split.closes_at, split.announcement_ends_at, site_ends_at)
         n_passed = sum(at is not None and at <= now for at in times)

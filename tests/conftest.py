@@ -15,7 +15,6 @@ from pytest_django import DjangoDbBlocker
 from pytest_django.fixtures import Settings
 
 from leaderboard.benchmark import splits
-from leaderboard.web.monitoring import healthiness, readiness
 from tests import emptying, kept, prepared, services, spread
 from tests.caching import forget_boards
 
@@ -152,8 +151,6 @@ def nothing_remembered() -> None:
     Nor does what the test before has found out about this machine, or done too often within a minute.
     """
     forget_boards()
-    readiness.forget()
-    healthiness.forget()
     cache.clear()
 
 

@@ -30,7 +30,6 @@ def make(*, into: str, now: datetime) -> Contents:
     What rows name and nobody has any more is in `missing`; everything else is there. Raises `NoBackup`, and
     `OSError` where a file cannot be read or written: an earlier backup in the folder then stays as it was.
     """
-    contents.require_variables()
     if environment.PRODUCTION and not os.environ.get(_KEY):
         raise NoBackup(f"{_KEY} is not set; expected it here too, since its public half is in the backup.")
     folder = contents.folder_of(into)
@@ -40,7 +39,7 @@ def make(*, into: str, now: datetime) -> Contents:
     rows.mkdir(mode=0o700)
     try:
         with database.one_moment():
-            parts = database.save(rows)
+            saved = database.save(rows)
             needed, anew = contents.named_files()
             missing = contents.missing_values()
             migrations, boards = contents.applied_migrations(), contents.board_digests()
@@ -55,8 +54,8 @@ def make(*, into: str, now: datetime) -> Contents:
             made_at=now.isoformat(),
             vendor=connection.vendor,
             migrations=migrations,
-            database=rows.name,
-            parts=parts,
+            database=f"{rows.name}/{saved.name}",
+            database_sha256=contents.digest_at(saved),
             files={name: digest for name, digest in kept.items() if digest},
             ground_truth=private,
             missing=[*missing, *(name for name in needed if not kept[name])],

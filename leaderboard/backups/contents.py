@@ -2,8 +2,7 @@
 
 import hashlib
 import json
-import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import IO, Any, Final
@@ -23,23 +22,14 @@ from leaderboard.storage.files import CHUNK_BYTES
 LIST: Final = "backup.json"
 FILES: Final = "files"
 GROUND_TRUTH: Final = "ground-truth"
-FORMAT: Final = 2
+FORMAT: Final = 3
 # Sums and manifests that workers make anew, and files that somebody writes at this moment.
 _MADE_ANEW: Final = "bags"
-_DIRECTORIES: Final = ("TSTTC_DATA_DIR", "TSTTC_FILES_DIR", "TSTTC_GROUND_TRUTH_DIR")
 _SHOWN: Final = 10
 
 
 class NoBackup(Exception):
     """The backup or the restoration cannot be made; the text says why, and what to do."""
-
-
-@dataclass(frozen=True)
-class RowFile:
-    """The file with all rows: an archive of PostgreSQL, or an SQLite database."""
-
-    name: str
-    sha256: str
 
 
 @dataclass(frozen=True)
@@ -50,8 +40,8 @@ class Contents:
     made_at: str
     vendor: str
     migrations: list[list[str]]
-    database: str
-    parts: list[RowFile]
+    database: str  # the file with all rows: an archive of PostgreSQL, or an SQLite database
+    database_sha256: str
     files: dict[str, str]
     ground_truth: dict[str, str]
     missing: list[str]
@@ -72,9 +62,8 @@ class Contents:
             document = json.loads(path.read_text(encoding="utf-8"))
             if document["format"] != FORMAT:
                 raise NoBackup(f"{path} has the format {document['format']!r}; expected {FORMAT}.")
-            parts = [RowFile(part["name"], part["sha256"]) for part in document["parts"]]
-            found = cls(**{**document, "parts": parts})
-            found.require_names_of_ours(path)
+            found = cls(**document)
+            found.require_names_inside(path)
             return found
         except OSError as fault:
             raise NoBackup(
@@ -83,42 +72,20 @@ class Contents:
         except (ValueError, KeyError, TypeError) as fault:
             raise NoBackup(f"{path} is damaged; expected the list that `manage.py backup` wrote.") from fault
 
-    def require_names_of_ours(self, path: Path) -> None:
+    def require_names_inside(self, path: Path) -> None:
         """Refuse a name that leads out of its directory: whoever changed it could write anywhere.
 
         Raises `NoBackup`.
         """
-        one_name = "expected a name without a slash"
-        of_the_store = "expected the name of a prediction file, a manifest or aligned values"
-        for entry, names, is_sound, expected in (
-            ("database", [self.database], _is_one_name, one_name),
-            ("parts", [part.name for part in self.parts], _is_one_name, one_name),
-            (GROUND_TRUTH, self.ground_truth, _is_one_name, one_name),
-            (FILES, self.files, files.is_name, of_the_store),
-        ):
-            for name in names:
-                if not is_sound(name):
-                    raise NoBackup(f"{path} names {name!r} in {entry}; {expected}. Nothing was changed.")
-
-
-def _is_one_name(text: str) -> bool:
-    return text not in {"", ".", ".."} and not {"/", "\0"} & set(text)
-
-
-def require_variables() -> None:
-    """Refuse a variable that is set and empty: it would name the folder in which the command runs.
-
-    Raises `NoBackup`.
-    """
-    for name in _DIRECTORIES:
-        if os.environ.get(name) == "":
-            raise NoBackup(f"{name} is empty; expected a directory, or the variable not set at all.")
+        for name in (self.database, *self.files, *self.ground_truth):
+            if name in {"", "."} or "\0" in name or name.startswith("/") or ".." in Path(name).parts:
+                raise NoBackup(
+                    f"{path} names {name!r}; expected a name inside of the backup. Nothing was changed."
+                )
 
 
 def folder_of(text: str) -> Path:
-    """The folder that a command names. Raises `NoBackup` for none, and for one of the site's own."""
-    if not text.strip():
-        raise NoBackup("The folder has no name (an empty variable?); expected a path such as /srv/backup.")
+    """The folder that a command names. Raises `NoBackup` for one of the site's own."""
     folder = Path(text).resolve()
     for name, own in (("file store", settings.FILES_DIR), ("ground truth", settings.GROUND_TRUTH_DIR)):
         kept = Path(own).resolve()
@@ -198,8 +165,3 @@ def listed(names: list[str]) -> str:
     """The first few, one a line, and how many more."""
     rest = [f"… and {len(names) - _SHOWN:,} more"] if len(names) > _SHOWN else []
     return "\n".join(f"  {line}" for line in [*names[:_SHOWN], *rest])
-
-
-def same_boards(kept: Mapping[str, str], found: Mapping[str, str]) -> list[str]:
-    """The boards that are not those of the backup, byte for byte."""
-    return sorted(name for name in {*kept, *found} if kept.get(name) != found.get(name))

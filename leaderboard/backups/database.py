@@ -1,7 +1,6 @@
 """The rows of a database as one file, and back: pg_dump and pg_restore, or SQLite's own backup."""
 
 import os
-import re
 import sqlite3
 import subprocess
 from collections.abc import Iterator
@@ -13,10 +12,9 @@ from django.contrib.auth import get_user_model
 from django.core.management import call_command
 from django.db import connection, transaction
 from django.db.migrations.executor import MigrationExecutor
-from psycopg import pq
 
 from leaderboard.backups import contents
-from leaderboard.backups.contents import Contents, NoBackup, RowFile
+from leaderboard.backups.contents import Contents, NoBackup
 from leaderboard.models import GroundTruth, Submission
 from leaderboard.storage.files import replacing
 
@@ -36,7 +34,7 @@ def one_moment() -> Iterator[None]:
         yield
 
 
-def save(folder: Path) -> list[RowFile]:
+def save(folder: Path) -> Path:
     """Write every row into a file of the folder; to be called within `one_moment`. Raises `NoBackup`."""
     path = folder / ROWS[connection.vendor]
     if connection.vendor == "sqlite":
@@ -55,7 +53,7 @@ def save(folder: Path) -> list[RowFile]:
         # The cache counts wrong passwords; what it has expires within hours.
         options = ("--format=custom", f"--snapshot={moment}", "--exclude-table-data=leaderboard_cache")
         _run("pg_dump", *options, *_OURS_ALONE, f"--file={path}")
-    return [RowFile(path.name, contents.digest_at(path))]
+    return path
 
 
 def require_fresh(kept: Contents) -> None:
@@ -81,8 +79,6 @@ def require_known(kept: Contents) -> None:
         raise NoBackup(
             f"The backup is one of {kept.vendor}, the database is {connection.vendor}; expected the same."
         )
-    if [part.name for part in kept.parts] != [ROWS[connection.vendor]]:
-        raise NoBackup(f"The backup does not name {ROWS[connection.vendor]}; expected that file alone.")
     known = set(MigrationExecutor(connection).loader.disk_migrations)
     newer = [f"{app} {name}" for app, name in kept.migrations if (app, name) not in known]
     if newer:
@@ -92,12 +88,11 @@ def require_known(kept: Contents) -> None:
         )
 
 
-def load(folder: Path) -> None:
+def load(path: Path) -> None:
     """Put the rows into a fresh database, as its owner, all or none; then bring it to this version.
 
     Raises `NoBackup`.
     """
-    path = folder / ROWS[connection.vendor]
     connection.ensure_connection()
     if connection.vendor == "sqlite":
         with closing(sqlite3.connect(path)) as source:
@@ -105,39 +100,26 @@ def load(folder: Path) -> None:
     else:
         # The schema alone: what else is in a database, such as extensions, belongs to its server.
         options = ("--clean", "--if-exists", "--single-transaction", "--exit-on-error", "--schema=public")
-        name = connection.connection.info.dbname
-        _run("pg_restore", *options, *_OURS_ALONE, f"--dbname={name}", str(path))
+        _run("pg_restore", *options, *_OURS_ALONE, str(path))
     call_command("migrate", interactive=False, verbosity=0)
 
 
 def _run(program: str, *arguments: str) -> None:
     """Run a client program of PostgreSQL on the database of the site. Raises `NoBackup`."""
-    connection.ensure_connection()
-    server = connection.connection.info.server_version // 10_000
-    expected = f"expected that of PostgreSQL {server} or later, for example from Debian's postgresql-client"
+    # As for dbshell. Everybody can read a command line: the password is among the variables.
+    (_, *options, name), variables = connection.client.settings_to_cmd_args_env(connection.settings_dict, [])
     try:
-        shown = _output(program, "--version")
+        done = subprocess.run(  # noqa: S603 - PostgreSQL's own programs, nothing of a visitor's
+            [program, *options, f"--dbname={name}", *arguments],
+            env=os.environ | (variables or {}),
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     except OSError as fault:
-        raise NoBackup(f"{program} cannot be run here ({fault.strerror}); {expected}.") from None
-    version = re.search(r"\d+", shown)
-    if not version or int(version[0]) < server:
-        raise NoBackup(f"The program here is {shown}, too old for the server; {expected}.")
-    _output(program, *arguments)
-
-
-def _output(*command: str) -> str:
-    done = subprocess.run(  # noqa: S603 - PostgreSQL's own programs, nothing of a visitor's
-        command, env=os.environ | _variables(), capture_output=True, text=True, check=False
-    )
+        raise NoBackup(
+            f"{program} cannot be run here ({fault.strerror}); expected that of the server's PostgreSQL or a "
+            "later one, for example from Debian's postgresql-client."
+        ) from None
     if done.returncode:
-        raise NoBackup(f"{command[0]} failed, and the database is as it was: {done.stderr.strip()}")
-    return done.stdout.strip()
-
-
-def _variables() -> dict[str, str]:
-    """What our own connection was made with, as variables of libpq: everybody can read a command line."""
-    info = connection.connection.info
-    used = {**info.get_parameters(), "password": info.password}
-    known = pq.Conninfo.get_defaults()
-    names = {option.keyword.decode(): option.envvar.decode() for option in known if option.envvar}
-    return {names[key]: text for key, text in used.items() if text and key in names}
+        raise NoBackup(f"{program} failed, and the database is as it was: {done.stderr.strip()}")

@@ -31,7 +31,6 @@ def restore(*, source: str) -> Restored:
     The database comes last, in one transaction, so a restoration that was interrupted is simply begun again.
     Raises `NoBackup`; before the first byte is written where the backup is damaged or the place is not fresh.
     """
-    contents.require_variables()
     folder = contents.folder_of(source)
     kept = Contents.read(folder)
     _require_whole(folder, kept)
@@ -53,7 +52,7 @@ def restore(*, source: str) -> Restored:
 def _require_whole(folder: Path, kept: Contents) -> None:
     """Every file of the backup has the bytes that it had when it was made."""
     wanted = {
-        **{f"{kept.database}/{part.name}": part.sha256 for part in kept.parts},
+        kept.database: kept.database_sha256,
         **{f"{contents.FILES}/{name}": digest for name, digest in kept.files.items()},
         **{f"{contents.GROUND_TRUTH}/{name}": digest for name, digest in kept.ground_truth.items()},
     }
@@ -86,8 +85,9 @@ def _verified_boards(kept: Contents) -> int:
     faults += [f"the audit log: {each.what}" for each in trail.breaks]
     is_same_version = kept.migrations == contents.applied_migrations()
     if is_same_version:
-        changed = contents.same_boards(kept.boards, contents.board_digests())
-        faults += [f"the board {name} is not what it was" for name in changed]
+        boards = contents.board_digests()
+        changed = [name for name in {*kept.boards, *boards} if kept.boards.get(name) != boards.get(name)]
+        faults += [f"the board {name} is not what it was" for name in sorted(changed)]
     if faults:
         raise NoBackup(f"What was restored is not what was saved:\n{contents.listed(faults)}")
     return len(kept.boards) if is_same_version else 0

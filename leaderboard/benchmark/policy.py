@@ -10,9 +10,9 @@ from django.db import transaction
 
 from leaderboard import audit, versions
 from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
-from leaderboard.models import SiteAnnouncement, Split, User
+from leaderboard.models import PageVersion, Split, User
 from leaderboard.models.benchmark import NO_END, NO_TEXT, Listing
-from leaderboard.models.quotas import excess
+from leaderboard.models.pages import ANNOUNCEMENT
 
 MAX_DESCRIPTION: Final = 1000
 MAX_POSITION: Final = 32767
@@ -76,15 +76,15 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
         if before.listing == Listing.OFF:
             require_listable(split)
         after = policy_of(split)
-        changes = changed(before, after)
-        if changes:
+        if after != before:
+            pairs = {name: (getattr(before, name), getattr(after, name)) for name in NAMES}
             split.save(update_fields=list(NAMES))
             audit.record(
                 verb="changed",
                 noun="Split",
                 noun_id=split.pk,
                 actor=actor,
-                details={name: f"{old} → {new}" for name, (old, new) in changes.items()},
+                details={name: f"{old} → {new}" for name, (old, new) in pairs.items() if old != new},
             )
             versions.changed(split.pk)
     return split
@@ -112,9 +112,11 @@ def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User 
         )
     with transaction.atomic():
         if ends_at is None:
-            SiteAnnouncement.objects.all().delete()
+            PageVersion.announcement().delete()
         else:
-            SiteAnnouncement.objects.update_or_create(pk=1, defaults={"text": text, "ends_at": ends_at})
+            PageVersion.objects.update_or_create(
+                page=ANNOUNCEMENT, number=1, defaults={"text": text, "ends_at": ends_at, "written_at": now}
+            )
         audit.record(
             verb="announced",
             noun="SiteAnnouncement",
@@ -137,8 +139,6 @@ def checked(split: Split, policy: Policy) -> Split:
     values["announcement"] = " ".join(
         clean_text("announcement", policy.announcement, limit=300, required=False).split()
     )
-    for field, fault in _out_of_range(policy).items():
-        raise Refused("bad-value", fault, field=field)
     for name, value in values.items():
         setattr(split, name, value)
     try:
@@ -161,16 +161,3 @@ def require_listable(split: Split) -> None:
             f"until its ground truth is imported (manage.py import_truth {split.pk} PATH).",
             field="listing",
         )
-
-
-def _out_of_range(policy: Policy) -> dict[str, str]:
-    faults = excess(quota_limit=policy.quota_limit, quota_rejected_limit=policy.quota_rejected_limit)
-    if not 0 <= policy.position <= MAX_POSITION:
-        faults["position"] = POSITION_FAULT % {"show_value": policy.position}
-    return faults
-
-
-def changed(before: Policy, after: Policy) -> Mapping[str, tuple[Any, Any]]:
-    """What differs between two policies: by name, the old value and the new one."""
-    pairs = {name: (getattr(before, name), getattr(after, name)) for name in NAMES}
-    return {name: pair for name, pair in pairs.items() if pair[0] != pair[1]}

@@ -57,23 +57,19 @@ def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResu
     """Make the three splits and the published rows where they are missing; change nothing that is there.
 
     Rows that come with their split stand there since ever; those that come later, since now. A migration
-    passes the models as they were in its time, without what came later.
+    passes the models as they were in its time.
     """
     now = timezone.now()
-    columns = {field.name for field in split_model._meta.get_fields()}
-    has_times = any(field.name == "added_at" for field in result_model._meta.get_fields())
     made = set()
     with transaction.atomic():
         for fields in SPLITS:
-            there = {name: value for name, value in fields.items() if name in columns}
-            _, is_new = split_model.objects.get_or_create(name=fields["name"], defaults=there)
+            _, is_new = split_model.objects.get_or_create(name=fields["name"], defaults=fields)
             made |= {fields["name"]} if is_new else set()
         known = [fields["name"] for fields in SPLITS]
         for path in sorted(PUBLISHED_DIR.glob("*.json")):
             for row in papers.rows_of(_with_results(papers.parse(path.read_bytes())), splits=known, now=now):
                 names = {"split_id": row.pop("split_id"), "slug": row.pop("slug")}
-                if has_times:
-                    row["added_at"] = SINCE_EVER if names["split_id"] in made else now
+                row["added_at"] = SINCE_EVER if names["split_id"] in made else now
                 if not result_model.objects.filter(**names).exists():
                     result_model.objects.create(**names, **row)
 

@@ -26,8 +26,8 @@ from leaderboard.boards.rows import Entry
 from leaderboard.models import (
     Edition,
     Method,
+    PageVersion,
     Score,
-    SiteAnnouncement,
     Split,
     Status,
     Visibility,
@@ -70,7 +70,7 @@ def splits() -> list[Split]:
     rows = (
         Split.objects.shown().order_by("position", "name").select_related("published_edition__ground_truth")
     )
-    rows = rows.annotate(**SiteAnnouncement.of_every_row(), board_number=F("board_version__number"))
+    rows = rows.annotate(**PageVersion.announcement_of_every_row(), board_number=F("board_version__number"))
     return sorted(rows, key=lambda split: split.is_archived)
 
 

@@ -1,9 +1,14 @@
 """The simulated split of the demo, and the runs whose files its teams submit: what ran, and its estimates.
 
-`python -m leaderboard.demo.make_runs` makes them anew from rendered frames; reading them needs numpy alone.
+`python -m leaderboard.demo.runs FOLDER [NAME …]` makes them anew, with the commands that the descriptions
+name; the frames in FOLDER take about 2 GB. Reading the estimates needs numpy alone.
 """
 
-from collections.abc import Mapping
+import json
+import shlex
+import subprocess
+import sys
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -100,3 +105,18 @@ def simulate(
     driving scripts or in highway driving.
     """
     return simulation.split(rng=rng, n_sequences=n_sequences, n_recordings=n_recordings, shape=SHAPE).truth
+
+
+def make(folder: Path, *, names: Sequence[str]) -> None:
+    """Render the frames in a folder, estimate with the runs of these names, and keep the estimates."""
+    folder.mkdir(parents=True, exist_ok=True)
+    runs = [get_run(name) for name in names or [run.name for run in RUNS]]
+    for command in (FRAMES, *(run.command for run in runs)):
+        subprocess.run(shlex.split(command), cwd=folder, check=True)  # noqa: S603 - our own commands
+    for run in runs:
+        values = json.loads((folder / f"{run.name}.json").read_text())["predictions"]
+        run.keep(np.array([values[key] for key in sorted(values, key=int)]))
+
+
+if __name__ == "__main__":
+    make(Path(sys.argv[1]), names=sys.argv[2:])

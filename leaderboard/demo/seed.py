@@ -65,7 +65,6 @@ class DemoEntry:
 
 
 def _measured(n_frames: int, **others: object) -> Mapping[str, object]:
-    """The details of a method that ran on the rendered frames."""
     return {
         "cameras": "ONE",
         "box_source": "GIVEN",
@@ -193,14 +192,12 @@ def seed(*, now: datetime, password_path: Path) -> str:
 
 
 def _user(entry: DemoEntry) -> User:
-    """The account of an entry; nobody has its password."""
     return User.objects.filter(email=entry.email).first() or User.objects.create_user(
         entry.email, name=entry.team
     )
 
 
 def _create_account(user: User, *, password: str) -> None:
-    """Give the account this password and a proved address, once."""
     with transaction.atomic():
         EmailAddress.objects.get_or_create(
             user=user, email=user.email, defaults={"verified": True, "primary": True}
@@ -217,7 +214,6 @@ def _has_submitted(entry: DemoEntry) -> bool:
 
 
 def _open_split(truth: evaluator.GroundTruth, *, now: datetime) -> None:
-    """Make sure that the split is scored against this ground truth."""
     edition = Split.objects.select_related("published_edition").get(pk=SPLIT).published_edition
     if edition is None:
         with tempfile.TemporaryDirectory() as folder:

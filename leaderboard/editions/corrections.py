@@ -63,11 +63,9 @@ def open_edition(
     """Open an edition beside the published one and queue every standing submission for it.
 
     The ground truth is read from `path`, or is the imported one of that `digest`, or stays; the protocol
-    stays unless given. It publishes with the split's `decimals` of now, and its unit is that of the rule: a
-    board that keeps recordings from before moves to days by this. Asked again for the same, it goes on with
-    what is there, also with an edition that was rolled back: nothing is queued twice. `actor` None is the
-    machine's command line.
-    Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file is at fault; nothing changes then.
+    stays unless given. Asked again for the same, it goes on with what is there: nothing is queued twice.
+    `actor` None is the command line. Raises `NotMaintainer`, `Refused`, or `evaluator.Rejected` if the file
+    is at fault; nothing changes then.
     """
     require_maintainer(actor, to="change editions")
     split = Split.objects.select_related("published_edition__ground_truth").filter(name=split_name).first()
@@ -179,10 +177,8 @@ def publish(
 ) -> Publication:
     """Make an edition the board of its split, in one transaction.
 
-    `replaces` is the number of the edition that the maintainer compared with; if another one has become the
-    board meanwhile, nothing happens. While standing submissions are unfinished, or scored on the board and
-    rejected in this edition, it refuses, unless they are knowingly left out (`leave_out`), which the
-    changelog then tells.
+    `replaces` is the number of the edition that the maintainer compared with. Submissions that are
+    unfinished, or scored on the board and rejected here, have to be left out knowingly (`leave_out`).
     Raises `NotMaintainer` or `Refused`.
     """
     require_maintainer(actor, to="change editions")
@@ -267,7 +263,6 @@ def discard(*, edition: Edition, reason: str, now: datetime, actor: User | None)
 
 
 def _locked(edition: Edition) -> tuple[Edition, Split]:
-    """The edition and its split as they are now, the split locked."""
     split = Split.objects.select_for_update(no_key=True).get(pk=edition.split_id)
     edition = Edition.objects.get(pk=edition.pk)
     edition.split = split
@@ -294,8 +289,8 @@ def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: 
     said = []
     if waiting:
         said.append(
-            f"{edition} is not finished: {_are(waiting)} neither scored nor "
-            f"rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
+            f"{edition} is not finished: {counted(len(waiting), 'submission is', 'submissions are')} neither "
+            f"scored nor rejected: {_named(waiting)}. Wait, retry them, or confirm that they are left out."
         )
     if losing:
         said.append(
@@ -303,10 +298,6 @@ def _left_out_sentence(edition: Edition, waiting: Sequence[Submission], losing: 
             f"{_named(losing)}. Confirm that they are left out, or correct the ground truth."
         )
     return " ".join(said)
-
-
-def _are(rows: Sequence[Submission]) -> str:
-    return counted(len(rows), "submission is", "submissions are")
 
 
 def _named(rows: Sequence[Submission]) -> str:

@@ -157,10 +157,7 @@ def count_changes(old: GroundTruth, new: GroundTruth) -> None:
 
 
 def units_of(row: GroundTruth) -> Units:
-    """What a new edition of a ground truth takes as independent, by its public manifest.
-
-    Raises `OSError` if the store does not have that whole.
-    """
+    """What a new edition takes as independent. Raises `OSError` if the store lacks the manifest."""
     return manifests.load(row.manifest_digest).units
 
 
@@ -172,11 +169,7 @@ def new_edition(
     now: datetime,
     actor: User | None,
 ) -> Edition:
-    """The next edition of a split whose row the caller has locked; not yet its board.
-
-    It publishes with the split's decimals of this moment, for ever, and keeps the unit that the rule gives
-    now.
-    """
+    """The next edition of a split whose row the caller has locked, with decimals and unit of this moment."""
     found = units_of(row)
     last = split.editions.aggregate(last=Max("number"))["last"] or 0
     edition = Edition.objects.create(

@@ -1,7 +1,8 @@
 """The history of editions: when each was published, what replaced it, how a correction changed an entry."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import Any
 
 from django.db.models import Count, QuerySet
 
@@ -75,22 +76,11 @@ def latest_changes(n: int) -> list[Publication]:
 def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionRecord, ...]:
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
-    # All at once, since each edition that followed another asks for one.
-    has_followed = any(publication.replaced_id for publication in publications)
-    compared = (
-        list(TruthComparison.objects.filter(new__split=split.truth_split_id).order_by("pk"))
-        if has_followed
-        else []
-    )
-    return tuple(record_of(each, publications, compared) for each in published.order_by("-number"))
+    return tuple(record_of(each, publications) for each in published.order_by("-number"))
 
 
-def record_of(
-    edition: Edition,
-    publications: Iterable[Publication] | None = None,
-    compared: Sequence[TruthComparison] | None = None,
-) -> EditionRecord:
-    """What became of one published edition; with the changelog and the comparisons where they are at hand."""
+def record_of(edition: Edition, publications: Iterable[Publication] | None = None) -> EditionRecord:
+    """What became of one published edition; with the changelog where that is at hand."""
     log = changelog(edition.split) if publications is None else publications
     own = tuple(each for each in log if each.edition_id == edition.pk)
     replaced_by = next((each for each in log if each.replaced_id == edition.pk), None)
@@ -99,26 +89,21 @@ def record_of(
     return EditionRecord(
         edition=edition,
         followed=followed,
-        change=change_of_truth(followed.ground_truth, edition.ground_truth, compared) if followed else None,
+        change=change_of_truth(followed.ground_truth, edition.ground_truth) if followed else None,
         replaced_by=None if is_board else replaced_by,
         publications=own,
     )
 
 
-def change_of_truth(
-    before: GroundTruth, after: GroundTruth, compared: Sequence[TruthComparison] | None = None
-) -> TruthChange | None:
+def change_of_truth(before: GroundTruth, after: GroundTruth) -> TruthChange | None:
     """What differs between two ground truths; None if these two were never compared.
 
     They are counted by the command that reads one of them in, against the board's of that moment, or else by
-    a worker. `compared` are the comparisons to look among, where they are at hand.
+    a worker.
     """
     if before.pk == after.pk:
         return TruthChange(0, 0, 0, 0)
-    if compared is None:
-        compared = list(TruthComparison.objects.between(before, after).order_by("pk"))
-    pair = {before.pk, after.pk}
-    found = next((row for row in reversed(compared) if {row.old_id, row.new_id} == pair), None)
+    found = TruthComparison.objects.between(before, after).order_by("pk").last()
     if found is None:
         return None
     added, removed = found.n_added, found.n_removed
@@ -147,19 +132,7 @@ def rescored(submission: Submission) -> Rescored | None:
     )
 
 
-@dataclass(frozen=True)
-class MaintainerOverview:
-    """What a maintainer finds of one split."""
-
-    split: Split
-    published: Edition | None
-    former: tuple[Edition, ...]  # published once, and replaced
-    in_preparation: tuple[tuple[Edition, corrections.RescoringProgress], ...]
-    system_errors: tuple[tuple[Edition, int], ...]
-    predecessor: Edition | None  # what rolling back returns to
-
-
-def maintainer_overview(split: Split) -> MaintainerOverview:
+def maintainer_overview(split: Split) -> dict[str, Any]:
     """The editions of a split as maintainers see them, and system errors."""
     rows = list(split.editions.select_related("ground_truth", "split").order_by("-number"))
     published = next((e for e in rows if e.pk == split.published_edition_id), None)
@@ -167,14 +140,15 @@ def maintainer_overview(split: Split) -> MaintainerOverview:
     n_failed = dict(
         failed.filter(edition__in=rows).values_list("edition").annotate(n=Count("pk")).order_by("edition")
     )
-    return MaintainerOverview(
-        split=split,
-        published=published,
-        former=tuple(e for e in rows if e.published_at and e != published),
-        in_preparation=tuple((e, corrections.progress(e)) for e in rows if e.is_in_preparation),
-        system_errors=tuple((e, n_failed[e.pk]) for e in rows if e.pk in n_failed),
-        predecessor=corrections.predecessor(split),
-    )
+    return {
+        "split": split,
+        "published": published,
+        "former": [e for e in rows if e.published_at and e != published],
+        "in_preparation": [(e, corrections.progress(e)) for e in rows if e.is_in_preparation],
+        "system_errors": [(e, n_failed[e.pk]) for e in rows if e.pk in n_failed],
+        # What rolling back returns to.
+        "predecessor": corrections.predecessor(split),
+    }
 
 
 def manifest_digest(*, split: Split, number: str) -> str | None:

@@ -6,6 +6,7 @@ For maintainers where the ground truth is: differences of hidden values are as p
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -16,33 +17,9 @@ from leaderboard.models import Edition, Split
 from leaderboard.storage import truth_values
 
 COLUMNS = (
-    "recording",
-    "n_added",
-    "n_removed",
-    "n_changed",
-    "largest_change_s",
-    "mean_change_s",
-    "n_sign_changed",
+    *("recording", "n_added", "n_removed", "n_changed"),
+    *("largest_change_s", "mean_change_s", "n_sign_changed"),
 )
-
-
-@dataclass(frozen=True, kw_only=True)
-class RecordingChange:
-    """What changes of one recording: sequences, and by how many seconds the true values differ."""
-
-    recording: str
-    n_added: int
-    n_removed: int
-    n_changed: int
-    largest_change_s: float
-    mean_change_s: float
-    n_sign_changed: int
-
-    @property
-    def as_row(self) -> Mapping[str, object]:
-        """The same by column, times to the microsecond."""
-        rounded = {name: round(getattr(self, name), 6) for name in ("largest_change_s", "mean_change_s")}
-        return vars(self) | rounded
 
 
 @dataclass(frozen=True)
@@ -51,7 +28,7 @@ class LabelChanges:
 
     edition: Edition
     counts: Comparison
-    recordings: Sequence[RecordingChange]
+    recordings: Sequence[Mapping[str, object]]
 
 
 def look(*, split_name: str, path: Path) -> LabelChanges:
@@ -70,7 +47,8 @@ def look(*, split_name: str, path: Path) -> LabelChanges:
     return LabelChanges(split.published_edition, compare(old, new), _by_recording(old, new))
 
 
-def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> list[RecordingChange]:
+def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> list[dict[str, Any]]:
+    """A row for each recording with any change; times are in seconds, to the microsecond."""
     rows = rows_in(old.manifest, new.manifest)
     is_common = rows >= 0
     # Sequences that the new one has are named by it, the others by the old one.
@@ -88,16 +66,17 @@ def _by_recording(old: evaluator.GroundTruth, new: evaluator.GroundTruth) -> lis
         n_added, n_removed = int(np.sum(here & ~is_common)), int(np.sum(names_gone == name))
         if n_added or n_removed or changed.any():
             found.append(
-                RecordingChange(
-                    recording=name,
-                    n_added=n_added,
-                    n_removed=n_removed,
-                    n_changed=int(np.sum(changed)),
-                    largest_change_s=float(np.max(change_s[changed], initial=0.0)),
-                    mean_change_s=float(np.mean(change_s[changed])) if changed.any() else 0.0,
-                    n_sign_changed=int(np.sum(changed & (np.sign(new.ttc_s) != np.sign(before)))),
-                )
+                {
+                    "recording": name,
+                    "n_added": n_added,
+                    "n_removed": n_removed,
+                    "n_changed": int(np.sum(changed)),
+                    "largest_change_s": round(float(np.max(change_s[changed], initial=0.0)), 6),
+                    "mean_change_s": round(float(np.mean(change_s[changed])), 6) if changed.any() else 0.0,
+                    "n_sign_changed": int(np.sum(changed & (np.sign(new.ttc_s) != np.sign(before)))),
+                }
             )
     return sorted(
-        found, key=lambda each: (-each.n_added - each.n_removed, -each.largest_change_s, each.recording)
+        found,
+        key=lambda row: (-row["n_added"] - row["n_removed"], -row["largest_change_s"], row["recording"]),
     )

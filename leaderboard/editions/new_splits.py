@@ -103,7 +103,6 @@ def _sharing(name: str) -> Split:
 
 
 def _publish_like(other: Split, split: Split, *, now: datetime, actor: User | None) -> None:
-    """Make the ground truth and protocol of the other split's board those of the new one's."""
     board = other.published_edition
     assert board is not None  # noqa: S101 - the caller has looked
     edition = ground_truth.new_edition(

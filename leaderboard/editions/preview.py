@@ -207,7 +207,6 @@ class _Side:
 
 
 def _side(edition: Edition) -> _Side:
-    """An edition's evaluations and values, and the rank of each submission that stands for its method."""
     board = boards.board(split=edition.split, edition=edition, viewer=AnonymousUser())
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
     return _Side(

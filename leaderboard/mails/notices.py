@@ -20,7 +20,6 @@ from leaderboard.models import (
     Evaluation,
     Mail,
     MailKind,
-    MutedKind,
     Publication,
     Split,
     Status,
@@ -63,22 +62,20 @@ def readers(kind: MailKind) -> QuerySet[User]:
             user=OuterRef("pk"), email__iexact=OuterRef("email"), verified=True
         )
         people = people.filter(Exists(proved))
-    muted = MutedKind.objects.filter(user=OuterRef("pk"), kind=kind)
-    return people.filter(~Exists(muted)).order_by("pk")
+    # No kind is a part of another one's name.
+    return people.exclude(muted_kinds__contains=kind).order_by("pk")
 
 
 def muted_by(user: User) -> set[str]:
     """The kinds that a person has switched off."""
-    return set(MutedKind.objects.filter(user=user).values_list("kind", flat=True))
+    return set(user.muted_kinds.split())
 
 
 def choose(*, user: User, wanted: Iterable[str]) -> None:
     """Send this person mails of these kinds, and of no others but those about the account."""
     unwanted = set(MailKind.values) - {MailKind.ACCOUNT.value} - set(wanted)
-    MutedKind.objects.filter(user=user).exclude(kind__in=unwanted).delete()
-    MutedKind.objects.bulk_create(
-        [MutedKind(user=user, kind=kind) for kind in sorted(unwanted)], ignore_conflicts=True
-    )
+    user.muted_kinds = " ".join(sorted(unwanted))
+    user.save(update_fields=["muted_kinds"])
 
 
 # --- what there is to tell -------------------------------------------------------------------------------

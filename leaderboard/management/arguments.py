@@ -8,7 +8,7 @@ from django.core.management.base import BaseCommand, CommandError
 
 from evaluator import Rejected
 from leaderboard.errors.refusals import Refused
-from leaderboard.models import Edition, Split, User
+from leaderboard.models import User
 
 
 class RefusingCommand(BaseCommand):
@@ -40,19 +40,3 @@ def account_of(options: Mapping[str, Any]) -> User:
     if user is None:
         raise CommandError("There is no account with that address; expected the primary address of one.")
     return user
-
-
-def split_of(options: Mapping[str, Any]) -> Split:
-    """The split that SPLIT names. Raises `CommandError`."""
-    split = Split.objects.filter(pk=options["split"]).first()
-    if split is None:
-        raise CommandError(f"There is no split {options['split']!r}.")
-    return split
-
-
-def edition_of(options: Mapping[str, Any]) -> Edition:
-    """The edition that SPLIT and NUMBER name. Raises `CommandError`."""
-    edition = Edition.objects.filter(split=options["split"], number=options["number"]).first()
-    if edition is None:
-        raise CommandError(f"There is no edition {options['number']} of {options['split']!r}.")
-    return edition

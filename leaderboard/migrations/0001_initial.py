@@ -118,6 +118,7 @@ class Migration(migrations.Migration):
                 ('is_staff', models.BooleanField(default=False, verbose_name='maintainer')),
                 ('is_active', models.BooleanField(default=True, verbose_name='active')),
                 ('date_joined', models.DateTimeField(default=django.utils.timezone.now)),
+                ('muted_kinds', models.CharField(blank=True, help_text='Kinds of mail that the person does not want, in a row.', max_length=100)),
                 ('groups', models.ManyToManyField(blank=True, help_text='The groups this user belongs to. A user will get all permissions granted to each of their groups.', related_name='user_set', related_query_name='user', to='auth.group', verbose_name='groups')),
                 ('user_permissions', models.ManyToManyField(blank=True, help_text='Specific permissions for this user.', related_name='user_set', related_query_name='user', to='auth.permission', verbose_name='user permissions')),
             ],
@@ -249,20 +250,13 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
-            name='MutedKind',
-            fields=[
-                ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
-                ('kind', models.CharField(choices=[('account', 'Your account'), ('scored', 'A file that I sent on the site is scored or rejected'), ('edition', 'A new edition of a board that has an entry of my team'), ('token', 'An API token of mine ends within a week'), ('deadline', 'A split that my team has sent files to closes within three days'), ('announcement', 'Announcements to the teams of a split')], max_length=16)),
-                ('user', models.ForeignKey(on_delete=django.db.models.deletion.CASCADE, related_name='muted_kinds', to=settings.AUTH_USER_MODEL)),
-            ],
-        ),
-        migrations.CreateModel(
             name='PageVersion',
             fields=[
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
                 ('page', models.CharField(max_length=20)),
                 ('number', models.PositiveIntegerField()),
-                ('text', models.TextField(help_text='Markdown.')),
+                ('text', models.TextField(help_text='Markdown; of an announcement plain text.')),
+                ('ends_at', models.DateTimeField(help_text='Of an announcement.', null=True)),
                 ('written_at', models.DateTimeField(default=django.utils.timezone.now)),
                 ('written_by', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='+', to=settings.AUTH_USER_MODEL)),
             ],
@@ -322,17 +316,6 @@ class Migration(migrations.Migration):
             ],
         ),
         migrations.CreateModel(
-            name='SiteAnnouncement',
-            fields=[
-                ('id', models.PositiveSmallIntegerField(default=1, editable=False, primary_key=True, serialize=False)),
-                ('text', models.CharField(max_length=300)),
-                ('ends_at', models.DateTimeField()),
-            ],
-            options={
-                'constraints': [models.CheckConstraint(condition=models.Q(('id', 1)), name='one_announcement_of_the_site')],
-            },
-        ),
-        migrations.CreateModel(
             name='SpentMailbox',
             fields=[
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
@@ -379,8 +362,6 @@ class Migration(migrations.Migration):
                 ('mails_begun_at', models.DateTimeField(blank=True, null=True)),
                 ('notices_at', models.DateTimeField(blank=True, null=True)),
                 ('cleaned_at', models.DateTimeField(blank=True, null=True)),
-                ('n_files_removed', models.PositiveBigIntegerField(default=0)),
-                ('n_bytes_removed', models.PositiveBigIntegerField(default=0)),
             ],
             options={
                 'constraints': [models.CheckConstraint(condition=models.Q(('id', 1)), name='one_sweep_beat')],
@@ -579,10 +560,6 @@ class Migration(migrations.Migration):
         migrations.AddIndex(
             model_name='mail',
             index=models.Index(condition=models.Q(('ended_at', None)), fields=['due_at'], name='mails_that_wait'),
-        ),
-        migrations.AddConstraint(
-            model_name='mutedkind',
-            constraint=models.UniqueConstraint(fields=('user', 'kind'), name='kind_is_muted_once'),
         ),
         migrations.AddConstraint(
             model_name='pageversion',

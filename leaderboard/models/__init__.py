@@ -12,9 +12,9 @@ from leaderboard.models.benchmark import (
 from leaderboard.models.boards import BoardVersion
 from leaderboard.models.inference import Analysis, Comparison, EditionRanges
 from leaderboard.models.limits import CachedValue
-from leaderboard.models.mails import Mail, MailKind, MutedKind
+from leaderboard.models.mails import Mail, MailKind
 from leaderboard.models.methods import BoxSource, Cameras, Method, Visibility
-from leaderboard.models.pages import PageVersion, SiteAnnouncement
+from leaderboard.models.pages import PageVersion
 from leaderboard.models.people import ApiToken, Invitation, Membership, Scope, Team, User
 from leaderboard.models.quotas import Admission, QuotaOverride, SpentMailbox
 from leaderboard.models.submissions import (

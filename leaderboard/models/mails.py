@@ -1,4 +1,4 @@
-"""Mails that wait to be sent, and those that a person does not want."""
+"""Mails that wait to be sent."""
 
 from django.db import models
 from django.db.models import Q
@@ -43,16 +43,3 @@ class Mail(models.Model):
 
     def __str__(self) -> str:
         return f"{self.kind} mail of {self.queued_at:%Y-%m-%d}"
-
-
-class MutedKind(models.Model):
-    """That a person wants no mails of a kind."""
-
-    user = models.ForeignKey(User, on_delete=models.CASCADE, related_name="muted_kinds")
-    kind = models.CharField(max_length=16, choices=MailKind)
-
-    class Meta:
-        constraints = [models.UniqueConstraint(fields=["user", "kind"], name="kind_is_muted_once")]
-
-    def __str__(self) -> str:
-        return f"{self.user}: no {self.kind}"

@@ -56,6 +56,11 @@ class User(AbstractBaseUser, PermissionsMixin):  # type: ignore[django-manager-m
     is_staff = models.BooleanField("maintainer", default=False)
     is_active = models.BooleanField("active", default=True)
     date_joined = models.DateTimeField(default=timezone.now)
+    muted_kinds = models.CharField(
+        max_length=100,
+        blank=True,
+        help_text="Kinds of mail that the person does not want, in a row.",
+    )
 
     objects: ClassVar[UserManager] = UserManager()
 

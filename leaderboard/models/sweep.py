@@ -24,8 +24,6 @@ class SweepBeat(models.Model):
 
     # What was removed because no submission named it, since the beginning; see `workers.queue`.
     cleaned_at = models.DateTimeField(null=True, blank=True)
-    n_files_removed = models.PositiveBigIntegerField(default=0)
-    n_bytes_removed = models.PositiveBigIntegerField(default=0)
 
     class Meta:
         constraints = [models.CheckConstraint(condition=Q(id=1), name="one_sweep_beat")]

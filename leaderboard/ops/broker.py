@@ -1,9 +1,6 @@
 """The broker: makes things fast, and may be absent. A message is only the news that something waits."""
 
-import math
-import threading
 import time
-from collections.abc import Callable
 from functools import lru_cache
 from typing import Any
 
@@ -24,7 +21,6 @@ FAIL_FAST = {
 }
 MAX_CONNECTIONS = 16
 REST_S = 5.0
-TOGETHER_S = 0.5
 
 
 class CircuitBreaker:
@@ -46,55 +42,14 @@ class CircuitBreaker:
 _rest = CircuitBreaker(rest_s=REST_S)
 
 
-class News:
-    """Of calls within `every_s` seconds the first goes ahead; `act` is done once for the others."""
-
-    def __init__(self, act: Callable[[], object], *, every_s: float) -> None:
-        self._act = act
-        self._every_s = every_s
-        self._lock = threading.Lock()
-        self._last_s = -math.inf
-        # Until when somebody is told anyway. A time, so that a copy of this process waits for no thread.
-        self._told_by_s = -math.inf
-
-    def is_first(self) -> bool:
-        """Whether to go ahead; if not, `act` is done in time."""
-        with self._lock:
-            now_s = time.monotonic()
-            if now_s < self._told_by_s:
-                return False
-            left_s = self._last_s + self._every_s - now_s
-            if left_s <= 0:
-                self._last_s = now_s
-                return True
-            self._last_s = self._told_by_s = now_s + left_s
-        timer = threading.Timer(left_s, self._act)
-        timer.daemon = True
-        timer.start()
-        return False
-
-
-_news = News(lambda: _sent("work_off"), every_s=TOGETHER_S)
-
-
 def nudge() -> bool:
-    """Tell the workers that a submission waits; False if the broker did not take it.
-
-    A lost nudge costs seconds: workers also look by themselves. It takes about two seconds at most, and none
-    right after one was lost.
-    """
+    """Tell the workers that a submission waits; False if the broker did not take it within two seconds."""
     return _sent("nudge")
 
 
 def work_off() -> bool:
-    """Tell the workers that something waits behind submissions; False if the broker did not take it.
-
-    Lost, it costs seconds, and the next reader of a board the drawing. Workers then look for all that there
-    is, so of many messages within `TOGETHER_S` the first is sent at once, and one for all others at its end.
-    """
-    if _rest or _connections() is None:
-        return False
-    return not _news.is_first() or _sent("work_off")
+    """Tell the workers that something waits behind submissions; False if the broker did not take it."""
+    return _sent("work_off")
 
 
 def _sent(task: str) -> bool:

@@ -7,10 +7,8 @@ import difflib
 import os
 import stat
 from collections.abc import Callable, Collection, Iterable
-from contextlib import suppress
 from ipaddress import IPv4Network, IPv6Network, ip_network
 from pathlib import Path
-from tempfile import mkstemp
 from typing import Any, Final
 
 import environ
@@ -174,11 +172,6 @@ def key_of_checkout(path: Path, make: Callable[[], str]) -> str:
     if PRODUCTION:
         return make()
     if not path.exists():
-        # Whole at once, and the first one's for all: several processes may start together.
-        handle, own = mkstemp(dir=path.parent, prefix=f".{path.name}-")
-        with os.fdopen(handle, "w") as file:
-            file.write(make())
-        with suppress(FileExistsError):
-            os.link(own, path)
-        Path(own).unlink()
+        path.touch(mode=0o600)
+        path.write_text(make())
     return path.read_text()

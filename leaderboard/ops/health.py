@@ -3,9 +3,8 @@
 The checks are for a probe that asks every few seconds: each is bounded in time, and none raises.
 """
 
-import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
@@ -194,32 +193,3 @@ def _limits(engine: str) -> dict[str, Any]:
         "tcp_user_timeout": milliseconds,
         "options": f"-c statement_timeout={milliseconds} -c lock_timeout={milliseconds}",
     }
-
-
-class Recent:
-    """The last answer to a costly question, for a while: whoever asks often costs no more than who asks once.
-
-    One caller at a time asks anew; the others meanwhile get the answer before that.
-    """
-
-    def __init__(self, ask: Callable[[], tuple[Check, ...]], *, keep_s: float) -> None:
-        self._ask = ask
-        self._keep_s = keep_s
-        self._lock = threading.Lock()
-        self.forget()
-
-    def forget(self) -> None:
-        """Ask anew next time."""
-        self._answer: tuple[Check, ...] = ()
-        self._answered_s = float("-inf")
-
-    def __call__(self) -> tuple[Check, ...]:
-        """The answer. Waits only where there is no former one to give."""
-        if self._lock.acquire(blocking=not self._answer):
-            try:
-                if time.monotonic() - self._answered_s >= self._keep_s:
-                    self._answer = self._ask()
-                    self._answered_s = time.monotonic()
-            finally:
-                self._lock.release()
-        return self._answer

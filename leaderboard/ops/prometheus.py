@@ -1,6 +1,6 @@
 """Figures for Prometheus, read from the database when they are asked for.
 
-So they are the same from every process on every machine, and a restart loses nothing. Six statements a
+So they are the same from every process on every machine, and a restart loses nothing. Five statements a
 scrape; the counters are counts of rows that never change again. Figures of HTTP alone are a process's own:
 processes of one gunicorn share a directory, `PROMETHEUS_MULTIPROC_DIR`, which `deploy/gunicorn.conf.py`
 makes, so that a scrape of any of them has the sum.
@@ -8,15 +8,13 @@ makes, so that a scrape of any of them has the sum.
 
 import os
 from collections.abc import Iterable, Iterator, Mapping
-from datetime import timedelta
 from functools import partial
-from itertools import accumulate
 from typing import Any, Final
 
-from django.db.models import Case, Count, F, IntegerField, Min, Sum, Value, When
+from django.db.models import Count, F, Min, Sum
 from django.db.models.functions import Now
 from prometheus_client import CollectorRegistry, Counter, Histogram, disable_created_metrics, generate_latest
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
 from prometheus_client.multiprocess import MultiProcessCollector
 from prometheus_client.registry import Collector
 
@@ -24,7 +22,6 @@ from leaderboard.models import AuditEvent, Evaluation, Mail, Status, SweepBeat
 from leaderboard.ops import health
 
 PRIORITIES: Final = {Evaluation.PRIORITY_LIVE: "live", Evaluation.PRIORITY_RESCORE: "rescore"}
-BUCKETS_S: Final = (0.1, 0.25, 0.5, 1.0, 2.5, 5.0, 10.0, 30.0, 60.0, 120.0, 300.0)
 
 
 def exposition() -> bytes:
@@ -42,9 +39,8 @@ class DatabaseCollector(Collector):
         return []
 
     def collect(self) -> Iterator[Metric]:
-        """Every figure, from six statements."""
+        """Every figure, from five statements."""
         yield from _queue(list(_by_status()))
-        yield from _durations(list(_by_bucket()))
         yield _gauge(
             "tsttc_last_sweep_age_seconds",
             "Time since the queue was last looked after; NaN if it never was.",
@@ -122,11 +118,6 @@ def _cleaning() -> Iterator[Metric]:
         "Time since stored files that no submission names were last looked for; NaN if they never were.",
         {(): _or_nan(None if age is None else age.total_seconds())},
     )
-    n_files, n_bytes = (beat.n_files_removed, beat.n_bytes_removed) if beat else (0, 0)
-    for what, n in (("files", n_files), ("bytes", n_bytes)):
-        yield _counter(
-            f"tsttc_unnamed_{what}_removed", f"Of such files, the {what} that were removed.", {(): n}
-        )
 
 
 def _mails() -> Iterator[Metric]:
@@ -147,51 +138,6 @@ def _sealing() -> Iterator[Metric]:
         "How long the oldest of them is there; 0 if there is none.",
         {(): unsealed.oldest_age_s},
     )
-
-
-# --- how long it takes ----------------------------------------------------------------------------------
-
-
-def _bucket(field: str) -> Case:
-    """The place of a duration among `BUCKETS_S`; beyond the last, their number."""
-    return Case(
-        *(
-            When(**{f"{field}__lte": timedelta(seconds=bound_s)}, then=Value(place))
-            for place, bound_s in enumerate(BUCKETS_S)
-        ),
-        default=Value(len(BUCKETS_S)),
-        output_field=IntegerField(),
-    )
-
-
-def _by_bucket() -> Iterable[Mapping[str, Any]]:
-    """Decided evaluations, counted by run time and turnaround together: one pass gives both histograms."""
-    return (
-        Evaluation.objects.filter(status__in=[Status.SCORED, Status.REJECTED], started_at__isnull=False)
-        .order_by()
-        .annotate(run=F("finished_at") - F("started_at"), turnaround=F("finished_at") - F("queued_at"))
-        .annotate(run_bucket=_bucket("run"), turnaround_bucket=_bucket("turnaround"))
-        .values("run_bucket", "turnaround_bucket")
-        .annotate(n=Count("pk"), run_sum=Sum("run"), turnaround_sum=Sum("turnaround"))
-    )
-
-
-def _durations(rows: list[Mapping[str, Any]]) -> Iterator[Metric]:
-    for field, documentation in (
-        ("run", "From the last claim to the decision."),
-        ("turnaround", "From queued to decided, with every attempt."),
-    ):
-        counts = [0] * (len(BUCKETS_S) + 1)
-        for row in rows:
-            counts[row[f"{field}_bucket"]] += row["n"]
-        bounds = [*(str(bound_s) for bound_s in BUCKETS_S), "+Inf"]
-        histogram = HistogramMetricFamily(f"tsttc_{field}_seconds", documentation)
-        histogram.add_metric(
-            [],
-            buckets=list(zip(bounds, accumulate(counts), strict=True)),
-            sum_value=sum(row[f"{field}_sum"].total_seconds() for row in rows),
-        )
-        yield histogram
 
 
 # --- Prometheus' words ----------------------------------------------------------------------------------

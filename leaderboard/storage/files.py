@@ -5,7 +5,6 @@ It goes through Django's storages, so that workers and web on several machines c
 
 import hashlib
 import os
-import re
 import tempfile
 import time
 from collections.abc import Iterator
@@ -25,9 +24,6 @@ from leaderboard.models import SentFile
 
 CHUNK_BYTES = 1 << 20
 _DIGEST_BYTES = 32
-_NAMES = re.compile(
-    r"predictions/[0-9a-f]{2}/[0-9a-f]{64}\.json|manifests/[0-9a-f]{64}\.csv|aligned/[0-9a-f]{16}/[0-9a-f]{64}\.f8"
-)
 # Web and workers may be two accounts, which share the group of the directory.
 _FILE_MODE = 0o640
 INCOMING = ".incoming"
@@ -49,8 +45,7 @@ class DurableFileSystemStorage(FileSystemStorage):
 
     Of what is `Rebuildable`, a power cut may leave a file that is not whole.
 
-    A file is written below `.incoming`, flushed to the disk, and renamed. What a process that was killed left
-    there is in nobody's way, and is removed by whoever saves next, after an hour.
+    A file is written below `.incoming`, flushed to the disk, and renamed.
     """
 
     def get_available_name(self, name: str, max_length: int | None = None) -> str:
@@ -70,8 +65,6 @@ class DurableFileSystemStorage(FileSystemStorage):
         incoming = Path(self.location) / INCOMING
         incoming.mkdir(parents=True, exist_ok=True)
         target.parent.mkdir(parents=True, exist_ok=True)
-        for leftover in self.leftovers():
-            leftover.unlink(missing_ok=True)
         handle, temporary = tempfile.mkstemp(dir=incoming)
         try:
             with os.fdopen(handle, "wb") as out:
@@ -156,11 +149,6 @@ def store() -> Storage:
     return storages["files"]
 
 
-def is_name(text: str) -> bool:
-    """Whether the store keeps a file under this name: it leads nowhere else."""
-    return _NAMES.fullmatch(text) is not None
-
-
 def predictions_name(digest: str) -> str:
     """Where a prediction file of this digest is kept."""
     hexadecimal = digest.removeprefix("sha256:")
@@ -187,12 +175,8 @@ def save_predictions(
 ) -> StoredFile:
     """Keep an uploaded file. When this returns, its bytes are durable; the same bytes are kept once.
 
-    `measured` is what `measure` has found, where somebody has asked already.
-
-    Bytes that have been there for long are written again all the same: whoever cleans up looks for old files
-    that no row names, and this one's row is only about to be written.
-
-    Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
+    Bytes that have been there for long are written again: whoever cleans up looks for old files that no row
+    names. Raises `OSError` if the store does not take it: `ENOSPC` and `EDQUOT` say that it is full.
     """
     kept = measured or measure(upload)
     name = predictions_name(kept.digest)
@@ -228,9 +212,6 @@ def save_aligned(predictions: Predictions) -> None:
     """Keep a file's values in seconds as little-endian float64, in ascending anno_id of the file's manifest.
 
     Before them stands their SHA-256, so that values that were changed or cut off are never scored.
-
-    They were checked when the file was read, so scoring them again needs neither its bytes nor a child. The
-    order is the manifest's own: two tables of the same sequences may have their rows in another order.
     """
     manifest = predictions.manifest
     name = aligned_name(manifest_digest=manifest.digest, digest=predictions.digest)
@@ -275,18 +256,9 @@ def save_manifest(manifest: Manifest) -> None:
 
 @contextmanager
 def opened_predictions(digest: str) -> Iterator[IO[bytes]]:
-    """A prediction file with a file descriptor, whatever the store is.
+    """A prediction file, which has a file descriptor in both stores.
 
     Raises `OSError` if the store does not have it or does not answer.
     """
     with store().open(predictions_name(digest), "rb") as kept:
-        try:
-            kept.fileno()
-        except (AttributeError, OSError):
-            with tempfile.TemporaryFile() as local:
-                for chunk in kept.chunks(CHUNK_BYTES):
-                    local.write(chunk)
-                local.seek(0)
-                yield local
-        else:
-            yield kept
+        yield kept

@@ -29,7 +29,6 @@ log = structlog.get_logger(__name__)
 MIN_AGE: Final = timedelta(days=1)
 FOLDERS: Final = ("predictions", "aligned")
 _NAMED: Final = re.compile(r"([0-9a-f]{64})\.(?:json|f8)")
-_BATCH: Final = 500
 # Names the files among PostgreSQL's advisory locks: "file" in ASCII.
 _LOCKS: Final = 0x66696C65
 
@@ -137,18 +136,14 @@ def leftovers() -> list[Path]:
 
 def _without_rows(folder: str) -> Iterator[tuple[str, str]]:
     """Name and digest of files in the folder's folders that no submission names, whether withdrawn or not."""
+    known = set(Submission.objects.values_list("digest", flat=True))
     for part in _folders(folder):
         named = {
             f"{part}/{name}": f"sha256:{match[1]}"
             for name in sorted(files.store().listdir(part)[1])
             if (match := _NAMED.fullmatch(name))
         }
-        names = list(named)
-        for start in range(0, len(names), _BATCH):
-            batch = names[start : start + _BATCH]
-            digests = [named[name] for name in batch]
-            known = set(Submission.objects.filter(digest__in=digests).values_list("digest", flat=True))
-            yield from ((name, named[name]) for name in batch if named[name] not in known)
+        yield from ((name, digest) for name, digest in named.items() if digest not in known)
 
 
 def _folders(folder: str) -> list[str]:

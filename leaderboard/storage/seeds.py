@@ -9,17 +9,14 @@ in a log or in an answer. Another secret gives other random numbers, as good as 
 
 import hashlib
 import hmac
-import os
 import secrets
-import tempfile
-from contextlib import suppress
 from pathlib import Path
 from typing import Final
 
 from django.conf import settings
 
 from leaderboard.models import Edition
-from leaderboard.storage import hidden_marks
+from leaderboard.storage import files, hidden_marks
 
 N_BYTES: Final = 32
 
@@ -47,24 +44,11 @@ def seed_of(edition: Edition) -> str:
 def ensure() -> None:
     """Make the secret where there is none: whole or not at all, for its owner only.
 
-    Of several processes at once the first one makes it. Raises `OSError` where the directory is not to be
-    written.
+    Raises `OSError` where the directory is not to be written.
     """
-    target = path()
-    if target.exists():
-        return
-    target.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-    handle, temporary = tempfile.mkstemp(dir=target.parent)  # with the mode 0600
-    try:
-        with os.fdopen(handle, "w") as out:
-            out.write(secrets.token_hex(N_BYTES) + "\n")
-            out.flush()
-            os.fsync(out.fileno())
-        with suppress(FileExistsError):
-            # A link, since a rename would replace what another process has made meanwhile.
-            target.hardlink_to(temporary)
-    finally:
-        Path(temporary).unlink()
+    if not path().exists():
+        with files.replacing(path()) as made:
+            made.write_text(secrets.token_hex(N_BYTES) + "\n")
 
 
 def _secret() -> bytes:

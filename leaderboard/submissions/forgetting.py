@@ -89,7 +89,7 @@ def export(*, user: User) -> dict[str, Any]:
             {"team": str(row.team_id), "created_at": _moment(row.created_at)}
             for row in Invitation.objects.filter(Q(created_by=user) | Q(accepted_by=user))
         ],
-        "mails_not_wanted": list(user.muted_kinds.values_list("kind", flat=True)),
+        "mails_not_wanted": user.muted_kinds.split(),
         "audit_log": [
             {"at": _moment(row.at), "action": row.verb, "object": row.noun, "id": row.noun_id}
             for row in deeds
@@ -149,7 +149,6 @@ def _delete_rows(user: User) -> None:
     Invitation.objects.filter(created_by=user).delete()
     addresses = [user.email, *EmailAddress.objects.filter(user=user).values_list("email", flat=True)]
     Mail.objects.filter(Q(user=user) | Q(recipient__in=addresses)).delete()
-    user.muted_kinds.all().delete()
     EmailAddress.objects.filter(user=user).delete()
     Authenticator.objects.filter(user=user).delete()
     SocialAccount.objects.filter(user=user).delete()
@@ -158,10 +157,10 @@ def _delete_rows(user: User) -> None:
 
 def _blank(user: User) -> None:
     user.email = _nowhere(user)
-    user.name, user.is_active, user.last_login = "", False, None
+    user.name, user.muted_kinds, user.is_active, user.last_login = "", "", False, None
     # Sessions rest on the password: they all end with it.
     user.set_unusable_password()
-    user.save(update_fields=["email", "name", "is_active", "last_login", "password"])
+    user.save(update_fields=["email", "name", "muted_kinds", "is_active", "last_login", "password"])
     Submission.objects.filter(submitted_by=user).update(filename="", note="")
     audit.blank(AuditText.objects.filter(Q(actor=user) | Q(noun="User", noun_id=str(user.pk))))
 

@@ -10,7 +10,7 @@ from django.utils.functional import SimpleLazyObject
 from django.utils.http import url_has_allowed_host_and_scheme
 
 from leaderboard.boards.snapshots import site_line_of, splits_of
-from leaderboard.models import SiteAnnouncement, Split
+from leaderboard.models import PageVersion, Split
 
 _SECTIONS = {
     "home": "home",
@@ -86,7 +86,8 @@ def _announcements(request: HttpRequest) -> list[tuple[str, str]]:
     """
     now, only = timezone.now(), _board_split(request)
     if _section(request) == "submit":
-        lines = [("", SiteAnnouncement.line_at(now))]
+        line = PageVersion.announcement().filter(ends_at__gt=now).values_list("text", flat=True).first()
+        lines = [("", line or "")]
     elif hasattr(request, "splits"):
         splits = splits_of(request)
         own = [(each.title, each.announcement_at(now)) for each in splits if only in {"", each.pk}]

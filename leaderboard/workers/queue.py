@@ -13,7 +13,7 @@ from datetime import datetime
 import structlog
 from django.conf import settings
 from django.db import Error, connections
-from django.db.models import F, Q
+from django.db.models import Q
 from django.db.models.functions import Now
 
 from leaderboard import audit, versions
@@ -108,11 +108,7 @@ def clean(*, now: datetime) -> None:
     for path in orphans.leftovers():
         path.unlink(missing_ok=True)
         n_leftovers += 1
-    SweepBeat.objects.update(
-        cleaned_at=now,
-        n_files_removed=F("n_files_removed") + n_files,
-        n_bytes_removed=F("n_bytes_removed") + n_bytes,
-    )
+    SweepBeat.objects.update(cleaned_at=now)
     log.info("cleaned", n_files=n_files, n_bytes=n_bytes, n_leftovers=n_leftovers)
 
 

@@ -1,7 +1,6 @@
 """The audit log: append-only, and sealed into a chain that shows what was done to it."""
 
 import random
-import re
 from datetime import timedelta
 from io import StringIO
 from typing import Any
@@ -85,17 +84,6 @@ def test_an_event_that_is_committed_late_is_sealed_when_it_is_found(db: None) ->
     assert audit.seal() == 0
 
 
-def test_verifying_says_what_is_not_sealed_yet(db: None) -> None:
-    tip = sealed(2).hash
-    record()
-    AuditEvent.objects.create(
-        at=timezone.now() - timedelta(seconds=50), verb="tried", noun="Door", noun_id="late"
-    )
-    said = verify_audit().splitlines()
-    assert said[0] == f"audit: 2 events, unbroken, last hash {tip}"
-    assert re.fullmatch(r"not sealed yet: 2, the oldest for 5[0-9] s", said[1])
-
-
 def test_every_sweep_seals(db: None) -> None:
     record(3)
     queue.sweep(rng=random.Random(0))
@@ -103,16 +91,11 @@ def test_every_sweep_seals(db: None) -> None:
     assert audit.verify().n_events == 3
 
 
-def test_an_empty_trail_holds(db: None) -> None:
-    assert verify_audit() == f"audit: 0 events, unbroken, last hash {GENESIS}"
-
-
 @pytest.mark.parametrize(
     "details",
     [
         {"text": "τ, “quoted”, 😀", "number": 10**25, "nothing": None, "yes": True, "list": [1, [], {}]},
-        {"b": 1, "a": 2, "": ""},
-        {"cut": "a\x00b\ud800c"},
+        {"b": 1, "a": 2, "": "", "cut": "a\x00b\ud800c"},
     ],
 )
 def test_details_come_back_as_they_were_hashed(db: None, details: dict[str, Any]) -> None:
@@ -218,8 +201,6 @@ def test_the_chain_cannot_fork(db: None, column: str) -> None:
     ("column", "value"),
     [
         ("verb", "other"),
-        ("noun", "Other"),
-        ("noun_id", "7"),
         ("details", '{"try": 8}'),
         ("at", "2020-01-01 00:00:00"),
         ("actor_id", None),
@@ -234,36 +215,15 @@ def test_a_changed_event_is_named(owner: User, column: str, value: str | None) -
 
 
 @SQLITE_ONLY
-def test_a_changed_event_with_a_fitting_hash_is_betrayed_by_the_next(db: None) -> None:
+def test_a_removed_event_is_missed(db: None) -> None:
     sealed(3)
-    second = AuditEvent.objects.order_by("pk")[1]
-    second.verb = "other"
-    in_sql(
-        "UPDATE leaderboard_auditevent SET verb = %s, hash = %s WHERE id = %s",
-        second.verb,
-        second.hash_after(second.previous_hash or ""),
-        second.pk,
-    )
-    [found] = audit.verify().breaks
-    assert found.event_id == second.pk + 1
-
-
-@SQLITE_ONLY
-@pytest.mark.parametrize("index", [0, 1])
-def test_a_removed_event_is_missed(db: None, index: int) -> None:
-    sealed(3)
-    removed = AuditEvent.objects.order_by("pk")[index]
+    removed = AuditEvent.objects.order_by("pk")[1]
     in_sql("DELETE FROM leaderboard_auditevent WHERE id = %s", removed.pk)
-    [found] = audit.verify().breaks
-    assert found.event_id == removed.pk + 1
-    assert "something is missing" in found.what
-
-
-@SQLITE_ONLY
-def test_two_events_that_changed_places_are_found(db: None) -> None:
-    last = sealed(3).pk
-    in_sql("UPDATE leaderboard_auditevent SET seal_number = 0 WHERE id = %s", last)
-    assert [found.event_id for found in audit.verify().breaks] == [last, last - 2]
+    with pytest.raises(
+        CommandError, match=f"2 events is damaged:\n  event {removed.pk + 1}: .*missing"
+    ) as caught:
+        verify_audit()
+    assert caught.value.returncode == 1
 
 
 @SQLITE_ONLY
@@ -284,15 +244,6 @@ def test_an_end_that_was_cut_off_is_missed_by_who_noted_the_last_hash(db: None) 
     assert verify_audit().startswith("audit: 2 events, unbroken")
     with pytest.raises(CommandError, match=f"no event has the hash {noted}"):
         verify_audit("--expect", noted)
-
-
-@SQLITE_ONLY
-def test_the_command_says_where_and_exits_with_1(db: None) -> None:
-    event = sealed(2)
-    in_sql("UPDATE leaderboard_auditevent SET verb = 'other' WHERE id = %s", event.pk)
-    with pytest.raises(CommandError, match=f"2 events is damaged:\n  event {event.pk}: says") as caught:
-        verify_audit()
-    assert caught.value.returncode == 1
 
 
 # --- looking for events ----------------------------------------------------------------------------------

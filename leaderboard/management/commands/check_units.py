@@ -7,7 +7,8 @@ from django.core.management.base import CommandError
 
 from evaluator.counting import counted
 from evaluator.units import MIN_DAYS, RECORDING
-from leaderboard.management.arguments import RefusingCommand, edition_of
+from leaderboard.management.arguments import RefusingCommand
+from leaderboard.models import Edition
 from leaderboard.scoring import unit_checks
 
 
@@ -23,7 +24,9 @@ class Command(RefusingCommand):
 
     def handle(self, *args: Any, **options: Any) -> None:
         """Print a line for each of the first methods, and for its difference from the best."""
-        edition = edition_of(options)
+        edition = Edition.objects.filter(split=options["split"], number=options["number"]).first()
+        if edition is None:
+            raise CommandError(f"There is no edition {options['number']} of {options['split']!r}.")
         try:
             groups = unit_checks.groups_of(edition)
             rows = list(unit_checks.checks(edition, groups))

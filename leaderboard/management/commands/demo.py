@@ -45,9 +45,8 @@ class Command(BaseCommand):
                 f"Port {port} on {host} is in use. "
                 "Stop the program there, or choose another port: make demo PORT=8010"
             )
-        # Database, logs and mails in them, of this run and of former ones, are for their owner alone.
+        # Database, logs and mails in them are for their owner alone.
         os.umask(0o077)
-        _close_old_files()
         # What the processes have to say is in their logs, and what the seed did is on the board.
         logging.disable(logging.WARNING)
         self._say("Preparing database, static files and simulated data …\n")
@@ -74,13 +73,6 @@ class Command(BaseCommand):
         """Print it at once, also where the output is not a terminal."""
         self.stdout.write(text, ending="")
         self.stdout.flush()
-
-
-def _close_old_files() -> None:
-    """Take the rights of others from the database and the logs that an older release left open."""
-    folder = Path(settings.DATA_DIR)
-    for path in (*folder.glob("*.sqlite3*"), *folder.glob("logs/*.log")):
-        path.chmod(0o600)
 
 
 def static_files_changed(root: Path) -> bool:

@@ -9,7 +9,7 @@ from django.core.management.base import BaseCommand, CommandError
 from evaluator.counting import counted
 from evaluator.tables.formats import csv_lines, parquet_of
 from leaderboard.exports import submission_tables
-from leaderboard.management.arguments import split_of
+from leaderboard.models import Split
 from leaderboard.storage import files
 
 
@@ -27,8 +27,8 @@ class Command(BaseCommand):
     def handle(self, *args: Any, **options: Any) -> None:
         """Write it, whole or not at all, readable by its owner only."""
         path: Path = options["file"]
-        if options["split"]:
-            split_of(options)
+        if options["split"] and not Split.objects.filter(pk=options["split"]).exists():
+            raise CommandError(f"There is no split {options['split']!r}.")
         if path.suffix not in {".csv", ".parquet"}:
             raise CommandError(f"{path.name} ends in {path.suffix!r}; expected .csv or .parquet.")
         rows = list(submission_tables.rows(split=options["split"], has_addresses=options["addresses"]))

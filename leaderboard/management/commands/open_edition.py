@@ -89,11 +89,11 @@ class Command(RefusingCommand):
         )
         for row in rows[:10]:
             self.stdout.write(
-                f"  {row.recording}: {row.n_added} added, {row.n_removed} removed, {row.n_changed} changed "
-                f"by up to {row.largest_change_s:.3f} s"
+                f"  {row['recording']}: {row['n_added']} added, {row['n_removed']} removed, "
+                f"{row['n_changed']} changed by up to {row['largest_change_s']:.3f} s"
             )
         if options["diff"]:
-            lines = csv_lines((row.as_row for row in rows), columns=label_changes.COLUMNS)
+            lines = csv_lines(rows, columns=label_changes.COLUMNS)
             try:
                 # It has values of the ground truth: for its owner only.
                 with files.replacing(options["diff"]) as unfinished:

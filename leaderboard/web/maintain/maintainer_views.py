@@ -64,7 +64,7 @@ def hub(request: HttpRequest) -> HttpResponse:
     """What else there is to look after, and every split: its board, what is being prepared, what failed."""
     splits = Split.objects.select_related("published_edition__ground_truth")
     desks = [
-        (desk, [edition_tables.running(*each) for each in desk.in_preparation])
+        (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
         for desk in map(history.maintainer_overview, splits)
     ]
     is_running = any(not shown["is_final"] for _, running in desks for shown in running)

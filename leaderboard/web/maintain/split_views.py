@@ -12,7 +12,7 @@ from leaderboard.benchmark import moments, policy
 from leaderboard.editions import new_splits
 from leaderboard.mails import announcements
 from leaderboard.mails.announcements import Announcement
-from leaderboard.models import SiteAnnouncement, Split
+from leaderboard.models import PageVersion, Split
 from leaderboard.quotas import admissions
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain import quota_tables
@@ -65,7 +65,7 @@ def change(request: HttpRequest, split: str) -> HttpResponse:
 @maintainers_form
 def announcement(request: HttpRequest) -> HttpResponse:
     """Show a line on the pages of every split, or take it away."""
-    current = SiteAnnouncement.objects.first()
+    current = PageVersion.announcement().first()
     initial = (
         {"announcement": current.text, "announcement_ends_at": moments.written(current.ends_at)}
         if current

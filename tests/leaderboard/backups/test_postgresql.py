@@ -155,7 +155,7 @@ def test_an_archive_that_cannot_be_read_leaves_the_database_as_it_was(source: So
     [archive] = folder.glob("database-*/leaderboard.dump")
     archive.write_bytes(archive.read_bytes()[:-100])
     made = json.loads((folder / contents.LIST).read_text())
-    made["parts"][0]["sha256"] = contents.digest_at(archive)
+    made["database_sha256"] = contents.digest_at(archive)
     (folder / contents.LIST).write_text(json.dumps(made))
     with empty_database() as new:
         before = content(new)
@@ -164,18 +164,8 @@ def test_an_archive_that_cannot_be_read_leaves_the_database_as_it_was(source: So
         assert content(new) == before
 
 
-@pytest.mark.parametrize(
-    ("script", "message"),
-    [
-        ("echo 'pg_dump (PostgreSQL) 9.6.24'", "The program here is pg_dump (PostgreSQL) 9.6.24, too old"),
-        (None, "pg_dump cannot be run here (No such file or directory); expected that of PostgreSQL"),
-    ],
-)
-def test_a_program_that_is_old_or_not_there_is_named(
-    source: Source, script: str | None, message: str, tmp_path: Path
-) -> None:
-    if script:
-        program(tmp_path / "bin" / "pg_dump", script)
+def test_a_program_that_is_not_there_is_named(source: Source, tmp_path: Path) -> None:
+    message = "pg_dump cannot be run here (No such file or directory); expected that of the server's"
     data = source.backup.parent / "data"
     new, path = tmp_path / "new", str(tmp_path / "bin")
     done = run("manage.py", "backup", str(new), url=source.url_of_role, data=data, PATH=path)

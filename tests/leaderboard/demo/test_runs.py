@@ -8,34 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from numpy.typing import NDArray
 
 from evaluator.cli import main
 from evaluator.metrics.metrics import MID
 from evaluator.metrics.scale import scale_ratio_to_ttc
-from leaderboard.demo import runs, seed
-from leaderboard.demo.make_runs import AllRuns, RenderedFolder
-from leaderboard.demo.runs import FRAMES, N_SEQUENCES, RUNS, SEED, Run
+from leaderboard.demo import runs
+from leaderboard.demo.runs import FRAMES, N_SEQUENCES, RUNS
 from tests.evaluator.worlds import REPOSITORY
 
 pytestmark = pytest.mark.slow
-
-N_DRAWN = 200
 TOLERANCE = 2e-4
-
-
-@pytest.fixture(scope="module")
-def drawn() -> NDArray[np.int64]:
-    """Sequences spread over the split; of each, every run is made anew."""
-    return np.sort(np.random.default_rng(20).choice(N_SEQUENCES, size=N_DRAWN, replace=False))
-
-
-def test_estimates_that_are_made_anew_are_those_that_are_kept(drawn: NDArray[np.int64]) -> None:
-    split = runs.demo_split()
-    worker = AllRuns(folder=RenderedFolder.of(split, seed=SEED, rows=drawn.tolist()), runs=RUNS)
-    made = np.array([worker(row)[1] for row in drawn.tolist()])
-    kept = np.stack([run.kept()[drawn] for run in RUNS], axis=1)
-    assert np.abs(made - kept).max() <= TOLERANCE
 
 
 def test_the_commands_of_the_description_make_the_kept_estimates(tmp_path: Path) -> None:
@@ -56,12 +38,11 @@ def _call(words: list[str]) -> None:
     assert result.exit_code == 0, result.output
 
 
-@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.name)
-def test_every_sequence_has_an_estimate_that_can_be_submitted(run: Run) -> None:
-    kept = run.kept()
-    assert kept.shape == (N_SEQUENCES,)
-    assert (kept > 0).all()
-    assert (kept < 10).all()
+def test_every_sequence_has_an_estimate_that_can_be_submitted() -> None:
+    for run in RUNS:
+        kept = run.kept()
+        assert kept.shape == (N_SEQUENCES,)
+        assert ((kept > 0) & (kept < 10)).all()
 
 
 def test_methods_come_in_the_order_of_the_paper() -> None:
@@ -95,12 +76,3 @@ print(len(seed.predictions_file(seed.ENTRIES[0], truth=demo_split().truth)))
     )
     assert done.returncode == 0, done.stderr
     assert int(done.stdout) > 400_000
-
-
-def test_every_description_names_its_commands_and_that_frames_are_rendered() -> None:
-    for entry in seed.ENTRIES:
-        if entry.run is not None:
-            assert FRAMES in entry.full_description
-            assert entry.run.command in entry.full_description
-            assert "rendered, not filmed" in entry.full_description
-            assert len(entry.full_description) <= 2_000

@@ -170,15 +170,6 @@ def test_what_was_scored_under_the_first_protocol_stays_as_it_is(
     assert not CountsSerializer().fields["far"].required
 
 
-def test_a_receipt_of_a_protocol_that_only_a_newer_release_knows_still_verifies(
-    far: Submission, owner: User, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    receipt = client_of(owner).get(f"/api/v1/submissions/{far.pk}/receipt").content
-    keys = receipts.read_keys(Client().get(receipts.KEYS_PATH).content)
-    monkeypatch.delitem(PROTOCOLS, FAR.name)
-    assert set(receipts.verify(receipt, keys).scores) == set(FAR.score_names)
-
-
 def test_names_fit_the_database() -> None:
     for protocol in PROTOCOLS.values():
         assert all(len(m.name) <= Score._meta.get_field("metric").max_length for m in protocol.metrics)

@@ -1,6 +1,5 @@
 """Re-scoring in batches: what a worker had in hand when it died, and what it says when it comes back."""
 
-import random
 from pathlib import Path
 
 import pytest
@@ -11,7 +10,6 @@ import evaluator
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import ground_truth
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status
-from leaderboard.ops import broker
 from leaderboard.scoring import lifecycle, worker
 from leaderboard.scoring.lifecycle import Lease
 from leaderboard.storage import files, truth_values
@@ -51,35 +49,6 @@ def assert_all_scored_once(edition: Edition) -> None:
     assert len(decided) == len(set(decided)) == N_SUBMISSIONS
 
 
-def test_a_batch_takes_no_more_than_its_size_and_leaves_the_rest_to_others(edition: Edition) -> None:
-    batches = list(iter(claim_batch, []))
-    assert [len(batch) for batch in batches] == [75, 38, 25, 12]
-    claimed = {lease.evaluation_id for batch in batches for lease in batch}
-    assert len(claimed) == N_SUBMISSIONS
-
-
-def test_a_batch_is_of_one_edition(edition: Edition, tmp_path: Path) -> None:
-    path = builders.truth_csv(tmp_path / "truth-val.csv", seed=1)
-    other = ground_truth.import_truth(split_name="val", path=path, now=timezone.now())
-    crowd.join(split_name="val", truth=truth_values.load(other.ground_truth_id), n=5, n_files=0)
-    while leases := claim_batch():
-        ids = [lease.evaluation_id for lease in leases]
-        assert Evaluation.objects.filter(pk__in=ids).values("edition").distinct().count() == 1
-
-
-def test_a_batch_whose_worker_died_is_finished_by_another_and_nothing_is_doubled(edition: Edition) -> None:
-    lost = claim_batch()
-    for lease in lost:
-        queue_rows.expire(lease)
-    assert queue_rows.release_expired() == len(lost)
-    queue_rows.make_due()
-    builders.score_all()
-    assert_all_scored_once(edition)
-    attempts = dict(Evaluation.objects.values_list("pk", "attempt"))
-    assert all(attempts[lease.evaluation_id] == 2 for lease in lost)
-    assert list(attempts.values()).count(1) == N_SUBMISSIONS - len(lost)
-
-
 def test_a_worker_that_comes_back_with_a_batch_that_others_finished_changes_nothing(edition: Edition) -> None:
     zombie = claim_batch()
     for lease in zombie:
@@ -89,6 +58,9 @@ def test_a_worker_that_comes_back_with_a_batch_that_others_finished_changes_noth
     builders.score_all()
     assert worker.rescore(zombie, edition=edition) == []
     assert_all_scored_once(edition)
+    attempts = dict(Evaluation.objects.values_list("pk", "attempt"))
+    assert all(attempts[lease.evaluation_id] == 2 for lease in zombie)
+    assert list(attempts.values()).count(1) == N_SUBMISSIONS - len(zombie)
 
 
 def test_a_batch_of_which_a_part_was_taken_away_is_stored_without_that_part(edition: Edition) -> None:
@@ -136,24 +108,3 @@ def test_kept_values_that_were_changed_are_not_scored(edition: Edition) -> None:
     # The file itself was read again, and what is kept is right.
     with store.open(name, "rb") as kept:
         assert kept.read() == right
-
-
-def test_workers_hear_of_every_batch(
-    benchmark: None, tmp_path: Path, django_capture_on_commit_callbacks, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    nudged: list[bool] = []
-
-    def nudge() -> bool:
-        nudged.append(True)
-        return True
-
-    monkeypatch.setattr(broker, "nudge", nudge)
-    path = builders.truth_csv(tmp_path / "truth-test.csv")
-    edition = ground_truth.import_truth(split_name="test", path=path, now=timezone.now())
-    with django_capture_on_commit_callbacks(execute=True):
-        truth = truth_values.load(edition.ground_truth_id)
-        crowd.join(split_name="test", truth=truth, n=N_SUBMISSIONS, n_files=0)
-    n_runs = 0
-    while worker.run_next(rng=random.Random(0)):
-        n_runs += 1
-    assert n_runs == len(nudged)

@@ -66,13 +66,6 @@ def test_a_diff_without_a_dry_run_or_a_published_edition_is_refused(edition: Edi
         call_command("open_edition", "val", dry_run=True, truth=tmp_path / "any.csv")
 
 
-def test_a_diff_that_cannot_be_written_is_refused_in_a_sentence(edition: Edition, tmp_path: Path) -> None:
-    truth = builders.truth_csv(tmp_path / "same.csv")
-    (tmp_path / "taken").mkdir()
-    with pytest.raises(CommandError, match=r"taken cannot be written: Is a directory"):
-        call_command("open_edition", "test", truth=truth, dry_run=True, diff=tmp_path / "taken")
-
-
 def test_the_manifest_of_a_former_edition_stays_to_be_had(rescored: Edition, client: Client) -> None:
     address = MANIFEST
     assert client.get(address, {"edition": "2"}).status_code == 404  # it was never the board

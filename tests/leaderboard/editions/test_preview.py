@@ -1,27 +1,21 @@
 """Looking before switching, and what former editions and withdrawn entries leave."""
 
-import csv
-import io
 import random
 from pathlib import Path
 
 import pytest
 from django.core.management import call_command
-from django.test import Client
 from django.utils import timezone
 
 from evaluator import read_truth
 from leaderboard.editions import preview
 from leaderboard.editions.history import TruthChange
-from leaderboard.errors.refusals import Refused
 from leaderboard.models import (
     Edition,
     Status,
     Submission,
-    User,
 )
 from leaderboard.storage import truth_values
-from leaderboard.submissions import submissions
 from leaderboard.workers import backlog
 from tests import builders
 from tests.editions import board_now, corrected, extended, offline, open_edition, publish
@@ -82,25 +76,6 @@ def test_counts_are_against_the_edition_that_is_named_whatever_was_the_board_at_
     assert "against edition 3: 5 sequences added, 0 removed, 5 changed" in capsys.readouterr().out
 
 
-def test_every_door_counts_the_sequences_that_have_another_anno_id(
-    entries: list[Submission], tmp_path: Path, keeper: Client, capsys: pytest.CaptureFixture[str]
-) -> None:
-    lines = (tmp_path / "truth-test.csv").read_text().splitlines()
-    ids = [line.partition(",")[0] for line in lines[1:]]
-    turned = [f"{number},{line.partition(',')[2]}" for number, line in zip(ids[::-1], lines[1:], strict=True)]
-    path = tmp_path / "turned.csv"
-    path.write_text("\n".join([lines[0], *turned]) + "\n")
-    call_command("open_edition", "test", "--truth", str(path))
-    builders.score_all()
-    assert "0 changed; 120 sequences have another anno_id" in capsys.readouterr().out
-    page = "/maintain/test/editions/2/"
-    [row, *_] = csv.DictReader(io.StringIO(keeper.get(f"{page}preview.csv").content.decode()))
-    assert row["n_renumbered"] == "120"
-    assert "120 sequences renumbered" in keeper.get(page).content.decode()
-    found = keeper.get("/api/v1/splits/test/editions/2/preview").json()
-    assert (found["n_renumbered"], found["n_changed_sequences"], found["n_changed"]) == (120, 0, 0)
-
-
 def test_changing_one_value_changes_exactly_the_values_that_it_must(
     entries: list[Submission], edition: Edition, tmp_path: Path
 ) -> None:
@@ -116,11 +91,6 @@ def test_changing_one_value_changes_exactly_the_values_that_it_must(
     for change in preview.preview(second).changes:
         changed = {name for name in change.old if change.old[name] != change.new[name]}
         assert changed == {"mid", "mid_small", "rte", "rte_small"}
-
-
-def test_only_the_team_withdraws_a_submission(entries: list[Submission], stranger: User) -> None:
-    with pytest.raises(Refused, match="Only the team"):
-        submissions.withdraw(submission=entries[0], actor=stranger, now=timezone.now())
 
 
 def test_the_command_opens_an_edition_follows_it_and_says_where_to_publish(

@@ -94,7 +94,3 @@ def test_the_words_are_true_wherever_they_stand(
     assert "problem in the file" not in outcome
     progress = submissions.progress(Submission.objects.get(pk=sent.pk))
     assert (progress.sentence, progress.kept_in) == (said, 1)
-
-
-def test_a_board_to_which_nobody_has_sent_says_so(edition: Edition, client: Client) -> None:
-    assert "test has no submissions yet." in assert_sound(client.get("/board/test/")).one("main").text

@@ -200,15 +200,3 @@ def test_a_damaged_manifest_is_our_fault_and_not_the_files(
     found = old.evaluations.get(edition=second)
     assert (found.status, found.n_infrastructure_strikes, found.problems) == (Status.QUEUED, 1, [])
     assert "has another content" in found.last_error
-
-
-def test_a_protocols_refusal_names_the_files_own_keys(edition: Edition, owner: User, tmp_path: Path) -> None:
-    manifest = read_manifest(tmp_path / "truth-test.csv")
-    said = dict.fromkeys(manifest.anno_id_keys, 3.0) | {"17": -0.05}
-    submission = builders.submit(owner, json.dumps(said).encode())
-    builders.score_all()
-    second = open_edition(permuted(tmp_path), protocol="toolkit")
-    builders.score_all()
-    found = submission.evaluations.get(edition=second)
-    assert [(p["code"], p["where"]) for p in found.problems] == [("undefined-error", "/17")]
-    assert preview.preview(second).n_newly_rejected == 1

@@ -7,12 +7,10 @@ from typing import Any
 
 import pytest
 from django.core.management import CommandError, call_command
-from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
 
 from evaluator import (
-    Difference,
     GroundTruth,
     Predictions,
     compare_predictions,
@@ -20,11 +18,9 @@ from evaluator import (
     published,
     read_predictions,
 )
-from evaluator.tables.sentences import sentence
 from leaderboard.editions import ground_truth
-from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Split, Submission, User
-from leaderboard.scoring import comparisons, verdicts
+from leaderboard.scoring import comparisons
 from leaderboard.storage import files, truth_values
 from tests import builders, pages
 from tests.editions import ANYBODY, open_edition, publish
@@ -101,17 +97,6 @@ def holds_offline(edition: Edition, sent: list[Submission], *, unit: str) -> Non
     assert pair == compare_predictions(first, second, truth, decimals=1, unit=unit)
 
 
-@pytest.mark.parametrize(
-    ("n_days", "unit", "n_units", "words"),
-    [(29, "recording", None, "87 recordings"), (30, "day", 30, "30 days")],
-)
-def test_an_edition_takes_days_from_30_on(
-    tmp_path: Path, n_days: int, unit: str, n_units: int | None, words: str
-) -> None:
-    edition = imported(dated(tmp_path, n_days=n_days))
-    assert (edition.unit, edition.n_units, edition.units) == (unit, n_units, words)
-
-
 def test_intervals_ranges_and_tests_of_an_edition_of_days_are_over_days(tmp_path: Path, owner: User) -> None:
     edition = imported(dated(tmp_path))
     sent = filled(edition, owner)
@@ -151,17 +136,6 @@ def test_an_edition_from_before_keeps_recordings_and_every_number(
     assert (old.units, old.n_effective["mid"]) == ("96 recordings", 96.0)
 
 
-def test_the_same_unit_again_is_nothing_to_correct(tmp_path: Path, owner: User) -> None:
-    imported(dated(tmp_path))
-    with pytest.raises(Refused, match="is the current board already"):
-        open_edition()
-
-
-def test_a_difference_that_was_kept_before_there_were_units_is_read(old: Edition) -> None:
-    kept = {"difference": -1.0, "low": -2.0, "high": -0.5, "p": 0.01, "p_below": 0.05, "n_effective": 96.0}
-    assert Difference(**kept).unit == "recording"  # type: ignore[arg-type]
-
-
 def test_the_ground_truths_own_units_are_public_and_taken(
     client: Client, tmp_path: Path, owner: User
 ) -> None:
@@ -170,33 +144,6 @@ def test_the_ground_truths_own_units_are_public_and_taken(
     text = b"".join(client.get("/api/v1/splits/test/manifest")).decode()
     assert text.splitlines()[0] == "anno_id,bag_stamp,cam_id,ts,track_id,unit"
     holds_offline(edition, filled(edition, owner), unit="given")
-
-
-def test_too_few_units_are_said_in_words(client: Client, tmp_path: Path, owner: User) -> None:
-    path = dated(tmp_path, unit=True)
-    path.write_text(path.read_text().replace("trip1\n", "trip0\n").replace("trip1", "trip"))
-    edition = imported(Path(path))
-    Edition.objects.filter(pk=edition.pk).update(n_effective={"mid": 5.2})
-    edition.refresh_from_db()
-    said = "too few units (effective number 5.2; at least 8 needed)"
-    assert said in verdicts.why_no_interval(edition)
-    few = Difference(-1.0, n_effective=5.2, unit="given")
-    assert f"there are {said} to say" in sentence("A", "B", name="mid", found=few)
-
-
-def test_a_recording_in_two_units_is_refused_and_nothing_is_kept(tmp_path: Path) -> None:
-    path = dated(tmp_path, unit=True)
-    path.write_text(path.read_text().replace("trip3\n", "trip4\n", 1))
-    with pytest.raises(CommandError, match=r"line \d+: The recording .* has the unit") as refused:
-        call_command("import_truth", "test", str(path), stdout=StringIO())
-    assert "expected one unit for a recording" in str(refused.value)
-    assert not Edition.objects.exists()
-
-
-def test_an_edition_cannot_have_days_without_their_number(tmp_path: Path) -> None:
-    edition = imported(dated(tmp_path))
-    with pytest.raises(IntegrityError, match="edition_unit_is_known"), transaction.atomic():
-        Edition.objects.filter(pk=edition.pk).update(n_units=None)
 
 
 # --- who says it --------------------------------------------------------------------------------------------
@@ -233,15 +180,6 @@ def test_pages_answers_and_exports_say_which_unit_it_is(client: Client, tmp_path
         assert caption in text.replace("\\%", "%"), form
 
 
-def test_the_commands_say_the_unit(tmp_path: Path, owner: User) -> None:
-    out = StringIO()
-    Split.objects.update(quota_limit=None, quota_min_gap=timedelta(0), quota_rejected_limit=None)
-    call_command("import_truth", "test", str(dated(tmp_path)), stdout=out)
-    assert "Intervals and ranks: over 32 days.\n" in out.getvalue()
-    call_command("open_edition", "test", truth=dated(tmp_path, n_days=29, seed=0), stdout=out)
-    assert "decimals 1, unit recording; against edition 1" in out.getvalue()
-
-
 # --- are the recordings of one day alike? -------------------------------------------------------------------
 
 
@@ -262,13 +200,6 @@ def test_the_check_has_a_line_for_each_method_and_for_its_difference_from_the_be
     for row in rows:
         factor, correlation, p = map(float, row.split()[:3])
         assert (0.5 < factor < 1.6, abs(correlation) < 0.5, 0 < p <= 1) == (True, True, True)
-
-
-def test_the_check_looks_at_days_where_there_are_too_few_to_be_units(tmp_path: Path, owner: User) -> None:
-    filled(imported(dated(tmp_path, n_days=20)), owner)
-    first, second, *_ = checked()
-    assert first == "test edition 1: 60 recordings in 20 days; its unit is the recording."
-    assert second.startswith("With fewer than 30 days the recording stays the unit; a column unit")
 
 
 def test_the_check_of_names_without_dates_says_why_not(edition: Edition) -> None:

@@ -5,7 +5,6 @@ import gc
 import io
 import os
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -168,17 +167,6 @@ def test_interrupted_upload_is_never_visible(settings: Settings, monkeypatch: py
     with pytest.raises(KeyboardInterrupt):
         files.save_predictions(ContentFile(b"{}"), now=timezone.now())
     assert not [path for path in Path(settings.FILES_DIR).rglob("*") if path.is_file()]
-
-
-def test_leftovers_of_killed_processes_are_removed_after_an_hour(settings: Settings) -> None:
-    incoming = Path(settings.FILES_DIR) / files.INCOMING
-    incoming.mkdir(parents=True)
-    old, new = incoming / "old", incoming / "new"
-    for path in (old, new):
-        path.write_bytes(b"{")
-    os.utime(old, (time.time() - files.LEFTOVER_S - 60,) * 2)
-    files.save_predictions(ContentFile(b"{}"), now=timezone.now())
-    assert [path.name for path in incoming.iterdir()] == ["new"]
 
 
 # --- uploads on their way in ------------------------------------------------------------------------------

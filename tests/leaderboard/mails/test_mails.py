@@ -143,6 +143,7 @@ def test_nobody_is_told_what_they_switched_off_nor_after_they_left_the_team(
     answer = signed_in.post("/mails/", {"wanted": ["edition", "token"]})
     assert answer.status_code == 302
     assert told() == []
+    owner.refresh_from_db()
     assert notices.muted_by(owner) == {"scored", "deadline", "announcement"}
     page = signed_in.get("/mails/").content.decode()
     assert page.count(" checked") == 2

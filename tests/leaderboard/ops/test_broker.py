@@ -1,18 +1,16 @@
 """`leaderboard.ops.broker`: a nudge never fails and never keeps anybody waiting for long."""
 
 import socket
-import threading
 from collections.abc import Iterator
 
 import pytest
-from django.db import transaction
 from kombu import Connection
 from pytest_django import DjangoCaptureOnCommitCallbacks
 
-from leaderboard import tasks, versions
+from leaderboard import tasks
 from leaderboard.models import Edition, User
 from leaderboard.ops import broker
-from leaderboard.ops.broker import CircuitBreaker, News
+from leaderboard.ops.broker import CircuitBreaker
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -68,14 +66,6 @@ def test_a_broker_that_hangs_is_given_up_and_then_left_alone_for_a_while(listene
     assert n_connected(listener) == 0
 
 
-def test_a_rest_ends(listener: socket.socket, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(broker, "_rest", CircuitBreaker(rest_s=0))
-    assert not broker.nudge()
-    n_connected(listener)
-    assert not broker.nudge()
-    assert n_connected(listener) >= 1
-
-
 # --- one message for each event ---------------------------------------------------------------------------
 
 
@@ -89,8 +79,6 @@ def told(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         return True
 
     monkeypatch.setattr(broker, "_sent", send)
-    monkeypatch.setattr(broker, "_connections", object)
-    monkeypatch.setattr(broker, "_news", News(lambda: send("work_off"), every_s=0))
     return told
 
 
@@ -109,27 +97,3 @@ def test_a_file_sent_and_a_file_decided_are_one_message_each(
     with django_capture_on_commit_callbacks(execute=True):
         builders.score_all()
     assert told == ["work_off"]
-
-
-def test_a_change_on_every_board_is_one_message(
-    benchmark: None, told: list[str], django_capture_on_commit_callbacks: DjangoCaptureOnCommitCallbacks
-) -> None:
-    with django_capture_on_commit_callbacks(execute=True), transaction.atomic():
-        versions.changed_everywhere()
-    assert told == ["work_off"]
-
-
-def test_of_many_messages_at_once_the_first_is_sent_and_one_for_all_others() -> None:
-    told = threading.Semaphore(0)
-    news = News(told.release, every_s=0.5)
-    assert [news.is_first() for _ in range(50)] == [True, *[False] * 49]
-    assert told.acquire(timeout=60)
-    assert not told.acquire(blocking=False)
-
-
-def test_what_comes_after_the_message_for_all_others_is_told_again() -> None:
-    told = threading.Semaphore(0)
-    news = News(told.release, every_s=0.05)
-    assert news.is_first()
-    for _ in range(3):
-        assert news.is_first() or told.acquire(timeout=60)

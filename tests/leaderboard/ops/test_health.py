@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from datetime import timedelta
 
 import pytest
-from django.db import connection, connections
+from django.db import connections
 from django.db.models.functions import Now
 from django.test import Client
 from django.utils import timezone
@@ -16,7 +16,6 @@ from pytest_django import Settings
 
 from leaderboard.models import AuditEvent, SweepBeat
 from leaderboard.ops import health, prometheus
-from leaderboard.web import monitoring
 from leaderboard.workers import queue
 
 pytestmark = pytest.mark.slow
@@ -24,9 +23,7 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(autouse=True)
 def _no_hurry(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No answer from an earlier test, and no hurry."""
     monkeypatch.setattr(health, "CHECK_TIMEOUT_S", 60)
-    monitoring.healthiness.forget()
 
 
 @pytest.fixture
@@ -44,14 +41,10 @@ def _swept(*, seconds_ago: float) -> None:
 
 def test_alive_needs_no_database() -> None:
     # Without the mark `django_db`, any question to the database fails the test.
-    response = Client().get("/healthz")
-    assert (response.status_code, response.json()) == (200, {"status": "alive"})
-
-
-def test_alive_with_a_session_cookie_needs_no_database() -> None:
     client = Client()
     client.cookies["sessionid"] = "x" * 32
-    assert client.get("/healthz").status_code == 200
+    response = client.get("/healthz")
+    assert (response.status_code, response.json()) == (200, {"status": "alive"})
 
 
 @pytest.mark.django_db(transaction=True)
@@ -70,9 +63,10 @@ def test_ready_when_database_broker_and_sweep_are_well() -> None:
 
 
 @pytest.mark.django_db(transaction=True)
-@pytest.mark.parametrize(("seconds_ago", "is_ok"), [(1, True), (30, True), (65, False), (3600, False)])
-def test_sweep_older_than_a_minute_is_not_ready(seconds_ago: float, is_ok: bool) -> None:
-    _swept(seconds_ago=seconds_ago)
+@pytest.mark.parametrize(("seconds_ago", "is_ok"), [(30, True), (65, False), (None, False)])
+def test_no_sweep_for_a_minute_is_not_ready(seconds_ago: float | None, is_ok: bool) -> None:
+    if seconds_ago is not None:
+        _swept(seconds_ago=seconds_ago)
     response = Client().get("/healthy")
     assert response.json()["checks"]["sweep"]["ok"] is is_ok
     assert response.status_code == (200 if is_ok else 503)
@@ -92,37 +86,9 @@ def test_events_that_nobody_seals_are_told_and_keep_the_site_ready(seconds_ago: 
 
 
 @pytest.mark.django_db(transaction=True)
-def test_installation_that_was_never_swept_is_not_ready() -> None:
-    response = Client().get("/healthy")
-    assert response.status_code == 503
-    assert response.json()["checks"]["sweep"] == {"ok": False, "detail": "there was none yet"}
-
-
-@pytest.mark.django_db(transaction=True)
-def test_the_balancer_is_told_of_the_database_alone(settings: Settings) -> None:
-    settings.CELERY_BROKER_URL = "redis://127.0.0.1:1/0"  # and nobody has swept
+def test_the_balancer_is_told_of_the_database_alone() -> None:  # and nobody has swept
     response = Client().get("/readyz")
     assert (response.status_code, list(response.json()["checks"])) == (200, ["database"])
-
-
-@pytest.mark.django_db(transaction=True)
-def test_every_sweep_moves_the_one_beat() -> None:
-    _swept(seconds_ago=100)
-    queue.sweep(rng=random.Random(0))
-    queue.sweep(rng=random.Random(0))
-    age_s = health.sweep_age_s()
-    assert age_s is not None
-    assert age_s < 50
-    assert SweepBeat.objects.count() == 1
-
-
-@pytest.mark.django_db(transaction=True)
-def test_broker_that_is_down_is_not_ready(settings: Settings) -> None:
-    _swept(seconds_ago=1)
-    settings.CELERY_BROKER_URL = "redis://127.0.0.1:1/0"
-    response = Client().get("/healthy")
-    assert response.status_code == 503
-    assert response.json()["checks"]["broker"] == {"ok": False, "detail": "does not answer"}
 
 
 @pytest.mark.django_db(transaction=True)
@@ -163,44 +129,3 @@ def test_database_that_accepts_but_never_answers_is_given_up(
     assert "swordfish" not in response.text
     with pytest.raises(ConnectionDoesNotExist):
         connections[health.PROBE]
-
-
-@pytest.mark.django_db(transaction=True)
-def test_probe_leaves_the_requests_own_connection_alone() -> None:
-    with connection.cursor() as cursor:
-        cursor.execute("CREATE TEMPORARY TABLE mine (x integer)")
-    health.checks()
-    with connection.cursor() as cursor:
-        cursor.execute("SELECT count(*) FROM mine")
-        assert cursor.fetchone() == (0,)
-        cursor.execute("DROP TABLE mine")
-
-
-def test_asking_often_costs_what_asking_once_does() -> None:
-    asked: list[int] = []
-
-    def ask() -> tuple[health.Check, ...]:
-        asked.append(len(asked))
-        return (health.Check("it", is_ok=True, detail=str(len(asked))),)
-
-    recent = health.Recent(ask, keep_s=60)
-    assert {recent()[0].detail for _ in range(50)} == {"1"}
-    recent.forget()
-    assert recent()[0].detail == "2"
-
-
-def test_whoever_asks_while_another_asks_gets_the_former_answer() -> None:
-    answers: list[str] = []
-
-    def ask() -> tuple[health.Check, ...]:
-        if answers:
-            # While the second question is under way, a third comes.
-            answers.append(recent()[0].detail)
-        else:
-            answers.append("")
-        return (health.Check("it", is_ok=True, detail="first" if len(answers) == 1 else "second"),)
-
-    recent = health.Recent(ask, keep_s=0)
-    assert recent()[0].detail == "first"
-    assert recent()[0].detail == "second"
-    assert answers == ["", "first"]

@@ -11,9 +11,9 @@ from pytest_django import Settings
 from leaderboard.models import Edition, Evaluation, Submission, User
 from leaderboard.scoring import worker
 from leaderboard.storage import truth_values
-from leaderboard.web import monitoring
 from leaderboard.workers import queue
 from tests import builders
+from tests.caching import forget_boards
 
 RNG = random.Random(0)
 
@@ -21,7 +21,6 @@ RNG = random.Random(0)
 @pytest.fixture
 def waiting(edition: Edition, owner: User) -> Submission:
     """A submission that waits."""
-    monitoring.healthiness.forget()
     return builders.submit(owner, builders.predictions(edition))
 
 
@@ -74,6 +73,6 @@ def test_the_sweep_says_so_in_the_log_and_healthy_to_whoever_watches(
 
 
 def healthiness() -> tuple[int, bool]:
-    monitoring.healthiness.forget()
+    forget_boards()
     response = Client().get("/healthy")
     return response.status_code, response.json()["checks"]["ground truth"]["ok"]

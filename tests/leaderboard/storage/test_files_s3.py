@@ -1,14 +1,9 @@
 """The file store in an S3-compatible service: everything through it, and nothing beside it."""
 
-import errno
-import hashlib
 import json
-import os
-import random
 import subprocess
 import sys
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from datetime import timedelta
 from pathlib import Path
 from typing import Any
@@ -25,7 +20,6 @@ from pytest_django import Settings
 
 from leaderboard.backups import contents
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
-from leaderboard.scoring import worker
 from leaderboard.storage import files, orphans, s3
 from tests import builders
 from tests.prepared import REPOSITORY, put_sqlite
@@ -126,49 +120,11 @@ def test_same_bytes_are_one_object(stored: s3.S3FileStore, bucket: Any) -> None:
         assert kept.read() == b'{"0": 1.5}'
 
 
-def test_object_is_named_by_the_digest_of_what_it_holds(stored: s3.S3FileStore, bucket: Any) -> None:
-    data = random.Random(1).randbytes(9_000_001)
-    kept = files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
-    [entry] = bucket.objects.all()
-    body = entry.get()["Body"].read()
-    assert kept.size_bytes == len(body)
-    assert f"sha256:{hashlib.sha256(body).hexdigest()}" == kept.digest
-
-
-def test_opened_file_has_a_descriptor_that_a_child_process_can_read(stored: s3.S3FileStore) -> None:
-    data = b'{"0": 1.5}' * 1000
-    kept = files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
-    with files.opened_predictions(kept.digest) as source:
-        assert os.pread(source.fileno(), len(data) + 1, 0) == data
-        assert os.lseek(source.fileno(), 0, os.SEEK_CUR) == 0, "a child reads from the start"
-
-
-def test_many_threads_may_use_the_store_at_once(stored: s3.S3FileStore) -> None:
-    def there_and_back(number: int) -> bool:
-        data = f'{{"{number}": 1.5}}'.encode()
-        kept = files.save_predictions(ContentFile(data, name="p.json"), now=timezone.now())
-        with files.opened_predictions(kept.digest) as source:
-            return source.read() == data
-
-    with ThreadPoolExecutor(8) as pool:
-        assert all(pool.map(there_and_back, range(40)))
-
-
 def test_absent_object_is_an_absent_file(stored: s3.S3FileStore) -> None:
     assert not stored.exists("predictions/00/absent.json")
     for ask in (stored.size, stored.get_modified_time, stored.open):
         with pytest.raises(FileNotFoundError):
             ask("predictions/00/absent.json")
-
-
-def test_folders_are_listed(stored: s3.S3FileStore) -> None:
-    stored.save("predictions/ab/one.json", ContentFile(b"1"))
-    stored.save("predictions/cd/two.json", ContentFile(b"22"))
-    assert stored.listdir("predictions") == (["ab", "cd"], [])
-    assert stored.listdir("predictions/cd") == ([], ["two.json"])
-    assert stored.size("predictions/cd/two.json") == 2
-    stored.delete("predictions/cd/two.json")
-    assert stored.listdir("predictions/cd") == ([], [])
 
 
 # --- when it is away ------------------------------------------------------------------------------------
@@ -186,80 +142,13 @@ def test_upload_while_the_store_is_away_is_answered_503_and_leaves_no_row(
     assert not Submission.objects.exists()
 
 
-def test_form_while_the_store_is_away_says_so(edition: Edition, owner: User, nobody_answers: None) -> None:
-    client = Client(raise_request_exception=False)
-    client.force_login(owner)
-    upload = SimpleUploadedFile("p.json", b'{"0": 1.5}')
-    response = client.post("/submit/", {"split": "test", "method": "Foo", "file": upload})
-    assert response.status_code == 503
-    assert "does not answer" in response.text
-    assert not Submission.objects.exists()
-
-
-def test_manifest_while_the_store_is_away_is_a_503(edition: Edition, nobody_answers: None) -> None:
-    response = Client(raise_request_exception=False).get("/api/v1/splits/test/manifest")
-    assert (response.status_code, response.json()["code"]) == (503, "store-unavailable")
-
-
-def test_worker_without_its_store_blames_the_machine_and_tries_again(
-    stored: s3.S3FileStore,
-    benchmark: None,
-    owner: User,
-    tmp_path: Path,
-    settings: Settings,
-    server: str,
-    request: pytest.FixtureRequest,
-) -> None:
-    edition = builders.import_truth(tmp_path)
-    builders.submit(owner, builders.predictions(edition))
-    there = settings.STORAGES
-    request.getfixturevalue("nobody_answers")
-    settings.BACKOFF_S = 0.0
-    assert worker.run_next(rng=random.Random(0))
-    evaluation = Evaluation.objects.get()
-    assert (evaluation.status, evaluation.n_infrastructure_strikes, evaluation.n_poison_strikes) == (
-        Status.QUEUED,
-        1,
-        0,
-    )
-    assert "does not answer" in evaluation.last_error
-    settings.STORAGES = there
-    builders.score_all()
-    evaluation.refresh_from_db()
-    assert evaluation.status == Status.SCORED
-
-
 # --- faults are told as a disk would tell them ------------------------------------------------------------
 
 
-def test_bucket_that_does_not_exist_is_a_store_that_refuses(stored: s3.S3FileStore, bucket: Any) -> None:
-    with pytest.raises(files.StoreAway) as caught:
-        s3.S3FileStore(url=f"s3://no-such-bucket?endpoint={stored.endpoint_url}").save("x", ContentFile(b"1"))
-    assert caught.value.errno == errno.EIO
-    assert caught.value.strerror == "the file store refused (NoSuchBucket)"
-
-
-@pytest.mark.parametrize(
-    ("url", "address"),
-    [
-        ("s3://tsttc", s3.Address("tsttc", "", None, "us-east-1")),
-        ("s3://tsttc/a/b/?region=eu-west-1", s3.Address("tsttc", "a/b", None, "eu-west-1")),
-        (
-            "s3://tsttc?endpoint=https://minio.example:9000",
-            s3.Address("tsttc", "", "https://minio.example:9000", "us-east-1"),
-        ),
-    ],
-)
-def test_url_says_where_the_files_are(url: str, address: s3.Address) -> None:
-    assert s3.parsed(url) == address
-
-
-@pytest.mark.parametrize(
-    "url", ["s3://", "http://bucket", "s3://bucket?endpiont=x", "s3:///folder", "bucket", ""]
-)
-def test_url_that_says_something_else_is_refused(url: str) -> None:
-    with pytest.raises(ImproperlyConfigured, match="expected s3://bucket/folder"):
-        s3.parsed(url)
+def test_url_that_says_something_else_is_refused() -> None:
+    for url in ("s3://", "http://bucket", "s3://bucket?endpiont=x", "s3:///folder", ""):
+        with pytest.raises(ImproperlyConfigured, match="expected s3://bucket/folder"):
+            s3.parsed(url)
 
 
 def test_key_in_the_url_is_refused_and_not_repeated() -> None:
@@ -281,15 +170,6 @@ def test_orphan_in_the_bucket_is_found_and_removed(stored: s3.S3FileStore, bucke
     assert not orphans.remove(orphan, now=timezone.now()), "written within the day"
     assert orphans.remove(orphan, now=in_two_days)
     assert _names(bucket) == []
-
-
-def test_old_object_that_comes_again_is_written_again(stored: s3.S3FileStore, bucket: Any) -> None:
-    upload = ContentFile(b'{"0": 1.5}', name="p.json")
-    n_puts: list[int] = []
-    stored._client.meta.events.register("before-call.s3.PutObject", lambda **_: n_puts.append(1))
-    for later in (timedelta(0), timedelta(hours=1), timedelta(hours=13)):
-        files.save_predictions(upload, now=timezone.now() + later)
-    assert len(n_puts) == 2
 
 
 # --- backups --------------------------------------------------------------------------------------------
