@@ -55,11 +55,12 @@ note "the demo of $ref"
 (cd "$work/source" && exec make demo PORT="$port") >"$work/demo.log" 2>&1 &
 demo=$!
 for ((tries = 0; tries < 300; tries++)); do
-    curl --silent --fail --output "$work/page.html" "http://127.0.0.1:$port/board/demo/" && break
+    curl --silent --fail --output "$work/page.html" "http://127.0.0.1:$port/board/demo/" &&
+        grep -q '<table' "$work/page.html" && break
     kill -0 "$demo" 2>/dev/null || { cat "$work/demo.log" >&2; fail "the demo ended"; }
     sleep 1
 done
-grep -q '<table' "$work/page.html" || fail "the demo shows no board"
+((tries < 300)) || fail "the demo showed no board within five minutes"
 
 note "good; the packages and their SHA-256"
 mkdir -p "$root/dist"
