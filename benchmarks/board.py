@@ -65,13 +65,13 @@ def change() -> None:
     from django.db import transaction  # noqa: PLC0415
     from django.db.models import F  # noqa: PLC0415
 
-    from leaderboard import versions  # noqa: PLC0415
+    from leaderboard import board_versions  # noqa: PLC0415
     from leaderboard.models import Score  # noqa: PLC0415
 
     with transaction.atomic():
         first = Score.objects.order_by("pk").values("pk")[:1]
         Score.objects.filter(pk__in=first).update(value=F("value") + 0.01)
-        versions.changed("test")
+        board_versions.changed("test")
 
 
 def first_reader_s(http: httpx.Client) -> float:

@@ -35,7 +35,7 @@ def infer(n: int) -> None:
         from django.utils import timezone  # noqa: PLC0415 - Django is configured only now
 
         from leaderboard.demo.runs import simulate  # noqa: PLC0415
-        from leaderboard.scoring import confidence  # noqa: PLC0415
+        from leaderboard.statistics import confidence  # noqa: PLC0415
         from leaderboard.storage import truth_values  # noqa: PLC0415
 
         rescoring.score_first(simulate(rng=np.random.default_rng(1)), made.directory, n=n)

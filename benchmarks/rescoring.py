@@ -57,7 +57,7 @@ def score_first(truth: evaluator.GroundTruth, directory: Path, *, n: int) -> Non
     from django.utils import timezone  # noqa: PLC0415
 
     from leaderboard.editions import ground_truth  # noqa: PLC0415
-    from leaderboard.scoring import worker as scoring  # noqa: PLC0415
+    from leaderboard.queue import worker as scoring  # noqa: PLC0415
 
     ground_truth.import_truth(split_name="test", path=written(truth, directory), now=timezone.now())
     crowd.join(split_name="test", truth=truth, n=n, n_files=0)

@@ -11,37 +11,37 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from evaluator.client.client import Client
+    from evaluator.client.api import Client
     from evaluator.metrics.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
     from evaluator.metrics.scale import convert_rate, fps_of_gap, scale_ratio_to_ttc, ttc_to_scale_ratio
     from evaluator.predictions.conversion import convert
-    from evaluator.predictions.predictions import Predictions, read_predictions
+    from evaluator.predictions.loading import Predictions, read_predictions
     from evaluator.predictions.writing import write_predictions
     from evaluator.problems import PROBLEM_CODES, Problem, Rejected
     from evaluator.scoring.differences import compare_predictions
     from evaluator.scoring.report import IntervalScore, Report, format_published, published
-    from evaluator.scoring.scoring import evaluate
+    from evaluator.scoring.scores import evaluate
     from evaluator.scoring.significance import Difference
     from evaluator.scoring.uncertainty import confidence_intervals
     from evaluator.truth.csv_tables import Table
+    from evaluator.truth.ground_truth import GroundTruth, Manifest, read_manifest, read_truth
     from evaluator.truth.numbering import read_numbering
-    from evaluator.truth.truth import GroundTruth, Manifest, read_manifest, read_truth
 else:
     # Each name is imported when it is first asked for: `tsttc --help` then answers without loading numpy.
     _HOMES = {
-        "client.client": ("Client",),
+        "client.api": ("Client",),
         "metrics.scale": ("convert_rate", "fps_of_gap", "scale_ratio_to_ttc", "ttc_to_scale_ratio"),
         "predictions.conversion": ("convert",),
         "truth.csv_tables": ("Table",),
         "truth.numbering": ("read_numbering",),
         "scoring.differences": ("compare_predictions",),
-        "predictions.predictions": ("Predictions", "read_predictions"),
+        "predictions.loading": ("Predictions", "read_predictions"),
         "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
         "metrics.protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
         "scoring.report": ("IntervalScore", "Report", "format_published", "published"),
-        "scoring.scoring": ("evaluate",),
+        "scoring.scores": ("evaluate",),
         "scoring.significance": ("Difference",),
-        "truth.truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
+        "truth.ground_truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
         "scoring.uncertainty": ("confidence_intervals",),
         "predictions.writing": ("write_predictions",),
     }

@@ -8,8 +8,8 @@ from typing import Any
 import pandas as pd
 
 from evaluator.arguments import require
-from evaluator.predictions.predictions import NATURAL_KEY, Predictions, read_predictions
-from evaluator.truth.truth import Manifest
+from evaluator.predictions.loading import NATURAL_KEY, Predictions, read_predictions
+from evaluator.truth.ground_truth import Manifest
 
 
 def manifest_frame(manifest: Manifest) -> pd.DataFrame:

@@ -13,10 +13,10 @@ class LeaderboardConfig(AppConfig):
     def ready(self) -> None:
         """Register the system checks; only now can what they look at be imported."""
         from leaderboard.ops import deployment  # noqa: PLC0415 - needs the models
-        from leaderboard.pages import pages  # noqa: PLC0415 - needs the models
+        from leaderboard.pages import texts  # noqa: PLC0415 - needs the models
         from leaderboard.submissions import receipts  # noqa: PLC0415 - needs the models
 
         checks.register(receipts.check_keys)
-        checks.register(pages.check_contact, deploy=True)
+        checks.register(texts.check_contact, deploy=True)
         checks.register(deployment.check_variables, deploy=True)
         checks.register(deployment.check_services, deploy=True)

@@ -202,12 +202,12 @@ FILE_UPLOAD_HANDLERS = ["leaderboard.web.middleware.upload_handlers.UnnamedFileU
 
 # How long after a renaming a team or a method can be renamed again; 0: at once.
 RENAME_AFTER = timedelta(hours=env.float("TSTTC_RENAME_AFTER_H", default=24.0))
-# Whether teams have quotas (see leaderboard/quotas/quotas.py).
+# Whether teams have quotas (see leaderboard/quotas/limits.py).
 QUOTAS = env.bool("TSTTC_QUOTAS", default=True)
 # Bytes that a team may send in 24 hours, to all splits together, rejected files included; 0: any number.
 MAX_TEAM_BYTES_PER_DAY = env.int("TSTTC_MAX_TEAM_BYTES_PER_DAY", default=2_000_000_000)
 
-# --- the life of an evaluation (seconds; see leaderboard/scoring/lifecycle.py) ------------------------------
+# --- the life of an evaluation (seconds; see leaderboard/queue/lifecycle.py) ------------------------------
 
 LEASE_S = env.float("TSTTC_LEASE_S", default=60.0)
 HEARTBEAT_S = env.float("TSTTC_HEARTBEAT_S", default=LEASE_S / 4)
@@ -221,7 +221,7 @@ if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
 SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
 # Without a broker nobody tells the workers, and somebody waits.
 POLL_S = env.float("TSTTC_POLL_S", default=5.0 if PRODUCTION else 0.5)
-# How often stored files that no submission names are removed (see leaderboard/workers/queue.py).
+# How often stored files that no submission names are removed (see leaderboard/queue/pollers.py).
 CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.

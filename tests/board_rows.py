@@ -8,7 +8,7 @@ from django.db import transaction
 from django.utils import timezone
 
 from evaluator.metrics.protocol import split_name
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import (
     Edition,
     EditionRanges,
@@ -46,7 +46,7 @@ def fill(edition: Edition, *, n: int, user: User, seed: int = 0) -> list[Method]
     )
     score(edition, methods=methods, user=user, seed=seed)
     with transaction.atomic():
-        versions.changed(edition.split_id)
+        board_versions.changed(edition.split_id)
     return methods
 
 

@@ -11,16 +11,15 @@ from django.db import transaction
 from django.utils import timezone
 
 import evaluator
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.editions import ground_truth
 from leaderboard.methods import visibility as visibility_verbs
 from leaderboard.models import Edition, PublishedResult, QuotaOverride, Split, Submission, Team, User
 from leaderboard.people import tokens
-from leaderboard.quotas import quotas
-from leaderboard.scoring import worker
+from leaderboard.queue import backlog, worker
+from leaderboard.quotas import limits
 from leaderboard.storage import truth_values
-from leaderboard.submissions import submissions
-from leaderboard.workers import backlog
+from leaderboard.submissions import intake
 
 N_SEQUENCES = 120
 
@@ -58,9 +57,9 @@ def send(
     method: str = "Foo",
     now: datetime | None = None,
     **fields: str,
-) -> submissions.Submitted:
+) -> intake.Submitted:
     """What sending a file is answered, as the web form sends it."""
-    return submissions.submit(
+    return intake.submit(
         user=user,
         split_name=split,
         method_name=method,
@@ -87,7 +86,7 @@ def override(team: Team, *, split: str = "test", **options: Any) -> QuotaOverrid
     rules = {"limit": None, "window": timedelta(days=1), "min_gap": timedelta(0), "rejected_limit": None}
     row = Split.objects.get(pk=split)
     said = {"reason": "R", "actor": None, "now": timezone.now()}
-    return quotas.override(team=team, split=row, **{**rules, **said, **options})
+    return limits.override(team=team, split=row, **{**rules, **said, **options})
 
 
 def quote(name: str, scores: dict[str, float]) -> PublishedResult:
@@ -113,7 +112,7 @@ def token(user: User, **options: Any) -> str:
 def board_changed(split: str) -> None:
     """Say that a board is not what it was: for tests that write behind the verbs' backs."""
     with transaction.atomic():
-        versions.changed(split)
+        board_versions.changed(split)
 
 
 def open_values(edition: Edition) -> None:

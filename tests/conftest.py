@@ -14,7 +14,7 @@ from django.db.backends.postgresql.operations import DatabaseOperations
 from pytest_django import DjangoDbBlocker
 from pytest_django.fixtures import Settings
 
-from leaderboard.benchmark import splits
+from leaderboard.editions import splits
 from tests import emptying, kept, prepared, services, spread
 from tests.caching import forget_boards
 

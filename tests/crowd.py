@@ -59,7 +59,7 @@ def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int)
 
     from leaderboard.models import Method, Split, Submission, Team, User, Visibility  # noqa: PLC0415
     from leaderboard.people.names import skeleton  # noqa: PLC0415
-    from leaderboard.scoring import lifecycle  # noqa: PLC0415
+    from leaderboard.queue import lifecycle  # noqa: PLC0415
     from leaderboard.storage import files  # noqa: PLC0415
 
     split = Split.objects.select_related("published_edition").get(pk=split_name)

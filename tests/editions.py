@@ -9,9 +9,8 @@ from django.utils import timezone
 
 from evaluator import GroundTruth, evaluate, published, read_manifest, read_predictions
 from evaluator.metrics.protocol import SCORE_NAMES
-from leaderboard.benchmark import splits
-from leaderboard.boards import boards
-from leaderboard.editions import corrections
+from leaderboard.boards import query
+from leaderboard.editions import corrections, splits
 from leaderboard.models import (
     Edition,
     Publication,
@@ -97,9 +96,9 @@ def quote(slug: str = "later", *, mid: float = 1.0) -> splits.Imported:
     return splits.import_published(document=document, now=timezone.now(), is_replacing=True)
 
 
-def board_now() -> boards.Board:
+def board_now() -> query.Board:
     split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
-    return boards.board(split=split, viewer=ANYBODY)
+    return query.board(split=split, viewer=ANYBODY)
 
 
 def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) -> dict[str, float | None]:

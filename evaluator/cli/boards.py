@@ -135,7 +135,7 @@ def in_words(found: Board, *, width: int | None) -> Iterator[str]:
         yield ""
         yield layouts.brackets(found.unit, found.n_units)
     if found.floor:
-        from evaluator.scoring.scoring import floor_sentence  # noqa: PLC0415 -- loads numpy
+        from evaluator.scoring.scores import floor_sentence  # noqa: PLC0415 -- loads numpy
 
         yield ""
         yield floor_sentence(found.floor, decimals=found.decimals or 2)
@@ -168,7 +168,7 @@ def _table(found: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
 
 def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
     """The places of the best and the second of a column, among the rows that everybody sees."""
-    from evaluator.metrics.metrics import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
+    from evaluator.metrics.registry import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
 
     return best_and_second(
         [None if entry.visibility == "PRIVATE" else entry.scores.get(name) for entry in board.entries]

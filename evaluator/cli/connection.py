@@ -18,7 +18,7 @@ from evaluator.cli.tokens import token_for
 
 if TYPE_CHECKING:
     from evaluator.client.answers import ClientError, Refused
-    from evaluator.client.client import Client
+    from evaluator.client.api import Client
 
 # A problem that names one of these is about the command's options; any other is about the file.
 OPTIONS = frozenset(
@@ -41,7 +41,7 @@ def connect(url: str, *, with_token: bool, token: str | None = None) -> Iterator
 
     # httpx brings a command line of its own, with rich and pygments: a third of the time of its import.
     sys.modules.setdefault("httpx._main", None)  # type: ignore[arg-type]  # None: as if it were not there
-    from evaluator.client.client import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
+    from evaluator.client.api import LOOPBACK_HOSTS, Client  # noqa: PLC0415 -- loads httpx, which --help can do without
     from evaluator.client.exchange import RetryPolicy  # noqa: PLC0415 -- the same
 
     site = urlsplit(url)

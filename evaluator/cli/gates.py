@@ -17,7 +17,7 @@ from evaluator.metrics.protocol import PRIMARY, known_names
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Board, BoardEntry
-    from evaluator.client.client import Client
+    from evaluator.client.api import Client
 
 OPERATORS: Final[dict[str, Callable[[float, float], bool]]] = {
     ">=": operator.ge,

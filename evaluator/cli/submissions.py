@@ -33,7 +33,7 @@ from evaluator.problems import Rejected, n_problems_in_words
 
 if TYPE_CHECKING:
     from evaluator.client.answers import Submission
-    from evaluator.client.client import Client
+    from evaluator.client.api import Client
 
 
 @click.command(short_help="Submit a prediction file to the leaderboard.")

@@ -13,7 +13,7 @@ from evaluator.cli.layout import printable
 from evaluator.problems import FileWarning
 
 if TYPE_CHECKING:
-    from evaluator.predictions.predictions import Predictions
+    from evaluator.predictions.loading import Predictions
     from evaluator.truth.numbering import Numbering
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Final
 
-from evaluator.metrics.metrics import MID, RTE, Metric
+from evaluator.metrics.registry import MID, RTE, Metric
 
 OVERALL: Final = "overall"
 """The name of the mean over all sequences, which is in no range."""

@@ -13,7 +13,7 @@ import numpy as np
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap, scale_ratio_to_ttc
 from evaluator.predictions.documents import Document, Members, kind_of, parse, read_document
 from evaluator.problems import Findings, listed, pointer, quoted
-from evaluator.truth.truth import Manifest
+from evaluator.truth.ground_truth import Manifest
 
 KeyKind = Literal["anno_id", "natural_key"]
 Place = Callable[[str], str]

@@ -29,7 +29,7 @@ from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
 from evaluator.predictions.alignment import Aligned, KeyKind, read_rates
 from evaluator.predictions.documents import BYTE_ORDER_MARK, Document, Members, parse, read_document
 from evaluator.problems import Findings, Rejected
-from evaluator.truth.truth import Manifest
+from evaluator.truth.ground_truth import Manifest
 
 Words = NDArray[np.uint64]
 Rows = NDArray[np.intp]

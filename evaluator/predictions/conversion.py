@@ -27,8 +27,8 @@ from evaluator.predictions.alignment import (
     seconds_fault,
 )
 from evaluator.predictions.documents import Document, Members, Unit, parse, read_document
+from evaluator.predictions.loading import json_of
 from evaluator.predictions.parquet import as_sent
-from evaluator.predictions.predictions import json_of
 from evaluator.predictions.writing import write_predictions
 from evaluator.problems import Findings, listed, quoted
 

@@ -36,7 +36,7 @@ def as_sent(data: bytes) -> bytes:
     import pyarrow as pa  # noqa: PLC0415 -- of an extra
     from pyarrow import parquet  # noqa: PLC0415 -- the same
 
-    from evaluator.predictions.predictions import document_of  # noqa: PLC0415 -- which asks this module
+    from evaluator.predictions.loading import document_of  # noqa: PLC0415 -- which asks this module
 
     try:
         table = parquet.ParquetFile(io.BytesIO(data))
@@ -49,7 +49,7 @@ def as_sent(data: bytes) -> bytes:
 
 def _columns(schema: Any) -> tuple[list[str], list[str]]:
     """The columns of the key and those of the numbers, each of a type that can be what its name says."""
-    from evaluator.predictions.predictions import columns_of  # noqa: PLC0415 -- which asks this module
+    from evaluator.predictions.loading import columns_of  # noqa: PLC0415 -- which asks this module
 
     keys, value, rate = columns_of(schema.names)
     values = [value] if rate is None else [value, rate]

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.metrics.scale import Floats
-from evaluator.predictions.predictions import Predictions
+from evaluator.predictions.loading import Predictions
 from evaluator.problems import FileWarning
-from evaluator.truth.truth import GroundTruth, Manifest
+from evaluator.truth.ground_truth import GroundTruth, Manifest
 
 MAX_STEP_NS: Final = 1_000_000_000
 """Windows of one track that end this close together are neighbours; in the dataset they are 0.6 s apart."""

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.counting import counted
-from evaluator.predictions.predictions import Predictions
+from evaluator.predictions.loading import Predictions
 from evaluator.problems import Problem, Rejected, listed, pointer, quoted
-from evaluator.truth.truth import GroundTruth, Manifest
+from evaluator.truth.ground_truth import GroundTruth, Manifest
 
 Rows = NDArray[np.intp]
 

@@ -17,7 +17,7 @@ from evaluator.counting import counted
 from evaluator.metrics.scale import N_FRAMES, Floats, fps_of_gap
 from evaluator.predictions.documents import parse, read_document
 from evaluator.problems import Findings, pointer, quoted
-from evaluator.truth.truth import Manifest
+from evaluator.truth.ground_truth import Manifest
 
 
 def write_predictions(

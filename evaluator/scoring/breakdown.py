@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from evaluator.metrics.protocol import OVERALL, Protocol, score_name
 from evaluator.metrics.scale import Floats
-from evaluator.truth.truth import GroundTruth
+from evaluator.truth.ground_truth import GroundTruth
 
 if TYPE_CHECKING:
-    from evaluator.predictions.predictions import Predictions
+    from evaluator.predictions.loading import Predictions
 
 CURVE_EDGES_S: Final = (
     -20,

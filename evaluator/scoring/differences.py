@@ -15,12 +15,12 @@ import numpy as np
 
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
-from evaluator.predictions.predictions import Predictions
+from evaluator.predictions.loading import Predictions
 from evaluator.scoring.report import published
-from evaluator.scoring.scoring import Scorer
+from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
 from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns
-from evaluator.truth.truth import GroundTruth
+from evaluator.truth.ground_truth import GroundTruth
 from evaluator.units import RECORDING
 
 N_SIGN_FLIPS: Final = 9_999

@@ -13,8 +13,8 @@ import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
 
-from evaluator.metrics.metrics import Metric
 from evaluator.metrics.protocol import metric_of
+from evaluator.metrics.registry import Metric
 from evaluator.scoring.breakdown import curve_of, scores_of
 
 if TYPE_CHECKING:

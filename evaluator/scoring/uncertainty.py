@@ -25,11 +25,11 @@ from numpy.typing import NDArray
 
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
-from evaluator.predictions.predictions import Predictions
+from evaluator.predictions.loading import Predictions
 from evaluator.scoring.report import RecordingSums
-from evaluator.scoring.scoring import Scorer
+from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import MIN_DEGREES
-from evaluator.truth.truth import GroundTruth
+from evaluator.truth.ground_truth import GroundTruth
 from evaluator.units import RECORDING, Units
 
 CONFIDENCE: Final = 0.95

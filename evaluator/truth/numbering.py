@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from evaluator.metrics.scale import Floats
 from evaluator.problems import Findings, listed
 from evaluator.truth.annotation_folders import read_annotations
-from evaluator.truth.truth import Manifest
+from evaluator.truth.ground_truth import Manifest
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,8 +27,8 @@ from leaderboard.api.serializers import (
 )
 from leaderboard.api.views import current_split, published_edition
 from leaderboard.ops import rate_limits
-from leaderboard.scoring import comparisons
-from leaderboard.scoring.comparisons import Compared, Pair
+from leaderboard.statistics import comparisons
+from leaderboard.statistics.comparisons import Compared, Pair
 
 
 class DifferenceSerializer(serializers.Serializer[Difference]):

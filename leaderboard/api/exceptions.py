@@ -13,12 +13,12 @@ from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
 from leaderboard.api.throttling import UnauthorizedThrottle
-from leaderboard.boards import boards, filters
+from leaderboard.boards import filters, query
 from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
-from leaderboard.quotas import quotas
-from leaderboard.scoring import comparisons, questions
+from leaderboard.quotas import limits
+from leaderboard.statistics import comparisons, questions
 
 UNAUTHORIZED = (exceptions.NotAuthenticated, exceptions.AuthenticationFailed, exceptions.PermissionDenied)
 
@@ -86,8 +86,8 @@ REFUSED_STATUS: dict[str, int] = {
 }
 # What the domain raises besides `Refused`: status, code, and the input at fault.
 DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
-    boards.UnknownColumn: (400, "unknown-column", "sort"),
-    boards.BadTime: (400, "bad-moment", "at"),
+    query.UnknownColumn: (400, "unknown-column", "sort"),
+    query.BadTime: (400, "bad-moment", "at"),
     NotMaintainer: (403, "not-maintainer", ""),
     comparisons.BadComparison: (400, comparisons.BadComparison.code, "m"),
     comparisons.UnknownMethod: (404, comparisons.UnknownMethod.code, "m"),
@@ -100,7 +100,7 @@ def _domain_error(exc: Exception) -> Response | None:
         case Refused():
             status = REFUSED_STATUS.get(exc.code, 422)
             return problem(status=status, code=exc.code, detail=str(exc), where=exc.field)
-        case quotas.QuotaExceeded() | questions.AskedTooOften():
+        case limits.QuotaExceeded() | questions.AskedTooOften():
             return _not_yet(exc)
         case filters.BadFilter():
             return problem(status=400, code="bad-filter", detail=str(exc), where=exc.field)
@@ -110,8 +110,8 @@ def _domain_error(exc: Exception) -> Response | None:
     return problem(status=status, code=code, detail=str(exc), where=where)
 
 
-def _not_yet(exc: quotas.QuotaExceeded | questions.AskedTooOften) -> Response:
-    if isinstance(exc, quotas.QuotaExceeded):
+def _not_yet(exc: limits.QuotaExceeded | questions.AskedTooOften) -> Response:
+    if isinstance(exc, limits.QuotaExceeded):
         retry_after_s = exc.quota.retry_after_s(now=timezone.now())
     else:
         retry_after_s = exc.retry_after_s

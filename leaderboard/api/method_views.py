@@ -34,7 +34,7 @@ from leaderboard.api.serializers import (
 from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.visibility_preview import BoardPreview, RankChange, VisibilityPreview
 from leaderboard.errors.refusals import Refused
-from leaderboard.methods import details, methods, visibility
+from leaderboard.methods import details, editing, visibility
 from leaderboard.methods.visibility import notice_of
 from leaderboard.models import Method, User, Visibility
 
@@ -70,7 +70,7 @@ class MethodSerializer(serializers.Serializer[Method]):
     def to_representation(self, instance: Method) -> dict[str, Any]:
         viewer = self.context["viewer"]
         profile = results.profile(method=instance, viewer=viewer)
-        is_own = instance.is_named_for(viewer) and viewer.is_authenticated and methods.is_of(instance, viewer)
+        is_own = instance.is_named_for(viewer) and viewer.is_authenticated and editing.is_of(instance, viewer)
         return {
             "id": str(instance.pk),
             "name": profile.name,
@@ -216,7 +216,7 @@ class MethodView(APIView):
     def patch(self, request: Request, method_id: UUID) -> Response:
         """Edit a method of your team: fields left out stay as they are, null clears a field."""
         found = _own(request, method_id)
-        edited = methods.edit(method=found, changes=_fields(request), actor=cast("User", request.user))
+        edited = editing.edit(method=found, changes=_fields(request), actor=cast("User", request.user))
         return Response(_data(edited, request))
 
 

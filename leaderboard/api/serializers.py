@@ -20,13 +20,13 @@ from evaluator.metrics.protocol import (
 )
 from evaluator.metrics.protocol import Interval as TTCRange
 from leaderboard.boards import snapshots
-from leaderboard.boards.boards import Board
+from leaderboard.boards.query import Board
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.methods import details
 from leaderboard.methods.details import Details
 from leaderboard.models import Split, Visibility
 from leaderboard.quotas import admissions
-from leaderboard.quotas.quotas import Quota
+from leaderboard.quotas.limits import Quota
 
 SPLIT: Final = "Name of the split."
 EDITION: Final = "Number of the edition."

@@ -25,10 +25,10 @@ from leaderboard.api.submission_serializers import (
 )
 from leaderboard.api.throttling import SubmitThrottle
 from leaderboard.api.views import visible
-from leaderboard.methods import methods
+from leaderboard.methods import editing
 from leaderboard.models import Evaluation, Submission, User
-from leaderboard.quotas import quotas
-from leaderboard.submissions import outcomes, submissions
+from leaderboard.quotas import limits
+from leaderboard.submissions import intake, outcomes
 
 TEXT_FIELDS = ("description", "paper_url", "code_url", "note", "commit")
 # While a submission waits or runs; a file is scored within a second.
@@ -60,7 +60,7 @@ class SubmissionsView(APIView):
         now = timezone.now()
         answer = _submit(request, form, now=now)
         made = answer.submission
-        quota = quotas.state(
+        quota = limits.state(
             team=made.method.team, user=cast("User", request.user), split=made.split, now=now
         )
         (outcome,) = outcomes.of([made], now=now)
@@ -106,14 +106,14 @@ class SubmissionView(APIView):
         return Response(SubmissionSerializer(outcome).data, headers=again)
 
 
-def _submit(request: Request, form: QueryDict, *, now: datetime) -> submissions.Submitted:
+def _submit(request: Request, form: QueryDict, *, now: datetime) -> intake.Submitted:
     """The submission of this request, or the one that had the same bytes before."""
     user, upload = cast("User", request.user), request.FILES.get("file")
     texts: dict[str, Any] = {name: str(form.get(name, "")) for name in TEXT_FIELDS}
-    return submissions.submit(
+    return intake.submit(
         user=user,
         split_name=str(form.get("split", "")),
-        method_name=methods.name_meant(user=user, text=str(form.get("method", ""))),
+        method_name=editing.name_meant(user=user, text=str(form.get("method", ""))),
         upload=upload,
         via=Submission.Via.API,
         now=now,

@@ -17,11 +17,11 @@ from leaderboard.api.serializers import SplitSerializer
 from leaderboard.api.submission_serializers import SubmissionSerializer
 from leaderboard.boards import snapshots
 from leaderboard.editions import history
-from leaderboard.http import is_known
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
 from leaderboard.storage import files
-from leaderboard.submissions import outcomes, submissions
+from leaderboard.submissions import intake, outcomes
+from leaderboard.web.decorators import is_known
 
 
 def visible(request: Request) -> SubmissionQuerySet:
@@ -55,7 +55,7 @@ class WithdrawView(APIView):
         """Cancel a waiting submission; a published one leaves a tombstone row. Cannot be undone."""
         submission = get_object_or_404(visible(request), pk=submission_id)
         now = timezone.now()
-        submissions.withdraw(submission=submission, actor=cast("User", request.user), now=now)
+        intake.withdraw(submission=submission, actor=cast("User", request.user), now=now)
         (outcome,) = outcomes.of([submission], now=now)
         return Response(SubmissionSerializer(outcome).data)
 

@@ -10,7 +10,7 @@ from datetime import datetime
 from typing import Any, Final, NamedTuple
 from uuid import UUID
 
-from evaluator.metrics import metrics
+from evaluator.metrics import registry
 from evaluator.metrics.protocol import PRIMARY, Protocol, score_name
 from leaderboard.methods.details import Details, details_of, stated
 from leaderboard.models import (
@@ -297,9 +297,9 @@ def key(value: float | None, submitted_at: datetime) -> Place:
 
 def in_ranks(entries: Sequence[Entry]) -> tuple[Entry, ...]:
     """The same rows with their ranks, and with the best and the second of each column marked."""
-    ranks = metrics.rank([entry.scores[PRIMARY] for entry in entries])
+    ranks = registry.rank([entry.scores[PRIMARY] for entry in entries])
     names = list(entries[0].scores) if entries else []
-    marks = {name: metrics.best_and_second([entry.scores[name] for entry in entries]) for name in names}
+    marks = {name: registry.best_and_second([entry.scores[name] for entry in entries]) for name in names}
     return tuple(
         replace(
             placed(entry, rank),

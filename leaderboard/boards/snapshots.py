@@ -1,6 +1,6 @@
 """What everybody sees of a board: read once for all readers, and kept by the number of its split.
 
-Each request reads the number (`leaderboard/versions.py`), so what is kept under it is current. The rows are
+Each request reads the number (`leaderboard/board_versions.py`), so what is kept under it is current. The rows are
 read as of one moment. A board as of a time is kept apart: anybody can ask for any number of times.
 """
 
@@ -20,8 +20,8 @@ from django.db.models import F, QuerySet
 from django.http import HttpRequest
 
 from evaluator.metrics.protocol import OVERALL
-from leaderboard import versions
-from leaderboard.boards import boards
+from leaderboard import board_versions
+from leaderboard.boards import query
 from leaderboard.boards.rows import Entry
 from leaderboard.models import (
     Edition,
@@ -107,7 +107,7 @@ def _number(split: Any, edition: Any) -> int:
     for row in (split, edition):
         if hasattr(row, "board_number"):
             return row.board_number or 0
-    return versions.number(split.pk)
+    return board_versions.number(split.pk)
 
 
 # --- reading ---------------------------------------------------------------------------------------------
@@ -117,19 +117,19 @@ def _public_rows(*, split: Split, edition: Edition | None, at: datetime | None) 
     if at is not None:
         return _as_of(split, edition, at)
     if edition is None:
-        return boards.public_rows(split=split, edition=None)
+        return query.public_rows(split=split, edition=None)
     return shown(split=split, edition=edition).entries
 
 
-board = partial(boards.board, read=_public_rows)
-"""The same as `boards.board`, from what is kept; `split` is of `splits()` or `editions()`."""
+board = partial(query.board, read=_public_rows)
+"""The same as `query.board`, from what is kept; `split` is of `splits()` or `editions()`."""
 
 
 def _as_of(split: Split, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
     """What everybody saw at that time."""
 
     def rows() -> CurrentBoard:
-        return CurrentBoard(boards.public_rows(split=split, edition=edition, at=at))
+        return CurrentBoard(query.public_rows(split=split, edition=edition, at=at))
 
     key = f"{split.pk}:{edition and edition.pk}:{_number(split, edition)}:{at.isoformat()}"
     return _kept(key, rows, cache="views").entries
@@ -164,7 +164,7 @@ def _encoded(read: Callable[[], CurrentBoard]) -> bytes:
 def _now(edition_id: int) -> CurrentBoard:
     """The edition as the database has it at this moment."""
     edition = Edition.objects.select_related("split__published_edition", "ground_truth").get(pk=edition_id)
-    entries = boards.public_rows(split=edition.split, edition=edition)
+    entries = query.public_rows(split=edition.split, edition=edition)
     return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
 
 

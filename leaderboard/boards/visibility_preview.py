@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from uuid import UUID
 
-from leaderboard.boards import boards
+from leaderboard.boards import query
 from leaderboard.boards.rows import Entry, Profile, profile_of
 from leaderboard.models import Edition, Method, Split, Visibility
 
@@ -55,10 +55,10 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     )
     for split in splits:
         edition = split.published_edition
-        rows = boards.public_rows(split=split, edition=edition, assuming_visible=assuming_visible)
+        rows = query.public_rows(split=split, edition=edition, assuming_visible=assuming_visible)
         entry = next((row for row in rows if row.method_id == method.pk), None)
         if entry is not None and edition is not None:
-            before = boards.public_rows(split=split, edition=edition)
+            before = query.public_rows(split=split, edition=edition)
             sights.append(
                 BoardPreview(
                     split=split,

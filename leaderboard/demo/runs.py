@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import evaluator
-from baselines import simulation
-from baselines.methods import Value
+from tsttc_baselines import simulation
+from tsttc_baselines.methods import Value
 
 Floats = NDArray[np.float64]
 

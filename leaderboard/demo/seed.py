@@ -20,9 +20,9 @@ import evaluator
 from leaderboard.demo.runs import FRAMES, Run, demo_split, get_run
 from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused
-from leaderboard.methods import methods, visibility
+from leaderboard.methods import editing, visibility
 from leaderboard.models import Split, Submission, User, Visibility
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 
 SPLIT = "demo"
 DEMO_EMAIL = "demo@example.org"
@@ -233,7 +233,7 @@ def _submit(entry: DemoEntry, *, user: User, truth: evaluator.GroundTruth, now: 
     """Send the entry's file, and say and show of its method what the demo does: all of it, or nothing."""
     data = predictions_file(entry, truth=truth)
     with transaction.atomic():
-        method = submissions.submit(
+        method = intake.submit(
             user=user,
             split_name=SPLIT,
             method_name=entry.method,
@@ -243,7 +243,7 @@ def _submit(entry: DemoEntry, *, user: User, truth: evaluator.GroundTruth, now: 
             via=Submission.Via.WEB,
             now=now,
         ).submission.method
-        methods.edit(method=method, changes=entry.details, actor=user)
+        editing.edit(method=method, changes=entry.details, actor=user)
         if entry.visibility != Visibility.PRIVATE:
             visibility.change(method=method, visibility=entry.visibility, actor=user, now=now)
 

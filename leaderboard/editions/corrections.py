@@ -20,7 +20,7 @@ from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
-from leaderboard.scoring import lifecycle
+from leaderboard.queue import lifecycle
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from evaluator.counting import counted
 from evaluator.metrics.protocol import INTERVALS, OVERALL, get_protocol, known_intervals
 from evaluator.predictions.revisions import Comparison, compare
 from evaluator.units import RECORDING, Units
-from leaderboard import audit, versions
+from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, GroundTruth, Publication, Split, TruthComparison, User
 from leaderboard.storage import files, manifests, truth_values
@@ -213,7 +213,7 @@ def make_board(
         actor=actor,
         details={"edition": str(edition), "reason": reason, "left_out": list(left_out)},
     )
-    versions.changed(split.pk)
+    board_versions.changed(split.pk)
     return Publication.objects.create(
         split=split,
         edition=edition,

@@ -7,9 +7,9 @@ from typing import Final
 from django.db import transaction
 from django.db.models import Max
 
-from leaderboard import audit, versions
-from leaderboard.benchmark.policy import Policy, checked, require_listable
+from leaderboard import audit, board_versions
 from leaderboard.editions import ground_truth
+from leaderboard.editions.policy import Policy, checked, require_listable
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Publication, Split, User
 
@@ -84,7 +84,7 @@ def add_split(
         )
         if other is not None and other.published_edition is not None:
             _publish_like(other, split, now=now, actor=actor)
-        versions.changed(name)
+        board_versions.changed(name)
     return split
 
 

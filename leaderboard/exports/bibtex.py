@@ -10,8 +10,8 @@ from typing import Final
 
 from evaluator.tables import layouts
 from evaluator.tables.escaping import latex, one_line
-from leaderboard.benchmark.splits import PUBLISHED_DIR
 from leaderboard.boards.rows import Entry
+from leaderboard.editions.splits import PUBLISHED_DIR
 from leaderboard.models import Edition
 
 _ARXIV: Final = re.compile(

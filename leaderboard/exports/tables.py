@@ -16,8 +16,8 @@ from evaluator.scoring.report import format_published
 from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
 from evaluator.units import RECORDING
-from leaderboard.boards.boards import Board
 from leaderboard.boards.filters import BadFilter
+from leaderboard.boards.query import Board
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports import bibtex
 from leaderboard.methods.details import DETAILS

@@ -13,9 +13,9 @@ from datetime import datetime, timedelta
 import structlog
 from django.db import transaction
 
-from leaderboard import audit, versions
+from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
-from leaderboard.methods.methods import require_team
+from leaderboard.methods.editing import require_team
 from leaderboard.models import Method, PublishedResult, Team, User, Visibility
 from leaderboard.people import teams
 from leaderboard.people.names import confusable_with, numbered
@@ -63,7 +63,7 @@ def change(
                 "reveal_at": reveal_at.isoformat() if reveal_at else None,
             },
         )
-        versions.changed_by_methods([row.pk])
+        board_versions.changed_by_methods([row.pk])
     log.info("method_shown", method_id=str(row.pk), visibility=row.visibility)
     return row
 
@@ -127,7 +127,7 @@ def reveal_due(*, now: datetime) -> int:
             _number_taken_name(Method.objects.get(pk=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
-            versions.changed_by_methods([method_id])
+            board_versions.changed_by_methods([method_id])
         n_revealed += 1
     return n_revealed
 

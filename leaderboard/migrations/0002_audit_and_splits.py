@@ -47,7 +47,7 @@ def on_postgresql(statements):
 
 def ensure_splits(apps, schema_editor):
     # The rows are made with the historical models, so that later columns do not matter here.
-    from leaderboard.benchmark.splits import ensure_splits
+    from leaderboard.editions.splits import ensure_splits
 
     ensure_splits(
         split_model=apps.get_model("leaderboard", "Split"),

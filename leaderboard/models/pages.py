@@ -13,8 +13,8 @@ ANNOUNCEMENT: Final = "announcement"
 class PageVersion(models.Model):
     """A text that a page has, or had. Rows are only added; the highest number is shown.
 
-    Written by `leaderboard.pages.pages`. One row is no page but the line that all pages about splits show
-    until it ends; `leaderboard.benchmark.policy` writes and deletes it.
+    Written by `leaderboard.pages.texts`. One row is no page but the line that all pages about splits show
+    until it ends; `leaderboard.editions.policy` writes and deletes it.
     """
 
     page = models.CharField(max_length=20)

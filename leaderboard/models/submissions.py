@@ -102,7 +102,7 @@ class Submission(models.Model):
 
 
 class Status(models.TextChoices):
-    """The states of an evaluation; only `leaderboard.scoring.lifecycle` writes them."""
+    """The states of an evaluation; only `leaderboard.queue.lifecycle` writes them."""
 
     QUEUED = "QUEUED", "queued"
     RUNNING = "RUNNING", "running"

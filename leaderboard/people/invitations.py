@@ -12,7 +12,7 @@ from django.db import IntegrityError, transaction
 from django.db.models import QuerySet
 from django.urls import reverse
 
-from leaderboard import audit, versions
+from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Membership, Method, Team, User, Visibility
 from leaderboard.people import accounts, teams
@@ -170,7 +170,7 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
                 "brought": sorted(moved),
             },
         )
-        versions.changed_by_methods(
+        board_versions.changed_by_methods(
             Method.objects.shown().filter(pk__in=list(moved)).values_list("pk", flat=True)
         )
     return team

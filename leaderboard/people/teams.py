@@ -9,7 +9,7 @@ from datetime import datetime
 from django.db import IntegrityError, transaction
 from django.db.models.functions import Now
 
-from leaderboard import audit, versions
+from leaderboard import audit, board_versions
 from leaderboard.errors.refusals import Refused, require_maintainer
 from leaderboard.models import Invitation, Membership, Method, QuotaOverride, Team, User
 from leaderboard.people import accounts
@@ -61,7 +61,9 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
         audit.record(
             verb="renamed", noun="Team", noun_id=row.pk, actor=actor, names={"from": before, "to": name}
         )
-        versions.changed_by_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
+        board_versions.changed_by_methods(
+            Method.objects.filter(team=row).shown().values_list("pk", flat=True)
+        )
     return row
 
 

@@ -7,15 +7,14 @@ from uuid import UUID
 
 from django.db.models import QuerySet
 
-from evaluator.metrics import metrics
+from evaluator.metrics import registry
 from evaluator.metrics.protocol import OVERALL, PRIMARY
 from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry, Interval, profile_of, scored_of, submitted_entry
 from leaderboard.boards.snapshots import CurrentBoard
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
-from leaderboard.scoring import verdicts
-from leaderboard.submissions import submissions
-from leaderboard.submissions.submissions import Progress
+from leaderboard.submissions import intake, status_text
+from leaderboard.submissions.intake import Progress
 
 # For so long somebody is told to wait for intervals, which usually take a second or two.
 AWAITED_FOR = timedelta(minutes=5)
@@ -51,7 +50,7 @@ class SubmissionResult:
 
 def of(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionResult, ...]:
     """What came of these submissions, best fetched with their evaluations, editions and scores."""
-    told = [(submission, submissions.progress(submission)) for submission in rows]
+    told = [(submission, intake.progress(submission)) for submission in rows]
     places = _places([each for each in told if _is_on_board(*each)])
     return tuple(
         SubmissionResult(
@@ -91,8 +90,8 @@ def awaits_intervals(submission: Submission, progress: Progress, *, now: datetim
         return False
     if now - progress.finished_at >= AWAITED_FOR:
         return False
-    edition = submissions.evaluation_of(submission).edition
-    return edition.discarded_at is None and not verdicts.why_no_interval(edition)
+    edition = intake.evaluation_of(submission).edition
+    return edition.discarded_at is None and not status_text.why_no_interval(edition)
 
 
 def why_no_intervals(submission: Submission, progress: Progress, *, now: datetime) -> str:
@@ -101,7 +100,7 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
         return ""
     if awaits_intervals(submission, progress, now=now):
         return "The confidence intervals are being computed."
-    return verdicts.why_no_interval(submissions.evaluation_of(submission).edition) or (
+    return status_text.why_no_interval(intake.evaluation_of(submission).edition) or (
         "There are no confidence intervals yet. They are computed when no submission is waiting."
     )
 
@@ -170,7 +169,7 @@ def _place(
     if submission.pk not in best:
         return place
     values = [row.scores[PRIMARY] for row in drawn.entries]
-    rank = metrics.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
+    rank = registry.rank([*values, (progress.scores or {}).get(PRIMARY)])[-1]
     return replace(place, rank=rank, n_ranked=n_ranked + 1, is_supposed=True)
 
 

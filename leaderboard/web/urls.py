@@ -2,16 +2,11 @@
 
 from django.urls import include, path, register_converter
 
-from leaderboard.http import cacheable
 from leaderboard.web.account import data_views, team_views, token_views
-from leaderboard.web.boards import (
-    board_views,
-    chart_views,
-    compare_views,
-    export_views,
-    paper_charts,
-    shared_views,
-)
+from leaderboard.web.boards import board_views, export_views, public_assets
+from leaderboard.web.charts import chart_views, paper_charts
+from leaderboard.web.compare import compare_views
+from leaderboard.web.decorators import cacheable
 from leaderboard.web.docs import docs_views
 from leaderboard.web.landing import crawler_views, landing_views
 from leaderboard.web.maintain import (
@@ -63,11 +58,11 @@ urlpatterns = [
         cacheable(export_views.edition),
         name="edition_export",
     ),
-    path("board/<slug:split>/feed.atom", cacheable(shared_views.feed), name="feed"),
-    path("feed.atom", cacheable(shared_views.feed), name="feed_of_all"),
+    path("board/<slug:split>/feed.atom", cacheable(public_assets.feed), name="feed"),
+    path("feed.atom", cacheable(public_assets.feed), name="feed_of_all"),
     path(
         "methods/<uuid:method_id>/badge.svg",
-        cacheable(shared_views.badge),
+        cacheable(public_assets.badge),
         name="badge",
     ),
     path("robots.txt", crawler_views.robots, name="robots"),

@@ -23,7 +23,7 @@ FORBIDDEN_NAMES = {
     "manager",
     "managers",
 }
-STATUS_WRITERS = {Path("leaderboard/scoring/lifecycle.py")}
+STATUS_WRITERS = {Path("leaderboard/queue/lifecycle.py")}
 
 
 def python_files(*folders: str) -> list[Path]:

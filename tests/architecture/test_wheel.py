@@ -70,9 +70,9 @@ def test_wheel_holds_evaluator_and_baselines_alone(wheel: Path) -> None:
     assert {top for top in tops if not top.endswith(".dist-info")} == {"evaluator", "baselines"}
     assert {
         "evaluator/py.typed",
-        "baselines/py.typed",
+        "tsttc_baselines/py.typed",
         "evaluator/cli/__init__.py",
-        "evaluator/client/client.py",
+        "evaluator/client/api.py",
     } <= set(names)
     present = {
         path.relative_to(REPOSITORY).as_posix()

@@ -8,13 +8,13 @@ import pytest
 from click.testing import CliRunner, Result
 from numpy.typing import NDArray
 
-from baselines.clips import Clip
-from baselines.folders import read_folder
-from baselines.images import ImageCache
 from evaluator import read_truth
 from evaluator.cli import main
 from tests.baselines.real_folders import kitti_clip_folder, kitti_label_folder
 from tests.services import shared_data
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.images import ImageCache
 
 
 @pytest.fixture

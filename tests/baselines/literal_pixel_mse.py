@@ -6,9 +6,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines import patches, pixel_mse_toolkit
-from baselines.boxes import box_around, centre_of, size_of
-from baselines.clips import Image
+from tsttc_baselines import patches, pixel_mse_toolkit
+from tsttc_baselines.boxes import box_around, centre_of, size_of
+from tsttc_baselines.clips import Image
 
 Floats = NDArray[np.float64]
 

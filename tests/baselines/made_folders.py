@@ -9,10 +9,10 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from baselines.clips import TARGET, Clip
-from baselines.estimates import Estimate, Unusable
-from baselines.methods import Method, Parameter
 from tests.baselines.real_folders import FRAME_NS
+from tsttc_baselines.clips import TARGET, Clip
+from tsttc_baselines.estimates import Estimate, Unusable
+from tsttc_baselines.methods import Method, Parameter
 
 SIZE = (160, 96)
 START_NS = 1_600_000_000_000_000_000

@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.boxes import box_around
-from baselines.clips import N_FRAMES, TARGET, Clip, Image
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from evaluator.metrics.scale import fps_of_gap, scale_ratio_to_ttc
+from tsttc_baselines.boxes import box_around
+from tsttc_baselines.clips import N_FRAMES, TARGET, Clip, Image
 
 Floats = NDArray[np.float64]
 Pixels = NDArray[np.float32]

@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.ablation import get_ablation, scores_of_settings
-from baselines.folders import read_folder
-from baselines.rendering.folders import write_folder
-from baselines.simulation import split
 from evaluator import GroundTruth, Rejected, read_truth
+from tsttc_baselines.ablation import get_ablation, scores_of_settings
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.rendering.folders import write_folder
+from tsttc_baselines.simulation import split
 
 pytestmark = pytest.mark.slow
 

@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines.alignment import Alignment
-from baselines.clips import TARGET, Clip, Image
-from baselines.estimates import Unusable
 from tests.baselines.scenes import Floats, changed, mean_mid, planted, swapped
+from tsttc_baselines.alignment import Alignment
+from tsttc_baselines.clips import TARGET, Clip, Image
+from tsttc_baselines.estimates import Unusable
 
 align = Alignment()
 

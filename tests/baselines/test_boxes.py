@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from baselines import boxes
+from tsttc_baselines import boxes
 
 IMAGE = {"width_px": 1024.0, "height_px": 576.0}
 sides = st.floats(4, 300)

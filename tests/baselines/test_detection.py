@@ -6,14 +6,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.boxes import Measure
-from baselines.clips import Clip
-from baselines.detection import Detection
-from baselines.estimates import Unusable
-from baselines.folders import read_folder
-from baselines.methods import get_method
-from baselines.running import run_method
 from evaluator import evaluate, read_predictions, read_truth
+from tsttc_baselines.boxes import Measure
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.detection import Detection
+from tsttc_baselines.estimates import Unusable
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.methods import get_method
+from tsttc_baselines.running import run_method
 
 
 def clip(reference: list[float], target: list[float]) -> Clip:

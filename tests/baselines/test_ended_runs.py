@@ -15,11 +15,11 @@ from pathlib import Path
 
 import pytest
 
-from baselines.journals import Journal
 from tests.baselines.made_folders import image_path, made_folder
 from tests.evaluator.worlds import REPOSITORY, Tsttc
 from tests.leaderboard.scoring.child_processes import children_of, kernel_says
 from tests.signals import default_signals
+from tsttc_baselines.journals import Journal
 
 pytestmark = [
     pytest.mark.slow,

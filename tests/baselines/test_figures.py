@@ -2,11 +2,11 @@
 
 import pytest
 
-from baselines.clips import Clip
-from baselines.drawing import Dot, Figure, Picture, Text
-from baselines.figures import search_figure
-from baselines.pixel_mse import PixelMse
 from tests.baselines.warped_frames import planted
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.drawing import Dot, Figure, Picture, Text
+from tsttc_baselines.figures import search_figure
+from tsttc_baselines.pixel_mse import PixelMse
 
 
 def texts(figure: Figure) -> str:

@@ -6,10 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.folder_checks import require_usable
-from baselines.folders import read_folder
-from baselines.images import ImageCache
-from baselines.methods import get_method
 from evaluator import Rejected
 from tests.baselines import made_folders
 from tests.baselines.made_folders import (
@@ -20,6 +16,10 @@ from tests.baselines.made_folders import (
     write_boxes,
     write_manifest,
 )
+from tsttc_baselines.folder_checks import require_usable
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.images import ImageCache
+from tsttc_baselines.methods import get_method
 
 
 @pytest.fixture

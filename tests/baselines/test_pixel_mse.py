@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from baselines.clips import Clip, Image
-from baselines.estimates import Unusable
-from baselines.pixel_mse import SEARCHES, PixelMse
-from baselines.scales import SCALE_RANGES
 from tests.baselines.scenes import swapped
 from tests.baselines.warped_frames import planted, rescaled, texture
+from tsttc_baselines.clips import Clip, Image
+from tsttc_baselines.estimates import Unusable
+from tsttc_baselines.pixel_mse import SEARCHES, PixelMse
+from tsttc_baselines.scales import SCALE_RANGES
 
 BIN = (1.5 - 0.65) / 124
 RATIOS = (0.72, 0.85, 0.97, 1.0, 1.08, 1.3)

@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from baselines import pixel_mse_toolkit
-from baselines.boxes import expand
-from baselines.clips import TARGET, Image
-from baselines.pixel_mse import Comparison
-from baselines.scales import scale_bins
 from tests.baselines.literal_pixel_mse import errors_one_by_one, toolkit_errors_one_by_one
 from tests.baselines.warped_frames import planted
+from tsttc_baselines import pixel_mse_toolkit
+from tsttc_baselines.boxes import expand
+from tsttc_baselines.clips import TARGET, Image
+from tsttc_baselines.pixel_mse import Comparison
+from tsttc_baselines.scales import scale_bins
 
 pytestmark = pytest.mark.slow
 

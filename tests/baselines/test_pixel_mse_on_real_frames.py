@@ -5,12 +5,12 @@ import itertools
 import numpy as np
 import pytest
 
-from baselines.clips import Clip
-from baselines.estimates import Estimator
-from baselines.pixel_mse import SEARCHES, PixelMse
 from evaluator import fps_of_gap, scale_ratio_to_ttc
-from evaluator.metrics.metrics import RTE
+from evaluator.metrics.registry import RTE
 from tests.baselines.scenes import Floats, mean_mid
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.estimates import Estimator
+from tsttc_baselines.pixel_mse import SEARCHES, PixelMse
 
 pytestmark = pytest.mark.slow
 

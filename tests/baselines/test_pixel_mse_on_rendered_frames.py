@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines.clips import Clip
-from baselines.estimates import Estimator
-from baselines.pixel_mse import PixelMse
-from baselines.rendering.clips import Rendered, render
-from baselines.simulation import split
 from tests.baselines.scenes import Floats, mean_mid
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.estimates import Estimator
+from tsttc_baselines.pixel_mse import PixelMse
+from tsttc_baselines.rendering.clips import Rendered, render
+from tsttc_baselines.simulation import split
 
 pytestmark = pytest.mark.slow
 

@@ -8,8 +8,6 @@ from typing import Any
 
 import pytest
 
-from baselines.folders import read_folder
-from baselines.running import Run, run_method
 from evaluator import Rejected, read_predictions
 from tests.baselines.made_folders import (
     GREY_LEVELS,
@@ -21,6 +19,8 @@ from tests.baselines.made_folders import (
     write_boxes,
     write_image,
 )
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.running import Run, run_method
 
 N = 3
 

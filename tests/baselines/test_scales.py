@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from baselines import scales
+from tsttc_baselines import scales
 
 
 @pytest.mark.parametrize("frame_gap", [1, 2, 3, 4, 5])

@@ -5,7 +5,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from baselines.scenarios import LANE_WIDTH_M, Run, runs, solve
+from tsttc_baselines.scenarios import LANE_WIDTH_M, Run, runs, solve
 
 CENTIMETRE = 0.01
 

@@ -5,11 +5,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from baselines import simulation
-from baselines.highway import SHARES
-from baselines.simulation import SHAPES, Split, split
 from evaluator import INTERVALS
 from evaluator.metrics.scale import ttc_to_scale_ratio
+from tsttc_baselines import simulation
+from tsttc_baselines.highway import SHARES
+from tsttc_baselines.simulation import SHAPES, Split, split
 
 N = 2_000
 

@@ -13,8 +13,8 @@ import pytest
 from click.testing import Result
 
 import evaluator
-from baselines.clips import Image
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
+from tsttc_baselines.clips import Image
 
 FOLDER = EXAMPLES / "baseline"
 NOTEBOOK = EXAMPLES / "starter.ipynb"

@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from baselines.folders import read_folder
-from baselines.images import ImageCache
-from baselines.running import run_method
 from evaluator import Manifest, Rejected, read_manifest, read_predictions
 from tests.baselines.made_folders import GREY_LEVELS, SIZE, box, picture, write_image
 from tests.evaluator.toolkit_folders import START_NS, STEP_NS, camera, foreign_class, write_folder
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.images import ImageCache
+from tsttc_baselines.running import run_method
 
 N_FRAMES = 13
 """Two sequences, and a frame that begins a third."""

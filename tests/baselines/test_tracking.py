@@ -7,10 +7,10 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines.clips import TARGET, Clip, Image
-from baselines.estimates import Unusable
-from baselines.tracking import TrackerRefused, Tracking, median_flow
 from tests.baselines.scenes import Floats, changed, mean_mid, planted, swapped
+from tsttc_baselines.clips import TARGET, Clip, Image
+from tsttc_baselines.estimates import Unusable
+from tsttc_baselines.tracking import TrackerRefused, Tracking, median_flow
 
 track = Tracking()
 

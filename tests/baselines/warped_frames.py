@@ -6,8 +6,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.boxes import box_around, expand
-from baselines.clips import TARGET, Clip, Image
+from tsttc_baselines.boxes import box_around, expand
+from tsttc_baselines.clips import TARGET, Clip, Image
 
 Floats = NDArray[np.float64]
 

@@ -40,7 +40,7 @@ import json
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 from leaderboard.models import Method, Split
-from leaderboard.scoring import comparisons
+from leaderboard.statistics import comparisons
 public = Method.objects.filter(visibility="PUBLIC", submissions__split="demo").order_by("created_at")
 two = [method.pk for method in public.exclude(name__startswith="Detection")[:2]]
 comparisons.of(

@@ -17,7 +17,7 @@ from leaderboard.models import Edition, Evaluation, Split, Status, Submission, U
 from leaderboard.ops import rate_limits
 from leaderboard.people import invitations, teams
 from leaderboard.storage import truth_values
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
 
@@ -73,7 +73,7 @@ def _sent(user: User, split: str) -> dict[str, Submission]:
         queue_rows.claim()
     made |= {name: send(name.capitalize()) for name in ("queued-late", "cancelled", "queued")}
     for name in ("withdrawn", "cancelled"):
-        submissions.withdraw(submission=made[name], actor=user, now=timezone.now())
+        intake.withdraw(submission=made[name], actor=user, now=timezone.now())
     for name in ("running", "queued"):
         _move(made[name], LONG)  # so it does not become late while it is looked at
         _move(made[f"{name}-late"], -LONG)
@@ -91,7 +91,7 @@ def _move(submission: Submission, shift: timedelta) -> None:
 def failures() -> str:
     """The pages for what goes wrong before or outside of any view, by name, as JSON."""
     too_many = {"sentence": rate_limits.refusal(125.0), "back": "/submit/"}
-    too_large = {"sentence": submissions.too_large(found_bytes=34_000_000)}
+    too_large = {"sentence": intake.too_large(found_bytes=34_000_000)}
     pages = {
         "failure-400": ("400.html", {}),
         "failure-403": ("403.html", {}),

@@ -15,12 +15,12 @@ from django.db import transaction
 from django.utils import timezone
 
 import evaluator
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.demo.runs import simulate
 from leaderboard.editions import ground_truth
 from leaderboard.models import BoxSource, Edition, Evaluation, Method, Split, Submission, User, Visibility
-from leaderboard.scoring import comparisons
-from leaderboard.submissions import submissions
+from leaderboard.statistics import comparisons
+from leaderboard.submissions import intake
 from tests import builders, editions
 from tests.browser.site import PASSWORD
 from tests.journeys.production import Site
@@ -66,10 +66,10 @@ def populate() -> str:
     _describe(gone.method, latency_ms=None)
     broken = builders.submit(owner, b'{"0": 0}', split=SPLIT, method="Broken")
     builders.score_all()
-    submissions.withdraw(submission=gone, actor=rival, now=timezone.now())
+    intake.withdraw(submission=gone, actor=rival, now=timezone.now())
     _spread_over_months()
     with transaction.atomic():
-        versions.changed(SPLIT)
+        board_versions.changed(SPLIT)
     shown = Submission.objects.get(method__name="Feature pyramid, two frames")
     second = Submission.objects.get(method__name="Dense scale matching")
     five = list(Method.objects.filter(name__in=METHODS).values_list("pk", flat=True))

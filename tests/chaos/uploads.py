@@ -15,7 +15,7 @@ import numpy as np
 import evaluator
 from evaluator import Rejected, published
 from evaluator.limits import READY
-from leaderboard.scoring.fork_server import environment
+from leaderboard.sandbox.fork_server import environment
 from tests.chaos.processes import REPOSITORY
 
 BOMB_ENTRIES = 3_150_000
@@ -95,7 +95,7 @@ def reader_memory_bytes(truth: evaluator.GroundTruth, *, directory: Path) -> int
     """
     path = directory / "manifest.npz"
     truth.manifest.save(path)
-    command = [sys.executable, "-m", "evaluator.predictions.sandbox", str(path), "4000000000", "60"]
+    command = [sys.executable, "-m", "evaluator.predictions.reader", str(path), "4000000000", "60"]
     with subprocess.Popen(
         command,
         stdin=subprocess.PIPE,

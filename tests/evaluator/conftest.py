@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 from evaluator.cli import main
-from evaluator.client.client import Client
+from evaluator.client.api import Client
 from tests.evaluator.cli.keyrings import NoKeyring
 from tests.evaluator.cli.recorded_site import RecordedSite
 from tests.evaluator.fake_time import FakeTime

@@ -23,7 +23,7 @@ from evaluator import (
     read_truth,
 )
 from evaluator.frames import manifest_frame
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY, make_truth
 
 FILE = EXAMPLES / "predictions.json"

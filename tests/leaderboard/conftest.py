@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from django.test import Client
 
-from leaderboard.benchmark import splits
+from leaderboard.editions import splits
 from leaderboard.models import Edition, Membership, Split, Submission, Team, User
 from leaderboard.people import teams
-from leaderboard.scoring.lifecycle import Lease
+from leaderboard.queue.lifecycle import Lease
 from tests import builders, kept
 from tests.editions import FACTORS, corrected, open_edition
 from tests.leaderboard.web.maintain import queue_rows

@@ -13,7 +13,7 @@ from django.utils import timezone
 from leaderboard import audit
 from leaderboard.models import AuditEvent, Edition, Evaluation, User
 from leaderboard.models.audit import GENESIS, AppendOnly
-from leaderboard.workers import queue
+from leaderboard.queue import pollers
 from tests import builders
 
 SQLITE_ONLY = pytest.mark.skipif("connection.vendor != 'sqlite'", reason="there the database refuses it")
@@ -86,7 +86,7 @@ def test_an_event_that_is_committed_late_is_sealed_when_it_is_found(db: None) ->
 
 def test_every_sweep_seals(db: None) -> None:
     record(3)
-    queue.sweep(rng=random.Random(0))
+    pollers.sweep(rng=random.Random(0))
     assert AuditEvent.objects.unsealed().n_events == 0
     assert audit.verify().n_events == 3
 

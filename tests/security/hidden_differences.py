@@ -76,7 +76,7 @@ def _published(delta: float, power: int, rule: Rule, rng: np.random.Generator) -
 
 def before(found: Difference, shown: Difference) -> Difference:
     """As it was: an end that is rounded to 0 is moved one unit of the last digit to its own side."""
-    from leaderboard.scoring import disclosure  # noqa: PLC0415 - needs Django's settings
+    from leaderboard.statistics import disclosure  # noqa: PLC0415 - needs Django's settings
 
     assert found.low is not None
     assert found.high is not None
@@ -90,7 +90,7 @@ def before(found: Difference, shown: Difference) -> Difference:
 def now(found: Difference, shown: Difference) -> Difference:
     """As it is."""
     from leaderboard.models import Edition, Split  # noqa: PLC0415 - needs Django's settings
-    from leaderboard.scoring import disclosure  # noqa: PLC0415 - likewise
+    from leaderboard.statistics import disclosure  # noqa: PLC0415 - likewise
 
     edition = Edition(split=Split(is_hidden=True), decimals=DECIMALS)
     return disclosure.published_difference(found, shown, edition=edition)

@@ -124,7 +124,7 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
     The mean and its interval, and difference, interval and class of p beside another team's public method.
     """
     from leaderboard.models import Edition, Split  # noqa: PLC0415 - as above
-    from leaderboard.scoring import disclosure  # noqa: PLC0415 - needs Django's settings
+    from leaderboard.statistics import disclosure  # noqa: PLC0415 - needs Django's settings
 
     edition = Edition(split=Split(is_hidden=True), decimals=1)
     counts = world.counts[:, [column]]

@@ -16,14 +16,12 @@ from kombu import Connection
 from pytest_django.fixtures import Settings
 
 import evaluator
-from leaderboard.benchmark import splits
-from leaderboard.editions import corrections, ground_truth
+from leaderboard.editions import corrections, ground_truth, splits
 from leaderboard.models import Edition, Evaluation, Split, Status, User
 from leaderboard.ops import broker as broker_verbs
 from leaderboard.ops import logs
-from leaderboard.scoring import worker
+from leaderboard.queue import pollers, worker
 from leaderboard.storage import truth_values
-from leaderboard.workers import queue
 from tests import builders
 from tests.security import canaries
 from tests.security.canaries import Search
@@ -122,7 +120,7 @@ def test_no_value_leaves_the_private_directory(
     seen = _look(people)
     corrections.publish(edition=second, reason="Labels.", now=timezone.now(), actor=people[1], replaces=1)
     builders.infer_all()
-    queue.sweep(rng=RNG)
+    pollers.sweep(rng=RNG)
     seen |= {f"after {where}": body for where, body in _look(people).items()}
     haystacks = {
         **seen,

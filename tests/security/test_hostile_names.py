@@ -16,8 +16,8 @@ from pytest_django.fixtures import Settings
 
 from evaluator.tables.escaping import guarded
 from leaderboard.models import Edition, Method, Split, Status, User, Visibility
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import Outcome
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import Outcome
 from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_nothing_from_elsewhere, assert_nothing_inline
 from tests.security.hostile_names import NAMES

@@ -8,7 +8,7 @@ from django.db import transaction
 from django.test import Client
 
 import evaluator
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import Edition, Method, Split, User, Visibility
 from leaderboard.storage import truth_values
 from tests import builders
@@ -65,7 +65,7 @@ def test_an_anonymous_successor_is_not_told_from_its_predecessor(
 
     Method.objects.filter(pk=later).update(visibility=Visibility.PUBLIC)
     with transaction.atomic():
-        versions.changed("test")
+        board_versions.changed("test")
     strangers, relatives = correlation(client, other, later), correlation(client, former, later)
     assert strangers is not None
     assert relatives is not None

@@ -19,8 +19,7 @@ from uuid import UUID
 from django.conf import settings
 from django.utils import timezone
 
-from leaderboard.benchmark import splits
-from leaderboard.editions import ground_truth
+from leaderboard.editions import ground_truth, splits
 from leaderboard.methods import visibility
 from leaderboard.models import (
     Edition,
@@ -34,7 +33,7 @@ from leaderboard.models import (
 )
 from leaderboard.people import teams, tokens
 from leaderboard.storage import seeds, truth_values
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders
 from tests.caching import forget_boards
 
@@ -79,7 +78,7 @@ class Scene:
 
     stranger: User
     methods: list[UUID] = field(default_factory=list)
-    submissions: list[UUID] = field(default_factory=list)
+    intake: list[UUID] = field(default_factory=list)
     teams: list[UUID] = field(default_factory=list)
 
 
@@ -199,7 +198,7 @@ class Secrets:
         submit(user, b"{}" + b" " * number, method=f"Secret Method {number}", now=now)
         builders.score_all()
         if number == 2:
-            submissions.withdraw(submission=made, actor=user, now=now + timedelta(hours=1))
+            intake.withdraw(submission=made, actor=user, now=now + timedelta(hours=1))
 
     def something_waits(self, insider: User) -> None:
         """What is not scored yet."""

@@ -9,7 +9,7 @@ from evaluator.counting import counted
 from evaluator.units import MIN_DAYS, RECORDING
 from leaderboard.management.arguments import RefusingCommand
 from leaderboard.models import Edition
-from leaderboard.scoring import unit_checks
+from leaderboard.statistics import unit_checks
 
 
 class Command(RefusingCommand):

@@ -11,13 +11,13 @@ from django.shortcuts import redirect, render
 from django.utils import timezone
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.http import own_form, own_page
 from leaderboard.mails import notices
 from leaderboard.models import MailKind, User
+from leaderboard.moderation import forgetting
 from leaderboard.people import addresses
 from leaderboard.quotas import mailboxes
 from leaderboard.quotas.spans import span
-from leaderboard.submissions import forgetting
+from leaderboard.web.decorators import own_form, own_page
 from leaderboard.web.forms import SiteForm
 
 

@@ -15,10 +15,10 @@ from django.views.decorators.cache import never_cache
 from django.views.decorators.debug import sensitive_variables
 
 from leaderboard.errors.refusals import Refused
-from leaderboard.http import asks_first, own_deed, own_form
 from leaderboard.models import Invitation, Team, User
 from leaderboard.people import invitations, names, teams
 from leaderboard.web.account import shown_once
+from leaderboard.web.decorators import asks_first, own_deed, own_form
 from leaderboard.web.forms import SiteForm
 
 

@@ -9,10 +9,10 @@ from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
 from django.views.decorators.debug import sensitive_variables
 
-from leaderboard.http import own_deed, own_form
 from leaderboard.models import ApiToken, Scope, Split, User
 from leaderboard.people import tokens
 from leaderboard.web.account import shown_once
+from leaderboard.web.decorators import own_deed, own_form
 from leaderboard.web.forms import SiteForm
 
 

@@ -13,8 +13,8 @@ from django.views.decorators.gzip import gzip_page
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards.snapshots import splits_of
-from leaderboard.pages import pages
-from leaderboard.pages.pages import PAGES
+from leaderboard.pages import texts
+from leaderboard.pages.texts import PAGES
 from leaderboard.web import markdown
 from leaderboard.web.docs import api_examples, api_reference, guides, reference, search, wheels
 
@@ -89,8 +89,8 @@ class PageConverter(StringConverter):
 @require_safe
 def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
     """Rules, contact, privacy, imprint or licence."""
-    version = pages.current(page_name)
-    text = version.text if version else pages.default_text(page_name)
+    version = texts.current(page_name)
+    text = version.text if version else texts.default_text(page_name)
     context = {"page": PAGES[page_name], "version": version, "text": markdown.page(text)}
     return render(request, "pages/page.html", context)
 

@@ -14,7 +14,7 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import feeds
 from leaderboard.models import Edition, Split, Visibility
-from leaderboard.pages import pages
+from leaderboard.pages import texts
 from leaderboard.web.docs import api_examples, guides
 
 # Public pages that are about no board.
@@ -55,7 +55,7 @@ def sitemap(request: HttpRequest) -> HttpResponse:
     """Every public page. Private and anonymous methods and withdrawn rows are left out."""
     fixed = [
         *map(_absolute, _NAMED),
-        *(_absolute("site_page", name) for name in pages.PAGES),
+        *(_absolute("site_page", name) for name in texts.PAGES),
         *(_absolute("guide", name) for name in guides.files()),
         *(_absolute("api_operation", name) for name in api_examples.EXAMPLES),
     ]

@@ -17,8 +17,9 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import bibtex
 from leaderboard.models import Split, User
 from leaderboard.quotas import admissions
-from leaderboard.web.boards import board_query, chart_views
+from leaderboard.web.boards import board_query
 from leaderboard.web.boards.board_views import MAIN_SPLIT
+from leaderboard.web.charts import chart_views
 from leaderboard.web.landing.leaders import lead_words, leaders
 from leaderboard.web.landing.news import latest
 from leaderboard.web.submissions.forms import offers_for

@@ -8,10 +8,10 @@ from django.utils.text import get_text_list
 from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Board
+from leaderboard.boards.query import Board
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports.tables import team_of
-from leaderboard.scoring import verdicts
+from leaderboard.submissions import status_text
 from leaderboard.web.boards.score_columns import interval_words
 from leaderboard.web.boards.tables import rank_range
 
@@ -68,7 +68,7 @@ def lead_words(board: Board) -> str:
 def _why_unknown(board: Board, leader: Entry) -> str:
     if leader.kind == "published":
         return "papers report no values per recording."
-    reason = verdicts.why_no_interval(board.edition) if board.edition else ""
+    reason = status_text.why_no_interval(board.edition) if board.edition else ""
     # As the end of a sentence.
     return f"{reason[:1].lower()}{reason[1:]}" or "the confidence intervals are being computed."
 

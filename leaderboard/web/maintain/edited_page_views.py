@@ -9,8 +9,8 @@ from django.shortcuts import redirect, render
 from django.utils import timezone
 from django.views.decorators.http import require_safe
 
-from leaderboard.pages import pages
-from leaderboard.pages.pages import MAX_TEXT, PAGES
+from leaderboard.pages import texts
+from leaderboard.pages.texts import MAX_TEXT, PAGES
 from leaderboard.web import markdown
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_views import (
@@ -41,17 +41,17 @@ class PageForm(SiteForm):
 @require_safe
 def site_pages(request: HttpRequest) -> HttpResponse:
     """Every page, and when it was changed."""
-    rows = [(page, pages.current(page.name)) for page in PAGES.values()]
-    return render(request, "maintain/pages.html", {"rows": rows, "imprint": pages.IMPRINT})
+    rows = [(page, texts.current(page.name)) for page in PAGES.values()]
+    return render(request, "maintain/pages.html", {"rows": rows, "imprint": texts.IMPRINT})
 
 
 @maintainers_form
 def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
     """The form with the text of a page, or with one that it had; a preview; the texts until now."""
-    versions = pages.versions(page_name)
+    versions = texts.versions(page_name)
     chosen = next((each for each in versions if str(each.number) == request.GET.get("version")), None)
     shown = chosen or (versions[0] if versions else None)
-    text = shown.text if shown and request.GET.get("version") != "0" else pages.default_text(page_name)
+    text = shown.text if shown and request.GET.get("version") != "0" else texts.default_text(page_name)
     form = PageForm.asked(request, initial={"text": text, "replaces": versions[0].number if versions else 0})
     context: dict[str, Any] = {"page": PAGES[page_name], "versions": versions}
     if form.is_valid():
@@ -64,7 +64,7 @@ def site_page(request: HttpRequest, page_name: str) -> HttpResponse:
                 **context,
             )
         with form.refusals():
-            pages.edit(name=page_name, actor=maintainer_of(request), now=timezone.now(), **form.cleaned_data)
+            texts.edit(name=page_name, actor=maintainer_of(request), now=timezone.now(), **form.cleaned_data)
             messages.success(request, f"{PAGES[page_name].title} was changed.")
             return redirect("site_page", page_name)
     return form_page(request, "maintain/page.html", form, **context)

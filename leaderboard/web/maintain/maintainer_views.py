@@ -16,10 +16,10 @@ from django_htmx.http import HttpResponseClientRefresh
 from evaluator.tables.formats import csv_lines
 from leaderboard.editions import corrections, history, preview
 from leaderboard.errors.refusals import NotMaintainer
-from leaderboard.http import asks_first
 from leaderboard.models import AuditEvent, Edition, QuotaOverride, Split, User
-from leaderboard.pages import pages
+from leaderboard.pages import texts
 from leaderboard.web.boards import edition_tables
+from leaderboard.web.decorators import asks_first
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain import queue_tables
 from leaderboard.web.maintain.maintainer_forms import (
@@ -74,7 +74,7 @@ def hub(request: HttpRequest) -> HttpResponse:
         "queue": queue_tables.totals(),
         "n_overrides": QuotaOverride.objects.count(),
         "n_events": AuditEvent.objects.count(),
-        "has_imprint": pages.current(pages.IMPRINT) is not None,
+        "has_imprint": texts.current(texts.IMPRINT) is not None,
     }
     return render(request, "maintain/hub.html", context)
 

@@ -16,10 +16,10 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Method, Submission, Team, User
+from leaderboard.moderation import forgetting, hiding
+from leaderboard.moderation.hiding import MAX_REASON
 from leaderboard.people import teams, tokens
 from leaderboard.people.names import MAX_NAME
-from leaderboard.submissions import forgetting, moderation
-from leaderboard.submissions.moderation import MAX_REASON
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_forms import reason_field
 from leaderboard.web.maintain.maintainer_views import (
@@ -89,7 +89,7 @@ def _move(*, subject: Method, name: str, now: object, **told: Any) -> None:
         raise Refused(
             "bad-value", f"{how} called {name!r}; expected the name or the id of one team.", field="name"
         )
-    moderation.move_method(method=subject, to=found[0], **told)
+    hiding.move_method(method=subject, to=found[0], **told)
 
 
 def _appoint(*, subject: User, now: object, **told: Any) -> None:
@@ -106,7 +106,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         _RENAMED,
         "Rename",
         RenameForm,
-        lambda subject, **told: moderation.rename_team(team=subject, **told),
+        lambda subject, **told: hiding.rename_team(team=subject, **told),
     ),
     "rename-method": Deed(
         Method,
@@ -114,7 +114,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         _RENAMED,
         "Rename",
         RenameForm,
-        lambda subject, **told: moderation.rename_method(method=subject, **told),
+        lambda subject, **told: hiding.rename_method(method=subject, **told),
     ),
     "clear-texts": Deed(
         Method,
@@ -122,7 +122,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         "Description, paper link and code link are deleted. The team can write new ones.",
         "Delete texts",
         DeedForm,
-        lambda subject, now, **told: moderation.clear_texts(method=subject, **told),
+        lambda subject, now, **told: hiding.clear_texts(method=subject, **told),
     ),
     "move-method": Deed(
         Method,
@@ -138,7 +138,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         "Its values leave the board; its row stays, marked with the date. This cannot be undone.",
         "Withdraw",
         DeedForm,
-        lambda subject, **told: moderation.withdraw_entry(submission=subject, is_hidden=False, **told),
+        lambda subject, **told: hiding.withdraw_entry(submission=subject, is_hidden=False, **told),
     ),
     "hide": Deed(
         Submission,
@@ -147,7 +147,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         "This cannot be undone.",
         "Hide",
         DeedForm,
-        lambda subject, **told: moderation.withdraw_entry(submission=subject, is_hidden=True, **told),
+        lambda subject, **told: hiding.withdraw_entry(submission=subject, is_hidden=True, **told),
     ),
     "appoint-owner": Deed(
         User,
@@ -163,7 +163,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         "Nobody can sign in to it or use its tokens. Its entries stay.",
         "Close account",
         DeedForm,
-        lambda subject, now, **told: moderation.set_active(user=subject, is_active=False, **told),
+        lambda subject, now, **told: hiding.set_active(user=subject, is_active=False, **told),
     ),
     "open-account": Deed(
         User,
@@ -171,7 +171,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         "The person can sign in again.",
         "Open account",
         DeedForm,
-        lambda subject, now, **told: moderation.set_active(user=subject, is_active=True, **told),
+        lambda subject, now, **told: hiding.set_active(user=subject, is_active=True, **told),
     ),
     "revoke-tokens": Deed(
         User,

@@ -8,8 +8,8 @@ from django.http import HttpRequest, HttpResponse
 from django.shortcuts import get_object_or_404, redirect
 from django.utils import timezone
 
-from leaderboard.benchmark import papers, splits
-from leaderboard.benchmark.papers import BadDocument
+from leaderboard.editions import papers, splits
+from leaderboard.editions.papers import BadDocument
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import PublishedResult
 from leaderboard.web.forms import SiteForm

@@ -11,7 +11,7 @@ from django.db.models import Count, Min, QuerySet
 from leaderboard.db import clock
 from leaderboard.models import Evaluation, Status, Visibility
 from leaderboard.ops import health
-from leaderboard.scoring.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
+from leaderboard.queue.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
 from leaderboard.templatetags.board import duration, grouped
 
 PER_PAGE: Final = 50

@@ -11,7 +11,7 @@ from django.views.decorators.http import require_POST, require_safe
 
 from evaluator.counting import counted
 from leaderboard.models import Evaluation, Split
-from leaderboard.scoring import lifecycle
+from leaderboard.queue import lifecycle
 from leaderboard.web.forms import SiteForm
 from leaderboard.web.maintain.maintainer_views import maintainer_of, maintainers_only
 from leaderboard.web.maintain.queue_tables import STATES, queue_table

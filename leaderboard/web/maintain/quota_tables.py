@@ -7,10 +7,10 @@ from django.db.models import Q, QuerySet
 
 from leaderboard.models import QuotaOverride, Split, Team, User
 from leaderboard.models.quotas import QuotaRules
+from leaderboard.moderation import forgetting
 from leaderboard.people import names
-from leaderboard.quotas import quotas
+from leaderboard.quotas import limits
 from leaderboard.quotas.spans import span
-from leaderboard.submissions import forgetting
 from leaderboard.templatetags.board import grouped
 
 MAX_FOUND = 50
@@ -63,7 +63,7 @@ def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]
             "split": split,
             "own": own.get(split.pk),
             "rules": rules_of(own.get(split.pk, split)),
-            "quota": quotas.state(team=team, user=viewer, split=split, now=now),
+            "quota": limits.state(team=team, user=viewer, split=split, now=now),
             "admission": admitted.get(split.pk),
         }
         for split in Split.objects.all()

@@ -6,8 +6,8 @@ from typing import Any, Final
 
 from django import forms
 
-from leaderboard.benchmark import moments
-from leaderboard.benchmark.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, POSITION_FAULT, Policy
+from leaderboard.editions import deadlines
+from leaderboard.editions.policy import MAX_DESCRIPTION, MAX_POSITION, NAMES, POSITION_FAULT, Policy
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Split
 from leaderboard.models.benchmark import Listing
@@ -33,7 +33,7 @@ class MomentField(forms.CharField):
     """A date with time and zone, or nothing."""
 
     def __init__(self, label: str, help_text: str) -> None:
-        attrs = {"placeholder": moments.EXAMPLE, "autocomplete": "off"}
+        attrs = {"placeholder": deadlines.EXAMPLE, "autocomplete": "off"}
         super().__init__(
             label=label,
             required=False,
@@ -46,7 +46,7 @@ class MomentField(forms.CharField):
         """The moment. Raises `ValidationError`."""
         text: str = super().clean(value)
         try:
-            return moments.parse(text) if text else None
+            return deadlines.parse(text) if text else None
         except Refused as refusal:
             raise forms.ValidationError(str(refusal)) from refusal
 
@@ -107,9 +107,9 @@ class PolicyForm(QuotaRulesForm):
     def filled_with(policy: Policy) -> dict[str, Any]:
         gap = policy.quota_min_gap
         return asdict(policy) | {
-            "opens_at": moments.written(policy.opens_at),
-            "closes_at": moments.written(policy.closes_at),
-            "announcement_ends_at": moments.written(policy.announcement_ends_at),
+            "opens_at": deadlines.written(policy.opens_at),
+            "closes_at": deadlines.written(policy.closes_at),
+            "announcement_ends_at": deadlines.written(policy.announcement_ends_at),
             "quota_window": span(policy.quota_window),
             "quota_min_gap": span(gap) if gap else "",
         }

@@ -8,8 +8,7 @@ from django.utils import timezone
 from django.views.decorators.http import require_safe
 
 from evaluator.counting import counted
-from leaderboard.benchmark import moments, policy
-from leaderboard.editions import new_splits
+from leaderboard.editions import deadlines, new_splits, policy
 from leaderboard.mails import announcements
 from leaderboard.mails.announcements import Announcement
 from leaderboard.models import PageVersion, Split
@@ -67,7 +66,7 @@ def announcement(request: HttpRequest) -> HttpResponse:
     """Show a line on the pages of every split, or take it away."""
     current = PageVersion.announcement().first()
     initial = (
-        {"announcement": current.text, "announcement_ends_at": moments.written(current.ends_at)}
+        {"announcement": current.text, "announcement_ends_at": deadlines.written(current.ends_at)}
         if current
         else {}
     )

@@ -6,7 +6,7 @@ from typing import Any, Final
 from django import forms
 from django.http import HttpRequest
 
-from leaderboard.methods import methods, visibility
+from leaderboard.methods import editing, visibility
 from leaderboard.methods.details import DETAILS, Detail
 from leaderboard.models import Method, Visibility
 from leaderboard.web.forms import DescriptionForm, SiteForm
@@ -64,7 +64,7 @@ def _field_of(detail: Detail) -> forms.CharField:
 
 
 def _stated(method: Method) -> dict[str, Any]:
-    found = {name: getattr(method, name) for name in methods.FIELDS}
+    found = {name: getattr(method, name) for name in editing.FIELDS}
     for detail in DETAILS:
         texts = {option.value: option.text for option in detail.kind.options}
         found[detail.name] = texts.get(found[detail.name], found[detail.name])

@@ -12,11 +12,11 @@ from django.views.decorators.http import require_safe
 from leaderboard.boards import results, visibility_preview
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.errors.refusals import Refused
-from leaderboard.http import own_form
-from leaderboard.methods import details, methods, visibility
+from leaderboard.methods import details, editing, visibility
 from leaderboard.models import Method, Split, Submission, User, Visibility
-from leaderboard.submissions import empty_methods
+from leaderboard.moderation import empty_methods
 from leaderboard.web.boards import export_views
+from leaderboard.web.decorators import own_form
 from leaderboard.web.methods.method_forms import MethodForm, ShowForm
 from leaderboard.web.methods.result_tables import edition_groups, method_result
 
@@ -65,7 +65,7 @@ def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
     form = MethodForm.of_method(request, method=found)
     if form.is_valid():
         with form.refusals():
-            methods.edit(method=found, changes=form.changes(), actor=cast("User", request.user))
+            editing.edit(method=found, changes=form.changes(), actor=cast("User", request.user))
             messages.success(request, "The details are saved.")
             return redirect("method", found.pk)
     return render(

@@ -1,6 +1,6 @@
 """Answers to anybody: what is the same for all readers without an account, kept while no board changes.
 
-What such a reader is shown changes only with the numbers of the boards (`leaderboard/versions.py`) and with
+What such a reader is shown changes only with the numbers of the boards (`leaderboard/board_versions.py`) and with
 the day, so both are part of the key: a kept answer is never old. A view says so with `http.cacheable`.
 
 Each process has two bounded caches: one for plain addresses, and one for those with a query, so that what
@@ -21,9 +21,9 @@ from django.core.exceptions import DisallowedHost
 from django.http import HttpRequest, HttpResponse, HttpResponseBase, HttpResponseNotModified
 from django.utils import timezone
 
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.boards import filters
-from leaderboard.http import is_cacheable, is_known
+from leaderboard.web.decorators import is_cacheable, is_known
 
 Next = Callable[[HttpRequest], HttpResponseBase]
 
@@ -79,7 +79,7 @@ class PublicAnswersMiddleware:
         query = _known_query(request)
         request.known_query = query  # type: ignore[attr-defined]  # our own, as `user` is Django's
         # Before the view looks: what it reads may be newer than this number, and is never older.
-        text = f"{path}?{query} {versions.state()} {timezone.now():%Y-%m-%d}"
+        text = f"{path}?{query} {board_versions.state()} {timezone.now():%Y-%m-%d}"
         key = hashlib.sha256(text.encode()).hexdigest()
         cache = caches["views" if query else "boards"]
         kept = cache.get(key)

@@ -14,7 +14,7 @@ from django.shortcuts import render
 
 from leaderboard.errors import problem_codes
 from leaderboard.ops import rate_limits
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from leaderboard.web.context_processors import page_before
 
 # Room for the other fields and the boundaries of a multipart body.
@@ -31,7 +31,7 @@ class UploadLimitMiddleware:
         announced = request.META.get("CONTENT_LENGTH") or "0"
         if announced.isdecimal() and int(announced) <= settings.MAX_PREDICTIONS_BYTES + FORM_BYTES:
             return self.get_response(request)
-        sentence = submissions.too_large(found_bytes=int(announced) if announced.isdecimal() else 0)
+        sentence = intake.too_large(found_bytes=int(announced) if announced.isdecimal() else 0)
         if request.path.startswith("/api/"):
             return problem_codes.response(status=413, code="too-large", detail=sentence, where="file")
         return render(request, "413.html", {"sentence": sentence}, status=413)

@@ -12,12 +12,12 @@ from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
-from leaderboard.quotas.quotas import Quota
+from leaderboard.quotas.limits import Quota
 from leaderboard.submissions import outcomes
+from leaderboard.submissions.intake import Progress
 from leaderboard.submissions.outcomes import BoardPlace
-from leaderboard.submissions.submissions import Progress
-from leaderboard.web.boards.compare_tables import signed
 from leaderboard.web.boards.tables import rank_range
+from leaderboard.web.compare.compare_tables import signed
 from leaderboard.web.methods.result_tables import result_groups
 
 

@@ -6,7 +6,7 @@ from datetime import datetime
 from typing import Final
 
 from leaderboard.models import Evaluation, Status
-from leaderboard.submissions.submissions import Progress
+from leaderboard.submissions.intake import Progress
 from leaderboard.templatetags.board import grouped
 
 MAX_POINTS: Final = 20

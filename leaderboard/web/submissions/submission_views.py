@@ -22,17 +22,18 @@ from django.views.decorators.http import require_safe
 
 from evaluator.predictions import writing
 from leaderboard.editions import history
-from leaderboard.http import is_known, own_form, own_page
 from leaderboard.models import Evaluation, Status, Submission, User, Visibility
-from leaderboard.quotas import quotas
-from leaderboard.scoring import analyses
+from leaderboard.quotas import limits
+from leaderboard.statistics import analyses
 from leaderboard.storage import manifests
-from leaderboard.submissions import outcomes, receipts, search, submissions
-from leaderboard.submissions.submissions import Progress
+from leaderboard.submissions import intake, outcomes, receipts, search
+from leaderboard.submissions.intake import Progress
 from leaderboard.web.boards import edition_tables
+from leaderboard.web.charts import analysis_charts
 from leaderboard.web.context_processors import split_or_404
+from leaderboard.web.decorators import is_known, own_form, own_page
 from leaderboard.web.methods import result_tables
-from leaderboard.web.submissions import analysis_charts, outcome_tables
+from leaderboard.web.submissions import outcome_tables
 from leaderboard.web.submissions.forms import SearchForm, SubmissionForm
 from leaderboard.web.submissions.progress import StateLine, state_line
 
@@ -48,8 +49,8 @@ def submit(request: HttpRequest) -> HttpResponse:
     form = SubmissionForm(user, request)
     if request.method == "POST" and form.is_valid():
         try:
-            submitted = submissions.submit(user=user, now=timezone.now(), **form.submission())
-        except (submissions.Refused, quotas.QuotaExceeded) as refusal:
+            submitted = intake.submit(user=user, now=timezone.now(), **form.submission())
+        except (intake.Refused, limits.QuotaExceeded) as refusal:
             form.refuse(refusal)
         else:
             if not submitted.is_new:
@@ -121,8 +122,8 @@ def withdraw(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     user = cast("User", request.user)
     own = Submission.objects.filter(method__team__memberships__user=user)
     found = get_object_or_404(own.select_related("method__team", "split"), pk=submission_id)
-    before = submissions.progress(found)
-    if request.method == "POST" and submissions.withdraw(submission=found, actor=user, now=timezone.now()):
+    before = intake.progress(found)
+    if request.method == "POST" and intake.withdraw(submission=found, actor=user, now=timezone.now()):
         done = "withdrawn" if before.is_final else "cancelled"
         messages.success(request, f"The submission is {done}.")
     if request.method == "POST" or not outcomes.can_be_withdrawn(found):
@@ -140,7 +141,7 @@ def _looked_at(request: HttpRequest, submission_id: UUID) -> tuple[Submission, P
         .prefetch_related(Prefetch("evaluations", evaluations))
     )
     found = get_object_or_404(rows, pk=submission_id)
-    progress = submissions.progress(found)
+    progress = intake.progress(found)
     awaits = outcomes.awaits_intervals(found, progress, now=timezone.now())
     return found, progress, state_line(progress, awaits_intervals=awaits)
 
@@ -151,7 +152,7 @@ def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dic
     rescored = edition_tables.rescored_notice(history.rescored(found))
     quota = None
     if progress.state == Status.REJECTED and rescored is None:
-        quota = quotas.state(team=found.method.team, user=found.submitted_by, split=found.split, now=now)
+        quota = limits.state(team=found.method.team, user=found.submitted_by, split=found.split, now=now)
     return {
         "submission": found,
         "progress": progress,
@@ -177,7 +178,7 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     """Error by time to contact, its distribution, predicted against true, the worst recordings."""
     rows = Submission.objects.visible_to(request.user).select_related("method", "split__published_edition")
     found = get_object_or_404(rows, pk=submission_id, split__is_hidden=False)
-    progress = submissions.progress(found)
+    progress = intake.progress(found)
     if progress.is_final and progress.state != Status.SCORED:
         raise Http404("This submission has no score.")
     closer = analyses.of(submission=found, viewer=request.user)
@@ -201,7 +202,7 @@ def receipt(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     found = get_object_or_404(rows.select_related("method__team", "split"), pk=submission_id)
     try:
         document = receipts.receipt(submission=found)
-    except submissions.Refused as fault:
+    except intake.Refused as fault:
         return render(request, "400.html", {"sentence": str(fault)}, status=409)
     response = HttpResponse(document, content_type=receipts.MEDIA_TYPE)
     response["Content-Disposition"] = f'attachment; filename="tsttc-receipt-{found.pk}.jwt"'

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.annotation.tracks import COLUMNS, Tracks
+from tsttc_baselines.annotation.tracks import COLUMNS, Tracks
 
 Floats = NDArray[np.float64]
 FRAME_NS = 100_000_000

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
-from baselines.annotation.consensus import consensus_velocity, least_squares_velocity
-from baselines.annotation.corners import corners_m, nearest_depth_m
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from tests.baselines.annotation.made_tracks import noisy_windows
+from tsttc_baselines.annotation.consensus import consensus_velocity, least_squares_velocity
+from tsttc_baselines.annotation.corners import corners_m, nearest_depth_m
 
 
 def literal_consensus(time_s: np.ndarray, depth_m: np.ndarray, inlier_m: float = 0.15) -> tuple[float, int]:

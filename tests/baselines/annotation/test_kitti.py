@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from baselines.annotation.kitti import read_kitti
-from baselines.annotation.pipeline import Depth, annotate
 from evaluator import read_truth
 from evaluator.problems import Rejected
+from tsttc_baselines.annotation.kitti import read_kitti
+from tsttc_baselines.annotation.pipeline import Depth, annotate
 
 LINE = "{frame} 7 Car {truncated} 0 0.1 100 100 140 130 1.5 1.8 4.0 {x} 1.0 {z} {rotation}"
 

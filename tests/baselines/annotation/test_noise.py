@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from baselines.annotation.noise import label_noise, successive, successive_in_sequences
-from baselines.annotation.pipeline import annotate
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from evaluator.problems import Rejected
 from evaluator.truth.csv_tables import Table
 from tests.baselines.annotation.made_tracks import tracks_of
+from tsttc_baselines.annotation.noise import label_noise, successive, successive_in_sequences
+from tsttc_baselines.annotation.pipeline import annotate
 
 
 def steady(n_tracks: int = 150, n_frames: int = 25) -> tuple[np.ndarray, np.ndarray]:

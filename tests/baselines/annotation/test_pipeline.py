@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from baselines.annotation.choice import choose
-from baselines.annotation.pipeline import DEPTHS, Depth, annotate, frame_ttc
-from baselines.annotation.tracks import Tracks
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from evaluator.problems import Rejected
 from tests.baselines.annotation.made_tracks import tracks_of
+from tsttc_baselines.annotation.choice import choose
+from tsttc_baselines.annotation.pipeline import DEPTHS, Depth, annotate, frame_ttc
+from tsttc_baselines.annotation.tracks import Tracks
 
 N_FRAMES = 12
 

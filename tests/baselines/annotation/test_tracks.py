@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.annotation.tracks import COLUMNS, read_tracks
-from baselines.estimates import PROBLEM_CODES as BASELINE_CODES
 from evaluator.problems import PROBLEM_CODES, Rejected
 from tests.baselines.annotation.made_tracks import HEADER, approaching, row, text
+from tsttc_baselines.annotation.tracks import COLUMNS, read_tracks
+from tsttc_baselines.estimates import PROBLEM_CODES as BASELINE_CODES
 
 
 def write(folder: Path, content: str) -> Path:

@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 import pytest
 
-from baselines.cli import COMMANDS, baseline
 from tests.evaluator.worlds import REPOSITORY, Tsttc
+from tsttc_baselines.cli import COMMANDS, baseline
 
 
 def command(name: str) -> click.Command:
@@ -61,7 +61,7 @@ print(*sorted(name for name in ("cv2", "numpy", "rich") if name in sys.modules))
 def test_without_opencv_a_sentence_says_how_to_install_it(
     tsttc: Tsttc, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("baselines.cli.find_spec", lambda _name: None)
+    monkeypatch.setattr("tsttc_baselines.cli.find_spec", lambda _name: None)
     result = tsttc("baseline", "run", "detection", tmp_path, "--out", tmp_path / "p.json")
     assert result.exit_code == 2
     assert result.stderr == (

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from baselines.methods import METHODS, Method
 from tests.baselines.made_folders import made_folder, write_boxes
 from tests.evaluator.worlds import Tsttc
+from tsttc_baselines.methods import METHODS, Method
 
 
 @pytest.fixture

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from baselines.methods import OWN_WEIGHTS
 from tests.evaluator.worlds import Tsttc
+from tsttc_baselines.methods import OWN_WEIGHTS
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from baselines.deep_scale.weights import SHAPES
+from tsttc_baselines.deep_scale.weights import SHAPES
 
 Tensors = dict[str, NDArray[np.float32]]
 

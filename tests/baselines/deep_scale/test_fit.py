@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from baselines.boxes import box_around, centre_of, size_of
-from baselines.clips import Clip, Image
-from baselines.deep_scale.estimator import DeepScale
-from baselines.deep_scale.fit import Grid, fitted_scale_ratio
-from baselines.deep_scale.layers import NumpyLayers
-from baselines.deep_scale.network import Operations
-from baselines.deep_scale.weights import read_weights
-from baselines.methods import OWN_WEIGHTS
 from tests.baselines.scenes import Floats, planted
+from tsttc_baselines.boxes import box_around, centre_of, size_of
+from tsttc_baselines.clips import Clip, Image
+from tsttc_baselines.deep_scale.estimator import DeepScale
+from tsttc_baselines.deep_scale.fit import Grid, fitted_scale_ratio
+from tsttc_baselines.deep_scale.layers import NumpyLayers
+from tsttc_baselines.deep_scale.network import Operations
+from tsttc_baselines.deep_scale.weights import read_weights
+from tsttc_baselines.methods import OWN_WEIGHTS
 
 pytestmark = pytest.mark.slow
 

@@ -9,15 +9,15 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import convolve2d, correlate2d
 
-from baselines.clips import Clip
-from baselines.deep_scale.crops import cut_pair
-from baselines.deep_scale.estimator import DeepScale, cut, network_logits, operations_on
-from baselines.deep_scale.layers import convolved, doubled
-from baselines.deep_scale.roi_align import sampling_matrix
-from baselines.deep_scale.weights import Use, Weights, write_weights
-from baselines.estimates import Unusable
 from tests.baselines.deep_scale.made_weights import random_tensors
 from tests.baselines.scenes import planted
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.deep_scale.crops import cut_pair
+from tsttc_baselines.deep_scale.estimator import DeepScale, cut, network_logits, operations_on
+from tsttc_baselines.deep_scale.layers import convolved, doubled
+from tsttc_baselines.deep_scale.roi_align import sampling_matrix
+from tsttc_baselines.deep_scale.weights import Use, Weights, write_weights
+from tsttc_baselines.estimates import Unusable
 
 Floats = NDArray[Any]
 

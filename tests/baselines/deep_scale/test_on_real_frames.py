@@ -9,15 +9,15 @@ import cv2
 import numpy as np
 import pytest
 
-from baselines.clips import Clip, Image
-from baselines.deep_scale.estimator import DeepScale
-from baselines.deep_scale.layers import NumpyLayers
-from baselines.deep_scale.network import Array, Sampling, features, similarities
-from baselines.deep_scale.roi_align import sampling_matrix
-from baselines.deep_scale.weights import read_weights
 from evaluator import scale_ratio_to_ttc
-from evaluator.metrics.metrics import MID, RTE
+from evaluator.metrics.registry import MID, RTE
 from tests.services import shared_data
+from tsttc_baselines.clips import Clip, Image
+from tsttc_baselines.deep_scale.estimator import DeepScale
+from tsttc_baselines.deep_scale.layers import NumpyLayers
+from tsttc_baselines.deep_scale.network import Array, Sampling, features, similarities
+from tsttc_baselines.deep_scale.roi_align import sampling_matrix
+from tsttc_baselines.deep_scale.weights import read_weights
 
 pytestmark = pytest.mark.slow
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from baselines.clips import Clip
-from baselines.deep_scale.estimator import DeepScale
-from baselines.pixel_mse import PixelMse
-from baselines.rendering.clips import render
-from baselines.simulation import split
 from tests.baselines.scenes import Floats, mean_mid
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.deep_scale.estimator import DeepScale
+from tsttc_baselines.pixel_mse import PixelMse
+from tsttc_baselines.rendering.clips import render
+from tsttc_baselines.simulation import split
 
 SEED, N = 7, 20
 """The first of the rendered sequences of docs/deep-scale.md, from which nothing was learned."""

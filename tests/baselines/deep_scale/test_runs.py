@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from baselines.deep_scale.weights import Use, Weights, write_weights
 from tests.baselines.deep_scale.made_weights import checkpoint, random_tensors
 from tests.baselines.made_folders import made_folder
 from tests.evaluator.worlds import Tsttc
+from tsttc_baselines.deep_scale.weights import Use, Weights, write_weights
 
 
 @pytest.fixture

@@ -9,15 +9,21 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from baselines.clips import Clip
-from baselines.deep_scale.samples import FolderSequences, RenderedSequences, Sample, batches, usable_pair
-from baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
-from baselines.folders import read_folder
-from baselines.methods import OWN_WEIGHTS
-from baselines.simulation import split
 from evaluator import GroundTruth, read_truth
 from evaluator.problems import Rejected
 from tests.baselines.made_folders import made_folder, stamp
+from tsttc_baselines.clips import Clip
+from tsttc_baselines.deep_scale.samples import (
+    FolderSequences,
+    RenderedSequences,
+    Sample,
+    batches,
+    usable_pair,
+)
+from tsttc_baselines.deep_scale.weights import Decoding, Use, Weights, read_weights
+from tsttc_baselines.folders import read_folder
+from tsttc_baselines.methods import OWN_WEIGHTS
+from tsttc_baselines.simulation import split
 
 pytestmark = pytest.mark.slow
 
@@ -29,7 +35,7 @@ def training() -> Any:
     """The module that trains, which needs torch."""
     torch = pytest.importorskip("torch", reason="torch is not installed: pip install '.[train]'")
     torch.set_num_threads(1)
-    from baselines.deep_scale import training  # noqa: PLC0415 -- it imports torch
+    from tsttc_baselines.deep_scale import training  # noqa: PLC0415 -- it imports torch
 
     return training
 
@@ -130,7 +136,7 @@ def test_with_a_start_the_score_before_epoch_1_comes_first_and_no_rate_keeps_it(
     decoding: Decoding,
 ) -> None:
     # Batches move the running means whatever the rate is.
-    monkeypatch.setattr("baselines.deep_scale.torch_layers.BN_MOMENTUM", 0.0)
+    monkeypatch.setattr("tsttc_baselines.deep_scale.torch_layers.BN_MOMENTUM", 0.0)
     start = Weights(read_weights(OWN_WEIGHTS).tensors, replace(SMALL, decoding=decoding))
     recipe = training.Recipe(epochs=1, batch=2, lr_per_pair=1e-12, use=start.use)
     rows = Rows(source)

@@ -8,8 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from baselines.deep_scale.checkpoint import MAX_BYTES
-from baselines.deep_scale.weights import CARD, Use, Weights, read_weights, write_weights
 from evaluator.problems import Rejected
 from tests.baselines.deep_scale.made_weights import (
     Tensors,
@@ -20,6 +18,8 @@ from tests.baselines.deep_scale.made_weights import (
     text,
     written,
 )
+from tsttc_baselines.deep_scale.checkpoint import MAX_BYTES
+from tsttc_baselines.deep_scale.weights import CARD, Use, Weights, read_weights, write_weights
 
 TENSORS = random_tensors()
 LINEAR = "head.scale_preds.bias"

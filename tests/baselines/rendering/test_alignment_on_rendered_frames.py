@@ -5,13 +5,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from baselines.alignment import Alignment, Template
-from baselines.boxes import centre_of, size_of
-from baselines.clips import TARGET
-from baselines.rendering.clips import Rendered, render
-from baselines.simulation import Split, split
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from evaluator.metrics.scale import scale_ratio_to_ttc
+from tsttc_baselines.alignment import Alignment, Template
+from tsttc_baselines.boxes import centre_of, size_of
+from tsttc_baselines.clips import TARGET
+from tsttc_baselines.rendering.clips import Rendered, render
+from tsttc_baselines.simulation import Split, split
 
 pytestmark = pytest.mark.slow
 

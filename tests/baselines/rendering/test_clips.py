@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from baselines.boxes import scale_ratio_of_boxes
-from baselines.highway import VEHICLES
-from baselines.rendering.clips import View, boxes, render
-from baselines.simulation import Split, split
 from evaluator.metrics.scale import scale_ratio_to_ttc
+from tsttc_baselines.boxes import scale_ratio_of_boxes
+from tsttc_baselines.highway import VEHICLES
+from tsttc_baselines.rendering.clips import View, boxes, render
+from tsttc_baselines.simulation import Split, split
 
 SEED = 3
 

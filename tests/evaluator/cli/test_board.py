@@ -15,7 +15,7 @@ import pytest
 from evaluator.cli import boards
 from evaluator.cli.connection import connect
 from evaluator.client.answers import Board
-from evaluator.client.client import Client
+from evaluator.client.api import Client
 from evaluator.client.exchange import RetryPolicy
 from evaluator.metrics.protocol import SCORE_NAMES
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply, problem
@@ -72,7 +72,7 @@ def test_unreachable_server_is_told_with_its_address(
 ) -> None:
     url = f"http://127.0.0.1:{free_port()}"
     monkeypatch.setenv("TSTTC_URL", url)
-    monkeypatch.setattr("evaluator.client.client.Client", partial(Client, sleep=clock.sleep))
+    monkeypatch.setattr("evaluator.client.api.Client", partial(Client, sleep=clock.sleep))
     result = tsttc("board")
     assert result.exit_code == 3
     assert result.stderr.startswith(f"Error: Nothing answers at {url} (")

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from evaluator.client.client import Client
+from evaluator.client.api import Client
 from tests.evaluator.cli.recorded_site import RecordedSite, Reply
 from tests.evaluator.cli.test_submissions import GET, ID, POST, QUEUED, SCORED, submit
 from tests.evaluator.fake_time import FakeTime

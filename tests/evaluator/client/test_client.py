@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from evaluator.client.answers import BadAnswer, Refused, Unreachable
-from evaluator.client.client import Client
+from evaluator.client.api import Client
 from evaluator.client.exchange import RetryPolicy
 from tests.evaluator.cli.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
 from tests.evaluator.fake_time import FakeTime

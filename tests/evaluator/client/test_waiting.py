@@ -8,7 +8,7 @@ from contextlib import ExitStack
 import pytest
 
 from evaluator.client.answers import Refused, TimedOut, Unreachable
-from evaluator.client.client import Client
+from evaluator.client.api import Client
 from evaluator.client.exchange import RetryPolicy
 from tests.evaluator.cli.recorded_site import CUT, RecordedSite, Reply
 from tests.evaluator.client.test_client import ONE, QUEUED, SCORED, SUBMISSIONS, send

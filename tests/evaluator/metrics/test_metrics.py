@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluator import evaluate
-from evaluator.metrics.metrics import MID, Metric
 from evaluator.metrics.protocol import known_metrics
-from evaluator.predictions.predictions import Predictions
+from evaluator.metrics.registry import MID, Metric
+from evaluator.predictions.loading import Predictions
 from tests.evaluator.worlds import errors_of_the_toolkit, make_truth, means_of_the_toolkit
 
 every_metric = pytest.mark.parametrize("metric", known_metrics().values(), ids=list(known_metrics()))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from evaluator.metrics.metrics import best_and_second, rank
+from evaluator.metrics.registry import best_and_second, rank
 
 Column = list[float | None]
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from evaluator import Problem, Rejected, convert, read_predictions, scale_ratio_to_ttc
-from evaluator.predictions import predictions
-from evaluator.predictions.predictions import sha256_digest
+from evaluator.predictions import loading
+from evaluator.predictions.loading import sha256_digest
 from tests.evaluator.worlds import flat, make_truth
 
 TRUTH = make_truth([1.0, 4.0, -10.0])
@@ -19,7 +19,7 @@ GOOD = flat([1.5, -2.25, 30.0])
 
 def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = None) -> bytes:
     names = {"ts": "ts_ns"}
-    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*predictions.NATURAL_KEY, "anno_id")}
+    keys = {name: getattr(MANIFEST, names.get(name, name)) for name in (*loading.NATURAL_KEY, "anno_id")}
     values = {"ttc": ["1.5", "-2.25", "3e1"], "scale_ratio": ["0.9", "1.1", "1"], "frame_gap": [5, 5, 1]}
     cells: dict[str, Any] = keys | values | {"note": ["a", '"b,c"', ""]} | (rows or {})
     lines = [",".join(columns), *(",".join(str(cells[name][row]) for name in columns) for row in range(3))]
@@ -27,7 +27,7 @@ def table(*columns: str, end: str = "\n", rows: dict[str, list[str]] | None = No
 
 
 @pytest.mark.parametrize(
-    "columns", [("anno_id", "ttc"), (*predictions.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
+    "columns", [("anno_id", "ttc"), (*loading.NATURAL_KEY, "ttc"), ("note", "ttc", "anno_id")]
 )
 @pytest.mark.parametrize("end", ["\n", "\r\n"])
 @pytest.mark.parametrize("start", [b"", b"\xef\xbb\xbf"])
@@ -81,7 +81,7 @@ def test_what_cannot_be_read_is_said_in_words(data: bytes, code: str, words: str
 
 
 def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(predictions, "MAX_UNPACKED_BYTES", 10_000)
+    monkeypatch.setattr(loading, "MAX_UNPACKED_BYTES", 10_000)
     bomb = gzip.compress(b" " * 10_001)
     for data in (bomb, gzip.compress(b" " * 9_000) * 3):
         with pytest.raises(Rejected) as caught:
@@ -89,7 +89,7 @@ def test_a_bomb_is_refused_before_it_is_unpacked(monkeypatch: pytest.MonkeyPatch
         assert [problem.code for problem in caught.value.problems] == ["too-large"]
     assert len(zlib.decompress(gzip.compress(b" " * 10_000), wbits=31)) == 10_000
     with pytest.raises(Rejected) as caught:
-        predictions.json_of(b"anno_id,ttc\n" + b"0,1\n" * 6, max_rows=5)
+        loading.json_of(b"anno_id,ttc\n" + b"0,1\n" * 6, max_rows=5)
     assert [problem.code for problem in caught.value.problems] == ["too-many-members"]
 
 
@@ -103,13 +103,13 @@ def refusal(data: bytes) -> Problem:
 def test_members_may_be_longer_than_what_is_read_at_once_and_have_zeros_between() -> None:
     long = np.random.default_rng(0).integers(0, 256, 300_000, dtype=np.uint8).tobytes()
     data = gzip.compress(long) + b"\x00" * 200_000 + gzip.compress(GOOD) + b"\x00" * 512
-    assert predictions.json_of(data) == long + GOOD
+    assert loading.json_of(data) == long + GOOD
     assert refusal(gzip.compress(long)[:-1]).message.endswith("it ends too early.")
 
 
 def test_an_archive_of_too_many_members_is_refused_with_the_place_of_the_first_too_many() -> None:
     empty = gzip.compress(b"", mtime=0)
-    good = gzip.compress(GOOD) + empty * (predictions.MAX_GZIP_MEMBERS - 1)
+    good = gzip.compress(GOOD) + empty * (loading.MAX_GZIP_MEMBERS - 1)
     assert read_predictions(good, manifest=MANIFEST).ttc_s[0] == 1.5
     assert refusal(good + empty) == Problem(
         "too-many-members",
@@ -120,7 +120,7 @@ def test_an_archive_of_too_many_members_is_refused_with_the_place_of_the_first_t
 
 
 def test_a_table_may_have_other_columns_but_not_any_number_of_them() -> None:
-    wide = b"".join(b",c%d" % i for i in range(predictions.MAX_COLUMNS - 2))
+    wide = b"".join(b",c%d" % i for i in range(loading.MAX_COLUMNS - 2))
     rows = b"".join(b"%d,1.5%b\n" % (i, b"," * (len(wide.split(b",")) - 1)) for i in range(3))
     assert read_predictions(b"anno_id,ttc" + wide + b"\n" + rows, manifest=MANIFEST).ttc_s[0] == 1.5
     assert refusal(b"anno_id,ttc" + wide + b",more\n" + rows) == Problem(

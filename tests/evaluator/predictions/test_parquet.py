@@ -8,8 +8,8 @@ import pytest
 
 from evaluator import Rejected, convert, read_manifest, read_predictions
 from evaluator.predictions import parquet as asking
-from evaluator.predictions.predictions import json_of, read_sent, sha256_digest
-from evaluator.predictions.sandbox import answer
+from evaluator.predictions.loading import json_of, read_sent, sha256_digest
+from evaluator.predictions.reader import answer
 from evaluator.tables.formats import parquet_of
 from tests.evaluator.worlds import EXAMPLES, Tsttc, flat
 

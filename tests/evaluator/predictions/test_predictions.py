@@ -11,7 +11,7 @@ import pytest
 
 from evaluator import Manifest, Predictions, read_predictions
 from evaluator.metrics.scale import fps_of_gap, scale_ratio_to_ttc
-from evaluator.predictions.predictions import sha256_digest
+from evaluator.predictions.loading import sha256_digest
 from tests.evaluator.worlds import envelope, flat, make_truth
 
 TTC_S = [5.31, -12.9, 0.4, 100.0]

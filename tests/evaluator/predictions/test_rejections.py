@@ -6,7 +6,7 @@ import pytest
 
 from evaluator import PROBLEM_CODES, Manifest, Problem, Rejected, read_predictions
 from evaluator.predictions.documents import parse
-from evaluator.predictions.predictions import read_sent
+from evaluator.predictions.loading import read_sent
 from tests.evaluator.faulty_files import CASES, GOOD, MANIFEST
 from tests.evaluator.worlds import flat, make_truth
 

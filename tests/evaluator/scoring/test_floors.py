@@ -5,7 +5,7 @@ import pytest
 
 from evaluator import Predictions, evaluate
 from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES
-from evaluator.scoring.scoring import floor_of, floor_sentence
+from evaluator.scoring.scores import floor_of, floor_sentence
 from tests.evaluator.worlds import errors_of_the_toolkit, make_truth
 
 TIMES_S = [-300.0, -45.0, -20.0, -12.0, -0.12, 0.03, 1.0, 4.0, 12.0, 20.0, 25.0, 1e6]

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluator import evaluate, format_published, published, read_predictions
-from evaluator.predictions.predictions import sha256_digest
+from evaluator.predictions.loading import sha256_digest
 from tests.evaluator.worlds import flat, make_truth
 
 

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from evaluator import PROTOCOLS, SCORE_NAMES, Rejected, evaluate, get_protocol
-from evaluator.metrics.metrics import MID, RTE
+from evaluator.metrics.registry import MID, RTE
 from evaluator.metrics.scale import scale_ratio_10hz
-from evaluator.predictions.predictions import Predictions
+from evaluator.predictions.loading import Predictions
 from evaluator.scoring.report import Report
-from evaluator.truth.truth import GroundTruth
+from evaluator.truth.ground_truth import GroundTruth
 from tests.evaluator.worlds import make_truth
 
 every_protocol = pytest.mark.parametrize("protocol", PROTOCOLS)

@@ -9,7 +9,7 @@ from django.utils import timezone
 from rest_framework.test import APIClient
 
 from leaderboard.models import Edition, Evaluation, Submission, User
-from leaderboard.submissions import outcomes, submissions
+from leaderboard.submissions import intake, outcomes
 from tests import builders
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of
@@ -89,7 +89,7 @@ def test_surpassed_one_has_intervals_and_neither_rank_nor_range(
 
 def test_withdrawn_one_has_no_rank(client: APIClient, entries: list[Submission], owner: User) -> None:
     builders.infer_all()
-    submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+    intake.withdraw(submission=entries[0], actor=owner, now=timezone.now())
     body = look(client, entries[0])
     assert body["rank"] is None
     assert {found["rank_low"] for found in body["intervals"].values()} == {None}

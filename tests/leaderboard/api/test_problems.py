@@ -13,7 +13,7 @@ from evaluator.problems import PROBLEM_CODES, WARNING_CODES
 from leaderboard.errors.problem_codes import API_CODES
 from leaderboard.models import Edition, Split, User
 from leaderboard.storage import files
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders
 from tests.leaderboard.api.test_submissions import client_of, post
 
@@ -94,7 +94,7 @@ def test_our_own_faults(edition: Edition, owner: User, monkeypatch: pytest.Monke
     def broken(*args: object, **kwargs: object) -> None:
         raise ZeroDivisionError
 
-    monkeypatch.setattr(submissions, "submit", broken)
+    monkeypatch.setattr(intake, "submit", broken)
     body = checked(post(client, builders.predictions(edition)), 500, "server-error")
     assert "ZeroDivision" not in str(body)
 

@@ -10,7 +10,7 @@ from django.core.files.uploadedfile import SimpleUploadedFile
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.benchmark import papers, splits
+from leaderboard.editions import papers, splits
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import AuditEvent, Edition, PublishedResult
 from leaderboard.models.benchmark import SINCE_EVER

@@ -12,7 +12,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.editions import corrections
-from leaderboard.methods import methods, visibility
+from leaderboard.methods import editing, visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -26,7 +26,7 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.people import teams
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders
 from tests.editions import corrected, extended, open_edition, publish, quote, roll_back
 from tests.leaderboard.boards.test_snapshots import n_queries
@@ -113,14 +113,14 @@ class History:
 
     def _withdraw(self) -> None:
         for sent in self._some(Submission.objects.filter(withdrawn_at=None), by="submitted_at"):
-            submissions.withdraw(submission=sent, actor=sent.submitted_by, now=timezone.now())
+            intake.withdraw(submission=sent, actor=sent.submitted_by, now=timezone.now())
 
     def _rename(self) -> None:
         self._n += 1
         for method in self._some(
             Method.objects.exclude(visibility=Visibility.PUBLIC).filter(renamed_at=None)
         ):
-            methods.edit(method=method, changes={"name": f"Renamed {self._n}"}, actor=self._of(method.team))
+            editing.edit(method=method, changes={"name": f"Renamed {self._n}"}, actor=self._of(method.team))
         for team in self._some(Team.objects.filter(renamed_at=None)):
             teams.rename(team=team, name=f"Team {self._n}", actor=self._of(team), now=timezone.now())
 
@@ -191,5 +191,5 @@ def test_it_is_read_once_until_the_board_changes(
     for address in (page, f"{page}&sort=-rte", f"{CSV}{query}", f"{API}{query}"):
         assert n_queries(client, address) <= 3, address
     assert "Edition 2 added sequences that its file does not predict." in client.get(page).text
-    submissions.withdraw(submission=entries[0], actor=entries[0].submitted_by, now=timezone.now())
+    intake.withdraw(submission=entries[0], actor=entries[0].submitted_by, now=timezone.now())
     assert 3 < n_queries(client, page) <= 8

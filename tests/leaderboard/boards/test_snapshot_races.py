@@ -8,7 +8,7 @@ import pytest
 from django.db import connection, transaction
 from django.test import Client
 
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import Score, User
 from tests import board_rows, builders
 from tests.services import ON_POSTGRESQL
@@ -36,7 +36,7 @@ def test_no_reader_gets_a_board_that_is_half_changed(benchmark: None, tmp_path: 
         with transaction.atomic():
             Score.objects.filter(interval="overall", metric="mid").update(value=value)
             Score.objects.filter(interval="overall", metric="rte").update(value=value)
-            versions.changed("test")
+            board_versions.changed("test")
 
     set_all(1.0)
     readers = [threading.Thread(target=read, args=(i,)) for i in range(3)]

@@ -10,9 +10,9 @@ from django.test import Client
 from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
-from leaderboard import versions
-from leaderboard.boards import boards, snapshots
-from leaderboard.methods import methods, visibility
+from leaderboard import board_versions
+from leaderboard.boards import query, snapshots
+from leaderboard.methods import editing, visibility
 from leaderboard.models import (
     Edition,
     Evaluation,
@@ -24,7 +24,7 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.people import teams
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import board_rows, builders
 from tests.caching import forget_boards
 from tests.editions import corrected, open_edition, publish
@@ -47,7 +47,7 @@ def by_hand(change: Callable[[], object], *, split: str = "test") -> None:
     """Change rows past the verbs, and say so as a verb would."""
     with transaction.atomic():
         change()
-        versions.changed(split)
+        board_versions.changed(split)
 
 
 def n_queries(client: Client, address: str) -> int:
@@ -63,7 +63,7 @@ def n_queries(client: Client, address: str) -> int:
 def test_what_is_kept_is_what_the_database_says(edition: Edition, filled: list[Method]) -> None:
     for _ in range(2):  # read, and kept
         shown = snapshots.shown(split=edition.split, edition=edition)
-        assert shown.entries == boards.public_rows(split=edition.split, edition=edition)
+        assert shown.entries == query.public_rows(split=edition.split, edition=edition)
         assert len(shown.entries) == 12 + edition.split.published_results.count()
         assert {attempt.method_id for attempt in shown.attempts} == {method.pk for method in filled}
 
@@ -103,7 +103,7 @@ def test_every_change_is_seen_by_the_very_next_reader(edition: Edition, owner: U
     builders.score_all()
     assert rows() == 1
     assert "Foo" in client.get(PAGE).text
-    submissions.withdraw(submission=submission, actor=owner, now=timezone.now())
+    intake.withdraw(submission=submission, actor=owner, now=timezone.now())
     [entry] = [e for e in client.get(API).json()["entries"] if e["kind"] == "submission"]
     assert entry["withdrawn_at"] is not None
     assert "withdrawn" in client.get(PAGE).text
@@ -114,7 +114,7 @@ def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
 ) -> None:
     builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
     builders.score_all()
-    number, is_shown = versions.number("test"), list[bool]()
+    number, is_shown = board_versions.number("test"), list[bool]()
 
     def show_meanwhile(execute, sql, params, many, context):
         # Before the row of its team is held, which whoever changes a method waits for.
@@ -127,29 +127,29 @@ def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
     with connection.execute_wrapper(show_meanwhile):
         builders.send(owner, data, description="Said anew.")
     assert is_shown
-    assert versions.number("test") == number + 1
+    assert board_versions.number("test") == number + 1
 
 
 def test_changing_outside_of_a_transaction_is_refused() -> None:
     with pytest.raises(RuntimeError, match="outside of the transaction"):
-        versions.changed("test")
+        board_versions.changed("test")
 
 
 def test_nobody_hears_of_a_change_that_was_taken_back(edition: Edition, filled: list[Method]) -> None:
-    before = versions.state()
+    before = board_versions.state()
     with transaction.atomic():
-        versions.changed("test")
+        board_versions.changed("test")
         transaction.set_rollback(True)
-    assert versions.state() == before
+    assert board_versions.state() == before
 
 
 def test_editions_in_preparation_move_no_number(
     edition: Edition, entries: list[Submission], second: Edition
 ) -> None:
-    before = versions.state()
+    before = board_versions.state()
     assert builders.score_all() > 0
     assert second.evaluations.filter(status=Status.SCORED).count() == len(entries)
-    assert versions.state() == before
+    assert board_versions.state() == before
 
 
 # --- what it costs -----------------------------------------------------------------------------------------
@@ -213,7 +213,7 @@ def test_a_method_is_nowhere_until_it_is_shown_and_told_of_as_it_is_then(
     mine.force_login(owner)
     assert mine.get(address).json()["name"] == "Secret"
     assert client.get(address).json()["name"] == method.pseudonym
-    methods.edit(method=method, changes={"n_frames": 3}, actor=owner)
+    editing.edit(method=method, changes={"n_frames": 3}, actor=owner)
     assert client.get(address).json()["details"]["n_frames"] == 3
     visibility.change(method=method, visibility="PUBLIC", actor=owner, now=timezone.now())
     assert client.get(address).json()["name"] == "Secret"

@@ -14,9 +14,11 @@ from django.utils import timezone
 from leaderboard.editions import ground_truth
 from leaderboard.methods import visibility
 from leaderboard.models import Edition, Submission, User
+from leaderboard.moderation import forgetting
 from leaderboard.people import invitations, teams, tokens
-from leaderboard.scoring import confidence, lifecycle
-from leaderboard.submissions import forgetting, submissions
+from leaderboard.queue import lifecycle
+from leaderboard.statistics import confidence
+from leaderboard.submissions import intake
 from tests import builders
 from tests.editions import corrected, open_edition, publish
 from tests.interlocking import Hold, meet
@@ -74,7 +76,7 @@ def verbs(entries: list[Submission], edition: Edition, maintainer: User, tmp_pat
     return {
         "submit": send(owner, description="What it is."),
         "submit for the first time": send(newcomer),
-        "withdraw": partial(submissions.withdraw, submission=entries[0], actor=owner, now=now),
+        "withdraw": partial(intake.withdraw, submission=entries[0], actor=owner, now=now),
         "finalise": lambda: lifecycle.finalise_many([(lease, queue_rows.SCORED) for lease in leases]),
         "infer": partial(confidence.infer, entries_now, now=now + timedelta(hours=1)),
         "import a ground truth": partial(ground_truth.add, split_name=split, path=truth, now=now, actor=None),

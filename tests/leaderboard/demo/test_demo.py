@@ -11,13 +11,13 @@ from django.core.management import CommandError, call_command
 from pytest_django.fixtures import Settings
 
 import evaluator
-from leaderboard.boards import boards
+from leaderboard.boards import query
 from leaderboard.demo import seed
 from leaderboard.demo.runs import N_RECORDINGS, N_SEQUENCES, demo_split
 from leaderboard.editions import ground_truth
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Evaluation, Split, Status, Submission, User
-from leaderboard.scoring import worker
+from leaderboard.queue import worker
 
 pytestmark = pytest.mark.slow
 
@@ -56,7 +56,7 @@ def test_the_worker_decides_what_the_seed_submits(benchmark: None, tmp_path: Pat
         Status.SCORED: n_scored,
         Status.REJECTED: 1,
     }
-    board = boards.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
+    board = query.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
     assert [entry.rank for entry in board.entries] == [*range(1, n_scored + 1)]
     assert board.entries[0].method == "Deep Scale features, own fit"
     assert board.split.is_simulated

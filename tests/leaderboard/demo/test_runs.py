@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from evaluator.cli import main
-from evaluator.metrics.metrics import MID
+from evaluator.metrics.registry import MID
 from evaluator.metrics.scale import scale_ratio_to_ttc
 from leaderboard.demo import runs
 from leaderboard.demo.runs import FRAMES, N_SEQUENCES, RUNS

@@ -13,8 +13,8 @@ from evaluator import Protocol, receipts
 from evaluator.cli.boards import in_words
 from evaluator.cli.layout import result_in_words
 from evaluator.client.answers import Board
-from evaluator.metrics.metrics import MID, RTE, Metric
 from evaluator.metrics.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Interval
+from evaluator.metrics.registry import MID, RTE, Metric
 from evaluator.tables.formats import FORMATS
 from leaderboard.api.serializers import CountsSerializer, ScoresSerializer
 from leaderboard.methods import visibility

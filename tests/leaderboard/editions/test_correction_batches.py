@@ -10,8 +10,8 @@ import evaluator
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import ground_truth
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status
-from leaderboard.scoring import lifecycle, worker
-from leaderboard.scoring.lifecycle import Lease
+from leaderboard.queue import lifecycle, worker
+from leaderboard.queue.lifecycle import Lease
 from leaderboard.storage import files, truth_values
 from tests import builders, crowd
 from tests.leaderboard.web.maintain import queue_rows

@@ -23,7 +23,7 @@ from leaderboard.models import (
     Submission,
     User,
 )
-from leaderboard.scoring import recording_sums
+from leaderboard.statistics import recording_sums
 from leaderboard.storage import files, truth_values
 from tests import builders
 from tests.editions import FACTORS, board_now, corrected, open_edition, publish, roll_back

@@ -9,10 +9,9 @@ from django.db import IntegrityError, transaction
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard import versions
-from leaderboard.benchmark import moments, policy
-from leaderboard.benchmark.policy import Policy
-from leaderboard.editions import corrections, new_splits
+from leaderboard import board_versions
+from leaderboard.editions import corrections, deadlines, new_splits, policy
+from leaderboard.editions.policy import Policy
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import AuditEvent, Edition, PageVersion, Split, Submission, User
 from tests import builders, pages
@@ -63,7 +62,7 @@ def add(name: str, *, policy: Policy, same_truth_as: str = "", actor: User | Non
 @pytest.fixture
 def challenge(edition: Edition) -> Split:
     """A challenge on the ground truth of the test split."""
-    closes_at = moments.parse("2099-03-01 23:59 Europe/Berlin")
+    closes_at = deadlines.parse("2099-03-01 23:59 Europe/Berlin")
     week = timedelta(days=7)
     return add(
         "challenge",
@@ -319,7 +318,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     later = timezone.now() - timedelta(seconds=1)
     Split.objects.filter(pk="val").update(announcement_ends_at=later)
     PageVersion.announcement().update(ends_at=later)
-    assert versions.times_passed(now=timezone.now()) == 3
+    assert board_versions.times_passed(now=timezone.now()) == 3
     assert "Val only" not in visitor.get("/board/val/").text
     assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
     assert keeper.post(page, sent | {"announcement": "Known error"}).status_code == 302
@@ -342,8 +341,8 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     ],
 )
 def test_a_moment_has_a_zone(text: str, moment: str) -> None:
-    assert moments.parse(text) == datetime.fromisoformat(f"{moment}+00:00")
-    assert moments.parse(moments.written(moments.parse(text))) == moments.parse(text)
+    assert deadlines.parse(text) == datetime.fromisoformat(f"{moment}+00:00")
+    assert deadlines.parse(deadlines.written(deadlines.parse(text))) == deadlines.parse(text)
 
 
 @pytest.mark.parametrize(
@@ -360,4 +359,4 @@ def test_a_moment_has_a_zone(text: str, moment: str) -> None:
 )
 def test_a_moment_that_is_none_is_refused_in_words(text: str, fault: str) -> None:
     with pytest.raises(Refused, match=fault):
-        moments.parse(text)
+        deadlines.parse(text)

@@ -10,9 +10,9 @@ from django.utils import timezone
 from leaderboard.errors.refusals import Refused
 from leaderboard.models import Edition, Publication, Split, Status, Submission, User
 from leaderboard.people import teams
-from leaderboard.quotas import quotas
-from leaderboard.quotas.quotas import Quota
-from leaderboard.submissions import submissions
+from leaderboard.quotas import limits
+from leaderboard.quotas.limits import Quota
+from leaderboard.submissions import intake
 from tests import builders
 from tests.editions import extended, open_edition, publish, roll_back
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -41,7 +41,7 @@ def adding(sent: Submission, tmp_path: Path) -> Edition:
 def left(user: User) -> Quota:
     Split.objects.update(quota_limit=3, quota_window=timedelta(days=30), quota_min_gap=timedelta(days=1))
     split = Split.objects.get(pk="test")
-    return quotas.state(team=teams.team_of(user=user), user=user, split=split, now=timezone.now())
+    return limits.state(team=teams.team_of(user=user), user=user, split=split, now=timezone.now())
 
 
 def test_publishing_is_refused_by_every_door_until_the_entries_are_left_out_knowingly(
@@ -73,7 +73,7 @@ def test_the_slot_is_given_back_for_as_long_as_the_board_rejects_the_entry(
     assert (found.used, found.n_rejected, found.is_open) == (0, 0, True)
     new = builders.submit(owner, builders.predictions(adding), method="Foo")
     builders.score_all()
-    assert submissions.progress(new).state == Status.SCORED
+    assert intake.progress(new).state == Status.SCORED
     assert left(owner).used == 1
     roll_back()
     assert left(owner).used == 2
@@ -92,5 +92,5 @@ def test_the_words_are_true_wherever_they_stand(
     outcome = page.one("div", id="outcome").text
     assert said in outcome
     assert "problem in the file" not in outcome
-    progress = submissions.progress(Submission.objects.get(pk=sent.pk))
+    progress = intake.progress(Submission.objects.get(pk=sent.pk))
     assert (progress.sentence, progress.kept_in) == (said, 1)

@@ -15,7 +15,7 @@ from evaluator.scoring.report import Report
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import preview
 from leaderboard.models import Edition, Evaluation, Status, Submission, User
-from leaderboard.scoring import recording_sums
+from leaderboard.statistics import recording_sums
 from leaderboard.storage import files
 from tests import builders
 from tests.editions import open_edition, publish, roll_back

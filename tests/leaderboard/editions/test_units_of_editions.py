@@ -20,7 +20,7 @@ from evaluator import (
 )
 from leaderboard.editions import ground_truth
 from leaderboard.models import Edition, Split, Submission, User
-from leaderboard.scoring import comparisons
+from leaderboard.statistics import comparisons
 from leaderboard.storage import files, truth_values
 from tests import builders, pages
 from tests.editions import ANYBODY, open_edition, publish

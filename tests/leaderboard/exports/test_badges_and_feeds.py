@@ -10,9 +10,9 @@ from django.test import Client
 from django.utils import timezone
 from django.utils.dateparse import parse_datetime
 
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import Edition, Method, Score, Submission, User, Visibility
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 
 pytestmark = pytest.mark.slow
@@ -31,7 +31,7 @@ def by_hand(method: Method, **values: object) -> None:
     """Change a method past the verbs, and say so as a verb would."""
     with transaction.atomic():
         Method.objects.filter(pk=method.pk).update(**values)
-        versions.changed_everywhere()
+        board_versions.changed_everywhere()
 
 
 def badge(client: Client, method: Method, query: str = "") -> str:
@@ -74,7 +74,7 @@ def test_badge_says_what_there_is_instead_of_a_rank(
     submission = builders.submit(owner, builders.predictions(edition), method="Gone")
     builders.score_all()
     by_hand(submission.method, visibility=Visibility.PUBLIC, shown_at=submission.submitted_at)
-    submissions.withdraw(submission=submission, actor=owner, now=timezone.now() + timedelta(seconds=1))
+    intake.withdraw(submission=submission, actor=owner, now=timezone.now() + timedelta(seconds=1))
     assert badge(client, submission.method) == "TSTTC test: withdrawn"
 
 
@@ -90,7 +90,7 @@ def test_badge_follows_the_board_and_is_kept_as_long_as_it_stands(
     assert known["Cross-Origin-Resource-Policy"] == "cross-origin"
     with transaction.atomic():
         Score.objects.filter(evaluation__submission__method=methods[0]).update(value=0.5)
-        versions.changed("test")
+        board_versions.changed("test")
     assert client.get(address, headers={"If-None-Match": first["ETag"]}).status_code == 200
     assert badge(client, methods[0]) == "TSTTC test: rank 1, MiD 0.5"
 
@@ -159,7 +159,7 @@ def test_withdrawn_entries_leave_the_feed(edition: Edition, owner: User, client:
     builders.score_all()
     by_hand(submission.method, visibility=Visibility.PUBLIC, shown_at=submission.submitted_at)
     assert [title.startswith("Gone") for title in titles(feed(client))] == [True]
-    submissions.withdraw(submission=Submission.objects.get(), actor=owner, now=timezone.now())
+    intake.withdraw(submission=Submission.objects.get(), actor=owner, now=timezone.now())
     assert titles(feed(client)) == []
 
 

@@ -16,7 +16,7 @@ from markdown_it import MarkdownIt
 
 from evaluator.tables.escaping import markdown, one_line
 from leaderboard.models import Edition, Method, User
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 from tests.services import REQUIRED
 
@@ -172,7 +172,7 @@ def test_what_was_withdrawn_stays_in_data_and_leaves_the_tables_of_papers(
 ) -> None:
     submission = builders.submit(owner, builders.predictions(edition), method="Gone")
     builders.score_all()
-    submissions.withdraw(submission=submission, actor=owner, now=timezone.now())
+    intake.withdraw(submission=submission, actor=owner, now=timezone.now())
     assert next(row for row in csv_rows(client) if row["method"] == "Gone")["withdrawn_at"]
     assert "Gone" not in text_of(client, "tex")
     assert "Gone" not in text_of(client, "md")

@@ -7,9 +7,9 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 
-from leaderboard.boards import boards, filters
+from leaderboard.boards import filters, query
 from leaderboard.errors.refusals import Refused
-from leaderboard.methods import methods
+from leaderboard.methods import editing
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User
 from tests import builders, pages
 
@@ -77,26 +77,26 @@ def patch(client: Client, method: Method, user: User, body: Any) -> tuple[int, d
 
 
 def test_everything_said_is_kept_and_taken_back_with_nothing(method: Method, owner: User) -> None:
-    kept = methods.edit(method=method, changes=WHOLE, actor=owner)
+    kept = editing.edit(method=method, changes=WHOLE, actor=owner)
     kept.refresh_from_db()
     assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
     for nothing in (None, ""):
-        methods.edit(method=method, changes=WHOLE, actor=owner)
-        kept = methods.edit(method=method, changes=dict.fromkeys(WHOLE, nothing), actor=owner)
+        editing.edit(method=method, changes=WHOLE, actor=owner)
+        kept = editing.edit(method=method, changes=dict.fromkeys(WHOLE, nothing), actor=owner)
         kept.refresh_from_db()
         assert {getattr(kept, name) for name in WHOLE} == {None, ""}
 
 
 def test_words_mean_what_values_do(method: Method, owner: User) -> None:
     words = {"n_frames": "6", "uses_nerf": "no", "uses_extra_data": "yes", "n_parameters": " 31000000 "}
-    kept = methods.edit(method=method, changes={**WHOLE, **words, "latency_ms": "41.5"}, actor=owner)
+    kept = editing.edit(method=method, changes={**WHOLE, **words, "latency_ms": "41.5"}, actor=owner)
     assert {name: getattr(kept, name) for name in WHOLE} == WHOLE
 
 
 @pytest.mark.parametrize("count", ["25M", "25 m", "25,000,000", "0.025b"])
 def test_a_count_is_read_as_people_write_it(method: Method, owner: User, count: str) -> None:
     assert (
-        methods.edit(method=method, changes={"n_parameters": count}, actor=owner).n_parameters == 25_000_000
+        editing.edit(method=method, changes={"n_parameters": count}, actor=owner).n_parameters == 25_000_000
     )
 
 
@@ -105,7 +105,7 @@ def test_what_it_cannot_be_is_named_with_what_was_expected(
     method: Method, owner: User, name: str, value: object
 ) -> None:
     with pytest.raises(Refused, match="expected") as refusal:
-        methods.edit(method=method, changes={name: value}, actor=owner)
+        editing.edit(method=method, changes={name: value}, actor=owner)
     assert refusal.value.field == name
     str(refusal.value).encode()
     assert AuditEvent.objects.filter(verb="edited").count() == 0
@@ -113,10 +113,10 @@ def test_what_it_cannot_be_is_named_with_what_was_expected(
 
 def test_a_latency_needs_its_hardware(method: Method, owner: User) -> None:
     with pytest.raises(Refused, match="what the latency was measured on"):
-        methods.edit(method=method, changes={"latency_ms": 3.5}, actor=owner)
-    methods.edit(method=method, changes={"latency_ms": 3.5, "hardware": "one GPU"}, actor=owner)
+        editing.edit(method=method, changes={"latency_ms": 3.5}, actor=owner)
+    editing.edit(method=method, changes={"latency_ms": 3.5, "hardware": "one GPU"}, actor=owner)
     with pytest.raises(Refused, match="what the latency was measured on"):
-        methods.edit(method=method, changes={"hardware": ""}, actor=owner)
+        editing.edit(method=method, changes={"hardware": ""}, actor=owner)
 
 
 def test_only_the_team_says_something_and_the_trail_knows_what_changed(
@@ -124,10 +124,10 @@ def test_only_the_team_says_something_and_the_trail_knows_what_changed(
 ) -> None:
     for other in (stranger, maintainer):
         with pytest.raises(Refused, match="Only the team"):
-            methods.edit(method=method, changes={"n_frames": 2}, actor=other)
+            editing.edit(method=method, changes={"n_frames": 2}, actor=other)
     number = BoardVersion.objects.get(split="test").number
-    methods.edit(method=method, changes={"n_frames": 2, "cameras": ""}, actor=teammate)
-    methods.edit(method=method, changes={"n_frames": 2}, actor=owner)
+    editing.edit(method=method, changes={"n_frames": 2, "cameras": ""}, actor=teammate)
+    editing.edit(method=method, changes={"n_frames": 2}, actor=owner)
     assert BoardVersion.objects.get(split="test").number == number + 1
     (event,) = AuditEvent.objects.filter(verb="edited")
     assert (event.actor, event.details) == (teammate, {"fields": ["n_frames"]})
@@ -137,12 +137,12 @@ def test_a_name_changes_until_it_is_public_and_is_no_other_ones_of_the_team(
     edition: Edition, method: Method, owner: User, stranger: User
 ) -> None:
     with pytest.raises(Refused, match="keeps its name"):
-        methods.edit(method=method, changes={"name": "Bar"}, actor=owner)
+        editing.edit(method=method, changes={"name": "Bar"}, actor=owner)
     data = builders.predictions(edition, factor=1.4)
     hidden = builders.submit(owner, data, method="Hidden", visibility="PRIVATE").method
     with pytest.raises(Refused, match="looks like 'Foo', the name of a method of your team"):
-        methods.edit(method=hidden, changes={"name": "F0o"}, actor=owner)
-    assert methods.edit(method=hidden, changes={"name": "Seen"}, actor=owner).name == "Seen"
+        editing.edit(method=hidden, changes={"name": "F0o"}, actor=owner)
+    assert editing.edit(method=hidden, changes={"name": "Seen"}, actor=owner).name == "Seen"
     other = builders.submit(stranger, data, method="F0o", visibility="PRIVATE").method
     assert other.team != method.team
     with pytest.raises(Refused, match="looks like"):
@@ -211,21 +211,21 @@ def test_nonsense_is_refused_in_words(
 def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     edition: Edition, method: Method, owner: User
 ) -> None:
-    methods.edit(method=method, changes=WHOLE, actor=owner)
+    editing.edit(method=method, changes=WHOLE, actor=owner)
     data = builders.predictions(edition, factor=1.3)
     veiled = builders.submit(owner, data, method="Veiled", visibility="ANONYMOUS").method
     hidden = {"pretraining": "Larknet's own", "hardware": "the larks' GPU", "code_url": "https://example.org"}
-    methods.edit(method=veiled, changes={"n_frames": 6, "n_parameters": 9_000, **hidden}, actor=owner)
+    editing.edit(method=veiled, changes={"n_frames": 6, "n_parameters": 9_000, **hidden}, actor=owner)
     builders.score_all()
     split = Split.objects.select_related("published_edition").get(pk="test")
 
     def names(**query: str) -> list[str]:
-        board = boards.board(split=split, viewer=ANYBODY, filters=filters.parse(query))
+        board = query.board(split=split, viewer=ANYBODY, filters=filters.parse(query))
         assert all(ranks[entry.method] == entry.rank for entry in board.entries)
         assert board.n_in_all == 7
         return [entry.method for entry in board.entries if entry.kind == "submission"]
 
-    ranks = {entry.method: entry.rank for entry in boards.board(split=split, viewer=ANYBODY).entries}
+    ranks = {entry.method: entry.rank for entry in query.board(split=split, viewer=ANYBODY).entries}
     both = ["Foo", veiled.pseudonym]
     for query, expected in (
         ({}, both),
@@ -267,7 +267,7 @@ def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(
 
     before = seen()
     hidden = {"pretraining": "Larks' corpus", "hardware": "The Larks' GPU"}
-    methods.edit(method=veiled, changes=hidden, actor=owner)
+    editing.edit(method=veiled, changes=hidden, actor=owner)
     assert seen() == before
     assert not any(veiled.pseudonym.encode() in answer for answer in before)
     client.force_login(owner)

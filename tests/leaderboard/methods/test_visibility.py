@@ -11,7 +11,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.boards import boards
+from leaderboard.boards import query
 from leaderboard.boards.rows import Entry
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import visibility
@@ -26,8 +26,8 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.people import teams
-from leaderboard.submissions import submissions
-from leaderboard.workers import queue
+from leaderboard.queue import pollers
+from leaderboard.submissions import intake
 from tests import builders, pages
 
 pytestmark = pytest.mark.slow
@@ -44,7 +44,7 @@ def split() -> Split:
 
 
 def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:
-    return {entry.method: entry for entry in boards.board(split=split(), viewer=viewer).entries}
+    return {entry.method: entry for entry in query.board(split=split(), viewer=viewer).entries}
 
 
 def change(method: Method, to: str, actor: User, **options: Any) -> Method:
@@ -72,7 +72,7 @@ def test_a_private_method_moves_no_number_that_counts_changes(sent: Submission) 
     number = BoardVersion.objects.filter(split="test").values_list("number", flat=True).first()
     builders.submit(sent.submitted_by, b"{}", method="Another", visibility="PRIVATE")
     builders.score_all()
-    submissions.withdraw(submission=sent, actor=sent.submitted_by, now=timezone.now())
+    intake.withdraw(submission=sent, actor=sent.submitted_by, now=timezone.now())
     assert BoardVersion.objects.filter(split="test").values_list("number", flat=True).first() == number
 
 
@@ -107,12 +107,12 @@ def test_a_board_as_of_a_time_shows_what_was_shown_then(method: Method, owner: U
     after = timezone.now()
 
     def names(viewer: Any, at: Any) -> list[str]:
-        return [entry.method for entry in boards.board(split=split(), viewer=viewer, at=at).entries]
+        return [entry.method for entry in query.board(split=split(), viewer=viewer, at=at).entries]
 
     for reader in (ANYBODY, stranger):
         assert "Secret sauce" not in names(reader, before)
         assert "Secret sauce" in names(reader, after)
-    own = boards.board(split=split(), viewer=owner, at=before).entries
+    own = query.board(split=split(), viewer=owner, at=before).entries
     assert [entry.visibility for entry in own if entry.method == "Secret sauce"] == [Visibility.PRIVATE]
 
 
@@ -165,8 +165,8 @@ def test_the_sweep_reveals_what_is_due_once_and_nothing_else(method: Method, own
     change(method, "ANONYMOUS", owner, reveal_at=now + timedelta(days=3))
     assert visibility.reveal_due(now=now + timedelta(days=2)) == 0
     Method.objects.update(reveal_at=now - timedelta(seconds=1))
-    queue.sweep(rng=random.Random(0))
-    queue.sweep(rng=random.Random(0))
+    pollers.sweep(rng=random.Random(0))
+    pollers.sweep(rng=random.Random(0))
     method.refresh_from_db()
     assert (method.visibility, method.reveal_at) == (Visibility.PUBLIC, None)
     (event,) = AuditEvent.objects.filter(verb="revealed")
@@ -178,7 +178,7 @@ def test_a_withdrawn_entry_of_a_shown_method_leaves_a_stone(
     sent: Submission, method: Method, owner: User
 ) -> None:
     change(method, "PUBLIC", owner)
-    submissions.withdraw(submission=sent, actor=owner, now=timezone.now())
+    intake.withdraw(submission=sent, actor=owner, now=timezone.now())
     entry = rows()["Secret sauce"]
     assert (entry.rank, entry.scores["mid"], entry.n_attempts) == (None, None, 1)
     assert entry.withdrawn_at

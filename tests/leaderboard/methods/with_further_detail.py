@@ -6,7 +6,7 @@ import pytest
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.methods import methods
+from leaderboard.methods import editing
 from leaderboard.models import Edition, Method, User, Visibility
 from tests import builders, openapi, pages
 
@@ -18,7 +18,7 @@ def method(edition: Edition, owner: User) -> Method:
     """A scored public method that states the detail."""
     sent = builders.submit(owner, builders.predictions(edition, factor=1.2), method="Foo")
     builders.score_all()
-    return methods.edit(method=sent.method, changes={"optimizer": "Larksgrad"}, actor=owner)
+    return editing.edit(method=sent.method, changes={"optimizer": "Larksgrad"}, actor=owner)
 
 
 def test_the_form_asks_for_it_and_the_method_page_shows_it(

@@ -16,7 +16,7 @@ from pytest_django import Settings
 
 from leaderboard.models import AuditEvent, SweepBeat
 from leaderboard.ops import health, prometheus
-from leaderboard.workers import queue
+from leaderboard.queue import pollers
 
 pytestmark = pytest.mark.slow
 
@@ -49,7 +49,7 @@ def test_alive_needs_no_database() -> None:
 
 @pytest.mark.django_db(transaction=True)
 def test_ready_when_database_broker_and_sweep_are_well() -> None:
-    queue.sweep(rng=random.Random(0))
+    pollers.sweep(rng=random.Random(0))
     response = Client().get("/healthy")
     assert response.status_code == 200
     assert response.json()["status"] == "healthy"

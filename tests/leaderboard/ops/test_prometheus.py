@@ -13,8 +13,8 @@ from pytest_django import Settings
 
 from leaderboard.models import Edition, Evaluation, User
 from leaderboard.ops import prometheus
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import Strike
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import Strike
 from tests.leaderboard.web.maintain import queue_rows
 
 RNG = random.Random(0)

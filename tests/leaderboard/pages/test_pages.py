@@ -10,28 +10,28 @@ from django.utils import timezone
 
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import AuditEvent, PageVersion, User
-from leaderboard.pages import pages
+from leaderboard.pages import texts
 from leaderboard.web.account import shown_once
-from tests import pages as html
+from tests import texts as html
 from tests.leaderboard.web.test_every_page import assert_sound
 
 RULES = "/maintain/pages/rules/"
 
 
 def edit(text: str, *, actor: User | None, replaces: int = 0, name: str = "rules") -> PageVersion:
-    return pages.edit(name=name, text=text, replaces=replaces, actor=actor, now=timezone.now())
+    return texts.edit(name=name, text=text, replaces=replaces, actor=actor, now=timezone.now())
 
 
 def shown(client: Client, name: str = "rules") -> str:
     return assert_sound(client.get(f"/{name}/")).one("main").text
 
 
-@pytest.mark.parametrize("name", pages.PAGES)
+@pytest.mark.parametrize("name", texts.PAGES)
 def test_every_page_has_a_text_from_the_start_and_is_linked_from_every_page(
     client: Client, benchmark: None, name: str
 ) -> None:
     root = assert_sound(client.get(f"/{name}/"))
-    assert root.one("h1").text == pages.PAGES[name].title
+    assert root.one("h1").text == texts.PAGES[name].title
     assert len(root.one("main").text) > 100
     assert "This is the text that comes with the software." in root.one("main").text
     for address in ("/", "/docs/", "/nowhere/", "/accounts/login/"):
@@ -84,7 +84,7 @@ def test_an_edit_of_a_text_that_is_no_longer_shown_is_refused(maintainer: User) 
         edit("Another.", actor=maintainer, replaces=0)
     with pytest.raises(Refused, match="expected another"):
         edit("One.\r\n", actor=maintainer, replaces=1)
-    assert pages.versions("rules")[0].text == "One.\n"
+    assert texts.versions("rules")[0].text == "One.\n"
 
 
 def test_the_maintainers_form_previews_saves_and_brings_back_earlier_texts(

@@ -8,7 +8,7 @@ from django.utils import timezone
 
 from leaderboard import audit
 from leaderboard.errors.refusals import Refused
-from leaderboard.methods import methods, visibility
+from leaderboard.methods import editing, visibility
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Membership, Method, Team, User
 from leaderboard.people import invitations, teams
 from tests import builders, pages
@@ -126,7 +126,7 @@ def test_a_team_and_a_method_are_renamed_once_a_day(owner: User, team: Team) -> 
         teams.rename(team=team, name=name, actor=owner, now=at)
 
     def rename_method(name: str, *, at: datetime) -> None:
-        methods.edit(method=method, changes={"name": name}, actor=owner, now=at)
+        editing.edit(method=method, changes={"name": name}, actor=owner, now=at)
 
     for do in (rename, rename_method):
         do("Barn Owls", at=now)
@@ -134,7 +134,7 @@ def test_a_team_and_a_method_are_renamed_once_a_day(owner: User, team: Team) -> 
             do("Eagle Owls", at=now + timedelta(hours=23))
         do("Eagle Owls", at=now + timedelta(hours=24))
     # What else is said of a method can be changed as often as one likes.
-    methods.edit(method=method, changes={"description": "Better."}, actor=owner)
+    editing.edit(method=method, changes={"description": "Better."}, actor=owner)
 
 
 def test_renaming_changes_every_board_and_is_told_to_the_trail(

@@ -9,10 +9,10 @@ from django.test import Client
 from django.utils import timezone
 from rest_framework.test import APIClient
 
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import BoardVersion, Edition, Split, User
+from leaderboard.queue import pollers
 from leaderboard.quotas import admissions
-from leaderboard.workers import queue
 from tests import builders, pages
 from tests.leaderboard.api.test_submissions import client_of, post
 
@@ -68,25 +68,25 @@ def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client
 def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
     opens_at = timezone.now() + HOUR
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
-    versions.times_passed(now=timezone.now())
-    before = versions.state()
+    board_versions.times_passed(now=timezone.now())
+    before = board_versions.state()
     assert "open at" in client.get("/board/test/").text
     # It has opened; then it has closed; then a maintainer gives more time.
     for shift, said in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
         moment = timezone.now() + shift
         Split.objects.filter(pk="test").update(opens_at=moment, closes_at=moment + HOUR)
-        queue.sweep(rng=random.Random(0))
-        assert versions.state() > before
-        before = versions.state()
+        pollers.sweep(rng=random.Random(0))
+        assert board_versions.state() > before
+        before = board_versions.state()
         assert said in client.get("/board/test/").text
-        assert versions.times_passed(now=timezone.now()) == 0
+        assert board_versions.times_passed(now=timezone.now()) == 0
     assert BoardVersion.objects.get(split="test").n_times_passed == 1
 
 
 def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> None:
-    before = versions.state()
-    assert versions.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
-    assert versions.state() == before
+    before = board_versions.state()
+    assert board_versions.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
+    assert board_versions.state() == before
     assert admissions.sentence_of(Split.objects.get(pk="test"), now=timezone.now()) == ""
 
 

@@ -9,11 +9,11 @@ from django.utils import timezone
 from pytest_django.fixtures import Settings
 
 from leaderboard.models import Edition, SpentMailbox, Split, Submission, User
+from leaderboard.moderation import forgetting
 from leaderboard.people import teams
-from leaderboard.quotas import quotas
-from leaderboard.quotas.quotas import QuotaExceeded
-from leaderboard.submissions import forgetting
-from leaderboard.workers import queue
+from leaderboard.queue import pollers
+from leaderboard.quotas import limits
+from leaderboard.quotas.limits import QuotaExceeded
 from tests import builders
 from tests.leaderboard.web.account import proving
 
@@ -52,7 +52,7 @@ def forget(user: User) -> None:
 def left(user: User) -> int | None:
     split = Split.objects.get(pk="test")
     team = teams.current_team_of(user=user)
-    return quotas.state(team=team, user=user, split=split, now=timezone.now()).left
+    return limits.state(team=team, user=user, split=split, now=timezone.now()).left
 
 
 # --- the attack ---------------------------------------------------------------------------------------------
@@ -98,9 +98,9 @@ def test_what_is_kept_names_nobody_and_goes_with_the_longest_window(limited: Edi
     tables = (SpentMailbox, User, EmailAddress, Submission)
     everything = "".join(serializers.serialize("json", model._base_manager.all()) for model in tables)
     assert [text for text in ("kestrel", "example.org") if text in everything] == []
-    queue.clean(now=row.kept_until - timedelta(seconds=1))
+    pollers.clean(now=row.kept_until - timedelta(seconds=1))
     assert SpentMailbox.objects.exists()
-    queue.clean(now=row.kept_until)
+    pollers.clean(now=row.kept_until)
     assert not SpentMailbox.objects.exists()
     assert Submission.objects.get().submitted_by == first
 

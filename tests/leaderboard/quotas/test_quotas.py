@@ -10,8 +10,7 @@ from django.utils import timezone
 from hypothesis import given
 from hypothesis import strategies as st
 
-from leaderboard.benchmark import splits
-from leaderboard.editions import corrections
+from leaderboard.editions import corrections, splits
 from leaderboard.errors.refusals import NotMaintainer
 from leaderboard.models import (
     AuditEvent,
@@ -24,9 +23,9 @@ from leaderboard.models import (
     User,
 )
 from leaderboard.people import teams
-from leaderboard.quotas import quotas
-from leaderboard.quotas.quotas import Quota, QuotaExceeded
-from leaderboard.submissions import submissions
+from leaderboard.quotas import limits
+from leaderboard.quotas.limits import Quota, QuotaExceeded
+from leaderboard.submissions import intake
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -40,7 +39,7 @@ def limit(split: str = "test", **rules: object) -> None:
     Split.objects.filter(pk=split).update(**{f"quota_{name}": value for name, value in rules.items()})
 
 
-def send(user: User, data: bytes, *, at: datetime = NOW, **options: Any) -> submissions.Submitted:
+def send(user: User, data: bytes, *, at: datetime = NOW, **options: Any) -> intake.Submitted:
     return builders.send(user, data, now=at, **options)
 
 
@@ -55,7 +54,7 @@ def bad(number: int) -> bytes:
 
 def state(user: User, *, at: datetime = NOW, split: str = "test") -> Quota:
     row = Split.objects.get(pk=split)
-    return quotas.state(team=teams.current_team_of(user=user), user=user, split=row, now=at)
+    return limits.state(team=teams.current_team_of(user=user), user=user, split=row, now=at)
 
 
 # --- the rules of the benchmark --------------------------------------------------------------------------
@@ -136,7 +135,7 @@ def test_a_scored_submission_costs_its_slot_even_if_it_is_withdrawn(edition: Edi
     limit(limit=1)
     submission = send(owner, other(edition, 1)).submission
     builders.score_all()
-    submissions.withdraw(submission=submission, actor=owner, now=NOW)
+    intake.withdraw(submission=submission, actor=owner, now=NOW)
     assert state(owner).left == 0
 
 
@@ -147,7 +146,7 @@ def test_cancelling_gives_no_end_of_files_that_are_kept(edition: Edition, owner:
     limit(limit=1, rejected_limit=3)
     for number in range(3):
         submission = send(owner, other(edition, number)).submission
-        submissions.withdraw(submission=submission, actor=owner, now=NOW)
+        intake.withdraw(submission=submission, actor=owner, now=NOW)
     with pytest.raises(QuotaExceeded, match="reached its limit for test: within 24 hours, 3 files"):
         send(owner, other(edition, 3))
     assert (state(owner).left, state(owner).n_rejected, state(owner).next_slot_at) == (1, 3, NOW + DAY)
@@ -228,7 +227,7 @@ def test_a_team_can_have_rules_of_its_own_with_a_reason(
     event = AuditEvent.objects.get(verb="quota_overridden", actor=maintainer)
     told = {name: event.details[name] for name in ("split", "quota_limit", "reason")}
     assert told == {"split": "test", "quota_limit": 2, "reason": reason}
-    quotas.end_override(row=row, actor=maintainer)
+    limits.end_override(row=row, actor=maintainer)
     assert state(owner).left == 0
     assert AuditEvent.objects.filter(verb="quota_restored", noun_id=row.team_id).count() == 1
 
@@ -253,7 +252,7 @@ def test_the_next_slot_opens_exactly_when_it_is_said_to(
     split = Split(name="test")
 
     def weighed(at: datetime) -> Quota:
-        return quotas.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
+        return limits.weigh(split=split, rules=rules, spent=sorted(spent), rejected=sorted(rejected), now=at)
 
     found = weighed(now)
     if found.is_open:

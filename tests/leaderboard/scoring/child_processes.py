@@ -11,8 +11,8 @@ needs_root = pytest.mark.skipif(
     os.geteuid() != 0, reason="the environment and the descriptors of a reader are shown to root alone"
 )
 
-READERS = ("evaluator.predictions.sandbox", "evaluator.truth.annotation_child")
-FORK_SERVER = "evaluator.predictions.fork_server"
+READERS = ("evaluator.predictions.reader", "evaluator.truth.annotation_child")
+FORK_SERVER = "evaluator.predictions.reader_server"
 
 
 def children() -> set[int]:

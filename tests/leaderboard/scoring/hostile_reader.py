@@ -9,7 +9,7 @@ from pathlib import Path
 
 from pytest_django import Settings
 
-from leaderboard.scoring import fork_server
+from leaderboard.sandbox import fork_server
 from tests.chaos.processes import REPOSITORY
 
 MARK = b"#run\n"

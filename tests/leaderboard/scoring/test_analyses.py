@@ -9,7 +9,7 @@ from django.utils import timezone
 import evaluator
 from evaluator import get_protocol
 from leaderboard.models import Analysis, Edition, Split, Submission, User
-from leaderboard.scoring import analyses
+from leaderboard.statistics import analyses
 from leaderboard.storage import files, truth_values
 from tests import builders
 from tests.editions import ANYBODY

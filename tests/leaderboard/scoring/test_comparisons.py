@@ -10,10 +10,10 @@ from django.utils import timezone
 
 from evaluator import SCORE_NAMES, Difference, compare_predictions, published, read_predictions
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
-from leaderboard.scoring import comparisons
-from leaderboard.scoring.comparisons import BadComparison, NotOnTheBoard, UnknownMethod
+from leaderboard.statistics import comparisons
+from leaderboard.statistics.comparisons import BadComparison, NotOnTheBoard, UnknownMethod
 from leaderboard.storage import files, truth_values
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders
 from tests.editions import ANYBODY
 
@@ -157,7 +157,7 @@ def test_what_makes_no_comparison_is_refused_in_words(entries: list[Submission],
         ask(entries[0], entries[0])
     with pytest.raises(NotOnTheBoard, match=r"val has no board"):
         ask(*many, split="val")
-    submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+    intake.withdraw(submission=entries[0], actor=owner, now=timezone.now())
     with pytest.raises(NotOnTheBoard, match=r"no scored submission on test"):
         ask(*many)
     codes = {kind.code for kind in (BadComparison, UnknownMethod, NotOnTheBoard)}

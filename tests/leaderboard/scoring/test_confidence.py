@@ -13,7 +13,7 @@ from scipy import stats
 
 from evaluator import SCORE_NAMES
 from evaluator.scoring import uncertainty
-from leaderboard.boards import boards
+from leaderboard.boards import query
 from leaderboard.models import (
     BoardVersion,
     Edition,
@@ -25,11 +25,11 @@ from leaderboard.models import (
     User,
     Visibility,
 )
-from leaderboard.scoring import confidence, disclosure, recording_sums, verdicts
-from leaderboard.scoring.confidence import Entries
+from leaderboard.queue import backlog
+from leaderboard.statistics import confidence, disclosure, recording_sums
+from leaderboard.statistics.confidence import Entries
 from leaderboard.storage import files, truth_values
-from leaderboard.submissions import submissions
-from leaderboard.workers import backlog
+from leaderboard.submissions import intake, status_text
 from tests import builders
 from tests.editions import ANYBODY, board_now, corrected, open_edition
 from tests.leaderboard.scoring.inferred_scores import INFERRED, everything, scores_of
@@ -118,7 +118,7 @@ def test_an_edition_without_enough_recordings_has_no_interval_and_says_why(
     assert {row[3:] for row in everything()} == {(None, None)}
     edition.refresh_from_db()
     assert edition.inferred_at is not None
-    assert verdicts.why_no_interval(edition) == (
+    assert status_text.why_no_interval(edition) == (
         "There are no confidence intervals: too few recordings (effective number 6.9; at least 8 needed)."
     )
 
@@ -128,7 +128,7 @@ def test_what_holds_is_not_made_again_and_what_changed_is(
 ) -> None:
     before = everything()
     assert builders.infer_all() == 0
-    submissions.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
+    intake.withdraw(submission=inferred[0], actor=owner, now=timezone.now())
     assert builders.infer_all() == 1
     withdrawn, *others = (scores_of(submission, edition)["mid"] for submission in inferred)
     assert (withdrawn.rank_low, withdrawn.rank_high, withdrawn.is_with_best) == (None, None, None)
@@ -190,7 +190,7 @@ def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
     inferred: list[Submission], edition: Edition, owner: User
 ) -> None:
     best, *others = inferred
-    submissions.withdraw(submission=best, actor=owner, now=timezone.now())
+    intake.withdraw(submission=best, actor=owner, now=timezone.now())
     rows = {row.submission_id: row for row in board_now().entries}
     gone = [rows[other.pk].intervals["mid"] for other in others]
     assert None in [found.rank_low for found in gone]
@@ -207,7 +207,7 @@ def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
 def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
     inferred: list[Submission], edition: Edition
 ) -> None:
-    then = boards.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
+    then = query.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
     rows = [entry for entry in then.entries if entry.kind == "submission"]
     assert len(rows) == len(inferred)
     for entry in rows:
@@ -244,7 +244,7 @@ def test_nothing_is_written_when_the_entries_change_meanwhile(
     before = everything()
 
     def withdraw() -> None:
-        submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+        intake.withdraw(submission=entries[0], actor=owner, now=timezone.now())
 
     assert not confidence.infer(Entries.of(edition), now=timezone.now(), between=withdraw)
     assert everything() == before
@@ -278,7 +278,7 @@ def test_an_edition_that_is_being_scored_has_patience_but_not_for_ever(
 
 def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submission], edition: Edition) -> None:
     chosen = {row.evaluation_id for row in confidence.ranked(confidence.active_entries(edition))}
-    board = boards.board(split=edition.split, viewer=ANYBODY)
+    board = query.board(split=edition.split, viewer=ANYBODY)
     assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
 
 

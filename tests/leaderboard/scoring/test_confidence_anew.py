@@ -4,7 +4,7 @@ import pytest
 
 from evaluator import SCORE_NAMES
 from leaderboard.models import Comparison, Edition, EditionRanges, Evaluation, Score, Submission
-from leaderboard.scoring import confidence, recording_sums
+from leaderboard.statistics import confidence, recording_sums
 from tests import builders
 from tests.leaderboard.scoring.inferred_scores import everything
 

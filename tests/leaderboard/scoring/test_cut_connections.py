@@ -10,8 +10,8 @@ from django.db import Error, connection
 
 from leaderboard.errors import outages
 from leaderboard.models import AuditEvent, Edition, Status, Submission, User
-from leaderboard.scoring import worker
-from leaderboard.scoring.lifecycle import Lease
+from leaderboard.queue import worker
+from leaderboard.queue.lifecycle import Lease
 from leaderboard.storage import files
 from tests import builders
 from tests.leaderboard.scoring.cutting_proxy import Cut, CuttingProxy

@@ -8,9 +8,9 @@ from django.db import transaction
 from django.test import Client
 
 from evaluator import SCORE_NAMES, Difference
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import Comparison, Edition, Score, Split, Submission, User, Visibility
-from leaderboard.scoring import comparisons, disclosure
+from leaderboard.statistics import comparisons, disclosure
 from tests import builders
 from tests.leaderboard.scoring.test_comparisons import ask, known, set_visibility
 
@@ -182,7 +182,7 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
 
     set_visibility(other, Visibility.PUBLIC)
     with transaction.atomic():
-        versions.changed("test")
+        board_versions.changed("test")
     (pair,) = ask(entries[0], other, viewer=owner).pairs
     assert pair.withheld == ""
 

@@ -1,4 +1,4 @@
-"""`leaderboard.scoring.lifecycle`: every verb, one step at a time."""
+"""`leaderboard.queue.lifecycle`: every verb, one step at a time."""
 
 from dataclasses import replace
 from datetime import timedelta
@@ -11,8 +11,8 @@ from pytest_django import DjangoCaptureOnCommitCallbacks
 from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Score, Status, Submission, User
 from leaderboard.ops import broker
 from leaderboard.people import teams
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import MAX_POISON_STRIKES, Lease, LostRace, Outcome, Strike
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import MAX_POISON_STRIKES, Lease, LostRace, Outcome, Strike
 from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
 

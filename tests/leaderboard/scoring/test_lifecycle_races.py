@@ -10,8 +10,8 @@ import pytest
 from django.db import connection
 
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, Submission, User
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import MAX_INFRASTRUCTURE_STRIKES, Lease, LostRace
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import MAX_INFRASTRUCTURE_STRIKES, Lease, LostRace
 from tests import builders
 from tests.leaderboard.db.test_races import at_once
 from tests.leaderboard.web.maintain import queue_rows

@@ -27,8 +27,8 @@ from hypothesis.stateful import (
 )
 
 from leaderboard.models import AuditEvent, Edition, Evaluation, Score, Status, User
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import (
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import (
     MAX_INFRASTRUCTURE_STRIKES,
     MAX_POISON_STRIKES,
     Lease,

@@ -1,4 +1,4 @@
-"""`leaderboard.scoring.lifecycle`: what happens to a run that came to nothing."""
+"""`leaderboard.queue.lifecycle`: what happens to a run that came to nothing."""
 
 import random
 from datetime import timedelta
@@ -8,13 +8,8 @@ from django.db.models.functions import Now
 from pytest_django import Settings
 
 from leaderboard.models import AuditEvent, Edition, Evaluation, Status, User
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import (
-    MAX_INFRASTRUCTURE_STRIKES,
-    MAX_POISON_STRIKES,
-    Lease,
-    Strike,
-)
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES, Lease, Strike
 from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.queue_rows import LEASE_S, WALL_S
 

@@ -12,8 +12,8 @@ from pytest_django import Settings
 
 from leaderboard.models import Comparison, Edition, Submission, User
 from leaderboard.ops import rate_limits
-from leaderboard.scoring import questions
-from leaderboard.scoring.questions import AskedTooOften
+from leaderboard.statistics import questions
+from leaderboard.statistics.questions import AskedTooOften
 from leaderboard.storage import truth_values
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows

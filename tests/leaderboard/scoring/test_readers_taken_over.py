@@ -16,11 +16,12 @@ import structlog
 from pytest_django import Settings
 
 from evaluator import Manifest, Predictions, Rejected, read_manifest, read_truth, system_calls
-from evaluator.predictions.predictions import sha256_digest
+from evaluator.predictions.loading import sha256_digest
 from evaluator.truth import annotation_folders
 from leaderboard.models import Edition, Evaluation, User
-from leaderboard.scoring import sandbox, worker
-from leaderboard.scoring.sandbox import ChildDied
+from leaderboard.queue import worker
+from leaderboard.sandbox import child
+from leaderboard.sandbox.child import ChildDied
 from leaderboard.storage import files
 from tests import builders
 from tests.leaderboard.scoring.hostile_reader import (
@@ -55,7 +56,7 @@ def read(tmp_path: Path, manifest: Manifest) -> Read:
         with tempfile.TemporaryFile() as source:
             source.write(data)
             source.seek(0)
-            return sandbox.read_predictions(
+            return child.read_predictions(
                 source,
                 digest=sha256_digest(data),
                 manifest=manifest,
@@ -118,13 +119,13 @@ def test_worker_says_once_that_there_is_no_filter(
     read: Read, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     known = os.uname()
-    sandbox._say_what_is_missing.cache_clear()
+    child._say_what_is_missing.cache_clear()
     monkeypatch.setattr(os, "uname", lambda: os.uname_result([*known[:4], "riscv64"]))
     with structlog.testing.capture_logs() as logged:
         for _ in range(2):
             with pytest.raises(Rejected):
                 read(b"no file")
-    sandbox._say_what_is_missing.cache_clear()
+    child._say_what_is_missing.cache_clear()
     [line] = logged
     assert line["event"] == "readers_without_a_filter_of_system_calls"
     assert "riscv64" in line["reason"]
@@ -169,7 +170,7 @@ def test_an_answer_as_an_honest_reader_gives_it_is_taken(
     read: Read, settings: Settings, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_forked: bool
 ) -> None:
     """Else the refusals below would prove nothing."""
-    monkeypatch.setattr(sandbox.fork_server, "AVAILABLE", is_forked)
+    monkeypatch.setattr(child.fork_server, "AVAILABLE", is_forked)
     with obeying_its_file(tmp_path, settings):
         data = changed("values[1] = float('-inf')")
         found = read(data)

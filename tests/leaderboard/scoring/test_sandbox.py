@@ -1,4 +1,4 @@
-"""`leaderboard.scoring.sandbox`: what a file can do to the process that reads it, and to nothing else.
+"""`leaderboard.sandbox.child`: what a file can do to the process that reads it, and to nothing else.
 
 The child is the real one. Where a test needs it in the middle of its file, the file is a pipe that is still
 open, and the heartbeat is the moment to look.
@@ -23,9 +23,9 @@ from pytest_django import Settings
 
 from evaluator import Manifest, Rejected, read_predictions, read_truth, write_predictions
 from evaluator.limits import READY
-from evaluator.predictions.predictions import Predictions, sha256_digest
-from leaderboard.scoring import sandbox
-from leaderboard.scoring.sandbox import ChildNotReady, LeaseLost
+from evaluator.predictions.loading import Predictions, sha256_digest
+from leaderboard.sandbox import child
+from leaderboard.sandbox.child import ChildNotReady, LeaseLost
 from tests import builders
 from tests.chaos.processes import REPOSITORY
 from tests.leaderboard.scoring.child_processes import (
@@ -68,7 +68,7 @@ def read(tmp_path: Path, manifest: Manifest) -> Read:
         manifest_path: Path = kept,
         digest: str = sha256_digest(FAULTY),
     ) -> Predictions:
-        return sandbox.read_predictions(
+        return child.read_predictions(
             source,
             digest=digest,
             manifest=manifest,
@@ -212,7 +212,7 @@ def test_server_has_no_descriptor_but_a_socket_and_no_credentials(
     read: Read, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TSTTC_DATABASE_URL", "postgres://somebody:secret@db/tsttc")
-    sandbox.fork_server.server_of_this_thread(python_path=REPOSITORY).close()
+    child.fork_server.server_of_this_thread(python_path=REPOSITORY).close()
     with opened(FAULTY) as source, tempfile.TemporaryFile() as left_open:
         os.set_inheritable(left_open.fileno(), True)
         with pytest.raises(Rejected):
@@ -228,7 +228,7 @@ def test_child_ends_with_a_parent_that_was_killed(tmp_path: Path, manifest: Mani
     """A worker that is killed leaves nothing behind that burns a processor."""
     manifest_path = tmp_path / "manifest.npz"
     manifest.save(manifest_path)
-    command = [sys.executable, "-m", "evaluator.predictions.sandbox", str(manifest_path), "4000000000", "60"]
+    command = [sys.executable, "-m", "evaluator.predictions.reader", str(manifest_path), "4000000000", "60"]
     parent = subprocess.Popen(
         # The shell, which the child's end of the pipe outlives, is the worker that is killed.
         ["sh", "-c", 'exec 3<&0; "$@" <&3 & echo $!; wait', "sh", *command],

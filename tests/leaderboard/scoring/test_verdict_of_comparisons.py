@@ -13,8 +13,8 @@ from evaluator.scoring.differences import sign_flips
 from evaluator.scoring.ranges import rank_ranges
 from evaluator.scoring.significance import p_below
 from leaderboard.boards.rows import Entry, Interval
-from leaderboard.scoring.comparisons import Compared, Difference, Pair
-from leaderboard.web.boards import compare_tables
+from leaderboard.statistics.comparisons import Compared, Difference, Pair
+from leaderboard.web.compare import compare_tables
 from tests.validity import margin, worlds
 
 A, B, C = (

@@ -9,9 +9,8 @@ from django.test import Client
 from pytest_django import Settings
 
 from leaderboard.models import Edition, Evaluation, Submission, User
-from leaderboard.scoring import worker
+from leaderboard.queue import pollers, worker
 from leaderboard.storage import truth_values
-from leaderboard.workers import queue
 from tests import builders
 from tests.caching import forget_boards
 
@@ -64,11 +63,11 @@ def test_the_sweep_says_so_in_the_log_and_healthy_to_whoever_watches(
     waiting: Submission, settings: Settings, caplog: pytest.LogCaptureFixture
 ) -> None:
     aside = take_away(settings)
-    queue.sweep(rng=RNG)
+    pollers.sweep(rng=RNG)
     assert "ground_truth_out_of_reach" in caplog.text
     assert healthiness() == (503, False)
     shutil.move(aside, settings.GROUND_TRUTH_DIR)
-    queue.sweep(rng=RNG)
+    pollers.sweep(rng=RNG)
     assert healthiness() == (200, True)
 
 

@@ -15,8 +15,8 @@ from structlog.testing import capture_logs
 
 from leaderboard.models import AuditEvent, Edition, Submission, User
 from leaderboard.ops import prometheus
+from leaderboard.queue import pollers
 from leaderboard.storage import files, orphans
-from leaderboard.workers import queue
 from tests import builders
 
 pytestmark = pytest.mark.slow
@@ -129,7 +129,7 @@ def test_the_workers_clean_by_themselves_and_say_what_they_removed(orphan: Path,
     half.write_bytes(b'{"0": 1')
     age(half, hours=2)
     with capture_logs() as lines:
-        queue.keep_up(rng=random.Random(0), stopping=threading.Event())
+        pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
     [line] = [line for line in lines if line["event"] == "cleaned"]
     assert (line["n_files"], line["n_bytes"], line["n_leftovers"]) == (1, 10, 1)
     assert not orphan.exists()

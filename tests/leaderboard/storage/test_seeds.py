@@ -6,7 +6,7 @@ import pytest
 from django.core.management import call_command
 
 from leaderboard.models import Comparison, Edition, Score, Split, Submission
-from leaderboard.scoring import confidence
+from leaderboard.statistics import confidence
 from leaderboard.storage import seeds
 from tests import builders
 

@@ -12,7 +12,7 @@ from django.utils import timezone
 
 from leaderboard import audit
 from leaderboard.errors.refusals import NotMaintainer, Refused
-from leaderboard.methods import methods
+from leaderboard.methods import editing
 from leaderboard.models import (
     AuditEvent,
     AuditText,
@@ -24,9 +24,9 @@ from leaderboard.models import (
     Team,
     User,
 )
+from leaderboard.moderation import forgetting, hiding
 from leaderboard.people import teams
-from leaderboard.submissions import forgetting, moderation
-from leaderboard.workers import queue
+from leaderboard.queue import pollers
 from tests import builders
 from tests.leaderboard.web.maintain.desk import get
 from tests.leaderboard.web.test_every_page import assert_sound
@@ -96,7 +96,7 @@ def test_a_hidden_entry_leaves_boards_of_all_times_and_a_withdrawn_one_its_value
     assert "Kept" not in Client().get("/board/test/").text
     assert "Kept" not in Client().get(f"/board/test.csv?at={at}").text
     with pytest.raises(Refused, match="withdrawn already"):
-        moderation.withdraw_entry(submission=sent, reason="R", actor=None, now=timezone.now(), is_hidden=True)
+        hiding.withdraw_entry(submission=sent, reason="R", actor=None, now=timezone.now(), is_hidden=True)
     assert set(
         AuditEvent.objects.filter(noun="Submission", noun_id=sent.pk).values_list("verb", flat=True)
     ) >= {
@@ -131,12 +131,12 @@ def test_a_closed_account_signs_in_nowhere_until_it_is_opened(
     do(keeper, "open-account", teammate.pk)
     assert Client().login(email=teammate.email, password="correct horse")
     with pytest.raises(Refused, match="your own account"):
-        moderation.set_active(user=maintainer, is_active=False, reason="R", actor=maintainer)
+        hiding.set_active(user=maintainer, is_active=False, reason="R", actor=maintainer)
 
 
 def test_only_maintainers_moderate(owner: User, stranger: User, team: Team) -> None:
     with pytest.raises(NotMaintainer):
-        moderation.rename_team(team=team, name="X", reason="R", actor=stranger, now=timezone.now())
+        hiding.rename_team(team=team, name="X", reason="R", actor=stranger, now=timezone.now())
     with pytest.raises(NotMaintainer):
         forgetting.forget(user=owner, reason="R", actor=stranger, now=timezone.now())
 
@@ -243,7 +243,7 @@ def test_what_is_written_into_a_blank_account_is_deleted_with_the_next_cleaning(
     EmailAddress.objects.create(user=owner, email="late@example.org")
     Authenticator.objects.create(user=owner, type=Authenticator.Type.TOTP, data={})
     SocialAccount.objects.create(user=owner, provider="github", uid="42")
-    queue.clean(now=timezone.now())
+    pollers.clean(now=timezone.now())
     assert list(EmailAddress.objects.values_list("email", flat=True)) == ["stays@example.org"]
     assert not Authenticator.objects.exists()
     assert not SocialAccount.objects.exists()
@@ -269,5 +269,5 @@ def test_the_export_names_no_method_of_a_team_that_the_person_has_left(
     ids = {method.name: str(method.pk) for method in Method.objects.all()}
     assert told() == {pk: name for name, pk in ids.items()}
     teams.leave(user=teammate)
-    methods.edit(method=Method.objects.get(name="Hers"), changes={"name": "NextGenSecret"}, actor=owner)
+    editing.edit(method=Method.objects.get(name="Hers"), changes={"name": "NextGenSecret"}, actor=owner)
     assert told() == {ids["Hers"]: None, ids["Masked"]: None, ids["Shown"]: "Shown"}

@@ -1,4 +1,4 @@
-"""`submissions.progress`: the place in the queue, and whose fault it was."""
+"""`intake.progress`: the place in the queue, and whose fault it was."""
 
 import random
 from datetime import UTC, datetime
@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 import pytest
 
 from leaderboard.models import Edition, Evaluation, Status, User
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import Strike
-from leaderboard.submissions import submissions
-from leaderboard.submissions.submissions import Progress
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import Strike
+from leaderboard.submissions import intake
+from leaderboard.submissions.intake import Progress
 from tests.leaderboard.web.maintain import queue_rows
 
 NOW = datetime(2026, 11, 21, 12, 0, tzinfo=UTC)
@@ -17,7 +17,7 @@ RNG = random.Random(0)
 
 
 def progress(evaluation: Evaluation) -> Progress:
-    return submissions.progress(Evaluation.objects.get(pk=evaluation.pk).submission)
+    return intake.progress(Evaluation.objects.get(pk=evaluation.pk).submission)
 
 
 def test_place_counts_those_that_are_claimed_before(edition: Edition, owner: User) -> None:

@@ -13,7 +13,7 @@ from pytest_django import Settings
 
 from evaluator import receipts as form
 from leaderboard.models import Edition, Submission, User
-from leaderboard.submissions import receipts, submissions
+from leaderboard.submissions import intake, receipts
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish
 from tests.leaderboard.api.test_submissions import client_of
@@ -74,7 +74,7 @@ def test_only_what_is_scored_and_stands_has_a_receipt(edition: Edition, owner: U
     rejected = builders.submit(owner, b"{}")
     builders.score_all()
     assert client.get(address(rejected)).json()["code"] == "not-scored"
-    submissions.withdraw(submission=waiting, actor=owner, now=timezone.now())
+    intake.withdraw(submission=waiting, actor=owner, now=timezone.now())
     response = client.get(address(waiting))
     assert (response.status_code, response.json()["code"]) == (409, "withdrawn")
 

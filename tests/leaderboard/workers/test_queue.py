@@ -1,4 +1,4 @@
-"""`leaderboard.workers.queue`: what waits is found again, with or without a broker."""
+"""`leaderboard.queue.pollers`: what waits is found again, with or without a broker."""
 
 import os
 import random
@@ -14,11 +14,11 @@ import pytest
 from django.db import connection, connections
 from django.utils import timezone
 
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import Edition, Evaluation, Status, SweepBeat, User
 from leaderboard.ops import health
-from leaderboard.workers import queue
-from leaderboard.workers.queue import Poller
+from leaderboard.queue import pollers
+from leaderboard.queue.pollers import Poller
 from tests import builders
 from tests.leaderboard.web.maintain import queue_rows
 
@@ -31,7 +31,7 @@ def test_sweep_takes_back_what_dead_workers_hold(edition: Edition, owner: User) 
     queue_rows.queued(edition, owner)
     lease = queue_rows.claim()
     queue_rows.expire(lease)
-    queue.sweep(rng=random.Random(0))
+    pollers.sweep(rng=random.Random(0))
     assert queue_rows.row(lease).status == Status.QUEUED
 
 
@@ -40,15 +40,15 @@ def keep_up(n: int, *, hours_ago: float) -> None:
     before = timezone.now() - timedelta(hours=hours_ago)
     SweepBeat.objects.update(sweep_begun_at=before, clean_begun_at=before, mails_begun_at=before)
     for _ in range(n):
-        queue.keep_up(rng=random.Random(0), stopping=threading.Event())
+        pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
 
 
 @pytest.fixture
 def done(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The times that something was swept, and cleaned."""
     done: list[str] = []
-    monkeypatch.setattr(queue, "sweep", lambda *, rng: done.append("swept"))
-    monkeypatch.setattr(queue, "clean", lambda *, now: done.append("cleaned"))
+    monkeypatch.setattr(pollers, "sweep", lambda *, rng: done.append("swept"))
+    monkeypatch.setattr(pollers, "clean", lambda *, now: done.append("cleaned"))
     return done
 
 
@@ -76,7 +76,7 @@ def test_workers_that_ask_at_the_same_moment_sweep_once(done: list[str]) -> None
 
     def ask() -> None:
         with connection.execute_wrapper(after_all_looks):
-            queue.keep_up(rng=random.Random(0), stopping=threading.Event())
+            pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
         connections.close_all()
 
     asking = [threading.Thread(target=ask) for _ in range(6)]
@@ -93,11 +93,11 @@ def test_a_sweep_that_breaks_is_not_written_down_and_keeps_nothing_else_waiting(
     def break_off(*, now: datetime) -> int:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(versions, "times_passed", break_off)
+    monkeypatch.setattr(board_versions, "times_passed", break_off)
     with pytest.raises(OSError, match="no space"):
-        queue.keep_up(rng=random.Random(0), stopping=threading.Event())
+        pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
     assert health.sweep_age_s() is None, "so that /readyz goes on saying that nobody sweeps"
-    queue.keep_up(rng=random.Random(0), stopping=threading.Event())
+    pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
     assert SweepBeat.objects.exclude(cleaned_at=None).exists()
 
 
@@ -154,7 +154,7 @@ def test_a_worker_keeps_its_memory_private() -> None:
 def test_a_look_decides_everything_that_waits(edition: Edition, owner: User) -> None:
     for factor in (1.1, 1.2, 1.3):
         builders.submit(owner, builders.predictions(edition, factor=factor))
-    assert queue.poll(rng=random.Random(0), stopping=threading.Event()) == 3
+    assert pollers.poll(rng=random.Random(0), stopping=threading.Event()) == 3
     assert set(Evaluation.objects.values_list("status", flat=True)) == {Status.SCORED}
 
 
@@ -162,7 +162,7 @@ def test_a_look_begins_nothing_once_it_is_told_to_stop(edition: Edition, owner: 
     builders.submit(owner, builders.predictions(edition))
     stopping = threading.Event()
     stopping.set()
-    assert queue.poll(rng=random.Random(0), stopping=stopping) == 0
+    assert pollers.poll(rng=random.Random(0), stopping=stopping) == 0
     assert Evaluation.objects.get().status == Status.QUEUED
 
 
@@ -172,7 +172,7 @@ def polling(act: Callable[..., object]) -> Iterator[Poller]:
     poller = Poller(act, every_s=0.01, rng=random.Random(0))
     poller.start()
     yield poller
-    queue.stop_pollers([poller], patience_s=PATIENCE_S)
+    pollers.stop_pollers([poller], patience_s=PATIENCE_S)
     assert not poller.is_alive()
 
 
@@ -201,7 +201,7 @@ def test_poller_finishes_what_is_in_hand_before_it_stops() -> None:
     with polling(look) as poller:
         assert begun.wait(PATIENCE_S)
         stop = threading.Thread(
-            target=queue.stop_pollers, args=([poller],), kwargs={"patience_s": PATIENCE_S}
+            target=pollers.stop_pollers, args=([poller],), kwargs={"patience_s": PATIENCE_S}
         )
         stop.start()
         assert not finished.is_set()

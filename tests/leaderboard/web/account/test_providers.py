@@ -22,8 +22,8 @@ from pytest_django import Settings
 
 from leaderboard import urls
 from leaderboard.models import User
+from leaderboard.moderation import forgetting
 from leaderboard.ops import environment
-from leaderboard.submissions import forgetting
 from leaderboard.web.account import providers
 from leaderboard.web.middleware import frame
 from tests.leaderboard.web.account.oauth_server import CODE, HANGS, IID, TOKEN, Provider, lead_to, running

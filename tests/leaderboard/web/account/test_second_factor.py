@@ -14,7 +14,7 @@ from django.utils import timezone
 from pytest_django import DjangoCaptureOnCommitCallbacks, Settings
 
 from leaderboard.models import AuditEvent, Edition, Mail, User
-from leaderboard.submissions import forgetting
+from leaderboard.moderation import forgetting
 from tests import builders
 from tests.leaderboard.web.test_every_page import assert_sound
 

@@ -15,7 +15,7 @@ from django.utils import timezone
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Comparison, Edition, Method, Submission, User
-from leaderboard.web.boards import charts
+from leaderboard.web.charts import board_charts
 from tests import builders, pages
 from tests.pages import get
 
@@ -204,10 +204,10 @@ def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_
         Attempt(first.method_id, uuid4(), began + timedelta(days=day), {"mid": mid})
         for day, mid in enumerate((60.0, 90.0, 80.0, 50.0, 70.0))
     ]
-    whole = charts.progress([first], attempts)
+    whole = board_charts.progress([first], attempts)
     assert (len(whole.rows), whole.note) == (5, "")
-    monkeypatch.setattr(charts, "MAX_BEHIND", 2)
-    chart = charts.progress([first], attempts)
+    monkeypatch.setattr(board_charts, "MAX_BEHIND", 2)
+    chart = board_charts.progress([first], attempts)
     assert [float(row[3].partition(">")[2].partition("<")[0]) for row in chart.rows] == [60, 80, 50, 70]
     assert chart.note == "Shown are the 4 with the lowest MiD, or on the line, of 5."
     assert sum(len(each["data"]) for each in chart.options["baseOption"]["series"][1:]) >= 4

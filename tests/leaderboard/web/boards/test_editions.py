@@ -10,7 +10,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.models import Edition, Publication, Submission, User
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders, pages
 from tests.editions import changed_on, corrected, extended, open_edition, publish, roll_back
 from tests.pages import get
@@ -177,7 +177,7 @@ def test_entry_that_the_next_edition_cannot_score_is_marked(
 def test_withdrawn_entry_leaves_its_mark_in_a_former_edition(
     client: Client, entries: list[Submission], owner: User, replaced: Edition
 ) -> None:
-    submissions.withdraw(submission=entries[0], actor=owner, now=timezone.now())
+    intake.withdraw(submission=entries[0], actor=owner, now=timezone.now())
     root = get(client, OLD)
     rows = root.one("table", class_="board").one("tbody").all("tr")
     (row,) = [row for row in rows if "withdrawn" in row.classes]

@@ -8,7 +8,7 @@ from django.test import Client
 from evaluator.papers.tables import published_tables
 from evaluator.tables.published import printed_tables
 from leaderboard.models import PublishedResult
-from leaderboard.web.boards.paper_charts import sweep
+from leaderboard.web.charts.paper_charts import sweep
 from tests.leaderboard.web.test_every_page import assert_sound
 
 pytestmark = pytest.mark.usefixtures("benchmark")

@@ -10,7 +10,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.models import Edition, Submission, User
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders
 
 LOC = "{http://www.sitemaps.org/schemas/sitemap/0.9}loc"
@@ -44,7 +44,7 @@ def test_the_sitemap_names_no_private_anonymous_or_withdrawn_method(
         data = builders.predictions(edition, factor=factor)
         sent = builders.submit(owner, data, method=f"M{factor}", visibility=visibility)
     builders.score_all()
-    submissions.withdraw(submission=Submission.objects.get(pk=sent.pk), actor=owner, now=timezone.now())
+    intake.withdraw(submission=Submission.objects.get(pk=sent.pk), actor=owner, now=timezone.now())
     assert [address for address in listed(client) if "/methods/" in address] == []
 
 

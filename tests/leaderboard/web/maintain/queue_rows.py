@@ -12,8 +12,8 @@ from django.utils import timezone
 
 from leaderboard.models import Edition, Evaluation, Method, Score, Status, Submission, User
 from leaderboard.people import teams
-from leaderboard.scoring import lifecycle
-from leaderboard.scoring.lifecycle import Lease, Outcome, Strike
+from leaderboard.queue import lifecycle
+from leaderboard.queue.lifecycle import Lease, Outcome, Strike
 
 LEASE_S = 60.0
 WALL_S = 300.0

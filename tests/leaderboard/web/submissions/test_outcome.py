@@ -7,7 +7,7 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from leaderboard.models import Edition, Method, Score, Split, Submission, User
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 from tests.editions import board_now
 from tests.leaderboard.scoring.inferred_scores import put_ranges
@@ -138,7 +138,7 @@ def test_nothing_of_another_team_and_nothing_withdrawn_is_beside_it(
     builders.submit(stranger, builders.predictions(edition, factor=1.01), method="Foreign")
     gone = builders.submit(owner, builders.predictions(edition, factor=1.05), method="Gone")
     builders.score_all()
-    submissions.withdraw(submission=gone, actor=owner, now=timezone.now())
+    intake.withdraw(submission=gone, actor=owner, now=timezone.now())
     rows = beside(look(signed_in, sent))
     assert len(rows) == 1
     assert "nearest row from a paper" in rows[0][0]

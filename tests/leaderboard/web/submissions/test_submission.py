@@ -10,7 +10,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.models import Edition, Evaluation, Submission, User
-from leaderboard.scoring import lifecycle
+from leaderboard.queue import lifecycle
 from leaderboard.submissions import outcomes
 from tests import builders, pages
 from tests.editions import corrected, open_edition, publish

@@ -7,7 +7,7 @@ from django.test import Client
 from django.utils import timezone
 
 from leaderboard.models import AuditEvent, Edition, Evaluation, Status, Submission, User
-from leaderboard.submissions import submissions
+from leaderboard.submissions import intake
 from tests import builders, pages
 from tests.editions import changed_on, corrected, extended, open_edition, publish, roll_back
 from tests.leaderboard.web.maintain import queue_rows
@@ -155,7 +155,7 @@ def test_an_edition_in_preparation_says_nothing_of_what_was_withdrawn_under_a_fo
     sent = builders.submit(owner, builders.predictions(edition, factor=1.15), method="Late")
     builders.score_all()
     assert sorted(sent.evaluations.values_list("edition__number", flat=True)) == [2, 3]
-    submissions.withdraw(submission=sent, actor=owner, now=timezone.now())
+    intake.withdraw(submission=sent, actor=owner, now=timezone.now())
     roll_back()
     sent = Submission.objects.get(pk=sent.pk)
-    assert submissions.progress(sent).edition_number == 2
+    assert intake.progress(sent).edition_number == 2

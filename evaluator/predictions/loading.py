@@ -1,0 +1,305 @@
+"""Prediction files: bytes in, values aligned with a manifest out, or a `Rejected` that says why.
+
+docs/file-format.md describes the format. Nothing but `Rejected` leaves `read_sent`, whatever the bytes; every
+sequence of the manifest ends up with exactly one finite or infinite value that is neither 0 nor NaN.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+import json
+import re
+import zlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from numpy.typing import ArrayLike
+
+from evaluator.arguments import Source, data_of, require
+from evaluator.arrays import in_row_order
+from evaluator.counting import counted
+from evaluator.metrics.scale import Floats, scale_ratio_to_ttc
+from evaluator.predictions.alignment import KeyKind, read_slowly
+from evaluator.predictions.columns import read_column
+from evaluator.predictions.documents import Unit
+from evaluator.predictions.parquet import as_sent
+from evaluator.predictions.writing import rate_of, require_values
+from evaluator.problems import pointer, quoted, reject
+from evaluator.truth.ground_truth import Manifest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Predictions:
+    """One value per sequence of the manifest.
+
+    `ttc_s` is float64 (n,), read-only, in the manifest's order: seconds from the target frame, scale ratios
+    already converted, nothing truncated. `digest` is "sha256:" and the hex SHA-256 of the file's bytes.
+    `names` are the file's own keys by row, where it was written for another manifest than this one.
+    """
+
+    manifest: Manifest
+    ttc_s: Floats
+    digest: str
+    unit: Unit = "ttc"
+    meta: Mapping[str, object] | None = None
+    keys: KeyKind = "anno_id"
+    enveloped: bool = False
+    names: tuple[str, ...] | None = None
+
+    def __repr__(self) -> str:
+        ends = f"{self.ttc_s.min():.4g} to {self.ttc_s.max():.4g} s"
+        return f"Predictions({counted(len(self.ttc_s), 'sequence')}, {ends}, {self.digest[:19]}…)"
+
+    @classmethod
+    def from_arrays(
+        cls,
+        *,
+        manifest: Manifest,
+        ttc_s: ArrayLike | None = None,
+        scale_ratio: ArrayLike | None = None,
+        fps_hz: float | None = None,
+        frame_gap: int | None = None,
+        digest: str | None = None,
+    ) -> Predictions:
+        """Predictions from values in the manifest's order, without a file.
+
+        Give either `ttc_s` (seconds) or `scale_ratio` with `fps_hz` or `frame_gap`, (n,). Without a `digest`,
+        that of the seconds' little-endian float64 bytes is taken. Raises `ValueError` for another shape, a
+        Series in another order and arguments that do not fit together, `TypeError` for a dict, `Rejected`
+        for scale ratios that are not greater than 0; other forbidden values are found by `evaluate`.
+        """
+        require(manifest, Manifest, name="manifest")
+        name, given = ("scale_ratio", scale_ratio) if ttc_s is None else ("ttc_s", ttc_s)
+        if given is None or (ttc_s is not None and scale_ratio is not None):
+            raise ValueError("Give either ttc_s or scale_ratio.")
+        values = in_row_order(given, name=name, anno_id=manifest.anno_id)
+        if values.shape != (manifest.n_sequences,):
+            raise ValueError(f"{name} has the shape {values.shape}; expected ({manifest.n_sequences},).")
+        unit: Unit = "ttc"
+        rate_hz = rate_of(is_ratio=ttc_s is None, fps_hz=fps_hz, frame_gap=frame_gap)
+        if rate_hz is not None:
+            require_values(values, manifest.anno_id_keys, is_ratio=True)
+            values, unit = scale_ratio_to_ttc(values, fps_hz=rate_hz), "scale_ratio"
+        values.setflags(write=False)
+        found = digest if digest is not None else sha256_digest(values.astype("<f8").tobytes())
+        return cls(manifest=manifest, ttc_s=values, digest=found, unit=unit)
+
+    def where(self, row: int) -> str:
+        """The JSON pointer to the value of sequence `row`."""
+        ours = self.manifest.anno_id_keys if self.keys == "anno_id" else self.manifest.natural_keys
+        names = ours if self.names is None else self.names
+        return pointer("predictions", names[row]) if self.enveloped else pointer(names[row])
+
+
+def read_predictions(source: Source, *, manifest: Manifest, max_bytes: int | None = None) -> Predictions:
+    """Read a prediction file and align it with `manifest`; raises `Rejected` with every fault of the file.
+
+    `source` is a path, the bytes of the file or the file itself, open, in any form of docs/file-format.md;
+    larger than `max_bytes` it is not looked at. The digest is that of the bytes, of a Parquet table that of
+    the JSON that is sent in its place; such a table needs pyarrow (`ModuleNotFoundError` without).
+    """
+    require(manifest, Manifest, name="manifest")
+    data = data_of(source)
+    if max_bytes is not None and len(data) > max_bytes:
+        raise reject("too-large", f"The file has {len(data):,} bytes; expected at most {max_bytes:,}.")
+    return read_sent(as_sent(data), manifest=manifest)
+
+
+def read_sent(data: bytes, *, manifest: Manifest) -> Predictions:
+    """As `read_predictions`, in the forms that a leaderboard takes: bytes of strangers come here."""
+    text = json_of(data, max_rows=2 * manifest.n_sequences + 100_000)
+    found = read_column(text, manifest) or read_slowly(text, manifest)
+    found.ttc_s.setflags(write=False)
+    return Predictions(
+        manifest=manifest,
+        ttc_s=found.ttc_s,
+        digest=sha256_digest(data),
+        unit=found.document.unit,
+        meta=found.document.meta,
+        keys=found.keys,
+        enveloped=found.document.enveloped,
+    )
+
+
+def sha256_digest(data: bytes) -> str:
+    """`sha256:` and the hex digest of `data`."""
+    return "sha256:" + hashlib.sha256(data).hexdigest()
+
+
+# --- files that are no JSON as they come: JSON in gzip, and CSV tables; a field that is no number becomes a
+# --- JSON text, and is refused as one
+
+MAX_UNPACKED_BYTES: Final = 64 * 1024 * 1024
+"""What a gzip archive may unpack to, far above what the largest split needs."""
+
+MAX_GZIP_MEMBERS: Final = 2_000
+"""What a gzip archive may consist of: gzip and pigz write one member, bgzip one for each 64 KB of text."""
+
+GZIP: Final = b"\x1f\x8b"
+_CHUNK_BYTES: Final = 1 << 16
+_PADDING: Final = re.compile(rb"\x00*")
+MAX_COLUMNS: Final = 1_000
+"""What a line of a CSV table may have, far more than the columns that are read."""
+
+NATURAL_KEY: Final = ("bag_stamp", "cam_id", "ts", "track_id")
+VALUES: Final = {"ttc": "ttc", "ttc_s": "ttc", "scale_ratio": "scale_ratio"}
+RATES: Final = ("fps", "frame_gap")
+
+_NAMES: Final = frozenset({"anno_id", *NATURAL_KEY, *VALUES, *RATES})
+_FIRST_LINE: Final = re.compile(rb"\s*([^\r\n]{0,2000})")
+_NUMBER: Final = re.compile(
+    r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|[+-]?(?:nan|inf|infinity)", re.IGNORECASE
+)
+_EXPECTED: Final = (
+    "expected anno_id, or bag_stamp, cam_id, ts and track_id, and either ttc (seconds) or scale_ratio with "
+    "fps or frame_gap"
+)
+
+
+def json_of(data: bytes, *, max_rows: int | None = None) -> bytes:
+    """The JSON text of a prediction file, which is most often the file itself.
+
+    Raises `Rejected` for an archive that is damaged or unpacks to too much, and for a table that cannot be
+    read or has more than `max_rows` rows.
+    """
+    if data.startswith(GZIP):
+        data = _unpacked(data)
+    return _of_table(data, max_rows=max_rows) if _is_table(data) else data
+
+
+def _unpacked(data: bytes) -> bytes:
+    """The content of a gzip archive, of all its members; nothing beyond the limits is ever unpacked."""
+    parts, start, n_members, n_left = list[bytes](), 0, 0, MAX_UNPACKED_BYTES
+    while start < len(data):
+        n_members += 1
+        if n_members > MAX_GZIP_MEMBERS:
+            message = (
+                f"The gzip archive has more than {MAX_GZIP_MEMBERS:,} members; expected at most "
+                f"{MAX_GZIP_MEMBERS:,}, as gzip, pigz and bgzip write them."
+            )
+            raise reject("too-many-members", message, f"byte {start}")
+        content, end = _member(data, start, max_bytes=n_left)
+        parts.append(content)
+        n_left -= len(content)
+        padding = _PADDING.match(data, end)
+        start = padding.end() if padding else end
+    return b"".join(parts)
+
+
+def _member(data: bytes, start: int, *, max_bytes: int) -> tuple[bytes, int]:
+    """The content of the member that begins at `start`, and where it ends; at most `max_bytes` of content."""
+    # A child that reads files may open nothing, and zlib opens nothing.
+    reader, parts = zlib.decompressobj(wbits=31), list[bytes]()
+    while not reader.eof:
+        if start >= len(data):
+            raise reject("not-json", "The file is not an intact gzip archive: it ends too early.")
+        # In pieces: zlib copies what comes behind the member's end.
+        piece = data[start : start + _CHUNK_BYTES]
+        try:
+            parts.append(reader.decompress(piece, max_bytes + 1))
+        except zlib.error as error:
+            raise reject("not-json", f"The file is not an intact gzip archive: {error}.") from None
+        max_bytes -= len(parts[-1])
+        if max_bytes < 0:
+            message = f"The archive unpacks to more than {MAX_UNPACKED_BYTES:,} bytes; expected at most that."
+            raise reject("too-large", message)
+        start += len(piece) - len(reader.unused_data)
+    return b"".join(parts), start
+
+
+def _is_table(data: bytes) -> bool:
+    """Whether the first line names columns of a table; no JSON text begins so."""
+    found = _FIRST_LINE.match(data.removeprefix(b"\xef\xbb\xbf"))
+    line = found[1] if found else b""
+    fields = line.decode("utf-8", "replace").split(",")
+    return (
+        len(fields) > 1
+        and not line.startswith((b"{", b"["))
+        and not _NAMES.isdisjoint(name.strip().strip('"') for name in fields)
+    )
+
+
+def _of_table(data: bytes, *, max_rows: int | None) -> bytes:
+    try:
+        text = data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        message = f"Byte {error.start:,} of the table is not UTF-8; expected CSV text encoded in UTF-8."
+        raise reject("not-utf8", message, f"byte {error.start}") from None
+    rows = csv.reader(_lines(text.lstrip(), max_rows=max_rows), strict=True)
+    try:
+        header = [name.strip() for name in next(rows)]
+        return document_of(header, _checked(rows, n_fields=len(header)))
+    except csv.Error as error:
+        message = f"This is not a CSV table: {error}."
+        raise reject("bad-csv", message, f"line {rows.line_num}") from None
+
+
+def _lines(text: str, *, max_rows: int | None) -> Iterator[str]:
+    """The lines of a table, its header first; refused before the fields of a line take memory."""
+    for number, line in enumerate(io.StringIO(text, newline="")):
+        if max_rows is not None and number > max_rows:
+            message = f"The table has more than {max_rows:,} rows; expected one for each sequence."
+            raise reject("too-many-members", message)
+        n_fields = line.count(",") + 1
+        if n_fields > MAX_COLUMNS:
+            message = f"The line has up to {n_fields:,} fields; expected at most {MAX_COLUMNS:,}."
+            raise reject("too-many-members", message, f"line {number + 1}")
+        yield line
+
+
+def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]:
+    for number, row in enumerate(filter(None, rows), start=1):
+        if len(row) != n_fields:
+            message = f"The row has {len(row)} fields; expected {n_fields}, as the header."
+            raise reject("bad-csv", message, f"row {number}")
+        yield row
+
+
+def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
+    """Of the columns of a table, those of the key, that of the value and, of scale ratios, that of the rate.
+
+    Raises `Rejected` for a table without the columns that it needs.
+    """
+    keys = NATURAL_KEY if set(NATURAL_KEY) <= set(header) else ("anno_id",)
+    values = [name for name in VALUES if name in header]
+    rates = [name for name in RATES if name in header]
+    if not set(keys) <= set(header) or len(values) != 1 or len(rates) != (values == ["scale_ratio"]):
+        message = f"The table has the columns {quoted(','.join(header))}; {_EXPECTED}."
+        raise reject("missing-columns", message, "line 1")
+    return keys, values[0], rates[0] if rates else None
+
+
+def document_of(header: Sequence[str], rows: Iterable[Sequence[str | None]]) -> bytes:
+    """The JSON text of a table: the flat form for seconds, an envelope for scale ratios.
+
+    Keys that appear twice stay there twice. A field of None has no value; those of keys have one. Raises
+    `Rejected` for a table without the columns that it needs.
+    """
+    keys, value, rate = columns_of(header)
+    columns = {name: header.index(name) for name in (*keys, value, *([rate] if rate else []))}
+    places = [columns[name] for name in keys]
+    members, ratios = list[str](), list[str]()
+    for row in rows:
+        name = json.dumps("/".join((row[place] or "").strip() for place in places))
+        members.append(f"{name}:{_number(row[columns[value]])}")
+        if rate is not None:
+            ratios.append(f"{name}:{_number(row[columns[rate]])}")
+    predictions, rates = (f"{{{','.join(each)}}}" for each in (members, ratios))
+    if rate is None:
+        return predictions.encode()
+    return f'{{"unit":"scale_ratio","{rate}":{rates},"predictions":{predictions}}}'.encode()
+
+
+def _number(text: str | None) -> str:
+    """A field as JSON: the nearest float64 of a number, else the text, which the reader refuses.
+
+    >>> _number(" 5.31"), _number("inf"), _number(""), _number(None)
+    ('5.31', 'Infinity', '""', 'null')
+    """
+    if text is None:
+        return "null"
+    text = text.strip()
+    return json.dumps(float(text)) if _NUMBER.fullmatch(text) else json.dumps(text)

@@ -1,0 +1,81 @@
+"""The child process in which untrusted bytes are parsed: `python -m evaluator.predictions.reader`.
+
+It writes `READY` to its standard output, reads a prediction file from its standard input, and writes one line
+of JSON, followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the
+first untrusted byte is read it gives up memory, processor time, new processes and the right to open anything,
+sockets included, and where the kernel can do that all system calls but those that reading needs. A child that
+ends before `READY` has seen nothing of the file.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, forbid_calls, limit, obey_the_parent_alone
+from evaluator.predictions.columns import key_words
+from evaluator.predictions.loading import read_sent
+from evaluator.problems import Rejected
+from evaluator.truth.ground_truth import Manifest
+
+
+def warm_up(manifest: Manifest) -> None:
+    """Run every branch that imports late, and make the manifest's keys: nothing can be opened afterwards."""
+    _ = key_words(manifest), manifest.row_of_natural_key
+    for sample in (
+        b"{",
+        b"[]",
+        b'{"a":NaN}',
+        b'{"a":1,"a":1}',
+        b'{"unit":"scale_ratio"}',
+        b"\xff",
+        b'{"a":"b"}',
+        b"\x1f\x8b",
+        b"PAR1",
+        b"anno_id,ttc\n\xff",
+        b"anno_id,ttc\n0,x\n",
+    ):
+        try:
+            read_sent(sample, manifest=manifest)
+        except Rejected:
+            continue
+
+
+def answer(data: bytes, *, manifest: Manifest) -> bytes:
+    """The header line for these bytes, and the values behind it if they are good."""
+    try:
+        predictions = read_sent(data, manifest=manifest)
+    except Rejected as rejected:
+        return json.dumps({"verdict": "rejected", **rejected.as_dict()}).encode() + b"\n"
+    header = {
+        "verdict": "good",
+        "digest": predictions.digest,
+        "unit": predictions.unit,
+        "keys": predictions.keys,
+        "enveloped": predictions.enveloped,
+    }
+    values = np.ascontiguousarray(predictions.ttc_s, dtype="<f8").tobytes()
+    return json.dumps(header).encode() + b"\n" + values
+
+
+def main() -> None:
+    """Arguments: manifest file, memory limit in bytes, processor time in seconds."""
+    obey_the_parent_alone()
+    manifest = Manifest.load(Path(sys.argv[1]))
+    warm_up(manifest)
+    limit(memory_bytes=int(sys.argv[2]), cpu_s=int(sys.argv[3]))
+    forbid_calls()
+    out = sys.stdout.buffer
+    out.write(READY)
+    out.flush()
+    try:
+        found = answer(sys.stdin.buffer.read(), manifest=manifest)
+    except MemoryError:
+        sys.exit(EXIT_OUT_OF_MEMORY)
+    out.write(found)
+    out.flush()
+
+
+if __name__ == "__main__":
+    main()

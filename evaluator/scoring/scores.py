@@ -1,0 +1,230 @@
+"""Scoring: the metric specification of the TSTTC benchmark.
+
+The errors of each sequence, from the true time to contact τ (seconds from the target frame, never truncated)
+and the predicted τ̂ (truncated by the protocol), in float64:
+
+    α₁₀(τ) = 1 / ((1/(τ·10) + 1) + 10⁻⁶)
+    MiD    = |ln α₁₀(τ) − ln α₁₀(τ̂)| · 10⁴
+    RTE    = |(τ̂ − τ) / τ| · 100 %
+
+A score is the mean of an error over a range of the *true* τ, closed at both ends. `overall` is the mean over
+all sequences, also those in no range, beyond ±20 s. A range without sequences has no value. Which metrics and
+ranges there are says the protocol.
+
+`tsttc-1` truncates τ̂ to [−20, −0.15] ∪ [0.05, 20], to the nearest boundary of the same sign, so that
+α₁₀(τ̂) stays within [1/3, 3]. `toolkit` truncates to [−20, 20] only and refuses τ̂ whose α₁₀ is not positive
+and finite, where the dataset's toolkit crashes. Both refuse 0 and NaN, and truncate ±∞ to ±20.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.arguments import require
+from evaluator.metrics.protocol import (
+    DEFAULT_PROTOCOL,
+    OVERALL,
+    Protocol,
+    column_words,
+    get_protocol,
+    known_names,
+    metric_of,
+    split_name,
+)
+from evaluator.metrics.registry import Terms
+from evaluator.metrics.scale import Floats, scale_ratio_10hz
+from evaluator.predictions.alignment import ZERO_MESSAGE
+from evaluator.predictions.loading import Predictions
+from evaluator.predictions.revisions import realigned
+from evaluator.problems import Findings
+from evaluator.scoring.breakdown import Details
+from evaluator.scoring.report import IntervalScore, RecordingSums, Report, format_published
+from evaluator.truth.ground_truth import GroundTruth
+
+
+def evaluate(
+    predictions: Predictions,
+    truth: GroundTruth,
+    *,
+    protocol: str | Protocol = DEFAULT_PROTOCOL,
+    keep_sequences: bool = False,
+    keep_bags: bool = False,
+) -> Report:
+    """Score `predictions` against `truth`.
+
+    Raises `Rejected` for values that the protocol forbids, `TypeError` for other things than these,
+    `ValueError` for an unknown protocol and for predictions that were aligned with another manifest. With
+    `keep_sequences` the report carries the errors of every sequence and can look closer, with `keep_bags`
+    their sums per recording.
+    """
+    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
+    return Scorer(truth, rules).report(predictions, keep_sequences=keep_sequences, keep_bags=keep_bags)
+
+
+class Scorer:
+    """One truth under one protocol, ready for many predictions.
+
+    Works on the sequences in ascending τ, where an interval is a slice: the means are sums over contiguous
+    memory, which numpy adds pairwise, fast and accurate, and in the same order on every run.
+    """
+
+    def __init__(self, truth: GroundTruth, protocol: Protocol) -> None:
+        require(truth, GroundTruth, name="truth")
+        self._truth = truth
+        self._protocol = protocol
+        tau = truth.ascending_ttc_s
+        self._n_out_of_range = truth.n_outside(protocol.intervals)
+        self._slices = {OVERALL: slice(0, len(tau))} | {
+            i.name: slice(
+                int(np.searchsorted(tau, i.low_s, side="left")),
+                int(np.searchsorted(tau, i.high_s, side="right")),
+            )
+            for i in protocol.intervals
+        }
+
+    @cached_property
+    def _recordings(self) -> NDArray[np.int64]:
+        """The recording of every sequence, in ascending τ."""
+        return self._truth.manifest.recording_index[self._truth.ascending_rows]
+
+    @cached_property
+    def recording_counts(self) -> Floats:
+        """Sequences per recording in every column: the counts of all `RecordingSums` of this truth."""
+        n_bags = self._truth.manifest.n_recordings
+        parts = [self._recordings[part] for part in self._slices.values()] * len(self._protocol.metrics)
+        counts = np.stack([np.bincount(part, minlength=n_bags) for part in parts], axis=1)
+        return counts.astype(np.float64)
+
+    def _recording_sums(self, errors: Mapping[str, Floats]) -> RecordingSums:
+        n_bags = self._truth.manifest.n_recordings
+        columns = [
+            np.bincount(self._recordings[part], weights=values[part], minlength=n_bags)
+            for values in errors.values()
+            for part in self._slices.values()
+        ]
+        return RecordingSums(sums=np.stack(columns, axis=1), counts=self.recording_counts)
+
+    def report(
+        self, predictions: Predictions, *, keep_sequences: bool = False, keep_bags: bool = False
+    ) -> Report:
+        """The report on one set of predictions; raises as `evaluate` does."""
+        require(predictions, Predictions, name="predictions")
+        if predictions.manifest is not self._truth.manifest:
+            if predictions.manifest.digest != self._truth.manifest.digest:
+                raise ValueError(
+                    "The predictions are aligned with another manifest than that of this ground truth."
+                )
+            # The same sequences, but the rows of the two files may have another order.
+            predictions = realigned(predictions, manifest=self._truth.manifest)
+        errors, n_truncated = self._errors(predictions)
+        return Report(
+            protocol=self._protocol.name,
+            truth_digest=self._truth.digest,
+            predictions_digest=predictions.digest,
+            n_sequences=self._truth.n_sequences,
+            n_out_of_range=self._n_out_of_range,
+            truncated=dict(zip(self._protocol.boundaries, n_truncated, strict=True)),
+            scores={name: self._score(errors, part) for name, part in self._slices.items()},
+            sequences=self._in_file_order(errors) if keep_sequences else None,
+            bags=self._recording_sums(errors) if keep_bags else None,
+            details=Details(
+                self._truth, predictions, _truncate(predictions.ttc_s, self._protocol)[0], self._protocol
+            )
+            if keep_sequences
+            else None,
+        )
+
+    def _score(self, errors: Mapping[str, Floats], part: slice) -> IntervalScore:
+        count = part.stop - part.start
+        if count == 0:
+            return IntervalScore(dict.fromkeys(errors), 0)
+        means = {name: float(np.add.reduce(values[part])) / count for name, values in errors.items()}
+        return IntervalScore(means, count)
+
+    def _in_file_order(self, errors: Mapping[str, Floats]) -> dict[str, Floats]:
+        found = {name: np.empty_like(values) for name, values in errors.items()}
+        for name, values in errors.items():
+            found[name][self._truth.ascending_rows] = values
+        return found
+
+    def _errors(self, predictions: Predictions) -> tuple[dict[str, Floats], tuple[int, ...]]:
+        """Errors by metric in ascending τ, and the number of predictions that went to each boundary."""
+        truth = self._truth
+        # Made with the first file of a truth, and better before the arrays below need memory too.
+        true_log = truth.ascending_log_scale_ratio
+        predicted, n_truncated = _truncate(predictions.ttc_s[truth.ascending_rows], self._protocol)
+        alpha = scale_ratio_10hz(predicted)
+        # One comparison each way: NaN fails both, so NaN, 0 (α₁₀ is 0 or -0 there) and undefined MiD end up
+        # here.
+        if not (alpha.min() > 0.0 and alpha.max() < np.inf):
+            _refuse(predictions, self._protocol)
+        terms = Terms(predicted, truth.ascending_ttc_s, alpha, true_log)
+        errors = {metric.name: metric.function(terms) for metric in self._protocol.metrics}
+        return errors, n_truncated
+
+
+def _truncate(ttc_s: Floats, protocol: Protocol) -> tuple[Floats, tuple[int, ...]]:
+    """The truncated values, a new array, and the number of changed values per boundary. 0 and NaN stay."""
+    limit_s = protocol.limit_s
+    truncated = np.clip(ttc_s, -limit_s, limit_s)
+    n_low, n_high = int(np.count_nonzero(ttc_s < -limit_s)), int(np.count_nonzero(ttc_s > limit_s))
+    if protocol.near_zero_s is None:
+        return truncated, (n_low, n_high)
+    low_s, high_s = protocol.near_zero_s
+    near = np.flatnonzero((ttc_s > low_s) & (ttc_s < high_s))
+    values = ttc_s[near]
+    truncated[near] = np.where(values < 0, low_s, np.where(values > 0, high_s, values))
+    return truncated, (n_low, int(np.count_nonzero(values < 0)), int(np.count_nonzero(values > 0)), n_high)
+
+
+def _refuse(predictions: Predictions, protocol: Protocol) -> NoReturn:
+    """Name the values that the protocol forbids, in file order."""
+    findings = Findings()
+    ttc_s, _ = _truncate(predictions.ttc_s, protocol)
+    alpha = scale_ratio_10hz(ttc_s)
+    for row in np.flatnonzero(~((alpha > 0.0) & (alpha < np.inf))).tolist():
+        value, where = predictions.ttc_s[row], predictions.where(row)
+        if np.isnan(value):
+            findings.add("nan", "The value is NaN; expected a number of seconds.", where)
+        elif value == 0:
+            findings.add("zero", ZERO_MESSAGE, where)
+        else:
+            message = (
+                f"The value is {value!s} s, where the protocol {protocol.name} has no motion-in-depth error; "
+                "expected a time to contact greater than 0, or at most -0.1."
+            )
+            findings.add("undefined-error", message, where)
+    findings.raise_if_any()
+    raise AssertionError("unreachable: the caller saw a forbidden value")
+
+
+def floor_of(truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL) -> dict[str, float | None]:
+    """The scores of the ground truth itself; None for a TTC range without sequences."""
+    predictions = Predictions.from_arrays(ttc_s=truth.ttc_s, manifest=truth.manifest)
+    return evaluate(predictions, truth, protocol=protocol).flat()
+
+
+def floor_sentence(floor: Mapping[str, float | None] | None, *, decimals: int = 2) -> str:
+    """The floor in words, from its published values; empty where it is not known, or 0 in every column.
+
+    >>> print(floor_sentence({"mid": 0.36, "mid_crucial": 0.0, "rte": 0.73, "rte_crucial": 0.02}))
+    Floor: the ground truth itself, submitted as predictions, scores MiD 0.36, RTE 0.73 %, RTE on crucial \
+0.02 % and 0 in every other column. Hardly any file can score lower, because the protocol truncates \
+predictions and not the ground truth.
+    """
+    if not floor or not any(floor.values()):
+        return ""
+    values = {name: floor[name] for name in known_names() if floor.get(name) is not None}
+    shown = [name for name, value in values.items() if value or split_name(name)[1] == OVERALL]
+    texts = {name: format_published(values[name], decimals=decimals) for name in shown}
+    parts = [f"{column_words(name)} {text}{metric_of(name).unit_of_value}" for name, text in texts.items()]
+    rest = " and 0 in every other column" if len(shown) < len(values) else ""
+    return (
+        f"Floor: the ground truth itself, submitted as predictions, scores {', '.join(parts)}{rest}. Hardly "
+        "any file can score lower, because the protocol truncates predictions and not the ground truth."
+    )

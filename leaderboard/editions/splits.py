@@ -1,0 +1,180 @@
+"""The splits that the benchmark has from the start, and the rows quoted from papers."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import Any, Final
+
+from django.db import transaction
+from django.db.models import QuerySet
+from django.utils import timezone
+
+from evaluator.papers.tables import published_tables
+from leaderboard import audit, board_versions
+from leaderboard.editions import papers
+from leaderboard.editions.policy import HIDDEN_QUOTA
+from leaderboard.errors.refusals import Refused, clean_text, require_maintainer
+from leaderboard.models import PublishedResult, Split, User
+from leaderboard.models.benchmark import SINCE_EVER
+
+PUBLISHED_DIR = Path(__file__).parent / "published"
+MAX_REASON: Final = 500
+
+SPLITS: tuple[dict[str, Any], ...] = (
+    {
+        "name": "test",
+        "title": "Test",
+        "description": "The hidden test set: the numbers that papers quote.",
+        "position": 0,
+        "is_hidden": True,
+        "decimals": 1,
+        **HIDDEN_QUOTA,
+    },
+    {
+        "name": "val",
+        "title": "Validation",
+        "description": "The validation set, whose ground truth comes with the dataset.",
+        "position": 1,
+        "is_hidden": False,
+        "decimals": 2,
+        "quota_limit": 50,
+    },
+    {
+        "name": "demo",
+        "title": "Demo",
+        "description": "Simulated data, for testing only.",
+        "position": 2,
+        "is_hidden": False,
+        "is_simulated": True,
+        "decimals": 2,
+        "quota_limit": 20,
+    },
+)
+
+
+def ensure_splits(*, split_model: Any = Split, result_model: Any = PublishedResult) -> None:
+    """Make the three splits and the published rows where they are missing; change nothing that is there.
+
+    Rows that come with their split stand there since ever; those that come later, since now. A migration
+    passes the models as they were in its time.
+    """
+    now = timezone.now()
+    made = set()
+    with transaction.atomic():
+        for fields in SPLITS:
+            _, is_new = split_model.objects.get_or_create(name=fields["name"], defaults=fields)
+            made |= {fields["name"]} if is_new else set()
+        known = [fields["name"] for fields in SPLITS]
+        for path in sorted(PUBLISHED_DIR.glob("*.json")):
+            for row in papers.rows_of(_with_results(papers.parse(path.read_bytes())), splits=known, now=now):
+                names = {"split_id": row.pop("split_id"), "slug": row.pop("slug")}
+                row["added_at"] = SINCE_EVER if names["split_id"] in made else now
+                if not result_model.objects.filter(**names).exists():
+                    result_model.objects.create(**names, **row)
+
+
+def _with_results(document: Mapping[str, Any]) -> dict[str, Any]:
+    """A document of ours with its numbers: `results_of` names the paper's table that has them."""
+    table = published_tables().table(document["results_of"])
+    results: dict[str, dict[str, list[Any]]] = {}
+    for row in table.rows:
+        results.setdefault(row.split or "", {})[row.method or ""] = list(row.values)
+    return {**document, "columns": list(table.columns), "results": results}
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What became of the rows of a document, each as `split/slug`."""
+
+    added: tuple[str, ...] = ()
+    replaced: tuple[str, ...] = ()
+    unchanged: tuple[str, ...] = ()
+
+
+def import_published(
+    *, document: Mapping[str, Any], now: datetime, is_replacing: bool = False, actor: User | None = None
+) -> Imported:
+    """Put the rows of one paper on the boards from now on, all or none of them.
+
+    A row that is there with the same content stays. One with other content is replaced, which boards of the
+    past do not notice. Raises `Refused` for that unless `is_replacing`, `papers.BadDocument` for what is no
+    such document, and `NotMaintainer`; `actor` None is the command line.
+    """
+    require_maintainer(actor, to="add rows of papers")
+    rows = papers.rows_of(document, splits=Split.objects.values_list("name", flat=True), now=now)
+    found: dict[str, list[str]] = {"added": [], "replaced": [], "unchanged": []}
+    with transaction.atomic():
+        for row in rows:
+            outcome = _import_row(row, now=now, is_replacing=is_replacing)
+            found[outcome].append(f"{row['split_id']}/{row['slug']}")
+        split_ids = sorted({row["split_id"] for row in rows})
+        if found["added"] or found["replaced"]:
+            audit.record(
+                verb="imported",
+                noun="PublishedResult",
+                noun_id=str(rows[0]["source_url"])[:80],
+                actor=actor,
+                details={"added": found["added"], "replaced": found["replaced"]},
+            )
+            for split_id in split_ids:
+                board_versions.changed(split_id)
+    return Imported(**{outcome: tuple(names) for outcome, names in found.items()})
+
+
+def remove_published(
+    *, split_name: str, slug: str, reason: str, now: datetime, actor: User | None = None
+) -> PublishedResult:
+    """Take a quoted row off the board from now on; boards of the past keep it.
+
+    `actor` None is the command line. Raises `NotMaintainer`, and `Refused` without a reason or such a row.
+    """
+    require_maintainer(actor, to="remove rows of papers")
+    reason = clean_text("reason", reason, limit=MAX_REASON)
+    with transaction.atomic():
+        standing = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
+        row = standing.filter(split=split_name, slug=slug).first()
+        if row is None:
+            known = ", ".join(sorted(standing.filter(split=split_name).values_list("slug", flat=True)))
+            raise Refused(
+                "bad-value",
+                f"The board of {split_name[:80]!r} quotes no row {slug[:80]!r}; "
+                f"expected one of {known or 'none'}.",
+            )
+        row.replaced_at = now
+        row.save(update_fields=["replaced_at"])
+        audit.record(
+            verb="removed",
+            noun="PublishedResult",
+            noun_id=f"{split_name}/{slug}"[:80],
+            actor=actor,
+            details={"reason": reason},
+        )
+        board_versions.changed(split_name)
+    return row
+
+
+def quoted() -> QuerySet[PublishedResult]:
+    """The quoted rows that the boards show now, split by split, the newest first."""
+    rows = PublishedResult.objects.filter(replaced_at=None).select_related("split")
+    return rows.order_by("split__position", "split", "-added_at", "pk")
+
+
+def _import_row(row: Mapping[str, Any], *, now: datetime, is_replacing: bool) -> str:
+    """Add or replace one row. Returns which of the two was done, or that it is unchanged."""
+    standing = PublishedResult.objects.select_for_update(no_key=True).filter(replaced_at=None)
+    there = standing.filter(split=row["split_id"], slug=row["slug"]).first()
+    if there is not None:
+        changed = sorted(name for name, value in row.items() if getattr(there, name) != value)
+        if not changed:
+            return "unchanged"
+        if not is_replacing:
+            raise Refused(
+                "bad-value",
+                f"The board of {row['split_id']} already has the row {row['slug']!r}, which differs in "
+                f"{', '.join(changed)}; expected the same content, or the choice to replace it (--replace).",
+                field="is_replacing",
+            )
+        PublishedResult.objects.filter(pk=there.pk).update(replaced_at=now)
+    PublishedResult.objects.create(**row, added_at=now)
+    return "added" if there is None else "replaced"

@@ -1,0 +1,79 @@
+"""Jobs of low priority: count changed labels, compare, compute intervals, analyse.
+
+Nobody needs to be told: each kind of work is found in the database. A live submission never waits behind it
+for longer than a fraction of a second.
+"""
+
+import random
+from collections.abc import Callable, Iterable
+from datetime import datetime
+from functools import partial
+
+import structlog
+
+from evaluator import Rejected
+from leaderboard.editions import ground_truth
+from leaderboard.queue import worker
+from leaderboard.sandbox import child
+from leaderboard.statistics import analyses, comparisons, confidence, questions
+from leaderboard.storage import truth_values
+
+log = structlog.get_logger(__name__)
+
+# Of each kind at most so much in one go, so that every kind has its turn.
+MAX_AT_ONCE = 50
+FAULTS = (OSError, Rejected, child.ChildDied, child.ChildNotReady, child.LeaseLost)
+
+
+class Stopping(Exception):
+    """The worker is to end; what was begun is begun anew by another."""
+
+
+def work_off(*, now: datetime, rng: random.Random, is_stopping: Callable[[], bool] = lambda: False) -> int:
+    """Do what waits and this worker has the values for. Returns how much was done.
+
+    What fails is logged and left for the next time, and keeps nothing else from being done.
+    """
+    between = partial(_yield_to_live_work, rng=rng, is_stopping=is_stopping)
+    try:
+        return sum(_done(task, between) for task in _tasks(now=now, between=between))
+    except Stopping:
+        return 0
+
+
+def _done(task: Callable[[], object], between: Callable[[], None]) -> bool:
+    between()
+    try:
+        task()
+    except FAULTS as fault:
+        log.warning("backlog_failed", reason=f"{type(fault).__name__}: {fault}"[:200])
+        return False
+    return True
+
+
+def _tasks(*, now: datetime, between: Callable[[], None]) -> Iterable[Callable[[], object]]:
+    held = truth_values.readable_digests()
+    for old, new in ground_truth.uncompared(held=held):
+        yield partial(ground_truth.count_changes, old, new)
+    asked = questions.waiting(held=held).select_related(
+        "edition__ground_truth", "edition__split", "first__submission__method", "second__submission__method"
+    )
+    begun: list[int] = []
+    # Asked anew each time: somebody may have come who waits for a pair, while others were only noted.
+    while len(begun) < MAX_AT_ONCE and (row := asked.exclude(pk__in=begun).first()) is not None:
+        begun.append(row.pk)
+        yield partial(comparisons.compute, row, now=now)
+    # Before entries are read: those of what waits are to be among them.
+    between()
+    for entries in confidence.stale(now=now, held=held):
+        yield partial(confidence.infer, entries, now=now, between=between)
+    for evaluation in analyses.missing(held=held)[:MAX_AT_ONCE]:
+        yield partial(analyses.make, evaluation, now=now)
+
+
+def _yield_to_live_work(*, rng: random.Random, is_stopping: Callable[[], bool]) -> None:
+    """Decide what waits before going on: somebody watches a page for it."""
+    while not is_stopping() and worker.run_next(rng=rng):
+        pass
+    if is_stopping():
+        raise Stopping

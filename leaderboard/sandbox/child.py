@@ -1,0 +1,313 @@
+"""A submission's values in the order of an edition's ground truth: saved before, or read from the file.
+
+Untrusted bytes are parsed in a limited child process, without credentials, files or sockets. Nothing that it
+writes is believed but what a file may say of itself; any other answer counts as the child's death.
+
+A file is read with the manifest that was public when it came. From there its values go by natural keys to the
+manifest of the edition, so only a correction that adds sequences asks for another file.
+"""
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache, lru_cache
+from pathlib import Path
+from typing import IO, Any, Final, get_args
+
+import numpy as np
+import structlog
+from django.conf import settings
+from numpy.typing import NDArray
+
+from evaluator import Manifest, Predictions, Rejected, system_calls
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY
+from evaluator.predictions.alignment import KeyKind
+from evaluator.predictions.documents import Unit
+from evaluator.predictions.revisions import Rows, absent, realigned, rows_in
+from leaderboard.models import Edition, SentFile
+from leaderboard.sandbox import fork_server
+from leaderboard.sandbox.fork_server import Answer
+from leaderboard.storage import files, manifests, truth_values
+
+log = structlog.get_logger(__name__)
+
+# Besides TSTTC_CHILD_CPU_S a reader has a second for so many sequences: three times what the slowest legal
+# file takes, a table of 1,000,000 scale ratios by natural keys, 14 s on a busy machine.
+SEQUENCES_PER_CPU_S = 25_000
+MAX_WORDS_BYTES: Final = 1_000_000
+"""What a child may write beside the values; the longest list of problems has a tenth."""
+
+
+class ChildDied(Exception):
+    """The child ended without an answer while it read the file: out of memory or time, or a crash."""
+
+
+class ChildOutOfTime(ChildDied):
+    """The child used up its processor time, as it would in any other run."""
+
+
+class ChildNotReady(Exception):
+    """The child could not begin, or lost the process that had started it: not the file's doing."""
+
+
+class LeaseLost(Exception):
+    """The work was taken away, or its time was up, while the child ran; the child has been ended."""
+
+
+def read_predictions(
+    source: IO[bytes],
+    *,
+    digest: str,
+    manifest: Manifest,
+    manifest_path: Path,
+    heartbeat: Callable[[], bool],
+    heartbeat_s: float,
+) -> Predictions:
+    """Parse and align the prediction file with this digest in a child process.
+
+    `heartbeat` is called every `heartbeat_s` seconds while the child works; when it says False the child is
+    ended. Raises `evaluator.Rejected` if the file is at fault, `ChildDied` also for an answer that no file
+    gives, `ChildNotReady`, or `LeaseLost`; `OSError` if no child could be started.
+    """
+    _say_what_is_missing()
+    request = {
+        "manifest": str(manifest_path),
+        "memory_bytes": settings.CHILD_MEMORY_BYTES,
+        "cpu_s": (cpu_s := settings.CHILD_CPU_S + manifest.n_sequences // SEQUENCES_PER_CPU_S),
+    }
+    read = _forked if fork_server.AVAILABLE else _spawned
+    max_bytes = MAX_WORDS_BYTES + 8 * manifest.n_sequences
+    try:
+        found = read(source, request, max_bytes=max_bytes, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+    except fork_server.TooMuch:
+        raise ChildDied(f"reading the file gave an answer of more than {max_bytes:,} bytes") from None
+    if not found.output.startswith(READY):
+        raise ChildNotReady(f"the reading process did not start: {_cause(found.returncode, found.complaint)}")
+    if found.returncode == -signal.SIGXCPU:
+        raise ChildOutOfTime(f"reading the file took more than {cpu_s} s of processor time")
+    if found.returncode != 0:
+        raise ChildDied(f"reading the file {_cause(found.returncode, found.complaint)}")
+    return _decoded(found.output[len(READY) :], manifest=manifest, digest=digest)
+
+
+@cache
+def _say_what_is_missing() -> None:
+    """Once for each process: a child goes on with its limits alone."""
+    why = system_calls.why_unavailable()
+    if why is not None:
+        log.warning("readers_without_a_filter_of_system_calls", reason=why)
+
+
+def _forked(
+    source: IO[bytes],
+    request: dict[str, object],
+    *,
+    max_bytes: int,
+    heartbeat: Callable[[], bool],
+    heartbeat_s: float,
+) -> Answer:
+    """What a child says that is forked for the file.
+
+    A server that has ended since the last file is replaced, once.
+    """
+    for _ in range(2):
+        server = fork_server.server_of_this_thread(python_path=settings.BASE_DIR)
+        is_new = not server.has_served
+        try:
+            return server.read(
+                source,
+                request=request,
+                max_bytes=max_bytes,
+                heartbeat=heartbeat,
+                heartbeat_s=heartbeat_s,
+            )
+        except fork_server.Interrupted:
+            raise LeaseLost("the run reached its time limit or was taken away") from None
+        except fork_server.NotStarted as fault:
+            raise ChildNotReady(f"the reading process did not start: {fault}") from fault
+        except fork_server.ServerEnded as fault:
+            if is_new or fault.began:
+                break
+    raise ChildNotReady("the process that starts reading processes ended")
+
+
+def _spawned(
+    source: IO[bytes],
+    request: dict[str, object],
+    *,
+    max_bytes: int,
+    heartbeat: Callable[[], bool],
+    heartbeat_s: float,
+) -> Answer:
+    """What a child says that is started for the file, where there is no `fork` to be trusted."""
+    command = [sys.executable, "-m", "evaluator.predictions.reader", *map(str, request.values())]
+    child = subprocess.Popen(  # noqa: S603 - our own interpreter and module, nothing of the file
+        command,
+        stdin=source,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=fork_server.environment(python_path=settings.BASE_DIR),
+        close_fds=True,
+    )
+    with child, ThreadPoolExecutor(2) as readers:
+        try:
+            parts = [readers.submit(_at_most, pipe, max_bytes) for pipe in (child.stdout, child.stderr)]
+            _await_end(child, heartbeat=heartbeat, heartbeat_s=heartbeat_s)
+        finally:
+            child.kill()
+        return Answer(child.returncode, *(part.result() for part in parts))
+
+
+def _at_most(pipe: IO[bytes] | None, max_bytes: int) -> bytes:
+    """All that comes through the pipe. Raises `TooMuch`; whoever writes on finds the pipe closed."""
+    if pipe is None:
+        raise RuntimeError("the reading process was started without pipes")
+    with pipe:
+        data = pipe.read(max_bytes + 1)
+    if len(data) > max_bytes:
+        raise fork_server.TooMuch
+    return data
+
+
+def _await_end(
+    child: "subprocess.Popen[bytes]", *, heartbeat: Callable[[], bool], heartbeat_s: float
+) -> None:
+    """Wait until the child ends, with a heartbeat meanwhile. Raises `LeaseLost`."""
+    while True:
+        try:
+            child.wait(timeout=heartbeat_s)
+        except subprocess.TimeoutExpired:
+            if not heartbeat():
+                raise LeaseLost("the run reached its time limit or was taken away") from None
+        else:
+            return
+
+
+def _cause(returncode: int, complaint: bytes) -> str:
+    """Why the child died, in words."""
+    if returncode == EXIT_OUT_OF_MEMORY:
+        return f"needed more than {settings.CHILD_MEMORY_BYTES // 1_000_000} MB of memory"
+    if returncode < 0:
+        return f"ended with signal {-returncode}"
+    last_line = complaint[-2000:].decode(errors="replace").strip().rpartition("\n")[2]
+    return f"ended with exit code {returncode}: {last_line[:200]}"
+
+
+def _decoded(answer: bytes, *, manifest: Manifest, digest: str) -> Predictions:
+    """The child's answer as predictions. Raises `evaluator.Rejected`, or `ChildDied` if it makes no sense."""
+    line, _, body = answer.partition(b"\n")
+    header = _header(line)
+    if header.get("verdict") == "rejected":
+        raise _rejection(header)
+    unit: Any = header.get("unit")
+    keys: Any = header.get("keys")
+    if header.get("verdict") != "good" or unit not in get_args(Unit) or keys not in get_args(KeyKind):
+        raise ChildDied("reading the file gave an answer of another form")
+    if header.get("digest") != digest:
+        # The store has other bytes under this name, or the child lies: neither is kept as this file's.
+        raise ChildDied(f"reading the file gave another digest than {digest}")
+    if len(body) != 8 * manifest.n_sequences:
+        raise ChildDied(f"reading the file gave {len(body)} bytes where {manifest.n_sequences} values belong")
+    ttc_s = np.frombuffer(body, dtype="<f8")
+    if not np.all(np.abs(ttc_s) > 0):
+        raise ChildDied("reading the file gave 0 or NaN, which no file may have")
+    return Predictions(
+        manifest=manifest,
+        ttc_s=ttc_s,
+        digest=digest,
+        unit=unit,
+        keys=keys,
+        enveloped=header.get("enveloped") is True,
+    )
+
+
+def _header(line: bytes) -> Mapping[str, Any]:
+    try:
+        header = json.loads(line) if len(line) <= MAX_WORDS_BYTES else None
+    except (ValueError, RecursionError):
+        header = None
+    if not isinstance(header, dict):
+        raise ChildDied("reading the file gave no answer")
+    return header
+
+
+def _rejection(header: Mapping[str, Any]) -> Rejected:
+    try:
+        return Rejected.from_dict(header)
+    except ValueError as fault:
+        raise ChildDied(f"reading the file gave a rejection of another form: {fault}") from None
+
+
+# --- in the order of the ground truth ---------------------------------------------------------------------
+
+
+def saved(file: SentFile, edition: Edition) -> Predictions | None:
+    """The values that were kept when the file was first read; None if they are not all there.
+
+    Raises `evaluator.Rejected` if the edition has sequences that the file's manifest did not have, and
+    `OSError` if the private directory or the store does not answer.
+    """
+    manifest = truth_values.load(edition.ground_truth_id).manifest
+    n_sent, places, missing = _places(file.manifest_digest, edition.ground_truth_id)
+    if len(missing):
+        raise absent(missing, manifest=manifest)
+    ascending = files.load_aligned(file, n_sequences=n_sent)
+    if ascending is None:
+        return None
+    ttc_s = ascending if places is None else ascending[places]
+    return Predictions(manifest=manifest, ttc_s=ttc_s, digest=file.digest)
+
+
+@lru_cache(maxsize=16)
+def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]:
+    """How many values a file for this manifest has, and where among them, in ascending anno_id, each is.
+
+    (n,) in the order of the ground truth; None where that is the order of the values. And the rows of the
+    ground truth that the file's manifest does not have.
+    """
+    manifest = truth_values.load(truth_digest).manifest
+    own = manifest if manifest.digest == own_digest else manifests.load(own_digest)
+    rows = rows_in(own, manifest)
+    place_of_row: NDArray[np.intp] = np.empty(own.n_sequences, dtype=np.intp)
+    place_of_row[own.rows_by_id] = np.arange(own.n_sequences)
+    places = place_of_row[rows]
+    is_same_order = own.n_sequences == len(places) and bool(np.array_equal(places, np.arange(len(places))))
+    return own.n_sequences, None if is_same_order else places, np.flatnonzero(rows < 0)
+
+
+def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = lambda: True) -> Predictions:
+    """The values from the bytes of the file, which are kept for the next time.
+
+    Raises `evaluator.Rejected` if the file is at fault or lacks sequences of the edition, `OSError` if the
+    store, the disk or the private directory does not answer, and what `sandbox.read_predictions` raises.
+    """
+    manifest = truth_values.load(edition.ground_truth_id).manifest
+    is_own = manifest.digest == file.manifest_digest
+    own = manifest if is_own else manifests.load(file.manifest_digest)
+    with files.opened_predictions(file.digest) as source:
+        predictions = read_predictions(
+            source,
+            digest=file.digest,
+            manifest=own,
+            manifest_path=(
+                truth_values.manifest_path(edition.ground_truth_id)
+                if is_own
+                else manifests.path(file.manifest_digest)
+            ),
+            heartbeat=heartbeat,
+            heartbeat_s=settings.HEARTBEAT_S,
+        )
+    try:
+        files.save_aligned(predictions)
+    except OSError as fault:
+        # They only make re-scoring quicker; without them it reads the file again.
+        log.warning("values_not_kept", digest=file.digest, reason=f"{type(fault).__name__}: {fault}")
+    return predictions if is_own else realigned(predictions, manifest=manifest)
+
+
+def of(file: SentFile, edition: Edition) -> Predictions:
+    """The values as they were kept, or from the file itself. Raises as `read` does."""
+    return saved(file, edition) or read(file, edition)

@@ -1,0 +1,190 @@
+"""Error analysis of an entry on an open split, for its team. Never of a hidden split."""
+
+import itertools
+from collections.abc import Collection, Mapping
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+from django.contrib.auth.models import AnonymousUser
+from django.db import transaction
+from django.db.models import QuerySet
+from numpy.typing import NDArray
+
+import evaluator
+from evaluator.metrics.protocol import PRIMARY, Protocol
+from evaluator.scoring import uncertainty
+from evaluator.scoring.breakdown import CURVE_EDGES_S
+from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
+from leaderboard.sandbox import child
+from leaderboard.storage import hidden_marks, truth_values
+
+Floats = NDArray[np.float64]
+Errors = Mapping[str, Floats]  # of every sequence, by metric
+
+QUANTILES = (0.05, 0.1, 0.25, 0.5, 0.75, 0.9, 0.95, 0.99)
+N_BINS = 24
+MAX_POINTS = 500
+MAX_RECORDINGS = 20
+
+
+def of(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | None:
+    """The analysis of a submission for its own team (and maintainers).
+
+    None for everybody else, on a hidden split, and until a worker has made it.
+    """
+    split = submission.split
+    if split.is_hidden or not Submission.objects.visible_to(viewer).filter(pk=submission.pk).exists():
+        return None
+    return Analysis.objects.filter(
+        evaluation__submission=submission, evaluation__edition=split.published_edition_id
+    ).first()
+
+
+# --- a worker's work -------------------------------------------------------------------------------------
+
+
+def missing(*, held: Collection[str]) -> QuerySet[Evaluation]:
+    """What stands on the board of an open split and has no analysis, the newest first."""
+    opened = [digest for digest in held if not hidden_marks.is_marked(digest)]
+    boards = Split.objects.filter(is_hidden=False, published_edition__ground_truth__in=opened)
+    return (
+        Evaluation.objects.filter(
+            status=Status.SCORED,
+            analysis=None,
+            edition__in=boards.values("published_edition"),
+            submission__withdrawn_at=None,
+        )
+        .select_related("edition__ground_truth", "edition__split", "submission")
+        .order_by("-finished_at")
+    )
+
+
+def make(evaluation: Evaluation, *, now: datetime) -> None:
+    """Look closely at one evaluation, and keep what is seen; not if its split was hidden meanwhile.
+
+    Nor if its ground truth was imported as a hidden one: then it is a mistake, or worse, to call it open.
+    Raises `OSError` if the store or the private directory does not answer.
+    """
+    if hidden_marks.is_marked(evaluation.edition.ground_truth_id):
+        return
+    truth = truth_values.load(evaluation.edition.ground_truth_id)
+    predictions = child.of(evaluation.submission.sent_file, evaluation.edition)
+    content = content_of(predictions, truth, rules=evaluation.edition.rules, unit=evaluation.edition.unit)
+    with transaction.atomic():
+        if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:
+            return
+        Analysis.objects.get_or_create(evaluation=evaluation, defaults={"content": content, "made_at": now})
+
+
+def delete_hidden() -> None:
+    """Remove the analyses of splits that were open once and are hidden now."""
+    Analysis.objects.filter(evaluation__edition__split__is_hidden=True).delete()
+
+
+def content_of(
+    predictions: evaluator.Predictions,
+    truth: evaluator.GroundTruth,
+    *,
+    rules: Protocol,
+    unit: str | None = None,
+) -> dict[str, Any]:
+    """The error analysis of one submission. The points drawn are the same for all submissions. It has
+
+    - `curve`: the mean errors by true time to contact, a list of `{"low_s", "high_s", "n", "mid", …,
+      "intervals"}` in ascending order, one for each bin [low_s, high_s) that has sequences; `intervals` are
+      the 95 % confidence intervals `{"mid": [low, high], …}` of those means that have enough units;
+    - `distribution`: `{"mid": […], …}`, each a list of `{"quantile", "value"}` from 0.05 to 0.99;
+    - `histogram`: a list of `{"low", "high", "n"}` of MiD over 24 equal bins up to its 95 % quantile; the
+      last has `"high": None` and holds all that is larger;
+    - `scatter`: `{"true_s": […], "predicted_s": […]}` of at most 500 sequences drawn at random, the
+      predictions as the protocol truncates them;
+    - `worst`: at most 20 recordings by their mean MiD, the worst first: `{"recording", "n", "mid", …}`;
+    - `n_sequences` and `n_recordings`.
+
+    Errors stand under the names of the protocol's metrics. They are rounded as published values are, times to
+    a thousandth of a second.
+    """
+    report = evaluator.evaluate(predictions, truth, protocol=rules, keep_sequences=True)
+    assert report.sequences is not None and report.details is not None  # noqa: S101, PT018 - asked for
+    errors, decimals = report.sequences, rules.decimals
+    rng = np.random.default_rng(0)
+    drawn = np.sort(rng.permutation(truth.n_sequences)[:MAX_POINTS])
+    predicted_s = report.details.predicted_ttc_s[drawn]
+    return {
+        "n_sequences": truth.n_sequences,
+        "n_recordings": truth.manifest.n_recordings,
+        "curve": _curve(truth, errors, decimals, unit),
+        "distribution": {
+            name: [
+                {"quantile": share, "value": round(float(value), decimals)}
+                for share, value in zip(QUANTILES, np.quantile(values, QUANTILES), strict=True)
+            ]
+            for name, values in errors.items()
+        },
+        "histogram": _histogram(errors[PRIMARY], decimals),
+        "scatter": {
+            "true_s": np.round(truth.ttc_s[drawn], 3).tolist(),
+            "predicted_s": np.round(predicted_s, 3).tolist(),
+        },
+        "worst": _worst(truth, errors, decimals),
+    }
+
+
+def _curve(
+    truth: evaluator.GroundTruth, errors: Errors, decimals: int, unit: str | None
+) -> list[dict[str, Any]]:
+    bins = np.digitize(truth.ttc_s, CURVE_EDGES_S)
+    n_bins = len(CURVE_EDGES_S) + 1
+    shape = (truth.manifest.n_recordings, n_bins)
+    cells = truth.manifest.recording_index * n_bins + bins
+    counts = np.bincount(cells, minlength=shape[0] * shape[1]).reshape(shape).astype(float)
+    per_metric = [np.bincount(cells, weights=each, minlength=counts.size) for each in errors.values()]
+    sums: Floats = np.stack([each.reshape(shape) for each in per_metric]).astype(float)
+    # The weights of an open split are no secret: these are those of `tsttc score`.
+    units = truth.manifest.units_by(unit)
+    of_units = [uncertainty.by_units(each, units) for each in (counts, sums)]
+    low, high = uncertainty.bootstrap_of(truth.digest, of_units[0]).intervals(of_units[1])
+    totals, n = sums.sum(axis=1), counts.sum(axis=0)
+    return [
+        {
+            "low_s": low_s,
+            "high_s": high_s,
+            "n": int(n[i]),
+            **{name: round(float(totals[k, i] / n[i]), decimals) for k, name in enumerate(errors)},
+            "intervals": {
+                name: [round(float(low[k, i]), decimals), round(float(high[k, i]), decimals)]
+                for k, name in enumerate(errors)
+                if np.isfinite(low[k, i])
+            },
+        }
+        for i, (low_s, high_s) in enumerate(itertools.pairwise(CURVE_EDGES_S), 1)
+        if n[i]
+    ]
+
+
+def _histogram(mid: Floats, decimals: int) -> list[dict[str, float | int | None]]:
+    end = float(np.quantile(mid, 0.95)) or 1.0
+    edges = np.linspace(0, end, N_BINS + 1)
+    inside, _ = np.histogram(mid[mid < end], edges)
+    rows: list[dict[str, float | int | None]] = [
+        {"low": round(low, decimals), "high": round(high, decimals), "n": n}
+        for low, high, n in zip(edges[:-1].tolist(), edges[1:].tolist(), inside.tolist(), strict=True)
+    ]
+    return [*rows, {"low": round(end, decimals), "high": None, "n": int((mid >= end).sum())}]
+
+
+def _worst(truth: evaluator.GroundTruth, errors: Errors, decimals: int) -> list[dict[str, float | int | str]]:
+    index, n_bags = truth.manifest.recording_index, truth.manifest.n_recordings
+    counts = np.bincount(index, minlength=n_bags)
+    means = {
+        name: np.bincount(index, weights=values, minlength=n_bags) / counts for name, values in errors.items()
+    }
+    return [
+        {
+            "recording": truth.manifest.recordings[row],
+            "n": int(counts[row]),
+            **{name: round(float(values[row]), decimals) for name, values in means.items()},
+        }
+        for row in np.argsort(-means[PRIMARY], kind="stable")[:MAX_RECORDINGS].tolist()
+    ]

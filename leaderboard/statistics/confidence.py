@@ -1,0 +1,315 @@
+"""Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
+
+Workers make them from sums per unit (day or recording), which never leave their private directory. An
+interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made anew when
+those change, which a digest tells. `docs/uncertainty.md` says how and why.
+"""
+
+import hashlib
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from functools import cached_property, lru_cache
+from typing import NamedTuple
+from uuid import UUID
+
+import numpy as np
+import structlog
+from django.db import transaction
+from django.db.models import Exists, OuterRef
+from numpy.typing import NDArray
+
+from evaluator import published
+from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
+from evaluator.scoring import uncertainty
+from evaluator.scoring.ranges import Quoted, rank_ranges
+from evaluator.scoring.significance import cut_off
+from leaderboard import board_versions
+from leaderboard.boards.rows import printed_decimals
+from leaderboard.models import (
+    Edition,
+    EditionRanges,
+    Evaluation,
+    PublishedResult,
+    Score,
+    SentFile,
+    Status,
+    Visibility,
+)
+from leaderboard.statistics import disclosure, recording_sums
+from leaderboard.storage.seeds import seed_of
+
+log = structlog.get_logger(__name__)
+
+Floats = NDArray[np.float64]
+# While an edition is being scored its entries change all the time; its ranges follow once a minute.
+PATIENCE = timedelta(minutes=1)
+# By the evaluation's id, of every column both ends, or None where there is no range.
+Ranges = dict[str, list[list[int] | None]]
+
+
+class ScoredEntry(NamedTuple):
+    """A scored submission in an edition that its team has not withdrawn."""
+
+    evaluation_id: UUID
+    file: SentFile
+    method_id: UUID
+    is_shown: bool
+    value: float  # its MiD, as published
+    submitted_at: datetime
+
+
+def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
+    """The random numbers of an edition for one purpose: everything that is drawn for it comes from here.
+
+    Raises `OSError` of a hidden split without its secret.
+    """
+    return uncertainty.generator_of(seed_of(edition), purpose=purpose)
+
+
+# --- which entries ---------------------------------------------------------------------------------------
+
+
+def active_entries(edition: Edition) -> list[ScoredEntry]:
+    """Everything that stands in an edition, private methods included: one query."""
+    rows = Score.objects.filter(
+        evaluation__edition=edition,
+        evaluation__status=Status.SCORED,
+        evaluation__submission__withdrawn_at=None,
+        metric=PRIMARY,
+        interval=OVERALL,
+    ).values_list(
+        "evaluation_id",
+        "evaluation__submission__digest",
+        "evaluation__submission__manifest_digest",
+        "evaluation__submission__method_id",
+        "evaluation__submission__method__visibility",
+        "value",
+        "evaluation__submission__submitted_at",
+    )
+    return [
+        ScoredEntry(pk, SentFile(digest, manifest), method, visibility != Visibility.PRIVATE, value, at)
+        for pk, digest, manifest, method, visibility, value, at in rows
+    ]
+
+
+def ranked(rows: Sequence[ScoredEntry]) -> list[ScoredEntry]:
+    """What everybody sees ranked: of each shown method its best, the earlier one of two that are as good."""
+    best: dict[UUID, ScoredEntry] = {}
+    for row in sorted(rows, key=lambda row: (row.value, row.submitted_at)):
+        if row.is_shown:
+            best.setdefault(row.method_id, row)
+    return list(best.values())
+
+
+def _printed(edition: Edition) -> list[tuple[float, ...]]:
+    """The numbers of each row on its board that is quoted from a paper; NaN where it has none."""
+    rows = PublishedResult.objects.on_board(edition.split, edition).values_list("scores", flat=True)
+    names = edition.rules.score_names
+    return [tuple(float(scores.get(name) or "nan") for name in names) for scores in rows]
+
+
+@dataclass(frozen=True)
+class Entries:
+    """What stands in an edition, read once for all that a worker does with it."""
+
+    edition: Edition
+    rows: tuple[ScoredEntry, ...]
+    printed: tuple[tuple[float, ...], ...]
+
+    @classmethod
+    def of(cls, edition: Edition) -> "Entries":
+        """As they are now."""
+        return cls(edition, tuple(active_entries(edition)), tuple(_printed(edition)))
+
+    @cached_property
+    def ranked(self) -> list[ScoredEntry]:
+        """Those that everybody sees ranked."""
+        return ranked(self.rows)
+
+    @cached_property
+    def digest(self) -> str:
+        """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
+        rivals = {row.evaluation_id for row in self.ranked}
+        return self._digest([f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in self.rows])
+
+    @cached_property
+    def ranked_digest(self) -> str:
+        """Names what ranges are made of: nothing that is private is in it."""
+        return self._digest([str(row.evaluation_id) for row in self.ranked])
+
+    def _digest(self, lines: Sequence[str]) -> str:
+        printed = sorted(map(repr, self.printed))
+        text = "\n".join([self.edition.ground_truth_id, self.edition.protocol, *printed, *sorted(lines)])
+        return f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
+
+    @property
+    def have_ranges(self) -> bool:
+        """Whether all that workers make of an edition beside its scores is there, and of these entries."""
+        return self.edition.floor is not None and self.edition.inference_digest == self.digest
+
+
+def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
+    """The entries of editions whose ranges were made of others, each read when it is asked for.
+
+    Only those whose ground truth is `held`, among these digests: what this worker can do. An edition in
+    which something is still to be scored has patience.
+    """
+    undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
+    found = (
+        Edition.objects.filter(discarded_at=None, ground_truth__in=held)
+        .select_related("ground_truth", "split")
+        .annotate(is_busy=Exists(undecided))
+        .order_by("pk")
+    )
+    for edition in found:
+        if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:
+            continue
+        entries = Entries.of(edition)
+        if not entries.have_ranges:
+            yield entries
+
+
+# --- a worker's work -------------------------------------------------------------------------------------
+
+
+def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
+    """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
+
+    False: they hold already, or the entries have changed since they were read, or another worker has written
+    theirs meanwhile. `between` is called every fraction of a second. Raises what `recording_sums.sums_of`
+    raises.
+    """
+    if entries.have_ranges:
+        return False
+    intervals = _intervals(entries, between=between)
+    ranges = _ranges(entries, between=between)
+    is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
+    log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
+    return is_written
+
+
+def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
+    """The scores that have no interval yet and can have one, with it."""
+    edition = entries.edition
+    usable = uncertainty.usable_columns(recording_sums.unit_counts_of(edition))
+    column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
+    missing: dict[UUID, list[Score]] = {}
+    for score in Score.objects.filter(evaluation__edition=edition, low=None):
+        if usable[column_of[score_name(score.metric, score.interval)]]:
+            missing.setdefault(score.evaluation_id, []).append(score)
+    rows = [row for row in entries.rows if row.evaluation_id in missing]
+    for start in range(0, len(rows), uncertainty.BATCH):
+        between()
+        some = rows[start : start + uncertainty.BATCH]
+        sums = np.stack([recording_sums.unit_sums_of(edition, file=row.file) for row in some])
+        # As they are kept: ranges must not depend on which of them were made before.
+        lows, highs = disclosure.published_ends(*bootstrap_of(edition).intervals(sums), edition=edition)
+        for i, row in enumerate(some):
+            for score in missing[row.evaluation_id]:
+                j = column_of[score_name(score.metric, score.interval)]
+                score.low, score.high = (
+                    published(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
+                )
+    return [score for row in rows for score in missing[row.evaluation_id]]
+
+
+def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Ranges] | None:
+    """The rank ranges and the digest of what they are made of; None where those that are there hold."""
+    edition, rivals, digest = entries.edition, entries.ranked, entries.ranked_digest
+    if EditionRanges.objects.filter(edition=edition, digest=digest).exists():
+        return None
+    counts = recording_sums.unit_counts_of(edition)
+    sums = np.empty((len(rivals), *counts.shape))
+    for i, row in enumerate(rivals):
+        sums[i] = recording_sums.unit_sums_of(edition, file=row.file)
+    found = rank_ranges(
+        sums,
+        published=_published_values(edition, [row.evaluation_id for row in rivals]),
+        usable=uncertainty.usable_columns(counts),
+        rng=generator_of(edition, purpose="signs"),
+        quoted=_quoted(entries, counts),
+        between=between,
+    )
+    ends = np.stack([found.low, found.high], axis=2).tolist()
+    return digest, {
+        str(row.evaluation_id): [pair if pair[0] else None for pair in columns]
+        for row, columns in zip(rivals, ends, strict=True)
+    }
+
+
+def _published_values(edition: Edition, wanted: Sequence[UUID]) -> Floats:
+    """The values of these evaluations as they are ranked, (n, columns); NaN where one has none."""
+    column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
+    row_of = {pk: i for i, pk in enumerate(wanted)}
+    values = np.full((len(wanted), len(column_of)), np.nan)
+    scores = Score.objects.filter(evaluation__edition=edition)
+    for pk, metric, interval, value in scores.values_list("evaluation_id", "metric", "interval", "value"):
+        if pk in row_of:
+            values[row_of[pk], column_of[score_name(metric, interval)]] = value
+    return values
+
+
+def _n_effective(edition: Edition) -> dict[str, float]:
+    """The effective number of units of each column, as it is published."""
+    degrees = uncertainty.degrees_of(recording_sums.unit_counts_of(edition))
+    return {name: cut_off(n) for name, n in zip(edition.rules.score_names, degrees.tolist(), strict=True)}
+
+
+def _quoted(entries: Entries, counts: Floats) -> Quoted | None:
+    """The rows quoted from papers, each value as exact as it was printed: 14.8 is 14.75 to 14.85."""
+    values = np.array(entries.printed).reshape(-1, len(entries.edition.rules.score_names))
+    if not len(values):
+        return None
+    decimals = [printed_decimals(v for v in row if not np.isnan(v)) for row in values.tolist()]
+    half_widths = 0.5 * 10.0 ** -np.array(decimals)[:, None]
+    return Quoted(values, np.where(np.isnan(values), np.nan, half_widths), counts)
+
+
+def bootstrap_of(edition: Edition) -> uncertainty.Bootstrap:
+    """The weights of the edition's ground truth. Raises `OSError` without access to its values."""
+    counts = recording_sums.unit_counts_of(edition)
+    return _bootstrap(seed_of(edition), counts.tobytes(), counts.shape)
+
+
+@lru_cache(maxsize=1)
+def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.Bootstrap:
+    return uncertainty.bootstrap_of(seed, np.frombuffer(counts).reshape(shape))
+
+
+def _write(
+    entries: Entries, *, intervals: list[Score], ranges: tuple[str, Ranges] | None, now: datetime
+) -> bool:
+    """Write what was made, all or nothing, if the entries are still the same.
+
+    They are read for the second time here, with the edition locked: the comparison of compare-and-set. Scores
+    need not be: a score does not change, and only who has the edition locked writes beside it.
+    """
+    edition = entries.edition
+    shown = {row.evaluation_id for row in entries.rows if row.is_shown}
+    floor, n_effective = recording_sums.floor_of(edition), _n_effective(edition)
+    with transaction.atomic():
+        present = (
+            Edition.objects.select_for_update(of=("self",), no_key=True)
+            .select_related("ground_truth", "split")
+            .get(pk=edition.pk)
+        )
+        is_first = present.inference_digest == edition.inference_digest
+        if not is_first or Entries.of(present).digest != entries.digest:
+            return False
+        Score.objects.bulk_update(intervals, ["low", "high"], batch_size=500)
+        if ranges is not None:
+            digest, of = ranges
+            EditionRanges.objects.update_or_create(edition=edition, defaults={"digest": digest, "ranges": of})
+        Edition.objects.filter(pk=edition.pk).update(
+            inferred_at=now, inference_digest=entries.digest, floor=floor, n_effective=n_effective
+        )
+        # Whose rows only their own team sees, changes nothing that anybody else is shown.
+        is_seen = (
+            (floor, n_effective) != (present.floor, present.n_effective)
+            or ranges is not None
+            or any(score.evaluation_id in shown for score in intervals)
+        )
+        if is_seen and present.published_at is not None:
+            board_versions.changed(present.split_id)
+    return True

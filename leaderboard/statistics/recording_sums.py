@@ -1,0 +1,123 @@
+"""Sums per recording, saved in the private directory of workers, beside the ground truth.
+
+They are made when a file is scored, and are all that intervals, rank ranges and comparisons need. What is
+missing, as on another worker, is made anew from the submission's values. An edition's units are days or
+recordings: whole recordings added up.
+"""
+
+import math
+import uuid
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import structlog
+from django.conf import settings
+from numpy.typing import NDArray
+
+from evaluator import GroundTruth, published
+from evaluator.metrics.protocol import get_protocol
+from evaluator.scoring import scores, uncertainty
+from evaluator.scoring.report import RecordingSums
+from evaluator.scoring.scores import Scorer
+from evaluator.units import Units
+from leaderboard.models import Edition, SentFile
+from leaderboard.sandbox import child
+from leaderboard.storage import truth_values
+
+log = structlog.get_logger(__name__)
+
+Floats = NDArray[np.float64]
+
+
+def path(edition: Edition, *, file: SentFile) -> Path:
+    """Where the sums of a file are kept for this ground truth and protocol."""
+    truth, digest, manifest = (
+        each.removeprefix("sha256:") for each in (edition.ground_truth_id, file.digest, file.manifest_digest)
+    )
+    kept = Path(settings.BAGS_DIR or f"{settings.GROUND_TRUTH_DIR}/bags")
+    return kept / f"{truth[:32]}-{edition.protocol}" / f"{digest}-{manifest[:32]}.f8"
+
+
+def save(edition: Edition, *, file: SentFile, bags: RecordingSums | None) -> None:
+    """Keep a file's sums, little-endian float64. A disk that does not take them costs only time later."""
+    if bags is None:
+        return
+    kept = path(edition, file=file)
+    temporary = kept.with_name(f"tmp{uuid.uuid4().hex}")
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        temporary.touch(mode=0o600, exist_ok=False)
+        temporary.write_bytes(np.ascontiguousarray(bags.sums, dtype="<f8").data)
+        temporary.replace(kept)
+    except OSError as fault:
+        log.warning("bags_not_kept", digest=file.digest, reason=str(fault)[:200])
+
+
+def load(edition: Edition, *, file: SentFile) -> Floats | None:
+    """The sums that were kept, (G, columns); None if they are not all there."""
+    shape = edition.ground_truth.n_recordings, len(edition.rules.score_names)
+    try:
+        data = path(edition, file=file).read_bytes()
+    except OSError:
+        return None
+    if len(data) != math.prod(shape) * 8:
+        return None
+    return np.frombuffer(data, dtype="<f8").reshape(shape).astype(np.float64)
+
+
+def sums_of(edition: Edition, *, file: SentFile) -> Floats:
+    """The sums of a scored file, kept or made anew, (G, columns).
+
+    Raises what `child.read` raises.
+    """
+    kept = load(edition, file=file)
+    if kept is not None:
+        return kept
+    predictions = child.of(file, edition)
+    bags = scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
+    assert bags is not None  # noqa: S101 - they were asked for
+    save(edition, file=file, bags=bags)
+    return bags.sums
+
+
+def counts_of(edition: Edition) -> Floats:
+    """Sequences per recording in every column, (G, columns). Raises `OSError` without the values."""
+    return scorer(edition.ground_truth_id, edition.protocol).recording_counts
+
+
+def unit_sums_of(edition: Edition, *, file: SentFile) -> Floats:
+    """The same added up to the edition's units, (U, columns)."""
+    return uncertainty.by_units(sums_of(edition, file=file), units_of(edition))
+
+
+def unit_counts_of(edition: Edition) -> Floats:
+    """Sequences per unit of the edition in every column, (U, columns). Raises `OSError` as `counts_of`."""
+    return uncertainty.by_units(counts_of(edition), units_of(edition))
+
+
+def units_of(edition: Edition) -> Units:
+    """The units that the edition keeps. Raises `OSError` without the values of its ground truth."""
+    return _units(edition.ground_truth_id, edition.unit)
+
+
+@lru_cache(maxsize=4)
+def _units(truth_digest: str, kind: str) -> Units:
+    return truth_values.load(truth_digest).manifest.units_by(kind)
+
+
+def floor_of(edition: Edition) -> dict[str, float | None]:
+    """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
+    floor = scores.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
+    return {name: published(value, decimals=edition.decimals) for name, value in floor.items()}
+
+
+def scorer(truth_digest: str, protocol: str) -> Scorer:
+    """Ready for every file of an edition, with the truth as it is cached. Raises as `truth_values.load`."""
+    truth: GroundTruth = truth_values.load(truth_digest)
+    return _scorer(truth, protocol)
+
+
+@lru_cache(maxsize=2)
+def _scorer(truth: GroundTruth, protocol: str) -> Scorer:
+    return Scorer(truth, get_protocol(protocol))

@@ -1,0 +1,57 @@
+"""Sentences about the end of scoring; pages ask for them, so this module computes nothing."""
+
+from evaluator.counting import counted
+from evaluator.scoring.significance import MIN_DEGREES, too_few_units
+from leaderboard.models import Edition, Evaluation, Status
+from leaderboard.queue import lifecycle
+
+
+def sentence_of(evaluation: Evaluation) -> str:
+    """Whose fault it was, or what goes on, where that needs saying."""
+    n_failed = evaluation.n_poison_strikes + evaluation.n_infrastructure_strikes
+    match evaluation.status:
+        case Status.REJECTED if evaluation.kept_in is not None:
+            return (
+                f"Edition {evaluation.edition.number} cannot score this file. It keeps its result in edition "
+                f"{evaluation.kept_in}, and your quota is refunded."
+            )
+        case Status.REJECTED:
+            n = evaluation.n_problems
+            return f"The file is at fault: it has {counted(n, 'problem')}, so it was not scored."
+        case Status.SYSTEM_ERROR:
+            return _of_system_error(evaluation, n_failed=n_failed)
+        case Status.CANCELLED:
+            return "The team cancelled the submission before it was scored."
+        case Status.QUEUED | Status.RUNNING if n_failed:
+            tries = f"{n_failed} tries" if n_failed != 1 else "One try"
+            return f"{tries} ended without a result; the file may be fine. We retry automatically."
+    return ""
+
+
+def _of_system_error(evaluation: Evaluation, *, n_failed: int) -> str:
+    """Why scoring was given up."""
+    counts = " Until then it counts as a rejected file for 24 hours." if evaluation.is_file_suspect else ""
+    if evaluation.is_file_suspect and evaluation.n_poison_strikes < lifecycle.MAX_POISON_STRIKES:
+        # Given up before its strikes were exhausted.
+        return (
+            "Reading the file took more processor time than a file for this split may take, so it was not "
+            "scored; `tsttc check` reads it on your machine without this limit. We keep the file, and a "
+            f"maintainer can have it read again.{counts}"
+        )
+    tries = f"{n_failed} times" if n_failed != 1 else "once"
+    return (
+        f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
+        f"the file, and a maintainer can retry it.{counts}"
+    )
+
+
+def why_no_interval(edition: Edition) -> str:
+    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
+
+    A worker finds out how many units an edition effectively has, and writes it beside the edition; until
+    then only an edition with too few units in all is known to have none.
+    """
+    most = max(edition.n_effective.values(), default=float(edition.unit_count))
+    if most >= MIN_DEGREES:
+        return ""
+    return f"There are no confidence intervals: {too_few_units(most, unit=edition.unit)}."

@@ -1,0 +1,236 @@
+"""Charts of the error analysis of one submission; only its team sees it, and only on open splits."""
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, Final
+
+from evaluator.counting import counted
+from evaluator.metrics.protocol import known_metrics
+from evaluator.metrics.registry import MID, Metric
+from evaluator.scoring.report import format_published
+from leaderboard.models import Analysis
+from leaderboard.templatetags.board import grouped
+from leaderboard.web.charts.chart_options import (
+    Chart,
+    Frame,
+    Mark,
+    Option,
+    call,
+    empty,
+    error_axis,
+    places_axis,
+    x_axis,
+    y_axis,
+)
+from leaderboard.web.charts.chart_series import Look, band, bars, line, marks
+from leaderboard.web.charts.svg import round_ticks, tick_text
+
+_END_S: Final = 20.0
+_TTC_AXIS: Final = {
+    "type": "value",
+    "min": -_END_S,
+    "max": _END_S,
+    "interval": 10,
+    "axisLabel": {"formatter": call("number")},
+}
+MEAN, SPAN = "Mean error", "95 % confidence interval"
+Row = Mapping[str, Any]
+
+
+def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
+    """An analysis, ready to be placed."""
+    content, distribution = closer.content, closer.content["distribution"]
+    errors = [metric for metric in known_metrics().values() if metric.name in distribution]
+    quantiles = zip(*(distribution[metric.name] for metric in errors), strict=True)
+    return {
+        "n_sequences": counted(content["n_sequences"], "sequence"),
+        "n_recordings": counted(content["n_recordings"], "recording"),
+        "curve": curve(content["curve"], errors),
+        "histogram": histogram(content["histogram"]),
+        "errors": errors,
+        "quantiles": [
+            (f"{100 * row[0]['quantile']:.0f} %", [format_published(each["value"]) for each in row])
+            for row in quantiles
+        ],
+        "scatter": scatter(content["scatter"]),
+        "worst": [
+            (row["recording"], grouped(row["n"]), [format_published(row[metric.name]) for metric in errors])
+            for row in content["worst"]
+        ],
+    }
+
+
+# --- error by time to contact ----------------------------------------------------------------------------
+
+
+def curve(bins: Sequence[Row], errors: Sequence[Metric]) -> Chart:
+    """The mean errors by true time to contact, each with its confidence interval where there is one."""
+    if not bins:
+        return empty("curve")
+    has_intervals = any(_interval(row, metric) for row in bins for metric in errors)
+    frame = Frame(
+        x_axes=[x_axis("True time to contact in s", _TTC_AXIS) for _ in errors],
+        y_axes=[error_axis(metric, _ends(bins, metric)) for metric in errors],
+        series=[
+            series
+            for i, metric in enumerate(errors)
+            for run in _runs(bins)
+            for series in _curve_series(run, metric, grid=i)
+        ],
+        names=[MEAN, SPAN] if has_intervals else [],
+    )
+    columns = ("Time to contact in s", "Sequences", *(metric.heading for metric in errors))
+    return Chart(
+        kind="curve",
+        label=f"Mean {' and '.join(metric.symbol for metric in errors)} by true time to contact.",
+        options=frame.options(),
+        columns=columns,
+        rows=tuple(
+            (_seconds(row), grouped(row["n"]), *(_value_words(row, metric) for metric in errors))
+            for row in bins
+        ),
+        numbers=tuple(range(1, len(columns))),
+        has_intervals=has_intervals,
+    )
+
+
+def _interval(row: Row, metric: Metric) -> tuple[float, float] | None:
+    """The confidence interval of a bin's mean, if it has one."""
+    found = row.get("intervals", {}).get(metric.name)
+    return (found[0], found[1]) if found else None
+
+
+def _ends(bins: Sequence[Row], metric: Metric) -> list[float]:
+    return [value for row in bins for value in (row[metric.name], *(_interval(row, metric) or ()))]
+
+
+def _runs(bins: Sequence[Row]) -> Iterator[list[Row]]:
+    """Bins that touch each other: no line leads over a gap without sequences."""
+    run = [bins[0]]
+    for before, row in itertools.pairwise(bins):
+        if row["low_s"] != before["high_s"]:
+            yield run
+            run = []
+        run.append(row)
+    yield run
+
+
+def _curve_series(run: Sequence[Row], metric: Metric, *, grid: int) -> Iterator[Option]:
+    middles = [(row["low_s"] + row["high_s"]) / 2 for row in run]
+    found = [
+        Mark(
+            middle,
+            row[metric.name],
+            (
+                f"{_seconds(row)} s",
+                f"{metric.symbol} {_value_words(row, metric)}",
+                counted(row["n"], "sequence"),
+            ),
+        )
+        for middle, row in zip(middles, run, strict=True)
+    ]
+    spans = [
+        (middle, *interval)
+        for middle, row in zip(middles, run, strict=True)
+        if (interval := _interval(row, metric)) is not None
+    ]
+    yield band(SPAN, spans, "--accent", grid=grid)
+    yield line(MEAN, [(mark.x, mark.y) for mark in found], "--accent", grid=grid)
+    yield marks(MEAN, found, Look("--accent", size=5.0), grid=grid) | {"upright": True}
+
+
+def _seconds(row: Row) -> str:
+    return f"{tick_text(row['low_s'])} to {tick_text(row['high_s'])}"
+
+
+def _value_words(row: Row, metric: Metric) -> str:
+    value, interval = format_published(row[metric.name]), _interval(row, metric)
+    if interval is None:
+        return value
+    return f"{value} ({format_published(interval[0])} to {format_published(interval[1])})"
+
+
+# --- how errors are distributed --------------------------------------------------------------------------
+
+
+def histogram(bins: Sequence[Row]) -> Chart:
+    """How many sequences have an error in each bin; the last bar holds all larger errors."""
+    if not bins:
+        return empty("histogram")
+    words = [_bin_words(row) for row in bins]
+    found = [
+        Mark(i, row["n"], (f"{MID.symbol} {text}", counted(row["n"], "sequence")))
+        for i, (row, text) in enumerate(zip(bins, words, strict=True))
+    ]
+    scale = places_axis(_bar_ticks(bins), low=0.0, high=float(len(bins)))
+    places = {"type": "category", "data": list(range(len(bins))), "show": False}
+    frame = Frame(
+        x_axes=[places],
+        y_axes=[y_axis("Sequences", {"type": "value", "min": 0, "minInterval": 1})],
+        series=[bars("Sequences", found, "--accent")],
+        further_x_axes=[x_axis(f"{MID.title} ({MID.symbol}), {MID.unit}", scale)],
+    )
+    return Chart(
+        kind="histogram",
+        label="Number of sequences by MiD; the last bar holds all larger values.",
+        options=frame.options(),
+        columns=(MID.heading, "Sequences"),
+        rows=tuple((text, grouped(row["n"])) for text, row in zip(words, bins, strict=True)),
+        numbers=(1,),
+    )
+
+
+def _bin_words(row: Row) -> str:
+    low, high = format_published(row["low"]), row["high"]
+    return f"{low} and more" if high is None else f"{low} to {format_published(high)}"
+
+
+def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:
+    """Round values of MiD, and where they stand among bars of equal width; the bar of the rest says so.
+
+    >>> _bar_ticks([{"low": 0.0}, {"low": 4.0}, {"low": 8.0}, {"low": 12.0}])
+    [(0.0, '0'), (1.25, '5'), (2.5, '10'), (3.5, 'more')]
+    """
+    end = bins[-1]["low"]
+    rest = (len(bins) - 0.5, "more")
+    if end <= 0:
+        return [(0.0, "0"), rest]
+    ticks = [tick for tick in round_ticks(0.0, end, n=4) if tick <= end]
+    return [*(((len(bins) - 1) * tick / end, tick_text(tick)) for tick in ticks), rest]
+
+
+# --- predicted against true ------------------------------------------------------------------------------
+
+
+def scatter(drawn: Mapping[str, Sequence[float]]) -> Chart:
+    """Every pair as a mark beside the line on which the two agree; what lies outside is at the edge."""
+    pairs = sorted(zip(drawn["true_s"], drawn["predicted_s"], strict=True))
+    if not pairs:
+        return empty("scatter")
+    found = [
+        Mark(
+            _clipped(true_s),
+            _clipped(predicted_s),
+            (f"true {true_s:.3f} s", f"predicted {predicted_s:.3f} s"),
+        )
+        for true_s, predicted_s in pairs
+    ]
+    cloud = marks("Sequences", found, Look("--accent", size=5.0))
+    cloud["itemStyle"] = {"color": "--accent", "opacity": 0.6}
+    frame = Frame(
+        x_axes=[x_axis("True time to contact in s", _TTC_AXIS)],
+        y_axes=[y_axis("Predicted, s", _TTC_AXIS)],
+        series=[line("Perfect", [(-_END_S, -_END_S), (_END_S, _END_S)], "--rule"), cloud],
+    )
+    return Chart(
+        kind="scatter",
+        label="Predicted against true time to contact, with the line on which the two agree.",
+        options=frame.options(),
+        columns=("True in s", "Predicted in s"),
+        rows=tuple((f"{true_s:.3f}", f"{predicted_s:.3f}") for true_s, predicted_s in pairs),
+        numbers=(0, 1),
+    )
+
+
+def _clipped(seconds: float) -> float:
+    return min(max(seconds, -_END_S), _END_S)

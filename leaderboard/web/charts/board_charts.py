@@ -1,0 +1,267 @@
+"""Charts of a board with a front: progress over time, accuracy against latency.
+
+They are made of the public rows, and each has a table with the same numbers. Hidden splits show nothing here
+that their board does not: values over whole TTC ranges, with the decimals of the split.
+"""
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import Final
+
+from django.utils.html import format_html
+from django.utils.safestring import SafeString
+
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.metrics.registry import MID
+from evaluator.scoring.report import format_published
+from leaderboard.boards.rows import Entry
+from leaderboard.boards.snapshots import Attempt
+from leaderboard.exports.tables import team_of
+from leaderboard.web.charts.chart_options import (
+    Chart,
+    Frame,
+    Mark,
+    Option,
+    empty,
+    error_axis,
+    error_text,
+    log_axis,
+    method_href,
+    x_axis,
+)
+from leaderboard.web.charts.chart_series import Look, marks, named_marks, staircase
+
+# Below the front, where its names are: this part of the whole height.
+_ROOM: Final = 0.15
+SUBMITTED, QUOTED = "Submissions", "Published results"
+# Behind a front. More marks are a blot, and a board of ten thousand made a page of 7 MB of them.
+MAX_BEHIND: Final = 500
+
+
+# --- a front and what lies behind it ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Placed:
+    x: float
+    y: float
+    entry: Entry
+    place: str  # in words
+    is_front: bool = False
+
+    def mark(self, praise: str) -> Mark:
+        """What is drawn of it, and told."""
+        value = error_text(MID, self.y, decimals=self.entry.decimals)
+        read = [self.entry.method, team_of(self.entry), f"{value} {MID.unit}, {self.place}"]
+        return Mark(
+            self.x, self.y, (*read, praise) if self.is_front else tuple(read), method_href(self.entry)
+        )
+
+
+def _with_front(placed: Iterable[tuple[float, float, Entry, str]]) -> list[_Placed]:
+    """In the order of their places; on the front is what is better than everything before it."""
+    best, found = math.inf, []
+    for x, y, entry, place in sorted(placed, key=lambda each: each[:2]):
+        found.append(_Placed(x, y, entry, place, is_front=y < best))
+        best = min(best, y)
+    return found
+
+
+def _drawn(found: Sequence[_Placed]) -> tuple[list[_Placed], str]:
+    """The front, and of what lies behind it those with the lowest MiD; and what to say of the others."""
+    behind = sorted((each for each in found if not each.is_front), key=lambda each: each.y)
+    if len(behind) <= MAX_BEHIND:
+        return list(found), ""
+    left_out = set(map(id, behind[MAX_BEHIND:]))
+    drawn = [each for each in found if id(each) not in left_out]
+    return drawn, f"Shown are the {len(drawn):,} with the lowest MiD, or on the line, of {len(found):,}."
+
+
+def _front_series(
+    found: Sequence[_Placed], *, line: str, praise: str, end: float
+) -> tuple[list[Option], list[str]]:
+    """The marks of submissions and of rows from papers, the front with its names; and the legend's names."""
+    front = [each for each in found if each.is_front]
+    series = [staircase(line, [*((each.x, each.y) for each in front), (end, front[-1].y)])]
+    names = [line]
+    for kind, name, symbol in (("submission", SUBMITTED, "circle"), ("published", QUOTED, "diamond")):
+        of_kind = [each for each in found if each.entry.kind == kind]
+        if not of_kind:
+            continue
+        names.append(name)
+        behind = [each.mark("") for each in of_kind if not each.is_front]
+        series.append(marks(name, behind, Look("--quiet", symbol, 9.0, is_hollow=True)))
+        ahead = [i for i, each in enumerate(front) if each.entry.kind == kind]
+        drawn = [each.mark(praise) for each in front]
+        series.append(named_marks(name, drawn, ahead, Look("--accent", symbol, 11.0)))
+    return series, names
+
+
+def _value_cells(found: Sequence[_Placed]) -> list[SafeString]:
+    """Their MiD for a table, as if all had the most decimals: the others keep the room of the missing one."""
+    most = max(each.entry.decimals for each in found)
+    return [
+        format_html(
+            '<span class="{}">{}</span>',
+            decimals_css(each.entry, most).strip(),
+            format_published(each.y, decimals=each.entry.decimals),
+        )
+        for each in found
+    ]
+
+
+def decimals_css(entry: Entry, most: int) -> str:
+    """The class of a number with fewer decimals than the most: it keeps the room of the missing ones."""
+    return "" if entry.decimals == most else f" d{entry.decimals}"
+
+
+# --- progress over time ----------------------------------------------------------------------------------
+
+
+def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Chart:
+    """MiD of every submission by day, with the lowest MiD so far, and rows quoted from papers.
+
+    Papers say a year and no day: their rows stand in its middle.
+    """
+    by_method = {entry.method_id: entry for entry in entries if entry.method_id is not None}
+    quoted = [
+        (entry, value, entry.year)
+        for entry in entries
+        if entry.kind == "published" and entry.year and (value := entry.scores[PRIMARY]) is not None
+    ]
+    sent = [
+        (by_method[attempt.method_id], value, _day(attempt.at))
+        for attempt in attempts
+        if attempt.method_id in by_method and (value := attempt.scores[PRIMARY]) is not None
+    ]
+    if not quoted and not sent:
+        return empty("progress")
+    placed = [
+        (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
+    ]
+    placed += [(_ms(day), value, entry, f"{day:%Y-%m-%d}") for entry, value, day in sent]
+    found, note = _drawn(_with_front(placed))
+    first, last = _time_range([day for *_, day in sent], [year for *_, year in quoted])
+    series, names = _front_series(found, line="Best so far", praise="the best when it came", end=_ms(last))
+    frame = Frame(
+        x_axes=[x_axis(_time_title(first, last), _time_axis(first, last))],
+        y_axes=[error_axis(MID, [each.y for each in found], room=_ROOM)],
+        series=series,
+        names=names,
+        more=ZOOMABLE,
+    )
+    return Chart(
+        kind="progress",
+        label=f"MiD of each method by date, with the lowest MiD so far: {_front_words(found)}.",
+        options=frame.options(),
+        columns=("Date", "Method", "Team", MID.heading, "Best so far"),
+        rows=tuple(
+            (each.place, each.entry.method, team_of(each.entry), value, "yes" if each.is_front else "")
+            for each, value in zip(found, _value_cells(found), strict=True)
+        ),
+        numbers=(3,),
+        is_zoomable=True,
+        note=note,
+    )
+
+
+# Dragging over a chart looks closer at a stretch of its level axis; the script turns it on.
+ZOOMABLE: Final = {
+    "toolbox": {
+        "itemSize": 0,
+        "showTitle": False,
+        "feature": {
+            "dataZoom": {
+                "yAxisIndex": "none",
+                "filterMode": "none",
+                "brushStyle": {"color": "--accent", "opacity": 0.15},
+            }
+        },
+    }
+}
+
+
+def _front_words(found: Sequence[_Placed]) -> str:
+    front = [each for each in found if each.is_front]
+    texts = [f"{each.entry.method} {error_text(MID, each.y, decimals=each.entry.decimals)}" for each in front]
+    return texts[0] if len(texts) == 1 else f"from {texts[0]} to {texts[-1]}"
+
+
+def _ms(at: datetime) -> float:
+    return at.timestamp() * 1000
+
+
+def _day(at: datetime) -> datetime:
+    return at.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
+
+
+def _time_range(days: Sequence[datetime], years: Sequence[int]) -> tuple[datetime, datetime]:
+    """From where to where the axis goes: whole years around papers, a margin around submissions."""
+    ends = [datetime(year, 1, 1, tzinfo=UTC) for year in years]
+    ends += [datetime(year + 1, 1, 1, tzinfo=UTC) for year in years]
+    margin = max(0.04 * (max([*ends, *days]) - min([*ends, *days])), timedelta(days=1))
+    ends += [day - margin for day in days] + [day + margin for day in days]
+    return min(ends), max(ends)
+
+
+def _time_axis(first: datetime, last: datetime) -> Option:
+    label = {
+        "formatter": {"year": "{yyyy}", "month": "{MMM} {yyyy}", "day": "{d} {MMM}"},
+        "showMinLabel": first.month == first.day == 1,
+        "showMaxLabel": False,
+    }
+    return {"type": "time", "min": _ms(first), "max": _ms(last), "axisLabel": label, "splitNumber": 5}
+
+
+def _time_title(first: datetime, last: datetime) -> str:
+    if last - first > timedelta(days=60):
+        return "Date"
+    years = sorted({f"{first:%Y}", f"{last:%Y}"})
+    return f"Date in {' and '.join(years)} (UTC)"
+
+
+# --- accuracy against latency ----------------------------------------------------------------------------
+
+
+def latency(entries: Sequence[Entry]) -> Chart:
+    """MiD against latency, of the methods that state one; the front is what nothing beats in both."""
+    found, note = _drawn(
+        _with_front(
+            (latency_ms, value, entry, f"{latency_ms:g} ms")
+            for entry in entries
+            if entry.is_visible_to_all
+            and (latency_ms := entry.details["latency_ms"]) is not None
+            and (value := entry.scores[PRIMARY]) is not None
+        )
+    )
+    if not found:
+        return empty("latency")
+    axis = log_axis(each.x for each in found)
+    series, names = _front_series(found, line="Pareto front", praise="on the Pareto front", end=axis["max"])
+    frame = Frame(
+        x_axes=[x_axis("Latency in ms (log scale)", axis)],
+        y_axes=[error_axis(MID, [each.y for each in found], room=_ROOM)],
+        series=series,
+        names=names,
+    )
+    return Chart(
+        kind="latency",
+        label=f"MiD of each method against its latency, with the Pareto front: {_front_words(found)}.",
+        options=frame.options(),
+        columns=("Method", "Team", "Latency in ms", "Hardware", MID.heading, "On the Pareto front"),
+        rows=tuple(
+            (
+                each.entry.method,
+                team_of(each.entry),
+                f"{each.x:g}",
+                each.entry.details["hardware"] or "not specified",
+                value,
+                "yes" if each.is_front else "",
+            )
+            for each, value in zip(found, _value_cells(found), strict=True)
+        ),
+        numbers=(2, 4),
+        note=note,
+    )

@@ -1,0 +1,282 @@
+"""Charts as options for Apache ECharts, built from the numbers of the table that stands beside each.
+
+`static/charts.js` draws them. JSON has neither the page's colours nor functions, so a text such as "--accent"
+is the page's colour of that name, and `call("names", …)` a function of that script. The `read` of a mark are
+the lines that a reader gets near it, the `href` what a click opens. The script adds no number of its own.
+"""
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from django.urls import reverse
+
+from evaluator.metrics.registry import Metric
+from evaluator.scoring.report import format_published
+from leaderboard.boards.rows import Entry
+
+Option = dict[str, Any]
+
+# Straight from 0 as long as the largest error is at most so many times the smallest.
+_MAX_STRAIGHT: Final = 6.0
+NARROW_PX: Final = 600
+_MAX_NAME_PX: Final = 260
+_LEFT_PX: Final = 44
+QUIET: Final = {"color": "--quiet", "fontSize": 11, "lineHeight": 14}
+TEXT: Final = {"color": "--ink", "fontSize": 12}
+
+
+@dataclass(frozen=True)
+class Chart:
+    """A chart ready to be placed: what ECharts draws, and the table with the same numbers."""
+
+    kind: str
+    label: str  # what it shows, for those who cannot see it
+    options: Mapping[str, Any]
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    numbers: tuple[int, ...] = ()  # which columns hold numbers of their own, from 0: they stand at the right
+    has_intervals: bool = False
+    is_zoomable: bool = False
+    is_low: bool = False  # it has so little in it that half the height will do
+    note: str = ""  # in a sentence, what it leaves out
+
+    @property
+    def has_links(self) -> bool:
+        """Whether a click on a mark opens anything."""
+        series = self.options["baseOption"]["series"]
+        return any("href" in mark for each in series for mark in each["data"])
+
+    def __bool__(self) -> bool:
+        """Whether there is anything to be drawn: an empty chart is never shown."""
+        return bool(self.rows)
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A point of a chart: where it stands, what a reader is told there, and what a click opens."""
+
+    x: float
+    y: float
+    read: tuple[str, ...]
+    href: str = ""
+
+    def item(self) -> Option:
+        """The mark as ECharts takes it."""
+        found: Option = {"value": [self.x, self.y], "name": self.read[0], "read": list(self.read[1:])}
+        return found | ({"href": self.href} if self.href else {})
+
+
+def empty(kind: str) -> Chart:
+    """A chart of which there is nothing to be drawn."""
+    return Chart(kind=kind, label="", options={}, columns=(), rows=())
+
+
+def call(name: str, of: Any = None) -> Option:
+    """A function of `static/charts.js`, and what it is about."""
+    return {"call": name, "of": of}
+
+
+def method_href(entry: Entry) -> str:
+    """The page of an entry's method; a row quoted from a paper has none."""
+    return reverse("method", args=[entry.method_id]) if entry.method_id else ""
+
+
+def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:
+    """A value with its symbol, as a reader is told it.
+
+    >>> from evaluator.metrics.registry import MID
+    >>> error_text(MID, 14.3, decimals=2)
+    'MiD 14.30'
+    """
+    return f"{metric.symbol} {format_published(value, decimals=decimals)}"
+
+
+# --- axes ------------------------------------------------------------------------------------------------
+
+
+def round_range(low: float, high: float) -> tuple[float, float]:
+    """The last of …, 1, 2, 5, 10, … at or below `low`, and the first at or above `high`; both positive.
+
+    >>> round_range(13.0, 41.0), round_range(20.0, 20.0)
+    ((10.0, 50.0), (20.0, 50.0))
+    """
+    steps = _round_numbers(low / 10, high * 10)
+    first = max(step for step in steps if step <= low * (1 + 1e-9))
+    return first, min(step for step in steps if step >= high * (1 - 1e-9) and step > first)
+
+
+def _round_numbers(low: float, high: float) -> list[float]:
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return [float(f"{factor}e{power}") for power in powers for factor in (1, 2, 5)]
+
+
+def log_axis(values: Iterable[float], *, room: float = 0.0) -> Option:
+    """A logarithmic axis around positive values, with numbers that can be read.
+
+    `room` is the part of its length that stays free below the least value, at least: a place for names.
+    """
+    known = list(values)
+    low, high = round_range(min(known), max(known))
+    while room and math.log(min(known) / low) < room * math.log(high / low):
+        low, _ = round_range(0.9 * low, high)
+    within = [step for step in _round_numbers(low, high) if low <= step <= high]
+    if len(within) > 10:  # several decades: their beginnings are enough
+        within = [step for step in within if math.log10(step) % 1 < 1e-9]
+    ticks = {"customValues": within}
+    return {"type": "log", "min": low, "max": high, "axisLabel": ticks, "axisTick": ticks}
+
+
+def error_axis(metric: Metric, values: Iterable[float], *, room: float = 0.0) -> Option:
+    """An axis of errors that exaggerates nothing: straight from 0, or logarithmic and saying so."""
+    known = list(values) or [1.0]
+    name = f"{metric.symbol}, {metric.unit}"
+    if min(known) <= 0 or max(known) <= _MAX_STRAIGHT * min(known):
+        return y_axis(name, {"type": "value", "min": 0})
+    return y_axis(f"{name} (log scale)", log_axis(known, room=room))
+
+
+def y_axis(name: str, axis: Mapping[str, Any]) -> Option:
+    """An upright axis with its name above it, and hairlines across."""
+    return _styled(axis) | {
+        "name": name,
+        "nameLocation": "end",
+        "nameGap": 12,
+        "nameTextStyle": {"color": "--soft", "fontSize": 12, "align": "left", "padding": [0, 0, 0, -34]},
+        "axisLine": {"show": False, "onZero": False},
+        "splitLine": {"show": True, "lineStyle": {"color": "--hair"}},
+    }
+
+
+def x_axis(name: str, axis: Mapping[str, Any]) -> Option:
+    """A level axis with its name below it."""
+    return _styled(axis) | {
+        "name": name,
+        "nameLocation": "middle",
+        "nameGap": 28,
+        "nameTextStyle": {"color": "--soft", "fontSize": 12},
+        "axisLine": {"lineStyle": {"color": "--rule"}, "onZero": False},
+        "splitLine": {"show": False},
+    }
+
+
+def _styled(axis: Mapping[str, Any]) -> Option:
+    label = {**QUIET, "hideOverlap": True, **axis.get("axisLabel", {})}
+    tick = {"show": True, "length": 4, "lineStyle": {"color": "--rule"}, **axis.get("axisTick", {})}
+    return {**axis, "axisLabel": label, "axisTick": tick}
+
+
+def places_axis(places: Sequence[tuple[float, str]], *, low: float, high: float) -> Option:
+    """An axis with these texts at these places."""
+    at = {"customValues": [place for place, _ in places]}
+    label = {**at, "formatter": call("texts", [list(place) for place in places])}
+    return {"type": "value", "min": low, "max": high, "axisLabel": label, "axisTick": at}
+
+
+def names_axis(names: Sequence[str]) -> Option:
+    """An axis on which the i-th name stands at i, so that marks can stand beside it."""
+    return places_axis(list(enumerate(names)), low=-0.5, high=len(names) - 0.5)
+
+
+def ranks_axis(names: Sequence[str], *, name: str = "", is_upright: bool = False) -> Option:
+    """An axis of a heat map: names at the left from the top downwards, or above it."""
+    label: Option = {**QUIET}
+    if is_upright:
+        label = {**TEXT, "interval": 0, "overflow": "truncate", "ellipsis": "…"}
+    hidden = {"show": False}
+    axis = {
+        "type": "category",
+        "data": list(names),
+        "axisLabel": label,
+        "axisTick": hidden,
+        "axisLine": hidden,
+    }
+    if is_upright:
+        return axis | {"inverse": True}
+    title = {"name": name, "nameLocation": "middle", "nameGap": 22, "nameTextStyle": {"color": "--soft"}}
+    return axis | title | {"position": "top"}
+
+
+# --- the whole -------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The ground of a chart: its axes, one pair for each panel, and what is drawn on them."""
+
+    x_axes: Sequence[Option]
+    y_axes: Sequence[Option]
+    series: Sequence[Option]
+    names: Sequence[str] = ()  # of the legend
+    further_x_axes: Sequence[Option] = ()  # of the last panel
+    left: tuple[int, int] = (
+        _LEFT_PX,
+        _LEFT_PX,
+    )  # px before the ground, where it is wide and where it is narrow
+    top: int = 0  # px more than usual above it
+    more: Mapping[str, Any] = field(default_factory=dict)
+
+    def options(self) -> Option:
+        """Options of one panel, or of two side by side that stand one above the other where it is narrow."""
+        n_panels = len(self.x_axes)
+        base = {
+            "animation": False,
+            "useUTC": True,
+            "textStyle": {"color": "--ink"},
+            "xAxis": [
+                *({**axis, "id": f"x{i}", "gridIndex": i} for i, axis in enumerate(self.x_axes)),
+                *({**axis, "gridIndex": n_panels - 1, "position": "bottom"} for axis in self.further_x_axes),
+            ],
+            "yAxis": [{**axis, "gridIndex": i} for i, axis in enumerate(self.y_axes)],
+            "series": list(self.series),
+            **self.more,
+        }
+        narrow = {"maxWidth": NARROW_PX}
+        media: list[Option] = [{"option": self._layout(n_panels, is_narrow=False)}]
+        media.append({"query": narrow, "option": self._layout(n_panels, is_narrow=True)})
+        return {"baseOption": base, "media": media}
+
+    def _layout(self, n_panels: int, *, is_narrow: bool) -> Option:
+        left = self.left[is_narrow]
+        top = 38 + self.top + 22 * self._n_legend_lines(320 if is_narrow else NARROW_PX)
+        layout = {"legend": self._legend(), "grid": _grids(n_panels, left=left, top=top, is_narrow=is_narrow)}
+        if n_panels > 1:  # one above the other, only the last has room for a name below it
+            shown = [not is_narrow or number == n_panels - 1 for number in range(n_panels)]
+            names = [axis["name"] if keeps else "" for axis, keeps in zip(self.x_axes, shown, strict=True)]
+            layout["xAxis"] = [{"id": f"x{number}", "name": name} for number, name in enumerate(names)]
+        if left == _LEFT_PX:
+            return layout
+        return layout | {"yAxis": [{"axisLabel": {"width": left - 16}} for _ in self.y_axes]}
+
+    def _n_legend_lines(self, width_px: int) -> int:
+        """How many lines the legend takes at most at this width, by half an em for each letter."""
+        n_lines, used_px = 0, width_px
+        for name in self.names:
+            needed_px = 38 + min(_MAX_NAME_PX, 7 * len(name))
+            if used_px + needed_px > width_px:
+                n_lines, used_px = n_lines + 1, 0
+            used_px += needed_px
+        return n_lines
+
+    def _legend(self) -> Option:
+        return {
+            "show": bool(self.names),
+            "data": list(self.names),
+            "left": 0,
+            "top": 0,
+            "itemGap": 14,
+            "itemWidth": 14,
+            "itemHeight": 10,
+            "textStyle": {**TEXT, "width": _MAX_NAME_PX, "overflow": "truncate"},
+            "inactiveColor": "--rule",
+        }
+
+
+def _grids(n_panels: int, *, left: int, top: int, is_narrow: bool) -> list[Option]:
+    sides = {"left": left, "right": 12, "bottom": 44 if left == _LEFT_PX else 8}
+    if n_panels == 1:
+        return [{**sides, "top": top}]
+    if is_narrow:
+        return [{**sides, "top": top, "bottom": "56%"}, {**sides, "top": "56%"}]
+    return [{**sides, "top": top, "right": "53%"}, {**sides, "top": top, "left": "53%"}]

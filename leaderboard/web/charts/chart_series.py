@@ -1,0 +1,155 @@
+"""Series of ECharts: marks, lines, whiskers, bands, bars and cells."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Final
+
+from leaderboard.web.charts.chart_options import TEXT, Mark, Option, call
+
+SERIES_INKS: Final = ("--s1", "--s2", "--s3", "--s4", "--s5")
+# One shape for each series: nobody has to tell colours apart.
+SERIES_SYMBOLS: Final = (
+    "circle",
+    "rect",
+    "triangle",
+    "diamond",
+    "path://M0 2L2 0L5 3L8 0L10 2L7 5L10 8L8 10L5 7L2 10L0 8L3 5Z",
+)
+
+
+@dataclass(frozen=True)
+class Look:
+    """How the marks of a series are drawn."""
+
+    ink: str = "--accent"
+    symbol: str = "circle"
+    size: float = 9.0
+    is_hollow: bool = False
+
+    def style(self) -> Option:
+        """Hollow marks have the ground inside, full ones a rim of it, so that neighbours stay apart."""
+        if self.is_hollow:
+            return {"color": "--ground", "borderColor": self.ink, "borderWidth": 1.25, "opacity": 1}
+        return {"color": self.ink, "borderColor": "--ground", "borderWidth": 1, "opacity": 1}
+
+
+def marks(name: str, found: Iterable[Mark], look: Look, *, grid: int = 0, z: int = 2) -> Option:
+    """A series of marks."""
+    return {
+        "type": "scatter",
+        "name": name,
+        "xAxisIndex": grid,
+        "yAxisIndex": grid,
+        "symbol": look.symbol,
+        "symbolSize": look.size,
+        "itemStyle": look.style(),
+        "data": [mark.item() for mark in found],
+        "emphasis": {"disabled": True},
+        "cursor": "inherit",
+        "z": z,
+    }
+
+
+def named_marks(name: str, front: Sequence[Mark], chosen: Iterable[int], look: Look) -> Option:
+    """The chosen marks of a front, by their places in it, each with its name in the empty corner below it.
+
+    Where names would overlap, the later mark keeps its own: ECharts prefers larger marks, by a hair here.
+    """
+    places = list(chosen)
+    items = [{**front[i].item(), "symbolSize": look.size + 0.01 * i} for i in places]
+    nexts = [[front[i + 1].x, front[i + 1].y] if i + 1 < len(front) else None for i in places]
+    series = marks(name, (), look, z=4)
+    label = {
+        **TEXT,
+        "show": True,
+        "position": "bottom",
+        "distance": 6,
+        "align": "left",
+        "formatter": call("name"),
+        "textBorderColor": "--ground",
+        "textBorderWidth": 3,
+    }
+    return series | {"data": items, "label": label, "labelLayout": call("below", nexts)}
+
+
+def staircase(name: str, corners: Iterable[tuple[float, float]]) -> Option:
+    """A line that stays where it is until something better comes."""
+    return {
+        "type": "line",
+        "name": name,
+        "step": "end",
+        "showSymbol": False,
+        "symbol": "none",
+        "lineStyle": {"color": "--accent", "width": 2},
+        "itemStyle": {"color": "--accent"},
+        "data": [list(corner) for corner in corners],
+        "emphasis": {"disabled": True},
+        "silent": True,
+        "z": 1,
+    }
+
+
+def line(name: str, points: Iterable[tuple[float, float]], ink: str, *, grid: int = 0) -> Option:
+    """A line through these points."""
+    series = staircase(name, points)
+    del series["step"]
+    drawn = {"lineStyle": {"color": ink, "width": 1.5}, "itemStyle": {"color": ink}}
+    return series | drawn | {"xAxisIndex": grid, "yAxisIndex": grid}
+
+
+def whiskers(name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, grid: int = 0) -> Option:
+    """Upright lines from low to high, each at its x."""
+    return _custom("whisker", name, spans, ink, grid=grid)
+
+
+def band(name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, grid: int = 0) -> Option:
+    """An area from low to high, over every x."""
+    return _custom("band", name, spans, ink, grid=grid) | {
+        "itemStyle": {"color": ink, "opacity": 0.25},
+        "z": 0,
+    }
+
+
+def _custom(
+    function: str, name: str, spans: Iterable[tuple[float, float, float]], ink: str, *, grid: int
+) -> Option:
+    return {
+        "type": "custom",
+        "name": name,
+        "xAxisIndex": grid,
+        "yAxisIndex": grid,
+        "renderItem": call(function, ink),
+        "encode": {"x": 0, "y": [1, 2]},
+        "data": [list(span) for span in spans],
+        "itemStyle": {"color": ink},
+        "clip": True,
+        "silent": True,
+        "z": 1,
+    }
+
+
+def cells(name: str, found: Iterable[Mark], ink: str) -> Option:
+    """Cells of a heat map, at the places of their column and row."""
+    return {
+        "type": "heatmap",
+        "name": name,
+        "itemStyle": {"color": ink, "borderColor": "--ground", "borderWidth": 1},
+        # ECharts draws no cell without a third value.
+        "data": [{**mark.item(), "value": [mark.x, mark.y, 0]} for mark in found],
+        "emphasis": {"disabled": True},
+        "cursor": "inherit",
+    }
+
+
+def bars(name: str, found: Iterable[Mark], ink: str) -> Option:
+    """A bar for each mark, read wherever the pointer is above or below its top."""
+    return {
+        "type": "bar",
+        "name": name,
+        "barCategoryGap": "12%",
+        "itemStyle": {"color": ink},
+        "data": [mark.item() for mark in found],
+        "emphasis": {"disabled": True},
+        "cursor": "inherit",
+        "upright": True,
+    }

@@ -1,0 +1,144 @@
+"""The page of the paper's tables, each table in other formats, and charts of the ablations.
+
+A chart has the errors over the setting that is varied, one line for each method.
+"""
+
+from collections import defaultdict
+from collections.abc import Sequence
+from typing import Final
+
+from django.http import Http404, HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.views.decorators.gzip import gzip_page
+from django.views.decorators.http import require_safe
+
+from evaluator.metrics.protocol import OVERALL, SCORE_NAMES, metric_of, split_name
+from evaluator.metrics.registry import Metric
+from evaluator.papers.tables import PublishedRow, PublishedTable, published_tables
+from evaluator.tables import published
+from evaluator.tables.formats import FORMATS
+from evaluator.tables.published import PrintedTable, method_name, setting_text
+from leaderboard.web.charts.chart_options import (
+    Chart,
+    Frame,
+    Mark,
+    Option,
+    empty,
+    error_axis,
+    places_axis,
+    x_axis,
+)
+from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Look, line, marks
+
+_MIN_SETTINGS: Final = 3
+"""Two settings are read faster in the table."""
+
+
+def sweep(shown: PrintedTable) -> Chart:
+    """MiD and RTE of a table over the setting that it varies; empty for a table that varies none."""
+    table = shown.table
+    rows: dict[str | None, list[PublishedRow]] = defaultdict(list)
+    for row in table.rows:
+        if isinstance(row.setting, int | float) and not isinstance(row.setting, bool):
+            rows[row.method].append(row)
+    if not table.is_result or min(map(len, rows.values()), default=0) < _MIN_SETTINGS:
+        return empty("published")
+    scores = [name for name in table.columns if name in SCORE_NAMES]
+    metrics = list(dict.fromkeys(map(metric_of, scores)))
+    # Lines of one panel are told apart by the method, or by the TTC range where there is one method.
+    has_ranges = any(split_name(name)[1] != OVERALL for name in scores)
+    lines = [
+        (split_name(name)[1] if has_ranges else method_name(of_method[0]), name, of_method)
+        for of_method in rows.values()
+        for name in scores
+    ]
+    names = list(dict.fromkeys(legend for legend, *_ in lines))
+    settings = sorted({_setting(row) for of_method in rows.values() for row in of_method})
+    room = 0.04 * (settings[-1] - settings[0])
+    places = places_axis(
+        [(setting, f"{setting:,g}") for setting in settings], low=settings[0] - room, high=settings[-1] + room
+    )
+    frame = Frame(
+        x_axes=[x_axis(shown.headings[shown.n_names - 1], places) for _ in metrics],
+        y_axes=[error_axis(metric, _values(table, metric)) for metric in metrics],
+        series=[
+            series
+            for legend, name, of_method in lines
+            for series in _series(
+                legend,
+                name,
+                [(_setting(row), float(row.values[table.columns.index(name)]), row) for row in of_method],
+                place=names.index(legend) % len(SERIES_INKS),
+                grid=metrics.index(metric_of(name)),
+            )
+        ],
+        names=names,
+    )
+    symbols = " and ".join(metric.symbol for metric in metrics)
+    return Chart(
+        kind=table.name,
+        label=f"{symbols} for {len(settings)} settings: {shown.title}. The table has the same numbers.",
+        options=frame.options(),
+        columns=shown.headings,
+        rows=tuple(row.cells for row in shown.rows),
+    )
+
+
+def _setting(row: PublishedRow) -> float:
+    return float(row.setting or 0)
+
+
+def _series(
+    legend: str, name: str, points: Sequence[tuple[float, float, PublishedRow]], *, place: int, grid: int
+) -> list[Option]:
+    """A line and its marks; the mark of the default is larger."""
+    metric, interval = metric_of(name), split_name(name)[1]
+    named = metric.symbol if interval == OVERALL else f"{metric.symbol} {interval}"
+    found = [
+        Mark(
+            x,
+            y,
+            (f"{legend}, {setting_text(row)}", f"{named} {y:.1f}")
+            + (("the paper's default",) if row.is_default else ()),
+        )
+        for x, y, row in points
+    ]
+    drawn = marks(legend, found, Look(SERIES_INKS[place], SERIES_SYMBOLS[place], 8.0), grid=grid)
+    for item, (*_, row) in zip(drawn["data"], points, strict=True):
+        if row.is_default:
+            item["symbolSize"] = 13.0
+    return [line(legend, [(x, y) for x, y, _ in points], SERIES_INKS[place], grid=grid), drawn]
+
+
+def _values(table: PublishedTable, metric: Metric) -> list[float]:
+    columns = [
+        place for place, name in enumerate(table.columns) if name in SCORE_NAMES and metric_of(name) == metric
+    ]
+    return [float(row.values[place]) for row in table.rows for place in columns]
+
+
+# A table has no papers of its own to cite, and its document is the API's.
+DOWNLOADS: Final = tuple(each for each in FORMATS if each.name in {"csv", "latex", "markdown"})
+
+
+@gzip_page
+@require_safe
+def published_page(request: HttpRequest) -> HttpResponse:
+    """All tables, each with its notes; a chart where a setting is varied."""
+    shown = [{"shown": each, "chart": sweep(each)} for each in published.printed_tables()]
+    context = {"tables": shown, "source": published_tables().source, "downloads": DOWNLOADS}
+    return render(request, "boards/published.html", context)
+
+
+@require_safe
+def published_table(request: HttpRequest, table_name: str, suffix: str) -> HttpResponse:
+    """One table as CSV, LaTeX or Markdown."""
+    chosen = next((each for each in DOWNLOADS if each.suffix == suffix), None)
+    table = next((each for each in published_tables().tables if each.name == table_name), None)
+    if chosen is None or table is None:
+        raise Http404(f"There is no table {table_name}.{suffix}.")
+    return HttpResponse(
+        published.WRITERS[chosen.name](published.printed(table)),
+        content_type=f"{chosen.media_type}; charset=utf-8",
+        headers={"Content-Disposition": f'attachment; filename="tsttc-paper-{table_name}.{suffix}"'},
+    )

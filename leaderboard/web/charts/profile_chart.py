@@ -1,0 +1,133 @@
+"""The chart of errors by TTC range, with confidence intervals, of up to five methods side by side."""
+
+from collections.abc import Sequence
+
+from django.utils.html import format_html
+from django.utils.safestring import SafeString
+
+from evaluator.metrics.protocol import OVERALL, PRIMARY, grouped_names, interval_of, metric_of, split_name
+from evaluator.scoring.report import format_published
+from leaderboard.boards.rows import Entry, Interval
+from leaderboard.web.boards.score_columns import figure_css, interval_words
+from leaderboard.web.boards.tables import rank_range
+from leaderboard.web.charts.board_charts import decimals_css
+from leaderboard.web.charts.chart_options import (
+    Chart,
+    Frame,
+    Mark,
+    Option,
+    empty,
+    error_axis,
+    method_href,
+    names_axis,
+    x_axis,
+)
+from leaderboard.web.charts.chart_series import SERIES_INKS, SERIES_SYMBOLS, Look, marks, whiskers
+
+
+def profile(entries: Sequence[Entry]) -> Chart:
+    """Values with their confidence intervals by TTC range, up to five methods side by side."""
+    shown = [entry for entry in entries if entry.scores[PRIMARY] is not None][: len(SERIES_INKS)]
+    if not shown:
+        return empty("profile")
+    panels = grouped_names(shown[0].scores)
+    frame = Frame(
+        x_axes=[x_axis("", names_axis([_range_words(name) for name in names])) for names in panels.values()],
+        y_axes=[error_axis(metric, _all_ends(shown, names)) for metric, names in panels.items()],
+        series=[
+            series
+            for k, entry in enumerate(shown)
+            for i, names in enumerate(panels.values())
+            for series in _profile_series(k, entry, names, n_methods=len(shown), grid=i)
+        ],
+        names=[_legend_name(k, entry) for k, entry in enumerate(shown)] if len(shown) > 1 else [],
+    )
+    # As if all had the most decimals: the others keep the room of the missing one.
+    most = max(entry.decimals for entry in shown)
+    css = figure_css(
+        format_published(entry.scores[name], decimals=most) for entry in shown for name in entry.scores
+    )
+    names = ", ".join(entry.method for entry in shown)
+    return Chart(
+        kind="profile",
+        label=f"{' and '.join(metric.symbol for metric in panels)} by TTC range of {names}.",
+        options=frame.options(),
+        columns=("Error", "TTC range", *(entry.method for entry in shown)),
+        rows=tuple(
+            (
+                metric_of(name).symbol,
+                split_name(name)[1],
+                *(_profile_cell(entry, name, css, most) for entry in shown),
+            )
+            for name in shown[0].scores
+        ),
+        has_intervals=any(found.low is not None for entry in shown for found in entry.intervals.values()),
+    )
+
+
+def _legend_name(k: int, entry: Entry) -> str:
+    """A method in the legend, with its rank; its place in the chart where there is none keeps names apart."""
+    place = f"{entry.rank} {rank_range(entry)}".strip() if entry.rank is not None else f"[{k + 1}]"
+    return f"{place}  {entry.method}"
+
+
+def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
+    return [
+        value
+        for entry in shown
+        for name in names
+        for found in [entry.intervals.get(name, Interval())]
+        for value in (entry.scores[name], found.low, found.high)
+        if value is not None
+    ]
+
+
+def _profile_series(
+    k: int, entry: Entry, names: Sequence[str], *, n_methods: int, grid: int
+) -> tuple[Option, Option]:
+    """The marks of one method in one panel, each a little beside its neighbours', and their whiskers."""
+    step = min(0.16, 0.7 / n_methods)
+    offset = step * (k - (n_methods - 1) / 2)
+    places = [
+        (i + offset, value, name) for i, name in enumerate(names) if (value := entry.scores[name]) is not None
+    ]
+    found = [
+        Mark(x, value, (entry.method, f"{_named(name)}: {_value_words(entry, name)}"), method_href(entry))
+        for x, value, name in places
+    ]
+    spans = [
+        (x, interval.low, interval.high)
+        for x, _, name in places
+        for interval in [entry.intervals.get(name, Interval())]
+        if interval.low is not None and interval.high is not None
+    ]
+    legend = _legend_name(k, entry)
+    look = Look(SERIES_INKS[k], SERIES_SYMBOLS[k], 9.0)
+    return marks(legend, found, look, grid=grid), whiskers(legend, spans, SERIES_INKS[k], grid=grid)
+
+
+def _range_words(name: str) -> str:
+    interval = interval_of(name)
+    return f"{interval.seconds}\n{interval.name}" if interval else OVERALL
+
+
+def _named(name: str) -> str:
+    return f"{metric_of(name).symbol} {split_name(name)[1]}"
+
+
+def _value_words(entry: Entry, name: str) -> str:
+    words = interval_words(entry.intervals.get(name, Interval()), decimals=entry.decimals)
+    value = format_published(entry.scores[name], decimals=entry.decimals)
+    return f"{value} ({words})" if words else value
+
+
+def _profile_cell(entry: Entry, name: str, css: str, most: int) -> SafeString:
+    """A value with its interval for a table; `css` gives what stands before the interval its width."""
+    words = interval_words(entry.intervals.get(name, Interval()), decimals=entry.decimals)
+    return format_html(
+        '<span class="{}{}">{}</span>{}',
+        css,
+        decimals_css(entry, most),
+        format_published(entry.scores[name], decimals=entry.decimals),
+        f" ({words})" if words else "",
+    )

@@ -1,0 +1,111 @@
+"""The chart of significance: every pair of the first rows of a board, by the p-value of their MiD."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final
+from urllib.parse import urlencode
+
+from django.urls import reverse
+
+from evaluator import Difference
+from evaluator.metrics.protocol import PRIMARY
+from evaluator.metrics.registry import MID
+from evaluator.tables.sentences import p_cell
+from leaderboard.boards.rows import Entry
+from leaderboard.statistics.comparisons import Pair
+from leaderboard.web.charts.chart_options import Chart, Frame, Mark, Option, empty, ranks_axis
+from leaderboard.web.charts.chart_series import cells
+from leaderboard.web.compare.compare_tables import signed
+
+_FEW: Final = 8
+SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}
+UNDECIDED, UNKNOWN = "not significant", "not compared"
+_INKS: Final = dict(
+    zip(
+        (*SIGNIFICANT.values(), UNDECIDED, UNKNOWN),
+        ("--heat1", "--heat2", "--heat3", "--hair", "--tint"),
+        strict=True,
+    )
+)
+
+
+@dataclass(frozen=True)
+class _Cell:
+    column: int
+    row: int
+    pair: Pair
+    split: str
+
+    @property
+    def found(self) -> Difference | None:
+        """The difference in MiD; None until a worker has computed it."""
+        return (self.pair.differences or {}).get(PRIMARY)
+
+    @property
+    def verdict(self) -> str:
+        """The class of its p-value, or why there is none."""
+        if self.found is None or self.found.p_below is None:
+            return UNKNOWN
+        return SIGNIFICANT.get(self.found.p_below, UNDECIDED)
+
+    def texts(self) -> tuple[str, str, str]:
+        """The difference, its confidence interval and p."""
+        if self.found is None:
+            return "being computed", "", ""
+        decimals = self.pair.first.decimals
+        difference = signed(self.found.difference, decimals=decimals)
+        if self.found.low is None or self.found.high is None:
+            return difference, "", "not compared"
+        ends = (signed(end, decimals=decimals) for end in (self.found.low, self.found.high))
+        return difference, " to ".join(ends), p_cell(self.found.p, self.found.p_below)
+
+    def mark(self) -> Mark:
+        """What is drawn of it, and told."""
+        difference, interval, p = self.texts()
+        first, second = self.pair.first, self.pair.second
+        words = f"{MID.symbol} {difference}" + (f" ({interval})" if interval else "")
+        read = [f"{_named(first)} against {_named(second)}", words]
+        read += [self.verdict if not p or self.verdict == UNKNOWN else f"p {p}: {self.verdict}"]
+        query = urlencode({"split": self.split, "m": [first.method_id, second.method_id]}, doseq=True)
+        return Mark(self.column, self.row, tuple(read), f"{reverse('compare')}?{query}")
+
+
+def significance(pairs: Sequence[Pair], *, split: str) -> Chart:
+    """For each pair of rows whether the lead of the better one is significant; rows against columns."""
+    if not pairs:
+        return empty("significance")
+    entries = _entries(pairs)
+    place = {entry.method_id: i for i, entry in enumerate(entries)}
+    found = [
+        _Cell(place[pair.second.method_id] - 1, place[pair.first.method_id], pair, split) for pair in pairs
+    ]
+    verdicts = [name for name in _INKS if any(cell.verdict == name for cell in found)]
+    frame = Frame(
+        x_axes=[ranks_axis([str(entry.rank) for entry in entries[1:]], name="Rank of the other method")],
+        y_axes=[ranks_axis([_named(entry) for entry in entries[:-1]], is_upright=True)],
+        series=[_series(name, [cell for cell in found if cell.verdict == name]) for name in verdicts],
+        names=verdicts,
+        left=(220, 120),
+        top=30,
+    )
+    return Chart(
+        kind="significance",
+        label=f"Pairs of the first {len(entries)} methods by the p-value of their difference in MiD.",
+        options=frame.options(),
+        columns=("Method", "Compared with", f"Difference in {MID.symbol}", "95 % confidence interval", "p"),
+        rows=tuple((_named(cell.pair.first), _named(cell.pair.second), *cell.texts()) for cell in found),
+        numbers=(2, 4),
+        is_low=len(entries) <= _FEW,
+    )
+
+
+def _series(name: str, found: Sequence[_Cell]) -> Option:
+    return cells(name, [cell.mark() for cell in found], _INKS[name])
+
+
+def _entries(pairs: Sequence[Pair]) -> list[Entry]:
+    return [pairs[0].first, *(pair.second for pair in pairs if pair.first is pairs[0].first)]
+
+
+def _named(entry: Entry) -> str:
+    return f"{entry.rank}  {entry.method}"

@@ -1,0 +1,149 @@
+"""Tables of comparisons: the verdict in words, the values, the differences of each pair."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any, Final
+from uuid import UUID
+
+from django.utils.html import format_html
+from django.utils.text import get_text_list
+
+from evaluator import Difference
+from evaluator.metrics.protocol import PRIMARY, grouped_names
+from evaluator.scoring.report import format_published
+from evaluator.scoring.significance import told_apart, too_few_units
+from evaluator.tables import sentences
+from evaluator.tables.sentences import p_cell
+from evaluator.units import in_words
+from leaderboard.boards.rows import Entry, Interval
+from leaderboard.statistics.comparisons import Compared, Pair
+from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
+from leaderboard.web.charts import profile_chart, svg
+
+_NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
+
+
+def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
+    """What was compared, as the compare page places it; `n_tried` are scored submissions by method."""
+    return {
+        "compared": compared,
+        "verdict": verdict(compared),
+        "pairs": [_pair_table(pair) for pair in compared.pairs],
+        "profile": profile_chart.profile(compared.entries),
+        "selection": sentences.selection(
+            {each.method: n_tried.get(each.method_id, 0) for each in compared.entries if each.method_id}
+        ),
+    }
+
+
+def verdict(compared: Compared) -> str:
+    """What came out, in words: a sentence for two; for more the best, and what it is better than.
+
+    Empty while a worker still computes it.
+    """
+    if not compared.is_complete:
+        return ""
+    if len(compared.entries) == len(("first", "second")):
+        return compared.pairs[0].sentence()
+    best = min(compared.entries, key=lambda entry: entry.scores[PRIMARY] or 0.0)
+    tested = [pair for pair in compared.pairs if not pair.withheld and PRIMARY in (pair.differences or {})]
+    worse, alike = _told_apart(best, tested)
+    head = (
+        f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
+        f"{format_published(best.scores[PRIMARY], decimals=best.decimals)}."
+    )
+    if compared.reason:
+        few = in_words(compared.edition.unit)
+        return f"{head} There are too few {few} for confidence intervals and p-values."
+    relations = (("significantly better than", worse), ("not significantly better than", alike))
+    parts = [f"{relation} {get_text_list(names, 'and')}" for relation, names in relations if names]
+    together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
+    said = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
+    return " ".join([*said, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
+
+
+def _told_apart(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[str]]:
+    """The methods that the best is significantly better than in MiD, and the others.
+
+    The best was chosen by looking, so all pairs are tested together. What the board says of the same methods
+    holds first: nothing is worse that it marks as possibly the best, and ranks whose ranges do not meet are
+    told apart.
+    """
+    apart = told_apart([(pair.differences or {})[PRIMARY] for pair in tested])
+    worse: list[str] = []
+    alike: list[str] = []
+    for pair, is_apart in zip(tested, apart, strict=True):
+        if best not in (pair.first, pair.second):
+            continue
+        other = pair.second if pair.first == best else pair.first
+        on_board, of_best = (each.intervals.get(PRIMARY, Interval()) for each in (other, best))
+        is_worse = is_apart and not on_board.is_with_best
+        is_worse |= (of_best.rank_high or math.inf) < (on_board.rank_low or 0)
+        (worse if is_worse else alike).append(other.method)
+    return worse, alike
+
+
+def _pair_table(pair: Pair) -> dict[str, Any]:
+    """Two methods and their differences, in words and as a table; no groups while they are computed."""
+    differences = pair.differences or {}
+    columns = pair.first.scores
+    return {
+        "pair": pair,
+        "sentence": pair.sentence(),
+        "others": pair.others(),
+        "influence": pair.influence(),
+        "groups": [
+            _difference_group(group, [name for name in names if name in differences], pair, differences)
+            for group, names in zip(score_groups(columns), grouped_names(columns).values(), strict=True)
+        ]
+        if differences
+        else [],
+        "has_intervals": any(found.low is not None for found in differences.values()),
+    }
+
+
+def _difference_group(
+    group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
+) -> dict[str, Any]:
+    found = [differences[name] for name in names]
+    ends = [end for each in found for end in (each.low, each.high, each.difference) if end is not None]
+    scale_end = svg.scale_end(ends)
+    # Both ends as wide as the widest, so that points stand in line.
+    css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
+    rows = [_difference_row(name, pair, differences[name], scale_end, css) for name in names]
+    return {"group": group, "axis": svg.axis(scale_end), "rows": rows}
+
+
+def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, css: str) -> dict[str, Any]:
+    decimals = pair.first.decimals  # both are of one edition
+    return {
+        "heading": score_heading(name),
+        "first": format_published(pair.first.scores[name], decimals=decimals),
+        "second": format_published(pair.second.scores[name], decimals=decimals),
+        "difference": signed(found.difference, decimals=decimals),
+        "interval": ""
+        if found.low is None or found.high is None
+        else format_html(
+            '<span class="{css}">{}</span> to <span class="{css}">{}</span>',
+            signed(found.low, decimals=decimals),
+            signed(found.high, decimals=decimals),
+            css=css,
+        ),
+        "p": p_cell(found.p, found.p_below),
+        # why there is neither interval nor p
+        "reason": "" if found.p_below is not None else too_few_units(found.n_effective, unit=found.unit),
+        "is_significant": found.is_significant,
+        "drawn": svg.difference(scale_end, found.difference, found.low, found.high),
+    }
+
+
+def signed(value: float, *, decimals: int = 2) -> str:
+    """A difference with its sign, and a minus that is one.
+
+    >>> signed(-4.1), signed(0.204), signed(-0.001), signed(-4.1, decimals=1)
+    ('−4.10', '+0.20', '0.00', '−4.1')
+    """
+    text = format_published(abs(value), decimals=decimals)
+    if not float(text):
+        return text
+    return f"{'−' if value < 0 else '+'}{text}"

@@ -1,0 +1,97 @@
+"""The page that sets two to five methods side by side."""
+
+from collections import Counter
+
+from django.http import HttpRequest, HttpResponse
+from django.shortcuts import render
+from django.utils import timezone
+from django.views.decorators.http import require_safe
+
+from leaderboard.boards import snapshots
+from leaderboard.boards.snapshots import splits_of
+from leaderboard.models import Split
+from leaderboard.ops import rate_limits
+from leaderboard.statistics import comparisons, questions
+from leaderboard.web.boards.board_views import MAIN_SPLIT
+from leaderboard.web.compare import compare_tables
+from leaderboard.web.decorators import cacheable
+
+NOT_FOUND, UNPROCESSABLE, TOO_MANY = 404, 400, 429
+# What the page offers to choose from; the board itself offers all.
+MAX_OFFERED = 50
+
+
+class UnknownSplit(comparisons.BadComparison):
+    """There is no such split."""
+
+    code = "unknown-split"
+
+
+@require_safe
+def compare(request: HttpRequest) -> HttpResponse:
+    """Two to five methods of one board, their differences and what they mean; or the choice of them."""
+    wanted, name = request.GET.getlist("m"), request.GET.get("split") or MAIN_SPLIT
+    splits = splits_of(request)
+    split = next((split for split in splits if split.pk == name), None)
+    try:
+        if split is None:
+            names = ", ".join(split.pk for split in splits)
+            raise UnknownSplit(f"There is no split {name[:60]!r}; expected one of {names}.")
+        if not wanted:
+            return _choose(request, split)
+        compared = comparisons.of(
+            methods=[comparisons.method_id(text) for text in wanted],
+            split=split,
+            viewer=request.user,
+            now=timezone.now(),
+            address=rate_limits.address_of(request),
+        )
+    except (comparisons.BadComparison, questions.AskedTooOften) as refusal:
+        return _refused(request, split, refusal)
+    draw = cacheable(_drawn) if compared.is_complete else _drawn  # what is being computed changes by itself
+    return draw(request, compared)
+
+
+@cacheable
+def _choose(request: HttpRequest, split: Split) -> HttpResponse:
+    return render(request, "boards/compare/choose.html", _choice(request, split))
+
+
+def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse:
+    # As many as everybody sees on the methods' pages.
+    attempts = snapshots.shown(split=compared.split, edition=compared.edition).attempts
+    n_tried = Counter(attempt.method_id for attempt in attempts)
+    page = compare_tables.comparison(compared, n_tried=n_tried)
+    context = {"page": page, "board_split": compared.split.pk}
+    return render(request, "boards/compare/compare.html", context)
+
+
+def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
+    """What can be compared on this board, the best first."""
+    board = snapshots.board(split=split, viewer=request.user)
+    entries = [entry for entry in board.entries if entry.method_id and entry.scores["mid"] is not None]
+    # A method's page asks for the choice of others beside it.
+    chosen = [*request.GET.getlist("m"), *request.GET.getlist("with")]
+    return {
+        "split": split,
+        "board_split": split.pk,
+        "entries": [
+            entry for i, entry in enumerate(entries) if i < MAX_OFFERED or str(entry.method_id) in chosen
+        ],
+        "n_in_all": len(entries),
+        "chosen": chosen,
+        "max_methods": comparisons.MAX_METHODS,
+        "refusal": refusal,
+    }
+
+
+def _refused(
+    request: HttpRequest, split: Split | None, refusal: comparisons.BadComparison | questions.AskedTooOften
+) -> HttpResponse:
+    status = NOT_FOUND if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else UNPROCESSABLE
+    context = _choice(request, split, refusal) if split else {"refusal": refusal}
+    response = render(request, "boards/compare/choose.html", context, status=status)
+    if isinstance(refusal, questions.AskedTooOften):
+        response.status_code = TOO_MANY
+        response["Retry-After"] = str(refusal.retry_after_s)
+    return response

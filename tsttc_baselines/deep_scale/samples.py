@@ -1,0 +1,258 @@
+"""Pairs to learn from: of a folder with ground truth, or of the renderer; changed a little each time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Final, Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator import GroundTruth, fps_of_gap, ttc_to_scale_ratio
+from evaluator.counting import counted
+from evaluator.problems import reject
+from tsttc_baselines.clips import TARGET, Clip, Image
+from tsttc_baselines.deep_scale.crops import CropPair
+from tsttc_baselines.deep_scale.estimator import cut, network_scales
+from tsttc_baselines.deep_scale.fit_samples import FitSample, fit_sample
+from tsttc_baselines.deep_scale.network import Operations
+from tsttc_baselines.deep_scale.weights import Use
+from tsttc_baselines.estimates import Unusable
+from tsttc_baselines.folders import SequenceFolder
+from tsttc_baselines.images import ImageCache
+from tsttc_baselines.patches import boxes_of_pair, require_centre_inside
+from tsttc_baselines.rendering.clips import Rendered, render
+from tsttc_baselines.simulation import Split
+
+Floats = NDArray[np.float64]
+
+FRAME_GAP: Final = 5
+_HSV: Final = (5.0, 30.0, 30.0)
+"""Greatest change of hue, saturation and brightness, in OpenCV's units: YOLOX's."""
+
+_BOX_JITTER: Final = 0.01
+"""Standard deviation of an edge, as a share of the side: detectors err, and the box must not give α away."""
+
+_RESIZING: Final = 0.06
+"""The reference frame is made larger or smaller by up to e to this power, and α with it."""
+
+_SHRINKING: Final = 0.6
+"""The longest side of a box is drawn from so much of `Use.max_box_px` up to all of it."""
+
+_N_SORTED: Final = 8
+"""Batches of pairs that are sorted by size together: a batch is as large as its largest pair."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pair:
+    """Two frames in colour, their boxes (4,) in pixels, and α."""
+
+    reference: Image
+    target: Image
+    boxes: tuple[Floats, Floats]
+    scale_ratio: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """What the network sees of a pair, and what it should say; and what the fit sees, where it learns too."""
+
+    crops: CropPair
+    scale_ratio: float
+    fit: FitSample | None = None
+
+
+class Source(Protocol):
+    """Sequences with their true times to contact."""
+
+    @property
+    def truth(self) -> GroundTruth:
+        """The ground truth, in the order of the rows."""
+        ...
+
+    @property
+    def scale_ratios(self) -> Floats:
+        """(n,): α of the rows' pairs, as exactly as they are known."""
+        ...
+
+    def clip(self, row: int) -> Clip:
+        """The sequence of a row."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class RenderedSequences:
+    """The sequences of a simulated split; their frames are rendered once, and stay in memory as JPEG."""
+
+    split: Split
+    seed: int
+    _rendered: dict[int, Rendered] = field(default_factory=dict)
+
+    @property
+    def truth(self) -> GroundTruth:
+        """As of a source."""
+        return self.split.truth
+
+    @property
+    def scale_ratios(self) -> Floats:
+        """As of a source: of the distances. A time to contact says less where the vehicle brakes."""
+        return self.split.gap_m[:, TARGET] / self.split.gap_m[:, TARGET - FRAME_GAP]
+
+    def clip(self, row: int) -> Clip:
+        """As of a source."""
+        if row not in self._rendered:
+            self._rendered[row] = render(self.split, anno_id=row, seed=self.seed)
+        return self._rendered[row].clip
+
+
+@dataclass(frozen=True, eq=False)
+class FolderSequences:
+    """The sequences of a folder, in the order of its ground truth."""
+
+    folder: SequenceFolder
+    truth: GroundTruth
+    rows: Sequence[int]
+    """The folder's row of each sequence of the ground truth."""
+    _cache: ImageCache = field(default_factory=ImageCache)
+
+    @classmethod
+    def of(cls, folder: SequenceFolder, truth: GroundTruth) -> FolderSequences:
+        """Those of `truth`, by their natural keys; raises `Rejected` where the folder lacks one."""
+        row_of = {key: row for row, key in enumerate(folder.manifest.natural_keys)}
+        missing = [key for key in truth.manifest.natural_keys if key not in row_of]
+        if missing:
+            message = (
+                f"The ground truth has {counted(len(missing), 'sequence')} without boxes, "
+                f"the first is {missing[0]}; expected boxes for every sequence."
+            )
+            raise reject("missing-keys", message)
+        return cls(folder, truth, [row_of[key] for key in truth.manifest.natural_keys])
+
+    @property
+    def scale_ratios(self) -> Floats:
+        """As of a source."""
+        return ttc_to_scale_ratio(self.truth.ttc_s, fps_hz=fps_of_gap(FRAME_GAP))
+
+    def clip(self, row: int) -> Clip:
+        """As of a source; asking for a frame raises `SequenceFault` where it cannot be had."""
+        return self.folder.clip(self.rows[row], cache=self._cache)
+
+
+def usable_pair(source: Source, row: int, *, scale_ratio: float) -> Pair:
+    """The pair of a row; raises `Unusable` where frames or boxes are missing or too small."""
+    clip = source.clip(row)
+    boxes = boxes_of_pair(clip, frame_gap=FRAME_GAP)
+    frames = clip.colour(TARGET - FRAME_GAP), clip.colour(TARGET)
+    for image, box, name in zip(frames, boxes, ("reference", "target"), strict=True):
+        require_centre_inside(image, box, name=name)
+    return Pair(*frames, boxes, scale_ratio)
+
+
+def batches(
+    source: Source, *, use: Use, size: int, rng: np.random.Generator, fitting: Operations | None = None
+) -> Iterator[tuple[int, list[Sample]]]:
+    """Batches of an epoch, each with the number of sequences it stands for: all rows once, in a random order.
+
+    Sequences that cannot be used, or whose α the network cannot say, are left out. With the network as
+    `fitting`, samples have what the fit learns from.
+    """
+    scale_ratios = source.scale_ratios
+    rows = rng.permutation(len(scale_ratios))
+    for first in range(0, len(rows), size * _N_SORTED):
+        chosen = rows[first : first + size * _N_SORTED]
+        samples = [
+            _sample(pair, use=use, fitting=fitting, rng=rng)
+            for row in chosen.tolist()
+            if (pair := _pair(source, row, float(scale_ratios[row]), rng=rng)) is not None
+        ]
+        samples.sort(key=lambda sample: sample.crops.reference.pixels.size)
+        starts = range(0, len(samples), size)
+        n_rows = len(chosen) / max(1, len(starts))
+        for number, place in enumerate(rng.permutation(len(starts)).tolist()):
+            n_before, n_after = round(number * n_rows), round((number + 1) * n_rows)
+            yield n_after - n_before, samples[starts[place] : starts[place] + size]
+
+
+def _pair(source: Source, row: int, scale_ratio: float, *, rng: np.random.Generator) -> Pair | None:
+    if not can_say(scale_ratio):
+        return None
+    try:
+        return augmented(usable_pair(source, row, scale_ratio=scale_ratio), rng=rng)
+    except Unusable:
+        return None
+
+
+def _sample(pair: Pair, *, use: Use, fitting: Operations | None, rng: np.random.Generator) -> Sample:
+    frames, scale_ratio = (pair.reference, pair.target), pair.scale_ratio
+    shrunk = float(use.max_box_px * _SHRINKING ** rng.random())
+    crops = cut(frames, pair.boxes, use=Use(use.similarity, use.n_cells, shrunk, use.margin_px))
+    if fitting is None:
+        return Sample(crops, scale_ratio)
+    fit = fit_sample(frames, pair.boxes, scale_ratio=scale_ratio, operations=fitting, rng=rng)
+    return Sample(crops, scale_ratio, fit)
+
+
+def can_say(scale_ratio: float) -> bool:
+    """Whether α lies between the least and the greatest of the network's scale ratios."""
+    scales = network_scales()
+    return bool(scales[0] <= scale_ratio <= scales[-1])
+
+
+def augmented(pair: Pair, *, rng: np.random.Generator) -> Pair:
+    """The pair with other colours and boxes; perhaps mirrored, in the reverse order, or with another α."""
+    pair = _jittered(_recoloured(pair, rng=rng), rng=rng)
+    if rng.random() < 0.5:
+        pair = _mirrored(pair)
+    if rng.random() < 0.25 and can_say(1 / pair.scale_ratio):
+        pair = Pair(pair.target, pair.reference, pair.boxes[::-1], 1 / pair.scale_ratio)
+    ratio = float(np.exp(rng.uniform(-_RESIZING, _RESIZING)))
+    if rng.random() < 0.3 and can_say(pair.scale_ratio * ratio):
+        pair = _resized(pair, ratio)
+    return pair
+
+
+def _recoloured(pair: Pair, *, rng: np.random.Generator) -> Pair:
+    """The same change of hue, saturation and brightness for both frames, as the paper's HSV augmentation."""
+    change = np.round(rng.uniform(-1, 1, 3) * _HSV).astype(np.int16)
+
+    def recoloured(image: Image) -> Image:
+        hsv = cv2.cvtColor(image, cv2.COLOR_BGR2HSV).astype(np.int16) + change
+        hsv[..., 0] %= 180
+        return np.asarray(
+            cv2.cvtColor(np.clip(hsv, 0, 255).astype(np.uint8), cv2.COLOR_HSV2BGR), dtype=np.uint8
+        )
+
+    return Pair(recoloured(pair.reference), recoloured(pair.target), pair.boxes, pair.scale_ratio)
+
+
+def _jittered(pair: Pair, *, rng: np.random.Generator) -> Pair:
+    reference, target = (
+        box + _BOX_JITTER * rng.normal(size=4) * np.tile(box[2:] - box[:2], 2) for box in pair.boxes
+    )
+    return Pair(pair.reference, pair.target, (reference, target), pair.scale_ratio)
+
+
+def _mirrored(pair: Pair) -> Pair:
+    width_px = pair.target.shape[1]
+    reference, target = (
+        np.array([width_px - box[2], box[1], width_px - box[0], box[3]]) for box in pair.boxes
+    )
+    return Pair(
+        np.ascontiguousarray(pair.reference[:, ::-1]),
+        np.ascontiguousarray(pair.target[:, ::-1]),
+        (reference, target),
+        pair.scale_ratio,
+    )
+
+
+def _resized(pair: Pair, ratio: float) -> Pair:
+    """The pair with a reference frame `ratio` times as large, to whole pixels."""
+    height, width = pair.reference.shape[:2]
+    size = max(1, round(width * ratio)), max(1, round(height * ratio))
+    interpolation = cv2.INTER_AREA if ratio < 1 else cv2.INTER_LINEAR
+    reference = np.asarray(cv2.resize(pair.reference, size, interpolation=interpolation), dtype=np.uint8)
+    growth = np.array([size[0] / width, size[1] / height])
+    scale_ratio = pair.scale_ratio * float(np.sqrt(growth.prod()))
+    return Pair(reference, pair.target, (pair.boxes[0] * np.tile(growth, 2), pair.boxes[1]), scale_ratio)

@@ -1,0 +1,59 @@
+"""What a baseline is: a function of a clip that estimates one scale ratio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Final, Protocol
+
+from evaluator.problems import Problem
+
+if TYPE_CHECKING:
+    from tsttc_baselines.clips import Clip
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """The estimate of one sequence.
+
+    `scale_ratio` is α, the object's size in the reference frame divided by its size in the target frame,
+    greater than 0. `confidence` is greater for surer estimates of the same baseline and has no unit.
+    `fallback` names, in a few lower-case words, why the value does not come from the baseline itself
+    ("box has no texture"); None where it does.
+    """
+
+    scale_ratio: float
+    confidence: float = 1.0
+    fallback: str | None = None
+
+
+class Estimator(Protocol):
+    """A baseline with its parameters."""
+
+    def __call__(self, clip: Clip, *, frame_gap: int) -> Estimate:
+        """Estimate α between frame `5 - frame_gap` (reference) and frame 5 (target), `frame_gap` in 1…5.
+
+        Raises `Unusable` where nothing can be said; the runner then takes the fallback.
+        """
+        ...
+
+
+PROBLEM_CODES: Final[dict[str, str]] = {
+    "bad-box": "A box is missing, empty, reversed, too small, outside of its image or in another unit.",
+    "bad-frame": "An image is missing, not readable or of another size, or a sequence has too few frames.",
+    "bad-weights": "A file of weights is damaged, too large, or of another network.",
+    "no-estimate": "A method has no estimate for a sequence.",
+    "reversed-time": "The rows of a track are not in the order of time.",
+}
+"""What can be wrong with frames, boxes and tracks, beside the codes of `evaluator.problems` for tables."""
+
+
+class Unusable(Exception):
+    """A clip that a baseline cannot say anything about; the message is the reason that is counted."""
+
+
+class SequenceFault(Unusable):
+    """A fault in the input of one sequence: its reason in a few words, and the problem in a sentence."""
+
+    def __init__(self, reason: str, problem: Problem) -> None:
+        super().__init__(reason)
+        self.problem = problem

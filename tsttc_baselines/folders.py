@@ -1,0 +1,224 @@
+"""Folders of sequences: `manifest.csv`, `boxes.csv` and images, or the dataset as it is downloaded.
+
+    manifest.csv                              anno_id,bag_stamp,cam_id,ts,track_id, as a split publishes it
+    boxes.csv                                 anno_id,frame,x1,y1,x2,y2; frame 0…5, pixels
+    images/{bag_stamp}/cam{cam_id}/{ts}.jpg   or .png, or without `images/`
+
+A sequence's target is frame 5 at its own ts; frame 5 − k has the timestamp ts − k·10⁸ ns.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.problems import Problem, Rejected, reject
+from evaluator.truth.annotation_folders import list_files, read_annotations
+from evaluator.truth.annotations import FRAME_STEP_NS
+from evaluator.truth.ground_truth import Manifest, read_manifest
+from evaluator.truth.numbering import require_the_same
+from tsttc_baselines.box_tables import read_boxes
+from tsttc_baselines.clips import TARGET, Clip, Image
+from tsttc_baselines.estimates import SequenceFault
+from tsttc_baselines.images import ImageCache
+
+EXTENSIONS: Final = (".jpg", ".png", ".jpeg")
+NOMINAL_SIZE: Final = (1024, 576)
+"""Width and height in pixels on which boxes of 0…1 are taken where no image is looked at."""
+
+MANIFEST: Final = "manifest.csv"
+BOXES: Final = "boxes.csv"
+IMAGES: Final = "images"
+
+
+@dataclass(frozen=True, eq=False)
+class SequenceFolder:
+    """The sequences of a folder in the order of its manifest.
+
+    `boxes` is (n, 6, 4), NaN for a frame without a box: pixels, or parts of the image's width and height
+    where `is_normalised`. `boxes_from` names their file or folder, for messages. `images` is the folder that
+    holds the folders of the recordings. `has_own_numbers` says that no manifest gave the anno_ids: a board
+    may number the sequences in another way.
+    """
+
+    path: Path
+    images: Path
+    manifest: Manifest
+    boxes: NDArray[np.float64]
+    boxes_from: str
+    is_normalised: bool
+    has_own_numbers: bool = False
+
+    @property
+    def n_sequences(self) -> int:
+        """Number of sequences."""
+        return self.manifest.n_sequences
+
+    def digest(self) -> str:
+        """Hex SHA-256 over the sequences and their boxes."""
+        content = hashlib.sha256(f"{self.manifest.digest} {self.is_normalised}".encode())
+        content.update(np.ascontiguousarray(self.boxes).tobytes())
+        return content.hexdigest()
+
+    def rows_in_time(self) -> NDArray[np.intp]:
+        """All rows by recording, camera and time, so that sequences that share frames follow each other."""
+        manifest = self.manifest
+        return np.lexsort((manifest.ts_ns, np.array(manifest.cam_id), np.array(manifest.bag_stamp)))
+
+    def frame_path(self, row: int, frame: int) -> Path:
+        """The file of a frame 0…5; the name with .jpg where there is none."""
+        camera = self.images / self.manifest.bag_stamp[row] / f"cam{self.manifest.cam_id[row]}"
+        ts_ns = int(self.manifest.ts_ns[row]) - (TARGET - frame) * FRAME_STEP_NS
+        paths = [camera / f"{ts_ns}{extension}" for extension in EXTENSIONS]
+        return next((path for path in paths if path.exists()), paths[0])
+
+    def where(self, path: Path) -> str:
+        """A path inside this folder, for messages."""
+        return path.relative_to(self.path).as_posix() if path.is_relative_to(self.path) else str(path)
+
+    def clip(self, row: int, *, cache: ImageCache, with_images: bool = True) -> Clip:
+        """The sequence of a row, its boxes in pixels; frames are decoded when they are asked for.
+
+        Boxes of 0…1 need the size of the target's image; without images they are taken on `NOMINAL_SIZE`.
+        Raises `SequenceFault` where that image is needed and cannot be had; so does asking for a frame.
+        """
+        boxes = self.boxes[row]
+        if self.is_normalised:
+            size = self.size(row, cache=cache) if with_images else NOMINAL_SIZE
+            boxes = boxes * np.array([*size, *size], dtype=np.float64)
+
+        paths: dict[int, Path] = {}
+
+        def load(frame: int, colour: bool) -> Image:
+            for each in {frame, TARGET} - paths.keys():
+                paths[each] = self.existing_path(row, each)
+            return self._image(paths[frame], like=paths[TARGET], colour=colour, cache=cache)
+
+        return Clip(anno_id=int(self.manifest.anno_id[row]), boxes=boxes, load=load)
+
+    def size(self, row: int, *, cache: ImageCache) -> tuple[int, int]:
+        """Width and height in pixels of the target's image; raises `SequenceFault`."""
+        path = self.existing_path(row, TARGET)
+        return cache.size(path, where=self.where(path))
+
+    def _image(self, path: Path, *, like: Path, colour: bool, cache: ImageCache) -> Image:
+        """An image; raises `SequenceFault` unless it has the size of the other."""
+        image = cache.image(path, colour=colour, where=self.where(path))
+        expected = cache.size(like, where=self.where(like))
+        found = (image.shape[1], image.shape[0])
+        if found != expected:
+            message = (
+                f"The image has {found[0]}×{found[1]} pixels; "
+                f"expected {expected[0]}×{expected[1]} as in the target frame of its sequence."
+            )
+            raise SequenceFault("image has another size", Problem("bad-frame", message, self.where(path)))
+        return image
+
+    def existing_path(self, row: int, frame: int) -> Path:
+        """The file of a frame 0…5; raises `SequenceFault`, with what is there instead."""
+        path = self.frame_path(row, frame)
+        if not path.exists():
+            reason, message = self._why_missing(row, frame, path)
+            raise SequenceFault(reason, Problem("bad-frame", message, self.where(path)))
+        return path
+
+    def _why_missing(self, row: int, frame: int, path: Path) -> tuple[str, str]:
+        """The reason in a few words, and in a sentence what is there instead."""
+        sequence = f"frame {frame} of the sequence {self.manifest.anno_id[row]}"
+        stamps = sorted(
+            int(other.stem)
+            for other in path.parent.glob("*")
+            if other.suffix in EXTENSIONS and other.stem.isdecimal()
+        )
+        if not stamps:
+            expected = f"expected {sequence}, as .jpg or .png"
+            return "image is missing", f"The image is missing, its folder has none; {expected}."
+        ts_ns = int(path.stem)
+        nearest = min(stamps, key=lambda stamp: abs(stamp - ts_ns))
+        if abs(nearest - ts_ns) < FRAME_STEP_NS // 2:
+            message = (
+                f"The image is missing; the nearest one is {nearest}, {(nearest - ts_ns) / 1e6:+.1f} ms off; "
+                f"expected {sequence}, whose frames are exactly 100,000,000 ns apart."
+            )
+            return "frames are not 0.1 s apart", message
+        if ts_ns < stamps[0]:
+            n_frames = sum(self.frame_path(row, other).exists() for other in range(frame, TARGET + 1))
+            message = (
+                "The image is missing, and no frame of this camera is so early; expected "
+                f"{sequence}, which has {n_frames} of the frames {frame} to {TARGET}."
+            )
+            return "too few frames", message
+        return "image is missing", f"The image is missing; expected {sequence}, as .jpg or .png."
+
+
+def read_folder(path: Path) -> SequenceFolder:
+    """The sequences of a folder of this convention, or of the dataset as it is downloaded.
+
+    Raises `Rejected` for a folder of neither kind, and for tables or annotation files that are at fault;
+    what is wrong with single boxes and images is found sequence by sequence.
+    """
+    root = path / IMAGES if (path / IMAGES).is_dir() else path
+    if (path / BOXES).is_file():
+        if not (path / MANIFEST).is_file():
+            message = (
+                f"The folder has a {BOXES} and no {MANIFEST}; expected the manifest of the split beside it."
+            )
+            raise reject("unreadable", message, path.name)
+        manifest = _manifest(path)
+        boxes, is_normalised = read_boxes(path / BOXES, manifest=manifest)
+        return SequenceFolder(path, root, manifest, boxes, BOXES, is_normalised)
+    given = _manifest(path) if (path / MANIFEST).is_file() else None
+    found = read_toolkit_folder(path, manifest=given)
+    if found is None:
+        expected = f"expected {MANIFEST} and {BOXES}, or the dataset's annotation files (*.pkl)"
+        missing = f"no {BOXES} and no" if given is not None else f"neither {MANIFEST} with {BOXES} nor"
+        raise reject("unreadable", f"The folder has {missing} annotation files; {expected}.", path.name)
+    manifest, boxes = found
+    return SequenceFolder(
+        path,
+        root,
+        manifest,
+        boxes,
+        "annotation files",
+        is_normalised=True,
+        has_own_numbers=given is None,
+    )
+
+
+def _manifest(path: Path) -> Manifest:
+    """The manifest of the folder; what is wrong with it has its file's name."""
+    try:
+        return read_manifest(path / MANIFEST)
+    except Rejected as fault:
+        named = [
+            problem
+            if problem.where.startswith(MANIFEST)
+            else replace(problem, where=f"{MANIFEST}, {problem.where}" if problem.where else MANIFEST)
+            for problem in fault.problems
+        ]
+        raise Rejected(named, n_problems=fault.n_problems) from None
+
+
+def read_toolkit_folder(
+    path: Path, *, manifest: Manifest | None = None
+) -> tuple[Manifest, NDArray[np.float64]] | None:
+    """The sequences and their boxes (n, 6, 4) in parts of the image; None for a folder without *.pkl.
+
+    Sequences have the order and the anno_ids of `manifest` where one is given, else those of `tsttc
+    manifest`. Raises `Rejected` for files at fault, and where folder and manifest have different sequences.
+    """
+    if not list_files(path):
+        return None
+    found = read_annotations(path, with_ttc=False, with_boxes=True)
+    own = Manifest.from_table(found.table)
+    boxes = np.array(found.boxes, dtype=np.float64).reshape(own.n_sequences, -1, 4)
+    if manifest is None or manifest.digest == own.digest:
+        return own, boxes
+    require_the_same(own.natural_keys, manifest.natural_keys, path.name)
+    rows = [own.row_of_natural_key[key] for key in manifest.natural_keys]
+    return manifest, boxes[rows]

@@ -1,0 +1,102 @@
+"""The journal of a run: outcomes as they come, so that a run that was ended goes on where it stopped.
+
+It is a text beside the output: a line that says which run this is, then a line of JSON for each piece of
+work. What was half-written when the run ended is cut off; a journal of another run is begun anew. Two runs
+at once cannot have one journal.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any
+
+from tsttc_baselines.outcomes import Outcome
+
+
+class OutputInUse(RuntimeError):
+    """Another run writes the same output."""
+
+
+class Journal:
+    """Outcomes of the run `key`; those that are no fallbacks hold for the next run with this key.
+
+    Fallbacks are estimated again: an image may have come in the meantime.
+    """
+
+    def __init__(self, path: Path, *, key: str) -> None:
+        self.path = path
+        self.found: list[Outcome] = []
+        self.seconds = 0.0
+        path.touch()
+        self._file: IO[bytes] = path.open("r+b")
+        try:
+            _lock(self._file)
+            end = self._read(key)
+            self._file.seek(end)
+            self._file.truncate()
+            if not end:
+                self._write({"run": key})
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _read(self, key: str) -> int:
+        """Take what is there; the number of bytes that are whole lines of this run."""
+        end = 0
+        for line in self._file:
+            entry = _entry(line)
+            if entry is None or (end == 0 and entry.get("run") != key):
+                break
+            end += len(line)
+            self.seconds = max(self.seconds, entry.get("seconds", 0.0))
+            self.found += [Outcome(row, value) for row, value in entry.get("values", ())]
+        return end
+
+    def add(self, outcomes: Sequence[Outcome], *, seconds: float) -> None:
+        """Note a piece of work, and how long the run has taken until now."""
+        values = [(outcome.row, outcome.scale_ratio) for outcome in outcomes if outcome.reason is None]
+        self._write({"values": values, "seconds": seconds})
+
+    def _write(self, entry: dict[str, Any]) -> None:
+        self._file.write(json.dumps(entry, separators=(",", ":")).encode() + b"\n")
+        self._file.flush()
+
+    def discard(self) -> None:
+        """The run is over."""
+        self._file.close()
+        self.path.unlink(missing_ok=True)
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._file.close()
+
+
+def _lock(file: IO[bytes]) -> None:
+    """The file is this process's until it is closed; raises `OutputInUse`. Windows has no such locks."""
+    if sys.platform == "win32":
+        return
+    import fcntl  # noqa: PLC0415 -- as above
+
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise OutputInUse from None
+
+
+def _entry(line: bytes) -> dict[str, Any] | None:
+    """What a line says; None for one that is not whole."""
+    if not line.endswith(b"\n"):
+        return None
+    try:
+        entry = json.loads(line)
+    except ValueError:
+        return None
+    return entry if isinstance(entry, dict) else None

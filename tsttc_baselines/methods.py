@@ -1,0 +1,207 @@
+"""The register of methods: what `tsttc baseline list` shows and `tsttc baseline run` runs.
+
+To add a method, write its estimator and add one row to `METHODS`. The command line makes its options from
+the parameters; nothing heavy is imported before an estimator is made.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, Literal
+
+if TYPE_CHECKING:
+    from tsttc_baselines.estimates import Estimator
+
+Value = str | int | float | Path | None
+"""The value of a parameter; None where it has no default and was not given."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter of a method, and the option of the command line with its name.
+
+    Methods may share a name, with defaults of their own; then kind, choices and limits are the same.
+    `low` and `high` are inclusive.
+    """
+
+    name: str
+    default: Value
+    help: str
+    kind: type[str] | type[int] | type[float] | type[Path] = str
+    choices: tuple[str, ...] = ()
+    low: float | None = None
+    high: float | None = None
+
+    @property
+    def default_in_words(self) -> str | None:
+        """The default as messages show it, of a file its name; None where there is none."""
+        if self.default is None:
+            return None
+        return self.default.name if isinstance(self.default, Path) else str(self.default)
+
+    @property
+    def option(self) -> str:
+        """`--name`, as it is typed."""
+        return "--" + self.name.replace("_", "-")
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A baseline: its name, what it needs of a sequence, and how to make its estimator.
+
+    `factory` is "module:name" of a callable that takes the parameters by keyword. `published` holds the
+    values with which the method is that of a published row; None for a method that no paper has.
+    `frames` are the images that it looks at: none, the pair of reference and target, or all between them too.
+    """
+
+    name: str
+    title: str
+    summary: str
+    factory: str
+    parameters: tuple[Parameter, ...] = ()
+    published: Mapping[str, Value] | None = None
+    frames: Literal["none", "pair", "all"] = "pair"
+    boxes: Literal["pair", "target"] = "pair"
+
+    def filled(self, given: Mapping[str, Value]) -> dict[str, Value]:
+        """All parameters in their order: those given, else the defaults.
+
+        Raises `KeyError` for a stranger and `ValueError` for a number that is not finite.
+        """
+        known = {parameter.name: parameter.default for parameter in self.parameters}
+        strangers = [name for name in given if name not in known]
+        if strangers:
+            raise KeyError(strangers[0])
+        for parameter in self.parameters:
+            value = given.get(parameter.name)
+            if isinstance(value, float) and not math.isfinite(value):
+                raise ValueError(f"{parameter.option} is {value}; expected a finite number.")
+        return known | dict(given)
+
+    def provenance(self, parameters: Mapping[str, Value]) -> str:
+        """Whether these parameters are those of a published row: as published, variant or unpublished."""
+        if self.published is None:
+            return "unpublished"
+        is_published = all(parameters[name] == value for name, value in self.published.items())
+        return "as published" if is_published else "variant"
+
+    def estimator(self, parameters: Mapping[str, Value]) -> Estimator:
+        """The estimator with these parameters."""
+        module, _, name = self.factory.partition(":")
+        made: Estimator = getattr(import_module(module), name)(**parameters)
+        return made
+
+
+MEASURES: Final = ("area", "sqrt-area", "height", "width")
+"""As in `tsttc_baselines.boxes`, which loads numpy."""
+
+OWN_WEIGHTS: Final = Path(__file__).parent / "deep_scale" / "rendered.npz"
+"""The weights that come with the package, trained on rendered frames."""
+
+METHODS: Final[tuple[Method, ...]] = (
+    Method(
+        name="detection",
+        title="Detection",
+        summary="The ratio of the boxes' sizes. Looks at no image.",
+        factory="tsttc_baselines.detection:Detection",
+        parameters=(
+            Parameter("measure", "area", "Size of a box whose ratio is the scale ratio.", choices=MEASURES),
+        ),
+        published={"measure": "area"},
+        frames="none",
+    ),
+    Method(
+        name="pixel-mse",
+        title="Pixel MSE",
+        summary="The scale at which the reference frame looks most like the target box.",
+        factory="tsttc_baselines.pixel_mse:PixelMse",
+        parameters=(
+            Parameter(
+                "variant",
+                "paper",
+                "The paper's wording, or what the toolkit's code does.",
+                choices=("paper", "toolkit"),
+            ),
+            Parameter("bins", 125, "Scale ratios that are tried.", kind=int, low=2, high=400),
+            Parameter("shift", 3, "Greatest shift of a patch, in its cells.", kind=int, low=0, high=16),
+            Parameter("top", 3, "Best scale ratios that are averaged.", kind=int, low=1, high=400),
+            Parameter("expand", 1.1, "Enlargement of the boxes.", kind=float, low=0.5, high=2.0),
+            Parameter(
+                "cells",
+                64,
+                "Most cells along the longer side of a patch; a cell is a pixel or more (paper's variant).",
+                kind=int,
+                low=16,
+                high=256,
+            ),
+            Parameter(
+                "search",
+                "full",
+                "All scale ratios at full detail, or first a few in coarse patches (paper's variant).",
+                choices=("full", "coarse-to-fine"),
+            ),
+        ),
+        # The published row is the work of the toolkit's code, for what the paper words.
+        published={"bins": 125, "shift": 3, "top": 3, "expand": 1.1},
+    ),
+    Method(
+        name="tracking",
+        title="SOT",
+        summary="The target box is followed back to the reference frame. The paper follows with OSTrack.",
+        factory="tsttc_baselines.tracking:Tracking",
+        parameters=(
+            # No choices: a tracker that cannot be used is refused with the reason.
+            Parameter("tracker", "median-flow", "median-flow, csrt (opencv-contrib) or nano (with models)."),
+            Parameter(
+                "measure", "sqrt-area", "Size of a box whose ratio is the scale ratio.", choices=MEASURES
+            ),
+            Parameter("backbone", None, "NanoTrack's backbone (ONNX).", kind=Path),
+            Parameter("head", None, "NanoTrack's head (ONNX).", kind=Path),
+        ),
+        frames="all",
+        boxes="target",
+    ),
+    Method(
+        name="deep-scale",
+        title="Deep Scale",
+        summary="The paper's network, which compares features of both boxes at 20 scale ratios.",
+        factory="tsttc_baselines.deep_scale.estimator:DeepScale",
+        parameters=(
+            Parameter(
+                "weights", OWN_WEIGHTS, "Weights, of this project or the toolkit's checkpoint.", kind=Path
+            ),
+            Parameter(
+                "device",
+                "numpy",
+                "What computes: numpy, or torch on cpu or cuda.",
+                choices=("numpy", "cpu", "cuda"),
+            ),
+            Parameter(
+                "decoding",
+                "auto",
+                "head: the head's mean over four scale ratios, as published; fit: a fit of the features; "
+                "auto: as the card of the weights says, which is fit for ours.",
+                choices=("auto", "head", "fit"),
+            ),
+        ),
+    ),
+    Method(
+        name="alignment",
+        title="Photometric alignment",
+        summary="Scale, shift, gain and offset under which the reference frame shows the target box.",
+        factory="tsttc_baselines.alignment:Alignment",
+        parameters=(
+            Parameter("expand", 1.0, "Enlargement of the boxes.", kind=float, low=0.5, high=2.0),
+            Parameter("samples", 64, "Samples along the longer side of a box.", kind=int, low=16, high=256),
+        ),
+    ),
+)
+
+
+def get_method(name: str) -> Method:
+    """The method of that name; raises `KeyError`."""
+    return {method.name: method for method in METHODS}[name]

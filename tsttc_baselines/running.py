@@ -1,0 +1,195 @@
+"""A baseline over a folder: every sequence gets a value, in a prediction file that appears when it is whole.
+
+    folder = read_folder(Path("val"))
+    run_method(folder=folder, method=get_method("detection"), parameters={}, frame_gap=5, out=Path("p.json"))
+
+With several processes, a script needs its `if __name__ == "__main__":`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Final
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from evaluator.predictions.writing import write_predictions
+from evaluator.problems import Findings, Problem
+from tsttc_baselines.folder_checks import require_complete, require_usable
+from tsttc_baselines.folders import SequenceFolder
+from tsttc_baselines.journals import Journal
+from tsttc_baselines.methods import Method, Value
+from tsttc_baselines.outcomes import Outcome, SequenceEstimator
+from tsttc_baselines.processes import worked_through
+
+MAX_REASONS: Final = 40
+"""Reasons that the prediction file counts one by one."""
+
+Progress = Callable[[int], None]
+"""Is told, at least every second, how many sequences have a value."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What a run has done. `scale_ratio` is (n,) in the manifest's order.
+
+    `n_fallback` counts by reason, the most frequent first, and `examples` has a problem for each reason.
+    `n_resumed` values come from an earlier run that was ended. `seconds` are those of all of them.
+    """
+
+    scale_ratio: NDArray[np.float64]
+    n_fallback: dict[str, int]
+    examples: dict[str, Problem]
+    n_resumed: int
+    seconds: float
+    meta: dict[str, Any]
+    data: bytes
+
+
+def run_method(
+    *,
+    folder: SequenceFolder,
+    method: Method,
+    parameters: Mapping[str, Value],
+    frame_gap: int,
+    out: Path,
+    n_processes: int = 1,
+    strict: bool = False,
+    progress: Progress = lambda _n_done: None,
+) -> Run:
+    """Estimate every sequence of `folder` and write `out`, a prediction file of scale ratios.
+
+    A run that was ended has left a journal beside `out`; the same call goes on from it. With `strict`, a
+    sequence without an estimate of the method itself is a fault: `Rejected` is raised and nothing written.
+    Raises `Rejected` for a folder that cannot be used, `WorkerEnded`, `OutputInUse` and `OSError`.
+    """
+    filled = method.filled(parameters)
+    require_usable(folder, method=method, frame_gap=frame_gap)
+    if strict:
+        require_complete(folder, method=method, frame_gap=frame_gap)
+    make = partial(SequenceEstimator, folder=folder, method=method, parameters=filled, frame_gap=frame_gap)
+    key = _key(folder, method, filled, frame_gap)
+    began_s = time.perf_counter()
+    with Journal(out.with_name(out.name + ".part"), key=key) as journal:
+        outcomes = {outcome.row: outcome for outcome in journal.found}
+        n_resumed = len(outcomes)
+        progress(n_resumed)
+        rows = [row for row in folder.rows_in_time().tolist() if row not in outcomes]
+        n_useful = n_processes if method.frames != "none" else 1
+        with closing(worked_through(make, rows, n_processes=n_useful)) as pieces:
+            for piece in pieces:
+                outcomes |= {outcome.row: outcome for outcome in piece}
+                seconds = journal.seconds + time.perf_counter() - began_s
+                if piece:
+                    journal.add(piece, seconds=seconds)
+                progress(len(outcomes))
+        in_order = [outcomes[row] for row in range(folder.n_sequences)]
+        if strict:
+            _require_no_fallback(in_order)
+        seconds = journal.seconds + time.perf_counter() - began_s
+        done = _done(folder, method, filled, frame_gap, in_order, n_resumed=n_resumed, seconds=seconds)
+        _write_whole(out, done.data)
+        journal.discard()
+    return done
+
+
+def _done(
+    folder: SequenceFolder,
+    method: Method,
+    parameters: Mapping[str, Value],
+    frame_gap: int,
+    outcomes: list[Outcome],
+    *,
+    n_resumed: int,
+    seconds: float,
+) -> Run:
+    scale_ratio = np.array([outcome.scale_ratio for outcome in outcomes], dtype=np.float64)
+    n_fallback = dict(Counter(outcome.reason for outcome in outcomes if outcome.reason).most_common())
+    examples: dict[str, Problem] = {}
+    for outcome in outcomes:
+        if outcome.reason and outcome.problem:
+            examples.setdefault(outcome.reason, outcome.problem)
+    meta = {
+        "method": method.name,
+        "version": tsttc_version(),
+        "provenance": method.provenance(parameters),
+        "parameters": _plain(parameters),
+        "seconds": round(seconds, 3),
+        "n_fallback": _shortened(n_fallback),
+        "opencv": cv2.__version__,
+        **_weights(parameters),
+    }
+    keys = folder.manifest.natural_keys if folder.has_own_numbers else folder.manifest.anno_id_keys
+    data = write_predictions(keys=keys, scale_ratio=scale_ratio, frame_gap=frame_gap, meta=meta)
+    return Run(scale_ratio, n_fallback, examples, n_resumed, seconds, meta, data)
+
+
+def tsttc_version() -> str:
+    """The release of this package; of a checkout that is not installed, "0"."""
+    try:
+        return version("tsttc")
+    except PackageNotFoundError:
+        return "0"
+
+
+def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value], frame_gap: int) -> str:
+    """Names a run: the same name, the same values."""
+    named = {
+        "folder": str(folder.images.resolve()),
+        "sequences": folder.digest(),
+        "method": method.name,
+        "parameters": _plain(parameters),
+        **_weights(parameters),
+        "frame_gap": frame_gap,
+        "versions": [tsttc_version(), cv2.__version__, np.__version__],
+    }
+    return hashlib.sha256(json.dumps(named, sort_keys=True).encode()).hexdigest()
+
+
+def _plain(parameters: Mapping[str, Value]) -> dict[str, object]:
+    """The parameters as JSON has them; of a file its name, for its folder is nobody's business."""
+    return {name: value.name if isinstance(value, Path) else value for name, value in parameters.items()}
+
+
+def _weights(parameters: Mapping[str, Value]) -> dict[str, dict[str, str]]:
+    """Under "weights", the SHA-256 of each file among the parameters; nothing where there is none."""
+    files = {name: value for name, value in parameters.items() if isinstance(value, Path)}
+    digests = {name: hashlib.sha256(path.read_bytes()).hexdigest() for name, path in files.items()}
+    return {"weights": digests} if digests else {}
+
+
+def _shortened(n_fallback: Mapping[str, int]) -> dict[str, int]:
+    """The most frequent reasons, and the others together."""
+    reasons = list(n_fallback.items())
+    rest = sum(count for _, count in reasons[MAX_REASONS:])
+    return dict(reasons[:MAX_REASONS]) | ({"other reasons": rest} if rest else {})
+
+
+def _require_no_fallback(outcomes: Iterable[Outcome]) -> None:
+    findings = Findings()
+    for outcome in outcomes:
+        if outcome.problem is not None:
+            findings.add(outcome.problem.code, outcome.problem.message, outcome.problem.where)
+    findings.raise_if_any()
+
+
+def _write_whole(path: Path, data: bytes) -> None:
+    """The file appears, or replaces an older one, when all of it is written."""
+    new = path.with_name(f"{path.name}.{os.getpid()}.new")
+    try:
+        new.write_bytes(data)
+        new.replace(path)
+    finally:
+        new.unlink(missing_ok=True)
