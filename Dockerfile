@@ -36,7 +36,7 @@ COPY . .
 RUN TSTTC_PROFILE=embedded TSTTC_DATA_DIR=/tmp/collect python manage.py collectstatic --no-input --verbosity 0 \
     && TSTTC_PROFILE=embedded TSTTC_DATA_DIR=/tmp/collect python manage.py build_wheel \
     && rm -rf /tmp/collect \
-    && python -m compileall -q baselines evaluator leaderboard
+    && python -m compileall -q evaluator leaderboard tsttc_baselines
 
 USER tsttc
 EXPOSE 8000

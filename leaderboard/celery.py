@@ -38,7 +38,7 @@ def keep_secrets_from_readers(**_: object) -> None:
 @worker_process_init.connect  # Celery has no other door into the processes that run tasks
 def start_poller(**_: object) -> None:
     """Start this process's pollers, so that queued work is found with no broker at all."""
-    from leaderboard.queue.pollers import start_pollers, stop_pollers
+    from leaderboard.upkeep.pollers import start_pollers, stop_pollers  # noqa: PLC0415 - needs the apps
 
     pollers = start_pollers(rng=random.Random())  # noqa: S311 - jitter, not a secret
 

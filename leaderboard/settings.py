@@ -221,7 +221,7 @@ if not 0 < HEARTBEAT_S < LEASE_S < WALL_S:
 SWEEP_S = env.float("TSTTC_SWEEP_S", default=15.0)
 # Without a broker nobody tells the workers, and somebody waits.
 POLL_S = env.float("TSTTC_POLL_S", default=5.0 if PRODUCTION else 0.5)
-# How often stored files that no submission names are removed (see leaderboard/queue/pollers.py).
+# How often stored files that no submission names are removed (see leaderboard/upkeep/pollers.py).
 CLEAN_S = env.float("TSTTC_CLEAN_S", default=6 * 3600.0)
 BACKOFF_S = env.float("TSTTC_BACKOFF_S", default=2.0)
 # Limits of the child process that parses untrusted bytes.

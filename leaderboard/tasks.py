@@ -6,9 +6,11 @@ from celery import shared_task
 from django.db import close_old_connections
 from django.utils import timezone
 
+from leaderboard.queue import worker
+
 # `queue` is what a worker runs by itself. Celery only logs an error of the signal that starts it, and goes on
 # without; an error here keeps the worker from starting.
-from leaderboard.queue import backlog, pollers, worker  # noqa: F401 - only its errors are wanted
+from leaderboard.upkeep import backlog
 
 
 @shared_task(name="leaderboard.tasks.nudge")

@@ -16,10 +16,11 @@ from leaderboard.editions import ground_truth
 from leaderboard.methods import visibility as visibility_verbs
 from leaderboard.models import Edition, PublishedResult, QuotaOverride, Split, Submission, Team, User
 from leaderboard.people import tokens
-from leaderboard.queue import backlog, worker
+from leaderboard.queue import worker
 from leaderboard.quotas import limits
 from leaderboard.storage import truth_values
 from leaderboard.submissions import intake
+from leaderboard.upkeep import backlog
 
 N_SEQUENCES = 120
 

@@ -18,9 +18,9 @@ ON_SQLITE_TOO = (
     "tests/leaderboard/db",
     "tests/leaderboard/boards",
     "tests/leaderboard/quotas",
-    "tests/leaderboard/scoring/test_lifecycle.py",
-    "tests/leaderboard/scoring/test_lifecycle_states.py",
-    "tests/leaderboard/scoring/test_questions.py",
+    "tests/leaderboard/queue/test_lifecycle.py",
+    "tests/leaderboard/queue/test_lifecycle_states.py",
+    "tests/leaderboard/statistics/test_questions.py",
     "tests/leaderboard/submissions",
 )
 

@@ -17,7 +17,8 @@ LONG = (
     "tests/browser/",
     "tests/security/",
     "tests/leaderboard/db/",
-    "tests/leaderboard/scoring/",
+    "tests/leaderboard/queue/",
+    "tests/leaderboard/sandbox/",
 )
 
 

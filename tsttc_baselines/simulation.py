@@ -1,7 +1,7 @@
 """Simulated splits: tracks of the six scripts and of highway driving, spread over recordings.
 
-A split gives ground truth, and for each sequence the motion from which `tsttc_baselines.rendering` makes frames.
-It needs numpy alone.
+A split gives ground truth, and for each sequence the motion from which `tsttc_baselines.rendering` makes
+frames. It needs numpy alone.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from django.http import HttpRequest, HttpResponse, HttpResponseNotModified
 
 from leaderboard.api.throttling import ApiThrottle, counted
-from leaderboard.web.decorators import is_known
+from leaderboard.http_caching import is_known
 
 Next = Callable[[HttpRequest], HttpResponse]
 

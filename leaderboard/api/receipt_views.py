@@ -11,10 +11,10 @@ from rest_framework.views import APIView
 from leaderboard.api.exceptions import edition_number
 from leaderboard.api.schema import errors
 from leaderboard.api.views import visible
+from leaderboard.http_caching import is_known
 from leaderboard.models import Submission, User
 from leaderboard.storage import files
 from leaderboard.submissions import receipts
-from leaderboard.web.decorators import is_known
 
 
 class ReceiptView(APIView):

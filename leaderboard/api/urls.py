@@ -15,7 +15,7 @@ from leaderboard.api import (
     submission_views,
     views,
 )
-from leaderboard.web.decorators import cacheable
+from leaderboard.http_caching import cacheable
 
 urlpatterns = [
     path("submissions", submission_views.SubmissionsView.as_view(), name="api-submissions"),

@@ -17,11 +17,11 @@ from leaderboard.api.serializers import SplitSerializer
 from leaderboard.api.submission_serializers import SubmissionSerializer
 from leaderboard.boards import snapshots
 from leaderboard.editions import history
+from leaderboard.http_caching import is_known
 from leaderboard.models import Edition, Split, Submission, User
 from leaderboard.models.submissions import SubmissionQuerySet
 from leaderboard.storage import files
 from leaderboard.submissions import intake, outcomes
-from leaderboard.web.decorators import is_known
 
 
 def visible(request: Request) -> SubmissionQuerySet:

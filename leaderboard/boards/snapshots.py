@@ -1,7 +1,7 @@
 """What everybody sees of a board: read once for all readers, and kept by the number of its split.
 
-Each request reads the number (`leaderboard/board_versions.py`), so what is kept under it is current. The rows are
-read as of one moment. A board as of a time is kept apart: anybody can ask for any number of times.
+Each request reads the number (see `leaderboard/board_versions.py`), so what is kept under it is current. The
+rows are read as of one moment. A board as of a time is kept apart: anybody can ask for any number of times.
 """
 
 import threading

@@ -1,4 +1,1 @@
-"""Editions: import and correct ground truth, preview, publish, roll back, and the history of it all.
-
-Only the entry points (pages, API, workers, commands) import this room.
-"""
+"""Editions: splits, quoted results and ground truth; correct, preview, publish and roll back."""

@@ -1,6 +1,6 @@
 """Documents of quoted rows: the numbers that a paper prints, read with the place of everything that is wrong.
 
-`docs/maintainers.md` describes the form. The document in `leaderboard/benchmark/published/` has its numbers
+`docs/maintainers.md` describes the form. The document in `leaderboard/editions/published/` has its numbers
 in the tables of `evaluator.papers`, which the boards share with the page of the paper.
 """
 

@@ -6,14 +6,15 @@ import unicodedata
 from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from functools import lru_cache
+from pathlib import Path
 from typing import Final
 
 from evaluator.tables import layouts
 from evaluator.tables.escaping import latex, one_line
 from leaderboard.boards.rows import Entry
-from leaderboard.editions.splits import PUBLISHED_DIR
 from leaderboard.models import Edition
 
+_QUOTED_ROWS: Final = Path(__file__).parents[1] / "editions" / "published"
 _ARXIV: Final = re.compile(
     r"https?://(?:www\.)?arxiv\.org/(?:abs|pdf)/([0-9]{4}\.[0-9]{4,5})(?:v[0-9]+)?(?:\.pdf)?"
 )
@@ -39,7 +40,7 @@ def references(entries: Iterable[Entry], *, of_board: str = "") -> Iterator[str]
 @lru_cache(maxsize=1)
 def benchmark_source() -> dict[str, str]:
     """The benchmark's paper as its published results name it: title, authors, year, url."""
-    path = PUBLISHED_DIR / "tsttc-2023.json"
+    path = _QUOTED_ROWS / "tsttc-2023.json"
     source: dict[str, str] = json.loads(path.read_text(encoding="utf-8"))["source"]
     return source
 

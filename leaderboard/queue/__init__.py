@@ -1,4 +1,4 @@
-"""Workers: the work that worker processes find by themselves: sweep, low-priority jobs, cleaning.
+"""Queue: an evaluation from queued to scored; workers claim, lease and decide it.
 
-Only Celery's entry points and commands import this room.
+The database is the queue.
 """

@@ -21,7 +21,7 @@ from evaluator.scoring.scores import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
 from leaderboard.queue import lifecycle
 from leaderboard.queue.lifecycle import Lease, LostRace, Outcome, Strike
-from leaderboard.sandbox import child
+from leaderboard.sandbox import child, file_values
 from leaderboard.statistics import recording_sums
 from leaderboard.storage import truth_values
 
@@ -121,7 +121,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
     for lease in leases:
         file = sent[lease.evaluation_id]
         try:
-            predictions = child.saved(file, edition)
+            predictions = file_values.saved(file, edition)
         except Rejected as rejected:
             # For want of sequences that the file cannot have, which needs no word of the file.
             outcomes.append((lease, rejection(rejected)))
@@ -251,7 +251,7 @@ def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcom
     edition, file = evaluation.edition, evaluation.submission.sent_file
     scorer = _scorer(edition)
     try:
-        predictions = child.read(file, edition, heartbeat=heartbeat)
+        predictions = file_values.read(file, edition, heartbeat=heartbeat)
         report = scorer.report(predictions, keep_bags=True)
     except Rejected as rejected:
         return rejection(rejected)

@@ -1,4 +1,1 @@
-"""Scoring: from a queued evaluation to scores, confidence intervals, comparisons and error analysis.
-
-Editions, submissions and workers import this room; it reads boards and stored files.
-"""
+"""Statistics: confidence intervals, rank ranges, comparisons and error analysis of scored files."""

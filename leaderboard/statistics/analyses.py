@@ -16,7 +16,7 @@ from evaluator.metrics.protocol import PRIMARY, Protocol
 from evaluator.scoring import uncertainty
 from evaluator.scoring.breakdown import CURVE_EDGES_S
 from leaderboard.models import Analysis, Evaluation, Split, Status, Submission, User
-from leaderboard.sandbox import child
+from leaderboard.sandbox import file_values
 from leaderboard.storage import hidden_marks, truth_values
 
 Floats = NDArray[np.float64]
@@ -69,7 +69,7 @@ def make(evaluation: Evaluation, *, now: datetime) -> None:
     if hidden_marks.is_marked(evaluation.edition.ground_truth_id):
         return
     truth = truth_values.load(evaluation.edition.ground_truth_id)
-    predictions = child.of(evaluation.submission.sent_file, evaluation.edition)
+    predictions = file_values.load(evaluation.submission.sent_file, evaluation.edition)
     content = content_of(predictions, truth, rules=evaluation.edition.rules, unit=evaluation.edition.unit)
     with transaction.atomic():
         if Split.objects.lock_shared(evaluation.edition.split_id).is_hidden:

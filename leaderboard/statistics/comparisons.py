@@ -24,7 +24,6 @@ from leaderboard.boards.rows import Entry
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.statistics import confidence, disclosure, questions, recording_sums
 from leaderboard.statistics.questions import Key
-from leaderboard.submissions import status_text
 
 MIN_METHODS, MAX_METHODS = 2, 5
 N_FIRST = 20
@@ -151,7 +150,7 @@ def of(
         entries=tuple(chosen),
         pairs=pairs,
         is_complete=all(pair.differences is not None for pair in pairs),
-        reason=status_text.why_no_interval(board.edition),
+        reason=confidence.why_no_interval(board.edition),
     )
 
 
@@ -161,7 +160,7 @@ def of_first(*, board: query.Board) -> tuple[Pair, ...]:
     What is not known yet is noted, for workers to compute after all that somebody waits for. Empty for a
     board of another time, and where there are too few recordings to compare anything.
     """
-    if board.edition is None or board.at is not None or status_text.why_no_interval(board.edition):
+    if board.edition is None or board.at is not None or confidence.why_no_interval(board.edition):
         return ()
     board.edition.split = board.split  # as above
     ranked = [

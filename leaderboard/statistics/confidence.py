@@ -23,7 +23,7 @@ from evaluator import published
 from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
 from evaluator.scoring import uncertainty
 from evaluator.scoring.ranges import Quoted, rank_ranges
-from evaluator.scoring.significance import cut_off
+from evaluator.scoring.significance import MIN_DEGREES, cut_off, too_few_units
 from leaderboard import board_versions
 from leaderboard.boards.rows import printed_decimals
 from leaderboard.models import (
@@ -313,3 +313,15 @@ def _write(
         if is_seen and present.published_at is not None:
             board_versions.changed(present.split_id)
     return True
+
+
+def why_no_interval(edition: Edition) -> str:
+    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
+
+    A worker finds out how many units an edition effectively has, and writes it beside the edition; until
+    then only an edition with too few units in all is known to have none.
+    """
+    most = max(edition.n_effective.values(), default=float(edition.unit_count))
+    if most >= MIN_DEGREES:
+        return ""
+    return f"There are no confidence intervals: {too_few_units(most, unit=edition.unit)}."

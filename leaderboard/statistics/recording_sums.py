@@ -22,7 +22,7 @@ from evaluator.scoring.report import RecordingSums
 from evaluator.scoring.scores import Scorer
 from evaluator.units import Units
 from leaderboard.models import Edition, SentFile
-from leaderboard.sandbox import child
+from leaderboard.sandbox import file_values
 from leaderboard.storage import truth_values
 
 log = structlog.get_logger(__name__)
@@ -69,12 +69,12 @@ def load(edition: Edition, *, file: SentFile) -> Floats | None:
 def sums_of(edition: Edition, *, file: SentFile) -> Floats:
     """The sums of a scored file, kept or made anew, (G, columns).
 
-    Raises what `child.read` raises.
+    Raises what `file_values.read` raises.
     """
     kept = load(edition, file=file)
     if kept is not None:
         return kept
-    predictions = child.of(file, edition)
+    predictions = file_values.load(file, edition)
     bags = scorer(edition.ground_truth_id, edition.protocol).report(predictions, keep_bags=True).bags
     assert bags is not None  # noqa: S101 - they were asked for
     save(edition, file=file, bags=bags)

@@ -13,7 +13,8 @@ from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry, Interval, profile_of, scored_of, submitted_entry
 from leaderboard.boards.snapshots import CurrentBoard
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
-from leaderboard.submissions import intake, status_text
+from leaderboard.statistics import confidence
+from leaderboard.submissions import intake
 from leaderboard.submissions.intake import Progress
 
 # For so long somebody is told to wait for intervals, which usually take a second or two.
@@ -91,7 +92,7 @@ def awaits_intervals(submission: Submission, progress: Progress, *, now: datetim
     if now - progress.finished_at >= AWAITED_FOR:
         return False
     edition = intake.evaluation_of(submission).edition
-    return edition.discarded_at is None and not status_text.why_no_interval(edition)
+    return edition.discarded_at is None and not confidence.why_no_interval(edition)
 
 
 def why_no_intervals(submission: Submission, progress: Progress, *, now: datetime) -> str:
@@ -100,7 +101,7 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
         return ""
     if awaits_intervals(submission, progress, now=now):
         return "The confidence intervals are being computed."
-    return status_text.why_no_interval(intake.evaluation_of(submission).edition) or (
+    return confidence.why_no_interval(intake.evaluation_of(submission).edition) or (
         "There are no confidence intervals yet. They are computed when no submission is waiting."
     )
 

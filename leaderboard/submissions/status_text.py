@@ -1,8 +1,7 @@
 """Sentences about the end of scoring; pages ask for them, so this module computes nothing."""
 
 from evaluator.counting import counted
-from evaluator.scoring.significance import MIN_DEGREES, too_few_units
-from leaderboard.models import Edition, Evaluation, Status
+from leaderboard.models import Evaluation, Status
 from leaderboard.queue import lifecycle
 
 
@@ -43,15 +42,3 @@ def _of_system_error(evaluation: Evaluation, *, n_failed: int) -> str:
         f"Scoring failed {tries} because of a system error; the file is not at fault. We keep "
         f"the file, and a maintainer can retry it.{counts}"
     )
-
-
-def why_no_interval(edition: Edition) -> str:
-    """Why nothing in this edition has an interval, a rank range or a p-value; "" where some have.
-
-    A worker finds out how many units an edition effectively has, and writes it beside the edition; until
-    then only an edition with too few units in all is known to have none.
-    """
-    most = max(edition.n_effective.values(), default=float(edition.unit_count))
-    if most >= MIN_DEGREES:
-        return ""
-    return f"There are no confidence intervals: {too_few_units(most, unit=edition.unit)}."

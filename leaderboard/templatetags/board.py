@@ -1,114 +1,18 @@
-"""How times, counts and sizes are written on every page."""
-
-from datetime import UTC, datetime
+"""The filters and tags of templates: `leaderboard.web.formatting` under the names that templates use."""
 
 from django import template
-from django.utils.html import format_html, format_html_join
-from django.utils.safestring import SafeString
 
-from evaluator.counting import counted
+from leaderboard.web import formatting
 
 register = template.Library()
 
-
-@register.filter
-def grouped(value: int | None) -> str:
-    """A count with its thousands set apart.
-
-    >>> grouped(28600)
-    '28,600'
-    """
-    return "" if value is None else f"{value:,}"
-
-
-@register.filter(name="counted")
-def with_noun(value: int, nouns: str) -> str:
-    """A count and its noun; two nouns with a comma between them where an s does not make the plural.
-
-    >>> with_noun(1, "recording"), with_noun(3, "person,people")
-    ('1 recording', '3 people')
-    """
-    return counted(value, *nouns.split(","))
-
-
-@register.filter
-def size(n_bytes: int) -> str:
-    """A size in the largest fitting unit.
-
-    >>> size(812), size(81_234), size(20_000_000)
-    ('812 bytes', '81.2 KB', '20 MB')
-    """
-    if n_bytes < 1000:
-        return counted(n_bytes, "byte")
-    return f"{n_bytes / 1e3:.3g} KB" if n_bytes < 1e6 else f"{n_bytes / 1e6:.3g} MB"
-
-
-@register.filter
-def duration(seconds: float | None) -> str:
-    """A span of time, as exactly as an estimate deserves.
-
-    >>> duration(0.3), duration(41.8), duration(150), duration(9000)
-    ('1 s', '42 s', '3 min', '3 h')
-    """
-    if seconds is None:
-        return ""
-    if seconds < 90:
-        return f"{max(1, round(seconds))} s"
-    return f"{-(-seconds // 60):.0f} min" if seconds < 5400 else f"{-(-seconds // 3600):.0f} h"
-
-
-@register.filter
-def ticked(text: str) -> SafeString:
-    """A sentence in which `names` are set in backticks, as HTML.
-
-    >>> ticked("The envelope has no `predictions`.")
-    'The envelope has no <code>predictions</code>.'
-    """
-    parts = text.split("`")
-    pieces = (part if i % 2 == 0 else format_html("<code>{}</code>", part) for i, part in enumerate(parts))
-    return format_html_join("", "{}", ((piece,) for piece in pieces))
-
-
-@register.filter
-def breakable(path: str) -> SafeString:
-    """A path that may go on in the next line after each of its slashes, as HTML.
-
-    >>> breakable("/api/v1")
-    '/<wbr>api/<wbr>v1'
-    """
-    *folders, last = path.split("/")
-    return format_html("{}{}", format_html_join("", "{}/<wbr>", ((part,) for part in folders)), last)
-
-
-@register.simple_tag
-def day(at: datetime) -> SafeString:
-    """The day, with time and zone on hover."""
-    return _time(at, "%Y-%m-%d")
-
-
-@register.simple_tag
-def moment(at: datetime) -> SafeString:
-    """Day and minute, with seconds and zone on hover."""
-    return _time(at, "%Y-%m-%d %H:%M UTC")
-
-
-@register.simple_tag
-def second(at: datetime) -> SafeString:
-    """Day, second and zone."""
-    return _time(at, "%Y-%m-%d %H:%M:%S UTC")
-
-
-@register.simple_tag
-def clock(at: datetime) -> SafeString:
-    """The time of day to the second, with day and zone on hover."""
-    return _time(at, "%H:%M:%S")
-
-
-def _time(at: datetime, pattern: str) -> SafeString:
-    at = at.astimezone(UTC)
-    return format_html(
-        '<time datetime="{}" title="{}">{}</time>',
-        at.isoformat(timespec="seconds"),
-        f"{at:%Y-%m-%d %H:%M:%S} UTC",
-        f"{at:{pattern}}",
-    )
+register.filter("grouped", formatting.grouped)
+register.filter("counted", formatting.with_noun)
+register.filter("size", formatting.size)
+register.filter("duration", formatting.duration)
+register.filter("ticked", formatting.ticked)
+register.filter("breakable", formatting.breakable)
+register.simple_tag(formatting.day)
+register.simple_tag(formatting.moment)
+register.simple_tag(formatting.second)
+register.simple_tag(formatting.clock)

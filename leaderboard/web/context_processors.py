@@ -1,16 +1,15 @@
 """Context of every page: the site's name, the section, and the splits."""
 
 from typing import Any
-from urllib.parse import urlsplit
 
 from django.conf import settings
-from django.http import Http404, HttpRequest
+from django.http import HttpRequest
 from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
-from django.utils.http import url_has_allowed_host_and_scheme
 
 from leaderboard.boards.snapshots import site_line_of, splits_of
-from leaderboard.models import PageVersion, Split
+from leaderboard.models import PageVersion
+from leaderboard.web.lookups import page_before
 
 _SECTIONS = {
     "home": "home",
@@ -47,13 +46,6 @@ _PREFIXES = {
     "published": "published",
     "maintain": "maintain",
 }
-
-
-def split_or_404(request: HttpRequest, name: str) -> Split:
-    found = next((split for split in splits_of(request) if split.pk == name), None)
-    if found is None:
-        raise Http404(f"There is no split {name!r}.")
-    return found
 
 
 def _board_split(request: HttpRequest) -> str:
@@ -108,14 +100,3 @@ def _section(request: HttpRequest) -> str:
 def _came_from(request: HttpRequest) -> str:
     path = page_before(request)
     return "" if path == request.get_full_path() else path
-
-
-def page_before(request: HttpRequest) -> str:
-    """The address, without a host, of the page of this site that the request names as its origin."""
-    address = request.headers.get("Referer", "")
-    # The settings' host, and the one that was asked for, whatever it is: a demo also answers as localhost.
-    hosts = {urlsplit(settings.SITE_URL).netloc, request.headers.get("Host", "")}
-    parts = urlsplit(address if url_has_allowed_host_and_scheme(address, allowed_hosts=hosts) else "")
-    path = f"{parts.path}?{parts.query}" if parts.query else parts.path
-    # A path that begins with two slashes would name another site where it is linked.
-    return "" if path.startswith("//") else path

@@ -2,11 +2,11 @@
 
 from django.urls import include, path, register_converter
 
+from leaderboard.http_caching import cacheable
 from leaderboard.web.account import data_views, team_views, token_views
 from leaderboard.web.boards import board_views, export_views, public_assets
 from leaderboard.web.charts import chart_views, paper_charts
 from leaderboard.web.compare import compare_views
-from leaderboard.web.decorators import cacheable
 from leaderboard.web.docs import docs_views
 from leaderboard.web.landing import crawler_views, landing_views
 from leaderboard.web.maintain import (
@@ -36,7 +36,7 @@ urlpatterns = [
     path("", cacheable(landing_views.home), name="home"),
     path("board/", landing_views.main_board, name="main_board"),
     path("board/<slug:split>/", cacheable(board_views.board), name="board"),
-    path("board/<slug:split>/charts/", chart_views.board_charts, name="charts"),
+    path("board/<slug:split>/charts/", chart_views.charts, name="charts"),
     path(
         "board/<slug:split>/charts/progress.json",
         cacheable(chart_views.progress_options),

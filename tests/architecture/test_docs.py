@@ -9,7 +9,7 @@ from tests.services import REPOSITORY
 DOCS = REPOSITORY / "docs"
 LINK = re.compile(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]*))?\)")
 PATH = re.compile(
-    r"`((?:leaderboard|evaluator|baselines|tests|benchmarks|examples|docs|deploy)/[\w./-]+\.(?:py|md|yml|html|csv))`"
+    r"`((?:leaderboard|evaluator|tsttc_baselines|tests|benchmarks|examples|docs|deploy)/[\w./-]+\.(?:py|md|yml|html|csv))`"
 )
 CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
 
@@ -37,7 +37,7 @@ def test_every_document_is_in_the_navigation_and_every_decision_in_its_list() ->
 
 def test_files_that_documents_and_docstrings_name_are_there() -> None:
     sources = [*REPOSITORY.glob("*.md"), *REPOSITORY.glob("docs/**/*.md")]
-    for folder in ("leaderboard", "evaluator", "baselines", "tests"):
+    for folder in ("leaderboard", "evaluator", "tsttc_baselines", "tests"):
         sources += (REPOSITORY / folder).rglob("*.py")
     missing = [
         f"{source.relative_to(REPOSITORY)}: {name}"

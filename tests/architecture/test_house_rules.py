@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PROGRAMS = ("evaluator", "baselines", "leaderboard")
+PROGRAMS = ("evaluator", "tsttc_baselines", "leaderboard")
 CODE = ("evaluator", "leaderboard", "tests", "benchmarks")
 MAX_LINES = 600
 # A name that says nothing collects everything.

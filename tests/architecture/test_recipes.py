@@ -23,7 +23,7 @@ def texts() -> list[Path]:
         ("examples", "*"),
         ("templates", "*.html"),
         ("evaluator", "*.py"),
-        ("baselines", "*.py"),
+        ("tsttc_baselines", "*.py"),
     ):
         found += [path for path in (REPOSITORY / folder).rglob(pattern) if path.is_file()]
     return [path for path in found if path.suffix not in {".jpg", ".pyc"}]

@@ -41,7 +41,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
     for name in ("pyproject.toml", "README.md", "LICENSE"):
         shutil.copy(REPOSITORY / name, source)
-    for name in ("evaluator", "baselines", "leaderboard"):
+    for name in ("evaluator", "tsttc_baselines", "leaderboard"):
         shutil.copytree(REPOSITORY / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
     # With the pinned setuptools, as `make` installs: nothing is fetched.
     pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", out, source)
@@ -67,7 +67,7 @@ def test_wheel_holds_evaluator_and_baselines_alone(wheel: Path) -> None:
     with ZipFile(wheel) as archive:
         names = archive.namelist()
     tops = {name.partition("/")[0] for name in names}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"evaluator", "baselines"}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"evaluator", "tsttc_baselines"}
     assert {
         "evaluator/py.typed",
         "tsttc_baselines/py.typed",
@@ -76,7 +76,7 @@ def test_wheel_holds_evaluator_and_baselines_alone(wheel: Path) -> None:
     } <= set(names)
     present = {
         path.relative_to(REPOSITORY).as_posix()
-        for folder in ("evaluator", "baselines")
+        for folder in ("evaluator", "tsttc_baselines")
         for path in (REPOSITORY / folder).rglob("*.py")
     }
     assert present <= set(names), "every module of the two is in the wheel"

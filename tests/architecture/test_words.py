@@ -58,7 +58,7 @@ PAGES = sorted((REPOSITORY / "templates").rglob("*.html"))
 GUIDES = sorted((*(REPOSITORY / "docs").glob("*.md"), REPOSITORY / "README.md", REPOSITORY / "SECURITY.md"))
 MESSAGES = sorted(
     path
-    for room in ("evaluator", "baselines", "leaderboard")
+    for room in ("evaluator", "tsttc_baselines", "leaderboard")
     for path in (REPOSITORY / room).rglob("*.py")
     if not {"migrations", "models", "api"} & set(path.parts)  # `models` and `api` have words of their own
 )

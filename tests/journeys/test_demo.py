@@ -18,7 +18,7 @@ from leaderboard.demo.seed import ENTRIES
 from leaderboard.management.commands.demo import names_of
 from tests.journeys.people import Visitor
 from tests.journeys.production import PATIENCE_S, REPOSITORY, Site, await_that, free_port, get
-from tests.leaderboard.scoring.child_processes import kernel_says
+from tests.leaderboard.sandbox.child_processes import kernel_says
 from tests.services import environment_of_its_own
 from tests.signals import default_signals
 

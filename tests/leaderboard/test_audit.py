@@ -13,7 +13,7 @@ from django.utils import timezone
 from leaderboard import audit
 from leaderboard.models import AuditEvent, Edition, Evaluation, User
 from leaderboard.models.audit import GENESIS, AppendOnly
-from leaderboard.queue import pollers
+from leaderboard.upkeep import pollers
 from tests import builders
 
 SQLITE_ONLY = pytest.mark.skipif("connection.vendor != 'sqlite'", reason="there the database refuses it")

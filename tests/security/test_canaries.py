@@ -20,8 +20,9 @@ from leaderboard.editions import corrections, ground_truth, splits
 from leaderboard.models import Edition, Evaluation, Split, Status, User
 from leaderboard.ops import broker as broker_verbs
 from leaderboard.ops import logs
-from leaderboard.queue import pollers, worker
+from leaderboard.queue import worker
 from leaderboard.storage import truth_values
+from leaderboard.upkeep import pollers
 from tests import builders
 from tests.security import canaries
 from tests.security.canaries import Search

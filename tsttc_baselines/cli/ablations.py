@@ -46,7 +46,10 @@ def ablate(
       tsttc baseline ablate bins frames/ --truth val.csv --json
     """
     require_opencv()
-    from tsttc_baselines.ablation import get_ablation, scores_of_settings
+    from tsttc_baselines.ablation import (  # noqa: PLC0415 -- needs OpenCV
+        get_ablation,
+        scores_of_settings,
+    )
     from tsttc_baselines.cli.progress import shown_progress  # noqa: PLC0415 -- as above
     from tsttc_baselines.folders import read_folder  # noqa: PLC0415 -- as above
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 from django.conf import settings
 from django.core.management.base import BaseCommand, CommandError
 
-PACKAGES: Final = ("evaluator", "baselines")
+PACKAGES: Final = ("evaluator", "tsttc_baselines")
 _FILES: Final = ("pyproject.toml", "README.md", "LICENSE")
 _BUILD: Final = "import sys; from setuptools import build_meta; build_meta.build_wheel(sys.argv[1])"
 # The time of every file in the wheel, the first that a zip can say: the same sources make the same bytes.

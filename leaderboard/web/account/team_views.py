@@ -18,7 +18,7 @@ from leaderboard.errors.refusals import Refused
 from leaderboard.models import Invitation, Team, User
 from leaderboard.people import invitations, names, teams
 from leaderboard.web.account import shown_once
-from leaderboard.web.decorators import asks_first, own_deed, own_form
+from leaderboard.web.decorators import asks_first, own_action, own_form
 from leaderboard.web.forms import SiteForm
 
 
@@ -125,7 +125,7 @@ def team(request: HttpRequest) -> HttpResponse:
     return _page(request, form=form, status=422)
 
 
-@own_deed
+@own_action
 @sensitive_variables("secret")
 def invite(request: HttpRequest) -> HttpResponse:
     """Make a link. It is shown on the page of the team that follows, and never again."""
@@ -137,7 +137,7 @@ def invite(request: HttpRequest) -> HttpResponse:
     return shown_once.redirect_with(invitations.link(secret), request=request, to="team")
 
 
-@own_deed
+@own_action
 def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse:
     """End a link that nobody has used."""
     found = get_object_or_404(Invitation, team=_own_team(request), pk=invitation_id)
@@ -149,7 +149,7 @@ def revoke_invitation(request: HttpRequest, invitation_id: UUID) -> HttpResponse
     )
 
 
-@own_deed
+@own_action
 def leave(request: HttpRequest) -> HttpResponse:
     """Go out of one's team. Whoever would leave methods to nobody says that they know."""
     _own_team(request)
@@ -160,7 +160,7 @@ def leave(request: HttpRequest) -> HttpResponse:
     return _done(request, lambda: teams.leave(user=user), told="You left the team.")
 
 
-@own_deed
+@own_action
 def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Put a member out of the team."""
     own, member = _member(request, handle)
@@ -171,7 +171,7 @@ def remove(request: HttpRequest, handle: UUID) -> HttpResponse:
     )
 
 
-@own_deed
+@own_action
 def hand_over(request: HttpRequest, handle: UUID) -> HttpResponse:
     """Let another member own the team."""
     own, member = _member(request, handle)

@@ -12,7 +12,7 @@ from django.views.decorators.debug import sensitive_variables
 from leaderboard.models import ApiToken, Scope, Split, User
 from leaderboard.people import tokens
 from leaderboard.web.account import shown_once
-from leaderboard.web.decorators import own_deed, own_form
+from leaderboard.web.decorators import own_action, own_form
 from leaderboard.web.forms import SiteForm
 
 
@@ -70,7 +70,7 @@ def token_page(request: HttpRequest) -> HttpResponse:
     return shown_once.render_with(request, "account/tokens.html", context, at="tokens", status=status)
 
 
-@own_deed
+@own_action
 def revoke(request: HttpRequest) -> HttpResponse:
     """End one's own token at once."""
     user = cast("User", request.user)

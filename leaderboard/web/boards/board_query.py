@@ -12,7 +12,7 @@ from leaderboard.boards import filters, query
 from leaderboard.boards.filters import FILTERS, Filters
 from leaderboard.boards.query import Board
 from leaderboard.statistics import comparisons
-from leaderboard.templatetags.board import grouped
+from leaderboard.web.formatting import grouped
 
 PER_PAGE: Final = 100
 ALL_COLUMNS: Final = "both"

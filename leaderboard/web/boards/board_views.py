@@ -15,7 +15,7 @@ from leaderboard.editions import history
 from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables
 from leaderboard.web.boards.board_query import BoardQuery, tools
-from leaderboard.web.context_processors import split_or_404
+from leaderboard.web.lookups import split_or_404
 
 MAIN_SPLIT = "test"
 """The split whose board papers quote."""

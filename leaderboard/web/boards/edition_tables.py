@@ -11,9 +11,9 @@ from leaderboard.editions import history
 from leaderboard.editions.corrections import RescoringProgress
 from leaderboard.editions.preview import ABSENT, Change, Preview
 from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Split, Status
-from leaderboard.templatetags.board import duration, grouped
 from leaderboard.web.boards import tables
 from leaderboard.web.boards.score_columns import column_css, score_heading
+from leaderboard.web.formatting import duration, grouped
 
 _ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}

@@ -26,7 +26,7 @@ from leaderboard.exports import bibtex, tables
 from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query
 from leaderboard.web.boards.board_query import BoardQuery
-from leaderboard.web.context_processors import split_or_404
+from leaderboard.web.lookups import split_or_404
 
 NOBODYS: Final = (
     "The address asks for the rows of your team as well (mine=1), but you are not signed in; sign in, or use "

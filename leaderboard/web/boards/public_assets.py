@@ -13,7 +13,7 @@ from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import badges, feeds
 from leaderboard.models import Method
 from leaderboard.web.boards.board_views import MAIN_SPLIT
-from leaderboard.web.context_processors import split_or_404
+from leaderboard.web.lookups import split_or_404
 
 
 @require_safe

@@ -19,7 +19,7 @@ from leaderboard.boards.query import Board
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports.tables import team_of
 from leaderboard.models import Edition, Visibility
-from leaderboard.submissions import status_text
+from leaderboard.statistics import confidence
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import PER_PAGE, BoardQuery
 from leaderboard.web.boards.score_columns import (
@@ -206,7 +206,7 @@ def _reason(board: Board, *, has_intervals: bool) -> str:
     """Why no value has an interval, where something was scored at all."""
     if has_intervals or board.edition is None or not any(map(_is_scored, board.entries)):
         return ""
-    return status_text.why_no_interval(board.edition) or ("The confidence intervals are being computed.")
+    return confidence.why_no_interval(board.edition) or ("The confidence intervals are being computed.")
 
 
 def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, WhiskerScale]:

@@ -9,7 +9,6 @@ from evaluator.metrics.protocol import known_metrics
 from evaluator.metrics.registry import MID, Metric
 from evaluator.scoring.report import format_published
 from leaderboard.models import Analysis
-from leaderboard.templatetags.board import grouped
 from leaderboard.web.charts.chart_options import (
     Chart,
     Frame,
@@ -24,6 +23,7 @@ from leaderboard.web.charts.chart_options import (
 )
 from leaderboard.web.charts.chart_series import Look, band, bars, line, marks
 from leaderboard.web.charts.svg import round_ticks, tick_text
+from leaderboard.web.formatting import grouped
 
 _END_S: Final = 20.0
 _TTC_AXIS: Final = {

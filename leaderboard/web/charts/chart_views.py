@@ -7,18 +7,18 @@ from django.views.decorators.http import require_safe
 from evaluator.tables import sentences
 from leaderboard.boards import snapshots
 from leaderboard.boards.query import Board
+from leaderboard.http_caching import cacheable
 from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.charts import board_charts, profile_chart, significance_chart
 from leaderboard.web.charts.chart_options import Chart
-from leaderboard.web.context_processors import split_or_404
-from leaderboard.web.decorators import cacheable
+from leaderboard.web.lookups import split_or_404
 
 N_PROFILES = 5
 
 
 @require_safe
-def board_charts(request: HttpRequest, split: str) -> HttpResponse:
+def charts(request: HttpRequest, split: str) -> HttpResponse:
     """Progress over time, accuracy against latency, errors by TTC range, significance of the first rows."""
     board = snapshots.board(split=split_or_404(request, split), viewer=request.user)
     pairs = comparisons.of_first(board=board)
@@ -42,7 +42,7 @@ def _drawn(request: HttpRequest, board: Board, pairs: tuple[Pair, ...]) -> HttpR
             decimals=board.edition.decimals if board.edition else 2,
         ),
     }
-    return render(request, "boards/charts.html", context)
+    return render(request, "charts/charts.html", context)
 
 
 @require_safe

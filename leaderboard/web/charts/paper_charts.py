@@ -127,7 +127,7 @@ def published_page(request: HttpRequest) -> HttpResponse:
     """All tables, each with its notes; a chart where a setting is varied."""
     shown = [{"shown": each, "chart": sweep(each)} for each in published.printed_tables()]
     context = {"tables": shown, "source": published_tables().source, "downloads": DOWNLOADS}
-    return render(request, "boards/published.html", context)
+    return render(request, "charts/published.html", context)
 
 
 @require_safe

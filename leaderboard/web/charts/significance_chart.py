@@ -15,7 +15,7 @@ from leaderboard.boards.rows import Entry
 from leaderboard.statistics.comparisons import Pair
 from leaderboard.web.charts.chart_options import Chart, Frame, Mark, Option, empty, ranks_axis
 from leaderboard.web.charts.chart_series import cells
-from leaderboard.web.compare.compare_tables import signed
+from leaderboard.web.formatting import signed
 
 _FEW: Final = 8
 SIGNIFICANT: Final = {0.001: "p < 0.001", 0.01: "p < 0.01", 0.05: "p < 0.05"}

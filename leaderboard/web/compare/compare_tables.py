@@ -19,6 +19,7 @@ from leaderboard.boards.rows import Entry, Interval
 from leaderboard.statistics.comparisons import Compared, Pair
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
 from leaderboard.web.charts import profile_chart, svg
+from leaderboard.web.formatting import signed
 
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
@@ -135,15 +136,3 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, 
         "is_significant": found.is_significant,
         "drawn": svg.difference(scale_end, found.difference, found.low, found.high),
     }
-
-
-def signed(value: float, *, decimals: int = 2) -> str:
-    """A difference with its sign, and a minus that is one.
-
-    >>> signed(-4.1), signed(0.204), signed(-0.001), signed(-4.1, decimals=1)
-    ('−4.10', '+0.20', '0.00', '−4.1')
-    """
-    text = format_published(abs(value), decimals=decimals)
-    if not float(text):
-        return text
-    return f"{'−' if value < 0 else '+'}{text}"

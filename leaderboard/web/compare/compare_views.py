@@ -9,12 +9,12 @@ from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
+from leaderboard.http_caching import cacheable
 from leaderboard.models import Split
 from leaderboard.ops import rate_limits
 from leaderboard.statistics import comparisons, questions
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.compare import compare_tables
-from leaderboard.web.decorators import cacheable
 
 NOT_FOUND, UNPROCESSABLE, TOO_MANY = 404, 400, 429
 # What the page offers to choose from; the board itself offers all.
@@ -54,7 +54,7 @@ def compare(request: HttpRequest) -> HttpResponse:
 
 @cacheable
 def _choose(request: HttpRequest, split: Split) -> HttpResponse:
-    return render(request, "boards/compare/choose.html", _choice(request, split))
+    return render(request, "compare/choose.html", _choice(request, split))
 
 
 def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse:
@@ -63,7 +63,7 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
     n_tried = Counter(attempt.method_id for attempt in attempts)
     page = compare_tables.comparison(compared, n_tried=n_tried)
     context = {"page": page, "board_split": compared.split.pk}
-    return render(request, "boards/compare/compare.html", context)
+    return render(request, "compare/compare.html", context)
 
 
 def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
@@ -90,7 +90,7 @@ def _refused(
 ) -> HttpResponse:
     status = NOT_FOUND if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else UNPROCESSABLE
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
-    response = render(request, "boards/compare/choose.html", context, status=status)
+    response = render(request, "compare/choose.html", context, status=status)
     if isinstance(refusal, questions.AskedTooOften):
         response.status_code = TOO_MANY
         response["Retry-After"] = str(refusal.retry_after_s)

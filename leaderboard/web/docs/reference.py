@@ -10,7 +10,7 @@ from evaluator.metrics.protocol import DEFAULT_PROTOCOL, get_protocol
 from evaluator.problems import PROBLEM_CODES
 from leaderboard.models import Split
 from leaderboard.quotas import admissions
-from leaderboard.templatetags.board import size
+from leaderboard.web.formatting import size
 
 # What only maintainers meet, when they import ground truth.
 GROUND_TRUTH_CODES: Final = frozenset(

@@ -11,7 +11,7 @@ from evaluator.scoring.report import format_published
 from leaderboard.boards.query import Board
 from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports.tables import team_of
-from leaderboard.submissions import status_text
+from leaderboard.statistics import confidence
 from leaderboard.web.boards.score_columns import interval_words
 from leaderboard.web.boards.tables import rank_range
 
@@ -68,7 +68,7 @@ def lead_words(board: Board) -> str:
 def _why_unknown(board: Board, leader: Entry) -> str:
     if leader.kind == "published":
         return "papers report no values per recording."
-    reason = status_text.why_no_interval(board.edition) if board.edition else ""
+    reason = confidence.why_no_interval(board.edition) if board.edition else ""
     # As the end of a sentence.
     return f"{reason[:1].lower()}{reason[1:]}" or "the confidence intervals are being computed."
 

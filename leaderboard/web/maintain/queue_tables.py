@@ -12,7 +12,7 @@ from leaderboard.db import clock
 from leaderboard.models import Evaluation, Status, Visibility
 from leaderboard.ops import health
 from leaderboard.queue.lifecycle import MAX_INFRASTRUCTURE_STRIKES, MAX_POISON_STRIKES
-from leaderboard.templatetags.board import duration, grouped
+from leaderboard.web.formatting import duration, grouped
 
 PER_PAGE: Final = 50
 PER_SECTION: Final = 20

@@ -11,7 +11,7 @@ from leaderboard.moderation import forgetting
 from leaderboard.people import names
 from leaderboard.quotas import limits
 from leaderboard.quotas.spans import span
-from leaderboard.templatetags.board import grouped
+from leaderboard.web.formatting import grouped
 
 MAX_FOUND = 50
 

@@ -17,7 +17,6 @@ from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
 from leaderboard.statistics.comparisons import MIN_METHODS
 from leaderboard.submissions.intake import evaluation_of
-from leaderboard.templatetags.board import grouped
 from leaderboard.web.boards.score_columns import (
     Cell,
     Group,
@@ -29,6 +28,7 @@ from leaderboard.web.boards.score_columns import (
 )
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.charts import profile_chart
+from leaderboard.web.formatting import grouped
 
 _MAX_REASON: Final = 110
 

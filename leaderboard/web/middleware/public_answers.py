@@ -1,7 +1,8 @@
 """Answers to anybody: what is the same for all readers without an account, kept while no board changes.
 
-What such a reader is shown changes only with the numbers of the boards (`leaderboard/board_versions.py`) and with
-the day, so both are part of the key: a kept answer is never old. A view says so with `http.cacheable`.
+What such a reader sees changes only with the numbers of the boards (see `leaderboard/board_versions.py`) and
+with the day, so both are part of the key: a kept answer is current. A view says so with
+`http_caching.cacheable`.
 
 Each process has two bounded caches: one for plain addresses, and one for those with a query, so that what
 anybody can make up pushes out no plain page. Answers are kept compressed, an eighth of the memory.
@@ -23,7 +24,7 @@ from django.utils import timezone
 
 from leaderboard import board_versions
 from leaderboard.boards import filters
-from leaderboard.web.decorators import is_cacheable, is_known
+from leaderboard.http_caching import is_cacheable, is_known
 
 Next = Callable[[HttpRequest], HttpResponseBase]
 

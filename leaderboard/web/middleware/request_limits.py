@@ -15,7 +15,7 @@ from django.shortcuts import render
 from leaderboard.errors import problem_codes
 from leaderboard.ops import rate_limits
 from leaderboard.submissions import intake
-from leaderboard.web.context_processors import page_before
+from leaderboard.web.lookups import page_before
 
 # Room for the other fields and the boundaries of a multipart body.
 FORM_BYTES = 100_000

@@ -17,7 +17,7 @@ from leaderboard.submissions import outcomes
 from leaderboard.submissions.intake import Progress
 from leaderboard.submissions.outcomes import BoardPlace
 from leaderboard.web.boards.tables import rank_range
-from leaderboard.web.compare.compare_tables import signed
+from leaderboard.web.formatting import signed
 from leaderboard.web.methods.result_tables import result_groups
 
 

@@ -7,7 +7,7 @@ from typing import Final
 
 from leaderboard.models import Evaluation, Status
 from leaderboard.submissions.intake import Progress
-from leaderboard.templatetags.board import grouped
+from leaderboard.web.formatting import grouped
 
 MAX_POINTS: Final = 20
 INTERVALS_FOLLOW: Final = "confidence intervals follow"

@@ -22,6 +22,7 @@ from django.views.decorators.http import require_safe
 
 from evaluator.predictions import writing
 from leaderboard.editions import history
+from leaderboard.http_caching import is_known
 from leaderboard.models import Evaluation, Status, Submission, User, Visibility
 from leaderboard.quotas import limits
 from leaderboard.statistics import analyses
@@ -30,8 +31,8 @@ from leaderboard.submissions import intake, outcomes, receipts, search
 from leaderboard.submissions.intake import Progress
 from leaderboard.web.boards import edition_tables
 from leaderboard.web.charts import analysis_charts
-from leaderboard.web.context_processors import split_or_404
-from leaderboard.web.decorators import is_known, own_form, own_page
+from leaderboard.web.decorators import own_form, own_page
+from leaderboard.web.lookups import split_or_404
 from leaderboard.web.methods import result_tables
 from leaderboard.web.submissions import outcome_tables
 from leaderboard.web.submissions.forms import SearchForm, SubmissionForm

@@ -15,7 +15,7 @@ EXAMPLE = REPOSITORY / "examples/baseline"
 
 
 def test_a_file_called_evaluator_does_not_hide_the_package_from_the_command(tmp_path: Path) -> None:
-    for name in ("evaluator", "baselines"):
+    for name in ("evaluator", "tsttc_baselines"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('the file in this folder was imported')")
     tsttc = Path(sys.executable).with_name("tsttc")
     # Two processes estimate, so what the command starts is held as well.

@@ -14,7 +14,7 @@ from evaluator.truth import annotation_folders
 from evaluator.truth.annotation_folders import read_annotations
 from tests.evaluator.toolkit_folders import camera, foreign_class, write_folder
 from tests.evaluator.truth.hostile_pickles import CHEAP, HOSTILE
-from tests.leaderboard.scoring.child_processes import children, kernel_says, limits, needs_root
+from tests.leaderboard.sandbox.child_processes import children, kernel_says, limits, needs_root
 
 SIX = list(range(6))
 

@@ -15,8 +15,8 @@ from leaderboard.models import (
     Status,
     Submission,
 )
-from leaderboard.queue import backlog
 from leaderboard.storage import truth_values
+from leaderboard.upkeep import backlog
 from tests import builders
 from tests.editions import board_now, corrected, extended, offline, open_edition, publish
 

@@ -24,7 +24,7 @@ from leaderboard.statistics import comparisons
 from leaderboard.storage import files, truth_values
 from tests import builders, pages
 from tests.editions import ANYBODY, open_edition, publish
-from tests.leaderboard.scoring.inferred_scores import everything, scores_of
+from tests.leaderboard.statistics.inferred_scores import everything, scores_of
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
 

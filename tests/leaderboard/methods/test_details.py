@@ -219,15 +219,15 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     builders.score_all()
     split = Split.objects.select_related("published_edition").get(pk="test")
 
-    def names(**query: str) -> list[str]:
-        board = query.board(split=split, viewer=ANYBODY, filters=filters.parse(query))
+    def names(**params: str) -> list[str]:
+        board = query.board(split=split, viewer=ANYBODY, filters=filters.parse(params))
         assert all(ranks[entry.method] == entry.rank for entry in board.entries)
         assert board.n_in_all == 7
         return [entry.method for entry in board.entries if entry.kind == "submission"]
 
     ranks = {entry.method: entry.rank for entry in query.board(split=split, viewer=ANYBODY).entries}
     both = ["Foo", veiled.pseudonym]
-    for query, expected in (
+    for params, expected in (
         ({}, both),
         ({"frames": "6"}, both),
         ({"cameras": "one"}, ["Foo"]),
@@ -246,7 +246,7 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
         ({"q": "anonymous"}, [veiled.pseudonym]),
         ({"frames": "", "q": " "}, both),
     ):
-        assert sorted(names(**query)) == sorted(expected), query
+        assert sorted(names(**params)) == sorted(expected), query
 
 
 def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(

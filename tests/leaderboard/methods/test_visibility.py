@@ -26,8 +26,8 @@ from leaderboard.models import (
     Visibility,
 )
 from leaderboard.people import teams
-from leaderboard.queue import pollers
 from leaderboard.submissions import intake
+from leaderboard.upkeep import pollers
 from tests import builders, pages
 
 pytestmark = pytest.mark.slow

@@ -16,7 +16,7 @@ from pytest_django import Settings
 
 from leaderboard.models import AuditEvent, SweepBeat
 from leaderboard.ops import health, prometheus
-from leaderboard.queue import pollers
+from leaderboard.upkeep import pollers
 
 pytestmark = pytest.mark.slow
 

@@ -11,8 +11,8 @@ from rest_framework.test import APIClient
 
 from leaderboard import board_versions
 from leaderboard.models import BoardVersion, Edition, Split, User
-from leaderboard.queue import pollers
 from leaderboard.quotas import admissions
+from leaderboard.upkeep import pollers
 from tests import builders, pages
 from tests.leaderboard.api.test_submissions import client_of, post
 

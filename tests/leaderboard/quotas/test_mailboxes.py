@@ -11,9 +11,9 @@ from pytest_django.fixtures import Settings
 from leaderboard.models import Edition, SpentMailbox, Split, Submission, User
 from leaderboard.moderation import forgetting
 from leaderboard.people import teams
-from leaderboard.queue import pollers
 from leaderboard.quotas import limits
 from leaderboard.quotas.limits import QuotaExceeded
+from leaderboard.upkeep import pollers
 from tests import builders
 from tests.leaderboard.web.account import proving
 

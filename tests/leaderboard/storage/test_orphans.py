@@ -15,8 +15,8 @@ from structlog.testing import capture_logs
 
 from leaderboard.models import AuditEvent, Edition, Submission, User
 from leaderboard.ops import prometheus
-from leaderboard.queue import pollers
 from leaderboard.storage import files, orphans
+from leaderboard.upkeep import pollers
 from tests import builders
 
 pytestmark = pytest.mark.slow

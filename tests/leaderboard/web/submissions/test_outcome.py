@@ -10,7 +10,7 @@ from leaderboard.models import Edition, Method, Score, Split, Submission, User
 from leaderboard.submissions import intake
 from tests import board_rows, builders, pages
 from tests.editions import board_now
-from tests.leaderboard.scoring.inferred_scores import put_ranges
+from tests.leaderboard.statistics.inferred_scores import put_ranges
 
 pytestmark = pytest.mark.slow
 

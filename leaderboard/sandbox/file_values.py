@@ -1,0 +1,90 @@
+"""A submission's values in the order of an edition's ground truth: saved before, or read from the file.
+
+A file is read with the manifest that was public when it came. From there its values go by natural keys to the
+manifest of the edition, so only a correction that adds sequences asks for another file.
+"""
+
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+import structlog
+from django.conf import settings
+from numpy.typing import NDArray
+
+from evaluator import Predictions
+from evaluator.predictions.revisions import Rows, absent, realigned, rows_in
+from leaderboard.models import Edition, SentFile
+from leaderboard.sandbox import child
+from leaderboard.storage import files, manifests, truth_values
+
+log = structlog.get_logger(__name__)
+
+
+def saved(file: SentFile, edition: Edition) -> Predictions | None:
+    """The values that were kept when the file was first read; None if they are not all there.
+
+    Raises `evaluator.Rejected` if the edition has sequences that the file's manifest did not have, and
+    `OSError` if the private directory or the store does not answer.
+    """
+    manifest = truth_values.load(edition.ground_truth_id).manifest
+    n_sent, places, missing = _places(file.manifest_digest, edition.ground_truth_id)
+    if len(missing):
+        raise absent(missing, manifest=manifest)
+    ascending = files.load_aligned(file, n_sequences=n_sent)
+    if ascending is None:
+        return None
+    ttc_s = ascending if places is None else ascending[places]
+    return Predictions(manifest=manifest, ttc_s=ttc_s, digest=file.digest)
+
+
+@lru_cache(maxsize=16)
+def _places(own_digest: str, truth_digest: str) -> tuple[int, Rows | None, Rows]:
+    """How many values a file for this manifest has, and where among them, in ascending anno_id, each is.
+
+    (n,) in the order of the ground truth; None where that is the order of the values. And the rows of the
+    ground truth that the file's manifest does not have.
+    """
+    manifest = truth_values.load(truth_digest).manifest
+    own = manifest if manifest.digest == own_digest else manifests.load(own_digest)
+    rows = rows_in(own, manifest)
+    place_of_row: NDArray[np.intp] = np.empty(own.n_sequences, dtype=np.intp)
+    place_of_row[own.rows_by_id] = np.arange(own.n_sequences)
+    places = place_of_row[rows]
+    is_same_order = own.n_sequences == len(places) and bool(np.array_equal(places, np.arange(len(places))))
+    return own.n_sequences, None if is_same_order else places, np.flatnonzero(rows < 0)
+
+
+def read(file: SentFile, edition: Edition, *, heartbeat: Callable[[], bool] = lambda: True) -> Predictions:
+    """The values from the bytes of the file, which are kept for the next time.
+
+    Raises `evaluator.Rejected` if the file is at fault or lacks sequences of the edition, `OSError` if the
+    store, the disk or the private directory does not answer, and what `child.read_predictions` raises.
+    """
+    manifest = truth_values.load(edition.ground_truth_id).manifest
+    is_own = manifest.digest == file.manifest_digest
+    own = manifest if is_own else manifests.load(file.manifest_digest)
+    with files.opened_predictions(file.digest) as source:
+        predictions = child.read_predictions(
+            source,
+            digest=file.digest,
+            manifest=own,
+            manifest_path=(
+                truth_values.manifest_path(edition.ground_truth_id)
+                if is_own
+                else manifests.path(file.manifest_digest)
+            ),
+            heartbeat=heartbeat,
+            heartbeat_s=settings.HEARTBEAT_S,
+        )
+    try:
+        files.save_aligned(predictions)
+    except OSError as fault:
+        # They only make re-scoring quicker; without them it reads the file again.
+        log.warning("values_not_kept", digest=file.digest, reason=f"{type(fault).__name__}: {fault}")
+    return predictions if is_own else realigned(predictions, manifest=manifest)
+
+
+def load(file: SentFile, edition: Edition) -> Predictions:
+    """The values as they were kept, or from the file itself. Raises as `read` does."""
+    return saved(file, edition) or read(file, edition)

@@ -1,0 +1,1 @@
+"""Charts: of a board, a method, a paper and a submission, each with its table."""

@@ -1,0 +1,1 @@
+"""Compare: two to five methods side by side."""

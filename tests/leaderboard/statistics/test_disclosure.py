@@ -1,0 +1,227 @@
+"""What is told of hidden values: coarse intervals, classes of p, and only of public methods of two teams."""
+
+import math
+from collections.abc import Callable
+
+import pytest
+from django.db import transaction
+from django.test import Client
+
+from evaluator import SCORE_NAMES, Difference
+from leaderboard import board_versions
+from leaderboard.models import Comparison, Edition, Score, Split, Submission, User, Visibility
+from leaderboard.statistics import comparisons, disclosure
+from tests import builders
+from tests.leaderboard.statistics.test_comparisons import ask, known, set_visibility
+
+pytestmark = pytest.mark.slow
+
+Rival = Callable[[float], Submission]
+
+
+@pytest.fixture
+def rival(edition: Edition, stranger: User) -> Rival:
+    """A scored public method of another team."""
+
+    def made(factor: float) -> Submission:
+        sent = builders.submit(stranger, builders.predictions(edition, factor=factor), method=f"R{factor}")
+        builders.score_all()
+        return sent
+
+    return made
+
+
+# --- how fine --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("decimals", [1, 2])
+@pytest.mark.parametrize("width", [0.05, 0.3, 1.0, 1.99, 2.0, 7.3, 10.0, 49.9, 320.0])
+@pytest.mark.parametrize("middle", [-3.217, 0.013, 14.83, 812.4])
+def test_ends_are_rounded_outwards_to_a_tenth_of_the_width(
+    decimals: int, width: float, middle: float
+) -> None:
+    low, high = middle - width / 2, middle + width / 2
+    step = disclosure.step_of(high - low, decimals=decimals)
+    ends = disclosure.coarse_ends(low, high, decimals=decimals)
+    assert step == pytest.approx(10.0**-decimals) or width / 25.1 <= step <= width / 9.9
+    assert low - step < ends[0] <= low + 1e-6
+    assert high - 1e-6 <= ends[1] < high + step
+    for end in ends:
+        assert end / step == pytest.approx(round(end / step), abs=1e-6)
+        assert end == round(end, decimals)
+        assert math.copysign(1, end) == 1 or end < 0
+
+
+def published(found: Difference, shown: Difference, *, is_hidden: bool = True) -> Difference:
+    edition = Edition(split=Split(is_hidden=is_hidden), ground_truth_id="sha256:0", decimals=1)
+    return disclosure.published_difference(found, shown, edition=edition)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "p", "ends"),
+    [
+        (0.03, 7.2, 0.049, (0.0, 7.5)),
+        (-7.2, -0.03, 0.049, (-7.5, 0.0)),
+        (-0.03, 7.2, 0.051, (-0.5, 7.5)),
+        (0.4, 0.6, 0.0001, (0.4, 0.6)),
+        (-0.13, -0.01, 0.0001, (-0.2, 0.0)),
+    ],
+)
+def test_ends_of_a_difference_are_rounded_outwards_and_p_alone_judges_it(
+    low: float, high: float, p: float, ends: tuple[float, float]
+) -> None:
+    found = Difference(round((low + high) / 2, 1), low, high, p)
+    told = published(found, found)
+    assert (told.low, told.high) == ends
+    assert told.low <= low
+    assert high <= told.high
+    assert told.p is None
+    assert told.is_significant == (p < 0.05)
+    assert published(found, found, is_hidden=False) == found
+
+
+def test_what_is_published_alike_is_not_told_apart() -> None:
+    told = published(Difference(0.03, 0.01, 0.05, 0.0001), Difference(0.0, 0.0, 0.1, 1.0))
+    assert (told.p, told.p_below) == (None, 1.0)
+    assert told.low is not None
+    assert told.high is not None
+    assert told.low <= 0 <= told.high
+
+
+def test_too_few_recordings_stay_too_few() -> None:
+    few = Difference(1.0, None, None, None, None, 5.3)
+    assert published(few, few) == few
+
+
+def test_nothing_finer_of_a_hidden_split_is_in_the_database(
+    entries: list[Submission], edition: Edition, rival: Rival
+) -> None:
+    ask(entries[0], rival(1.07))
+    builders.infer_all()
+    for low, high in Score.objects.filter(low__isnull=False).values_list("low", "high"):
+        step = disclosure.step_of(0.8 * (high - low), decimals=1)
+        assert (low / step, high / step) == pytest.approx((round(low / step), round(high / step)), abs=1e-6)
+    (row,) = Comparison.objects.all()
+    for found in row.differences.values():
+        assert found["p"] is None
+
+
+def test_p_is_told_as_a_class_in_every_form(entries: list[Submission], rival: Rival, client: Client) -> None:
+    other = rival(1.3)
+    ask(entries[0], other)
+    builders.infer_all()
+    (pair,) = ask(entries[0], other).pairs
+    found = known(pair)["mid"]
+    assert (found.p, found.p_below, found.is_significant) == (None, 0.001, True)
+    query = {"split": "test", "m": [str(entries[0].method_id), str(other.method_id)]}
+    answer = client.get("/api/v1/compare", query).json()["pairs"][0]
+    assert answer["withheld"] == ""
+    assert {name: each["p"] for name, each in answer["differences"].items()} == dict.fromkeys(SCORE_NAMES)
+    assert answer["differences"]["mid"]["p_below"] == 0.001
+    assert "p < 0.001)" in answer["sentence"]
+    page = client.get("/compare/", query).text
+    assert "&lt; 0.001</td>" in page
+    assert (
+        "so the ends of the intervals are rounded outwards: 0 may be an end although p is below 0.05." in page
+    )
+
+
+# --- of which pairs --------------------------------------------------------------------------------------
+
+
+def plain(pair: comparisons.Pair) -> None:
+    """Of this pair nothing but the difference of what the board says is told."""
+    for name, found in known(pair).items():
+        one, other = pair.first.scores[name], pair.second.scores[name]
+        assert one is not None
+        assert other is not None
+        assert found == Difference(round(one - other, 1) + 0.0, None, None, None)
+    assert Comparison.objects.count() == 0
+
+
+def test_two_methods_of_one_team_are_not_compared_on_a_hidden_split(
+    entries: list[Submission], owner: User, stranger: User
+) -> None:
+    for viewer in (owner, stranger):
+        answer = ask(*entries[:2], viewer=viewer)
+        assert answer.is_complete
+        plain(answer.pairs[0])
+        assert answer.pairs[0].withheld == (
+            "No confidence interval and no p-value: both methods are of one team, and the ground truth of "
+            "test is hidden. There, only public methods of different teams are compared; compare these two "
+            "on a split with open ground truth, or their files offline with tsttc compare."
+        )
+
+
+@pytest.mark.parametrize("seen", [Visibility.PRIVATE, Visibility.ANONYMOUS])
+def test_what_is_not_public_is_not_compared_on_a_hidden_split_by_its_own_team_either(
+    entries: list[Submission], owner: User, rival: Rival, seen: Visibility
+) -> None:
+    other = rival(1.07)
+    set_visibility(entries[0], seen)
+    (pair,) = ask(entries[0], other, viewer=owner).pairs
+    plain(pair)
+    assert "M1.05 is not public" in pair.withheld
+
+
+@pytest.mark.parametrize("is_hidden", [True, False])
+def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
+    entries: list[Submission], owner: User, stranger: User, rival: Rival, is_hidden: bool
+) -> None:
+    Split.objects.filter(pk="test").update(is_hidden=is_hidden)
+    other = rival(1.07)
+    set_visibility(other, Visibility.ANONYMOUS)
+    (pair,) = ask(entries[0], other, viewer=owner).pairs
+    plain(pair)
+    assert pair.second.method in pair.withheld
+    assert pair.second.method.startswith("Anonymous")
+    assert "They appear once the method is public." in pair.sentence()
+    # Its own team may, where the values are open.
+    (pair,) = ask(entries[0], other, viewer=stranger).pairs
+    assert bool(pair.withheld) == is_hidden
+
+    set_visibility(other, Visibility.PUBLIC)
+    with transaction.atomic():
+        board_versions.changed("test")
+    (pair,) = ask(entries[0], other, viewer=owner).pairs
+    assert pair.withheld == ""
+
+
+# --- whatever the database says --------------------------------------------------------------------------
+
+
+def test_calling_a_hidden_split_open_in_the_database_tells_no_more_of_it(
+    entries: list[Submission], edition: Edition, owner: User, rival: Rival, client: Client
+) -> None:
+    """The attack of somebody who has the web process: `is_hidden = false`, and everything made anew."""
+    other = rival(1.07)
+    ask(entries[0], other)
+    builders.infer_all()
+    scores = Score.objects.order_by("pk").values_list("low", "high")
+    before, (told,) = list(scores), Comparison.objects.values_list("differences", flat=True)
+
+    Comparison.objects.all().delete()
+    Score.objects.update(low=None, high=None)
+    Edition.objects.update(inference_digest="")
+    Split.objects.filter(pk="test").update(is_hidden=False)
+    set_visibility(entries[1], Visibility.PRIVATE)
+    own = (entries[0], entries[2]), (entries[0], entries[1])
+    for sent in ((entries[0], other), *own):
+        ask(*sent, viewer=owner)
+    builders.infer_all()
+
+    assert list(scores.all()) == before
+    assert told in Comparison.objects.values_list("differences", flat=True)
+    for sent in own:
+        (pair,) = ask(*sent, viewer=owner).pairs
+        for found in known(pair).values():
+            assert (found.low, found.high, found.p, found.p_below) == (None, None, None, None)
+        assert pair.withheld == (
+            "No confidence interval and no p-value: the ground truth of test was imported as hidden. There, "
+            "only public methods of different teams are compared; compare these two on a split with open "
+            "ground truth, or their files offline with tsttc compare."
+        )
+        query = {"split": "test", "m": [str(each.method_id) for each in sent]}
+        client.force_login(owner)
+        assert client.get("/api/v1/compare", query).json()["pairs"][0]["withheld"] == pair.withheld
+        assert pair.withheld in client.get("/compare/", query).text

@@ -1,0 +1,103 @@
+"""`tsttc baseline run` and `list`: from a folder to a file that the other commands take."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.evaluator.worlds import Tsttc
+from tests.tsttc_baselines.made_folders import made_folder, write_boxes
+from tsttc_baselines.methods import METHODS, Method
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "in").mkdir()
+    return made_folder(tmp_path / "in")
+
+
+def test_the_list_names_every_method_with_its_parameters(tsttc: Tsttc) -> None:
+    text = tsttc("baseline", "list").stdout
+    assert "detection  Detection; as published with --measure area." in text
+    documents = json.loads(tsttc("baseline", "list", "--json").stdout)
+    assert [found["name"] for found in documents] == [method.name for method in METHODS]
+    assert documents[0]["parameters"][0]["choices"] == ["area", "sqrt-area", "height", "width"]
+    for method in METHODS:
+        assert f"{method.name}  {method.title}; " in text
+        for parameter in method.parameters:
+            assert f"  {parameter.option} " in text
+
+
+def test_the_file_of_a_run_is_taken_by_check(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    out = tmp_path / "p.json"
+    result = tsttc("baseline", "run", "detection", folder, "--out", out, "--measure", "height")
+    assert result.exit_code == 0, result.stderr
+    assert result.stdout.startswith(f"{out}: 3 sequences in ")
+    assert result.stderr == ""
+    assert tsttc("check", out, "--manifest", folder / "manifest.csv").exit_code == 0
+    assert json.loads(out.read_text())["meta"]["parameters"] == {"measure": "height"}
+
+
+def test_fallbacks_are_counted_by_reason_with_an_example(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    write_boxes(folder, changes={(1, 5): (), (2, 5): (50, 10, 20, 60)})
+    result = tsttc("baseline", "run", "detection", folder, "--out", tmp_path / "p.json")
+    assert result.exit_code == 0
+    assert result.stderr.splitlines() == [
+        "2 of them have a fallback, from the boxes' areas or 1:",
+        "  1  no box in the target frame "
+        "(boxes.csv, sequence 1: There is no box for the target; expected one.)",
+        "  1  box is reversed "
+        "(boxes.csv, sequence 2: The box of the target is (50, 10, 20, 60); expected x1 < x2 and y1 < y2.)",
+    ]
+    document = json.loads(
+        tsttc("baseline", "run", "detection", folder, "--out", tmp_path / "p.json", "--json").stdout
+    )
+    assert document["n_fallback"] == {"no box in the target frame": 1, "box is reversed": 1}
+    assert document["n_sequences"] == 3
+
+
+def test_strict_exits_1_and_writes_nothing(tsttc: Tsttc, folder: Path, tmp_path: Path) -> None:
+    write_boxes(folder, changes={(1, 5): ()})
+    out = tmp_path / "p.json"
+    result = tsttc("baseline", "run", "detection", folder, "--out", out, "--strict", "--json")
+    assert result.exit_code == 1
+    assert f"{folder} is rejected: 1 problem" in result.stderr
+    assert json.loads(result.stdout)["problems"] == [
+        {
+            "code": "bad-box",
+            "where": "boxes.csv, sequence 1",
+            "message": "There is no box for the target; expected one.",
+        }
+    ]
+    assert not out.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["detection", "--bins", "20"], "detection has no option --bins; its options are --measure."),
+        (["detection", "--gap", "6"], "Invalid value for '--gap'"),
+        (["nothing"], "Invalid value for 'METHOD'"),
+        (["detection", "--out", "no/folder/p.json"], "no/folder is not a folder that can be written to."),
+        (["pixel-mse", "--expand", "nan"], "--expand is nan; expected a finite number."),
+    ],
+)
+def test_wrong_usage_exits_2_in_words(
+    tsttc: Tsttc, folder: Path, tmp_path: Path, words: list[str], message: str
+) -> None:
+    method, *options = words
+    result = tsttc("baseline", "run", method, folder, "--out", tmp_path / "p.json", *options)
+    assert result.exit_code == 2
+    assert message in " ".join(result.stderr.split())
+    assert {path.name for path in tmp_path.iterdir()} == {"in"}
+
+
+@pytest.mark.parametrize("method", METHODS, ids=lambda method: method.name)
+def test_every_method_needs_no_option_and_is_as_published_or_says_that_it_is_not(method: Method) -> None:
+    parameters = method.filled({})
+    assert method.estimator(parameters) is not None
+    assert set(method.published or {}) <= set(parameters)
+    assert method.provenance(parameters) in {"as published", "variant", "unpublished"}
+    for parameter in method.parameters:
+        if parameter.choices:
+            assert parameter.default in parameter.choices
