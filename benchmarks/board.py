@@ -71,7 +71,7 @@ def change() -> None:
     with transaction.atomic():
         first = Score.objects.order_by("pk").values("pk")[:1]
         Score.objects.filter(pk__in=first).update(value=F("value") + 0.01)
-        board_versions.changed("test")
+        board_versions.bump("test")
 
 
 def first_reader_s(http: httpx.Client) -> float:

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from evaluator.client.api import Client
-    from evaluator.metrics.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Protocol, get_protocol
+    from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES, TTC_RANGES, Protocol, get_protocol
     from evaluator.metrics.scale import convert_rate, fps_of_gap, scale_ratio_to_ttc, ttc_to_scale_ratio
     from evaluator.predictions.conversion import convert
     from evaluator.predictions.loading import Predictions, read_predictions
     from evaluator.predictions.writing import write_predictions
     from evaluator.problems import PROBLEM_CODES, Problem, Rejected
     from evaluator.scoring.differences import compare_predictions
-    from evaluator.scoring.report import IntervalScore, Report, format_published, published
+    from evaluator.scoring.report import RangeScore, Report, format_rounded, rounded
     from evaluator.scoring.scores import evaluate
     from evaluator.scoring.significance import Difference
     from evaluator.scoring.uncertainty import confidence_intervals
@@ -37,8 +37,8 @@ else:
         "scoring.differences": ("compare_predictions",),
         "predictions.loading": ("Predictions", "read_predictions"),
         "problems": ("PROBLEM_CODES", "Problem", "Rejected"),
-        "metrics.protocol": ("INTERVALS", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
-        "scoring.report": ("IntervalScore", "Report", "format_published", "published"),
+        "metrics.protocol": ("TTC_RANGES", "PROTOCOLS", "SCORE_NAMES", "Protocol", "get_protocol"),
+        "scoring.report": ("RangeScore", "Report", "format_rounded", "rounded"),
         "scoring.scores": ("evaluate",),
         "scoring.significance": ("Difference",),
         "truth.ground_truth": ("GroundTruth", "Manifest", "read_manifest", "read_truth"),
@@ -56,18 +56,18 @@ else:
 
 
 __all__ = [
-    "INTERVALS",
     "PROBLEM_CODES",
     "PROTOCOLS",
     "SCORE_NAMES",
+    "TTC_RANGES",
     "Client",
     "Difference",
     "GroundTruth",
-    "IntervalScore",
     "Manifest",
     "Predictions",
     "Problem",
     "Protocol",
+    "RangeScore",
     "Rejected",
     "Report",
     "Table",
@@ -76,14 +76,14 @@ __all__ = [
     "convert",
     "convert_rate",
     "evaluate",
-    "format_published",
+    "format_rounded",
     "fps_of_gap",
     "get_protocol",
-    "published",
     "read_manifest",
     "read_numbering",
     "read_predictions",
     "read_truth",
+    "rounded",
     "scale_ratio_to_ttc",
     "ttc_to_scale_ratio",
     "write_predictions",

@@ -193,7 +193,7 @@ def _said(document: Document, named: str) -> Verified:
     rules = PROTOCOLS.get(document["protocol"])
     names = rules.score_names if rules else sorted(document["scores"])
     texts = {name: document["scores"][name] for name in names}
-    ranges = rules.interval_names if rules else sorted(document["counts"])
+    ranges = rules.range_names if rules else sorted(document["counts"])
     return Verified(
         site=document["site"],
         key_id=named,

@@ -33,7 +33,7 @@ def record(
     details: Mapping[str, Any] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> AuditEvent:
-    """Write one deed. Call it inside the transaction of the deed itself: both happen, or neither.
+    """Write one action. Call it inside the transaction of the action itself: both happen, or neither.
 
     `names`, what people call themselves and their work, stand in a table where they can be blanked. `details`
     hold neither those nor addresses, secrets, or values of a hidden ground truth. Raises `TypeError` for
@@ -65,11 +65,11 @@ def blank(rows: QuerySet[AuditText]) -> int:
     return rows.exclude(text="").update(text="")
 
 
-def record_many(deeds: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
-    """Write many deeds of the machine itself at once: verb, noun, noun_id, details."""
+def record_many(actions: Iterable[tuple[str, str, object, Mapping[str, Any]]]) -> None:
+    """Write many actions of the machine itself at once: verb, noun, noun_id, details."""
     AuditEvent.objects.bulk_create(
         AuditEvent(verb=verb, noun=noun, noun_id=_storable(str(noun_id)), details=_plain(details))
-        for verb, noun, noun_id, details in deeds
+        for verb, noun, noun_id, details in actions
     )
 
 

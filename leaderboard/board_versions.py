@@ -26,12 +26,12 @@ _LOCK = 0x626F617264
 _CHECK_AND_LOCK = f"SET CONSTRAINTS ALL IMMEDIATE; SELECT pg_advisory_xact_lock({_LOCK})"
 
 
-def changed(*split_ids: str) -> None:
+def bump(*split_ids: str) -> None:
     """What everybody sees of these splits' boards has changed. To be called in the transaction of the change.
 
-    Call it last of all that a verb writes: see `hold`.
+    Call it last of all that a verb writes: see `lock`.
     """
-    hold()
+    lock()
     for split_id in split_ids:
         if not BoardVersion.objects.filter(split=split_id).update(number=F("number") + 1):
             BoardVersion.objects.create(split_id=split_id, number=1)
@@ -39,7 +39,7 @@ def changed(*split_ids: str) -> None:
     transaction.on_commit(broker.work_off, robust=True)
 
 
-def hold() -> None:
+def lock() -> None:
     """Let nobody else change a board until the transaction ends; to be called where it ends soon.
 
     Foreign keys of the rows written until now are checked before, since at COMMIT they would wait for rows
@@ -53,23 +53,23 @@ def hold() -> None:
             cursor.execute(_CHECK_AND_LOCK)
 
 
-def number(split_id: str) -> int:
+def number_of(split_id: str) -> int:
     """How often a split's boards have changed."""
     found = BoardVersion.objects.filter(split=split_id).values_list("number", flat=True).first()
     return found or 0
 
 
-def state() -> int:
+def sum_of_all() -> int:
     """The sum of all versions: the key of everything cached that any board appears in."""
     return BoardVersion.objects.aggregate(n=Sum("number"))["n"] or 0
 
 
-def changed_everywhere() -> None:
+def bump_all() -> None:
     """The same for every split: a team's name, say, may stand on each of them."""
-    changed(*Split.objects.order_by("name").values_list("name", flat=True))
+    bump(*Split.objects.order_by("name").values_list("name", flat=True))
 
 
-def times_passed(*, now: datetime) -> int:
+def bump_passed_deadlines(*, now: datetime) -> int:
     """Count for each split that it has opened or closed since, or that an announcement has ended.
 
     Its pages say so. Returns how many had.
@@ -82,13 +82,13 @@ def times_passed(*, now: datetime) -> int:
         known = BoardVersion.objects.filter(split=split).values_list("n_times_passed", flat=True).first()
         if n_passed != (known or 0):
             with transaction.atomic():
-                changed(split.pk)
+                bump(split.pk)
                 BoardVersion.objects.filter(split=split).update(n_times_passed=n_passed)
             n_told += 1
     return n_told
 
 
-def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
+def bump_for_methods(method_ids: Iterable[uuid.UUID]) -> None:
     """The same for the splits that these methods have submissions to."""
     methods = list(method_ids)
     submissions = Submission.objects.filter(method__in=methods)
@@ -97,17 +97,17 @@ def changed_by_methods(method_ids: Iterable[uuid.UUID]) -> None:
         # On no board, and yet with a page of its own: any of the numbers will do.
         split_ids = list(Split.objects.order_by("name").values_list("name", flat=True)[:1])
     if split_ids:
-        changed(*split_ids)
+        bump(*split_ids)
 
 
-def changed_by_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
+def bump_for_evaluations(evaluation_ids: Iterable[uuid.UUID]) -> None:
     """The same for the splits on whose boards these evaluations stand, just decided, for everybody to see.
 
     Of private methods and editions in preparation the workers alone hear.
     """
     # Before looking who is private: whoever shows a method holds this until it is shown.
-    hold()
+    lock()
     shown = Evaluation.objects.filter(pk__in=list(evaluation_ids), edition__published_at__isnull=False)
     public = shown.exclude(submission__method__visibility=Visibility.PRIVATE)
     split_ids = public.order_by().values_list("edition__split", flat=True).distinct()
-    changed(*sorted(split_ids))
+    bump(*sorted(split_ids))

@@ -46,7 +46,7 @@ def fill(edition: Edition, *, n: int, user: User, seed: int = 0) -> list[Method]
     )
     score(edition, methods=methods, user=user, seed=seed)
     with transaction.atomic():
-        board_versions.changed(edition.split_id)
+        board_versions.bump(edition.split_id)
     return methods
 
 
@@ -82,13 +82,13 @@ def score(edition: Edition, *, methods: Sequence[Method], user: User, seed: int 
         Score(
             evaluation=evaluation,
             metric=metric,
-            interval=interval,
+            ttc_range=ttc_range,
             value=value,
             low=round(value * 0.95, edition.decimals),
             high=round(value * 1.05, edition.decimals),
         )
         for i, evaluation in enumerate(evaluations)
-        for metric, interval in map(split_name, edition.rules.score_names)
+        for metric, ttc_range in map(split_name, edition.rules.score_names)
         for value in [round(rng.uniform(8, 80), edition.decimals)]
     )
     n_columns = len(edition.rules.score_names)

@@ -113,7 +113,7 @@ def token(user: User, **options: Any) -> str:
 def board_changed(split: str) -> None:
     """Say that a board is not what it was: for tests that write behind the verbs' backs."""
     with transaction.atomic():
-        board_versions.changed(split)
+        board_versions.bump(split)
 
 
 def open_values(edition: Edition) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from evaluator import GroundTruth, evaluate, published, read_manifest, read_predictions
+from evaluator import GroundTruth, evaluate, read_manifest, read_predictions, rounded
 from evaluator.metrics.protocol import SCORE_NAMES
 from leaderboard.boards import query
 from leaderboard.editions import corrections, splits
@@ -109,7 +109,7 @@ def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) ->
     said = dict(zip(own.natural_keys, sent.ttc_s.tolist(), strict=True))
     file = json.dumps({key: said[key] for key in truth.manifest.natural_keys}).encode()
     values = evaluate(read_predictions(file, manifest=truth.manifest), truth).flat()
-    return {name: published(value, decimals=decimals) for name, value in values.items()}
+    return {name: rounded(value, decimals=decimals) for name, value in values.items()}
 
 
 def changed_on() -> str:

@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 from django.db import connection
 
-Deed = Callable[[], object]
-# Whether a statement is where to hold: by its number within the deed's transactions, and by its text.
+Action = Callable[[], object]
+# Whether a statement is where to hold: by its number within the action's transactions, and by its text.
 Place = Callable[[int, str], bool]
 PATIENCE_S = 180.0
 LOOK_EVERY_S = 0.001
@@ -44,14 +44,14 @@ class Hold:
 
 
 class Outcome(NamedTuple):
-    """What came of two deeds: the fault of each or None, and how they met."""
+    """What came of two actions: the fault of each or None, and how they met."""
 
     faults: tuple[BaseException | None, ...]
     was_held: bool  # the first
     has_waited: bool  # the second
 
 
-def meet(first: Deed, second: Deed, *, at: Place) -> Outcome:
+def meet(first: Action, second: Action, *, at: Place) -> Outcome:
     """Hold `first` where `at` says, let `second` run until it ends or waits, and let both end."""
     hold, pids = Hold(at), SimpleQueue[int]()
 
@@ -73,15 +73,15 @@ def meet(first: Deed, second: Deed, *, at: Place) -> Outcome:
             connection.close()
 
     with ThreadPoolExecutor(2) as threads:
-        deeds = [threads.submit(held)]
+        actions = [threads.submit(held)]
         assert hold.reached.wait(PATIENCE_S)
-        deeds.append(threads.submit(meeting))
+        actions.append(threads.submit(meeting))
         pid = pids.get(timeout=PATIENCE_S)
-        while not deeds[1].done() and not _is_waiting(pid):
-            wait(deeds[1:], timeout=LOOK_EVERY_S)
-        has_waited = not deeds[1].done()
+        while not actions[1].done() and not _is_waiting(pid):
+            wait(actions[1:], timeout=LOOK_EVERY_S)
+        has_waited = not actions[1].done()
         hold.may_go_on.set()
-        return Outcome(tuple(deed.exception(PATIENCE_S) for deed in deeds), hold.is_held, has_waited)
+        return Outcome(tuple(action.exception(PATIENCE_S) for action in actions), hold.is_held, has_waited)
 
 
 def _is_waiting(pid: int) -> bool:

@@ -113,7 +113,7 @@ def _server_s_words(
 
 
 def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | None, as_json: bool) -> None:
-    from evaluator import compare_predictions, evaluate, published, read_predictions, read_truth  # noqa: PLC0415 -- numpy
+    from evaluator import compare_predictions, evaluate, read_predictions, read_truth, rounded  # noqa: PLC0415 -- numpy
 
     with naming(truth_path):
         truth = read_truth(truth_path)
@@ -130,7 +130,7 @@ def _compare_files(first: Path, second: Path, truth_path: Path, *, unit: str | N
             name: {
                 **asdict(gap),
                 "is_significant": gap.is_significant,
-                "detectable_difference": published(gap.detectable_difference),
+                "detectable_difference": rounded(gap.detectable_difference),
             }
             for name, gap in found.items()
         }
@@ -167,18 +167,16 @@ def table(
     decimals: int = 2,
 ) -> list[str]:
     """Both results, and below them the difference of each column with its interval and p."""
-    from evaluator.scoring.report import format_published, published  # noqa: PLC0415 -- loads numpy
+    from evaluator.scoring.report import format_rounded, rounded  # noqa: PLC0415 -- loads numpy
 
     columns = list(scores[0])
     rows = [[Cell(""), *(Cell(short_name(name), is_bold=True) for name in columns)]]
     for name, values in zip(names, scores, strict=True):
-        texts = [
-            format_published(values.get(score), decimals=decimals, missing=NO_VALUE) for score in columns
-        ]
+        texts = [format_rounded(values.get(score), decimals=decimals, missing=NO_VALUE) for score in columns]
         rows.append([Cell(printable(name)), *map(Cell, texts)])
 
     def column(kind: str) -> list[Cell]:
-        values = [published(getattr(found.get(name), kind, None), decimals=decimals) for name in columns]
+        values = [rounded(getattr(found.get(name), kind, None), decimals=decimals) for name in columns]
         return [Cell(NO_VALUE if value is None else f"{value:+.{decimals}f}") for value in values]
 
     gaps = [found.get(name) for name in columns]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import click
 
 from evaluator.counting import counted
-from evaluator.metrics.protocol import OVERALL, grouped_names, interval_of, metric_of, split_name
+from evaluator.metrics.protocol import OVERALL, grouped_names, metric_of, range_of, split_name
 
 NO_VALUE = "–"
 GAP = "  "
@@ -30,8 +30,8 @@ def short_name(score: str) -> str:
     >>> short_name("mid"), short_name("rte_crucial")
     ('MiD', 'RTE_c')
     """
-    symbol, interval = metric_of(score).symbol, split_name(score)[1]
-    return symbol if interval == OVERALL else f"{symbol}_{interval[0]}"
+    symbol, ttc_range = metric_of(score).symbol, split_name(score)[1]
+    return symbol if ttc_range == OVERALL else f"{symbol}_{ttc_range[0]}"
 
 
 def units(scores: Iterable[str]) -> str:
@@ -41,8 +41,8 @@ def units(scores: Iterable[str]) -> str:
     'MiD ×10⁻⁴, RTE %, lower is better; TTC ranges in s: c 0–3, n −20–0'
     """
     groups = grouped_names(scores)
-    found = dict.fromkeys(interval_of(name) for names in groups.values() for name in names)
-    ranges = ", ".join(f"{interval.letter} {interval.ends}" for interval in found if interval)
+    found = dict.fromkeys(range_of(name) for names in groups.values() for name in names)
+    ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for interval in found if interval)
     said = f"{', '.join(metric.heading for metric in groups)}, lower is better"
     return f"{said}; TTC ranges in s: {ranges}" if ranges else said
 
@@ -130,23 +130,20 @@ def score_table(
     intervals: Mapping[str, tuple[float, float] | None] | None = None,
 ) -> list[str]:
     """One result, below each value the ends of its interval and the number of sequences behind it."""
-    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     behind = [counts.get(split_name(name)[1]) for name in scores]
     rows = [
         [Cell(""), *(Cell(short_name(name), is_bold=True) for name in scores)],
         [
             Cell("error"),
-            *(
-                Cell(format_published(value, decimals=decimals, missing=NO_VALUE))
-                for value in scores.values()
-            ),
+            *(Cell(format_rounded(value, decimals=decimals, missing=NO_VALUE)) for value in scores.values()),
         ],
         *(
             [
                 Cell(words),
                 *(
-                    Cell(format_published(ends[end] if ends else None, decimals=decimals, missing=NO_VALUE))
+                    Cell(format_rounded(ends[end] if ends else None, decimals=decimals, missing=NO_VALUE))
                     for ends in map(intervals.get, scores)
                 ),
             ]

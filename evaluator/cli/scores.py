@@ -343,12 +343,12 @@ def _in_words(report: Report, row: ResultRow) -> Iterator[str]:
 
 def _table(rows: Sequence[ResultRow], *, by: str | None) -> list[str]:
     """A row for each file or group; the ends of its intervals are rows below it."""
-    from evaluator import format_published  # noqa: PLC0415 -- numpy, as above
+    from evaluator import format_rounded  # noqa: PLC0415 -- numpy, as above
 
     names, scores = names_of(rows, by=by), list(rows[0].scores)
 
     def line(texts: Sequence[str], values: Sequence[float | None], last: str) -> list[Cell]:
-        cells = [format_published(value, missing=NO_VALUE) for value in values]
+        cells = [format_rounded(value, missing=NO_VALUE) for value in values]
         return [Cell(printable(text)) for text in (*texts, *cells, last)]
 
     heads = [*(title for title, _ in names), *map(short_name, scores), "sequences"]

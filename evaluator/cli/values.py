@@ -10,7 +10,7 @@ from evaluator.metrics.protocol import OVERALL, PRIMARY, metric_of, split_name
 from evaluator.tables import layouts
 
 if TYPE_CHECKING:
-    from evaluator.client.answers import BoardEntry, Interval, Submission
+    from evaluator.client.answers import BoardEntry, ConfidenceInterval, Submission
 
 
 def authors_or_team(entry: BoardEntry) -> str:
@@ -30,10 +30,10 @@ def overall_of(names: Iterable[str]) -> list[str]:
 
 def texts_of(entry: BoardEntry, *, missing: str, scores: Sequence[str]) -> list[str]:
     """A submission's scores as its edition publishes them, a published row's as they were printed."""
-    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     decimals = entry.decimals
-    return [format_published(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
+    return [format_rounded(entry.scores.get(name), decimals=decimals, missing=missing) for name in scores]
 
 
 def state_in_words(submission: Submission) -> str:
@@ -72,10 +72,12 @@ def in_short(submission: Submission) -> Iterator[str]:
         yield "The confidence intervals are being computed."
 
 
-def _interval_text(label: str, value: float | None, found: Interval | None, *, decimals: int) -> str:
-    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- as above
+def _interval_text(
+    label: str, value: float | None, found: ConfidenceInterval | None, *, decimals: int
+) -> str:
+    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- as above
 
     if value is None or found is None or found.low is None or found.high is None:
         return ""
-    text, low, high = (format_published(each, decimals=decimals) for each in (value, found.low, found.high))
+    text, low, high = (format_rounded(each, decimals=decimals) for each in (value, found.low, found.high))
     return f"{label} {text} ({low}–{high})"

@@ -42,7 +42,7 @@ class Submission(msgspec.Struct, frozen=True, kw_only=True):
     withdrawn_at: str | None = None
     scores: dict[str, float | None] | None = None
     decimals: int = 2
-    intervals: dict[str, Interval] = {}
+    intervals: dict[str, ConfidenceInterval] = {}
     awaits_intervals: bool = False
     rank: int | None = None
     counts: dict[str, int] | None = None
@@ -84,7 +84,7 @@ class Account(msgspec.Struct, frozen=True, kw_only=True):
     expires_at: str | None = None
 
 
-class Interval(msgspec.Struct, frozen=True, kw_only=True):
+class ConfidenceInterval(msgspec.Struct, frozen=True, kw_only=True):
     """Where a value may lie at 95 %, and its row in that column; None where that is not known."""
 
     low: float | None = None
@@ -112,11 +112,11 @@ class BoardEntry(msgspec.Struct, frozen=True, kw_only=True):
     kind: str = "submission"
     visibility: str = "PUBLIC"
     pseudonym: str | None = None
-    intervals: dict[str, Interval] = {}
+    intervals: dict[str, ConfidenceInterval] = {}
 
-    def interval(self, score: str) -> Interval:
+    def interval(self, score: str) -> ConfidenceInterval:
         """That of one score; without ends where it was not asked for, or is not known."""
-        return self.intervals.get(score, Interval())
+        return self.intervals.get(score, ConfidenceInterval())
 
 
 class Board(msgspec.Struct, frozen=True, kw_only=True):

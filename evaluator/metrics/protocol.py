@@ -24,7 +24,7 @@ _NAME: Final = re.compile(r"[a-z][a-z0-9]*")
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class TTCRange:
     """A TTC range: true times to contact in seconds, closed at both ends as in the dataset's toolkit."""
 
     name: str
@@ -40,7 +40,7 @@ class Interval:
     def ends(self) -> str:
         """Its ends, without their unit.
 
-        >>> [interval.ends for interval in INTERVALS]
+        >>> [ttc_range.ends for ttc_range in INTERVALS]
         ['0–3', '3–6', '6–20', '−20–0']
         """
         return f"{self.low_s:g}–{self.high_s:g}".replace("-", "−")
@@ -51,22 +51,22 @@ class Interval:
         return f"{self.ends} s"
 
 
-INTERVALS: Final = (
-    Interval("crucial", 0.0, 3.0),
-    Interval("small", 3.0, 6.0),
-    Interval("large", 6.0, 20.0),
-    Interval("negative", -20.0, 0.0),
+TTC_RANGES: Final = (
+    TTCRange("crucial", 0.0, 3.0),
+    TTCRange("small", 3.0, 6.0),
+    TTCRange("large", 6.0, 20.0),
+    TTCRange("negative", -20.0, 0.0),
 )
 """The paper's TTC ranges, in its order."""
 
 
-def score_name(metric: str, interval: str) -> str:
+def score_name(metric: str, ttc_range: str) -> str:
     """The name of a score: a metric's alone is that of the overall one.
 
     >>> score_name("mid", "overall"), score_name("mid", "crucial")
     ('mid', 'mid_crucial')
     """
-    return metric if interval == OVERALL else f"{metric}_{interval}"
+    return metric if ttc_range == OVERALL else f"{metric}_{ttc_range}"
 
 
 def split_name(name: str) -> tuple[str, str]:
@@ -75,8 +75,8 @@ def split_name(name: str) -> tuple[str, str]:
     >>> split_name("mid"), split_name("mid_crucial")
     (('mid', 'overall'), ('mid', 'crucial'))
     """
-    metric, _, interval = name.partition("_")
-    return metric, interval or OVERALL
+    metric, _, ttc_range = name.partition("_")
+    return metric, ttc_range or OVERALL
 
 
 @dataclass(frozen=True)
@@ -87,19 +87,19 @@ class Protocol:
     predictions in (low, 0) become `low` and those in (0, high) become `high`; with None they stay, and those
     for which MiD is undefined are rejected. NaN and 0 are always rejected.
 
-    There is a score for each of `metrics`, overall and in each of `intervals`. A name of either means the
+    There is a score for each of `metrics`, overall and in each of `ranges`. A name of either means the
     same in every protocol. The first metric is MiD, which boards rank by.
     """
 
     name: str
     limit_s: float
     near_zero_s: tuple[float, float] | None
-    intervals: tuple[Interval, ...] = INTERVALS
+    ranges: tuple[TTCRange, ...] = TTC_RANGES
     metrics: tuple[Metric, ...] = (MID, RTE)
 
     def __post_init__(self) -> None:
         """Raise `ValueError` for names that scores cannot have, and where MiD is not the first metric."""
-        names = [*self.overall_names, *(interval.name for interval in self.intervals)]
+        names = [*self.overall_names, *(ttc_range.name for ttc_range in self.ranges)]
         if not all(map(_NAME.fullmatch, names)) or len({*names, OVERALL}) <= len(names):
             raise ValueError(f"Names of metrics and TTC ranges are words, each once; found {names}.")
         if names[0] != PRIMARY:
@@ -112,14 +112,14 @@ class Protocol:
         return {f"{value:g}": value for value in values}
 
     @cached_property
-    def interval_names(self) -> tuple[str, ...]:
+    def range_names(self) -> tuple[str, ...]:
         """`overall`, then the TTC ranges in the protocol's order."""
-        return (OVERALL, *(interval.name for interval in self.intervals))
+        return (OVERALL, *(ttc_range.name for ttc_range in self.ranges))
 
     @cached_property
     def score_names(self) -> tuple[str, ...]:
         """The numbers of a result in the order of their columns: `mid`, `mid_crucial`, …, `rte_negative`."""
-        return tuple(score_name(m.name, interval) for m in self.metrics for interval in self.interval_names)
+        return tuple(score_name(m.name, ttc_range) for m in self.metrics for ttc_range in self.range_names)
 
     def names_of(self, metric: str) -> tuple[str, ...]:
         """The scores of one metric; all of them where there is no metric of this name."""
@@ -177,18 +177,18 @@ def column_words(name: str) -> str:
     >>> column_words("mid"), column_words("rte_crucial")
     ('MiD', 'RTE on crucial')
     """
-    symbol, interval = metric_of(name).symbol, split_name(name)[1]
-    return symbol if interval == OVERALL else f"{symbol} on {interval}"
+    symbol, ttc_range = metric_of(name).symbol, split_name(name)[1]
+    return symbol if ttc_range == OVERALL else f"{symbol} on {ttc_range}"
 
 
-def interval_of(name: str) -> Interval | None:
+def range_of(name: str) -> TTCRange | None:
     """The TTC range of a score; None for an overall one, and for one that only a newer server knows."""
-    return known_intervals().get(split_name(name)[1])
+    return known_ranges().get(split_name(name)[1])
 
 
-def known_intervals() -> dict[str, Interval]:
+def known_ranges() -> dict[str, TTCRange]:
     """The TTC ranges of all protocols by their names."""
-    return {interval.name: interval for protocol in PROTOCOLS.values() for interval in protocol.intervals}
+    return {ttc_range.name: ttc_range for protocol in PROTOCOLS.values() for ttc_range in protocol.ranges}
 
 
 def known_metrics() -> dict[str, Metric]:
@@ -199,8 +199,8 @@ def known_metrics() -> dict[str, Metric]:
 def known_names() -> tuple[str, ...]:
     """The names of the scores of all protocols, in an order that is each one's own as well."""
     there = {name for protocol in PROTOCOLS.values() for name in protocol.score_names}
-    intervals = (OVERALL, *known_intervals())
-    named = (score_name(metric, interval) for metric in known_metrics() for interval in intervals)
+    ranges = (OVERALL, *known_ranges())
+    named = (score_name(metric, ttc_range) for metric in known_metrics() for ttc_range in ranges)
     return tuple(name for name in named if name in there)
 
 

@@ -92,8 +92,8 @@ def scores_of(
     """The scores of groups of sequences, given as the rows of each by its name."""
     manifest, ttc_s = details.truth.manifest, details.truth.ttc_s
     masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
-    for interval in details.protocol.intervals if has_ranges else ():
-        masks[interval.name] = (ttc_s >= interval.low_s) & (ttc_s <= interval.high_s)
+    for ttc_range in details.protocol.ranges if has_ranges else ():
+        masks[ttc_range.name] = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)
     names = [score_name(metric, name) for metric in errors for name in masks]
     found = []
     sums, counts = list[Floats](), list[Floats]()
@@ -170,9 +170,9 @@ def _by_name(names: Sequence[str]) -> dict[str, Rows]:
 def _by_range(details: Details) -> dict[str, Rows]:
     ttc_s, left = details.truth.ttc_s, np.ones(details.truth.n_sequences, dtype=bool)
     found = {}
-    for interval in details.protocol.intervals:
-        inside = (ttc_s >= interval.low_s) & (ttc_s <= interval.high_s)  # both ends, as in the scores
-        found[f"{interval.name} {interval.seconds}"] = np.flatnonzero(inside)
+    for ttc_range in details.protocol.ranges:
+        inside = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)  # both ends, as in the scores
+        found[f"{ttc_range.name} {ttc_range.seconds}"] = np.flatnonzero(inside)
         left &= ~inside
     return found | {"in no range": np.flatnonzero(left)}
 

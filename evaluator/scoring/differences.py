@@ -16,7 +16,7 @@ import numpy as np
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.loading import Predictions
-from evaluator.scoring.report import published
+from evaluator.scoring.report import rounded
 from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
 from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns
@@ -254,9 +254,9 @@ def rounded_difference(
 
 
 def _rounded(value: float, decimals: int) -> float:
-    rounded = published(value, decimals=decimals)
-    assert rounded is not None  # noqa: S101 - for the type checker: a number stays one
-    return rounded
+    shown = rounded(value, decimals=decimals)
+    assert shown is not None  # noqa: S101 - for the type checker: a number stays one
+    return shown
 
 
 def compare_predictions(

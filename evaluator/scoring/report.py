@@ -10,7 +10,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from evaluator.counting import counted
-from evaluator.metrics.protocol import OVERALL, interval_of, metric_of, score_name
+from evaluator.metrics.protocol import OVERALL, metric_of, range_of, score_name
 from evaluator.metrics.scale import Floats
 from evaluator.scoring.breakdown import Details, GroupScores, groups_of, scores_of
 
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class IntervalScore:
+class RangeScore:
     """Mean errors over one TTC range, by metric. One without sequences has no value: None, never 0."""
 
     means: Mapping[str, float | None]
@@ -59,7 +59,7 @@ class RecordingSums:
 class Report:
     """What the predictions scored: means per TTC range, counts, and what was truncated at which boundary.
 
-    `scores` runs as the protocol's `interval_names`: overall, crucial, …. Only on request, and no part of the
+    `scores` runs as the protocol's `range_names`: overall, crucial, …. Only on request, and no part of the
     JSON: `sequences`, by metric the errors of every sequence, float64 (n,) in the manifest's order, `details`
     and `bags`. Of a hidden split none of them leaves the worker. `by`, `frame` and `plot` need a report made
     with `keep_sequences=True`.
@@ -71,7 +71,7 @@ class Report:
     n_sequences: int
     n_out_of_range: int
     truncated: Mapping[str, int]
-    scores: Mapping[str, IntervalScore]
+    scores: Mapping[str, RangeScore]
     sequences: Mapping[str, Floats] | None = field(default=None, repr=False)
     bags: RecordingSums | None = field(default=None, repr=False)
     details: Details | None = field(default=None, repr=False, compare=False)
@@ -79,7 +79,7 @@ class Report:
     def __repr__(self) -> str:
         overall = self.scores[OVERALL].means
         means = ", ".join(
-            f"{metric_of(name).symbol} {format_published(value)}" for name, value in overall.items()
+            f"{metric_of(name).symbol} {format_rounded(value)}" for name, value in overall.items()
         )
         return f"Report({self.protocol}, {counted(self.n_sequences, 'sequence')}, {means})"
 
@@ -105,9 +105,9 @@ class Report:
         metrics = list(self.scores[OVERALL].means)
         rows = [["TTC range", *(metric_of(name).heading for name in metrics), "count"]]
         for name, score in self.scores.items():
-            interval = interval_of(score_name(metrics[0], name))
-            title = f"{name} {interval.seconds}" if interval else name
-            means = [format_published(score.means[metric]) for metric in metrics]
+            ttc_range = range_of(score_name(metrics[0], name))
+            title = f"{name} {ttc_range.seconds}" if ttc_range else name
+            means = [format_rounded(score.means[metric]) for metric in metrics]
             rows.append([title, *means, f"{score.count:,}"])
         return rows
 
@@ -233,7 +233,7 @@ def _with_ends(row: GroupScores, *, with_intervals: bool) -> dict[str, float | N
     return found
 
 
-def published(value: float | None, *, decimals: int = 2) -> float | None:
+def rounded(value: float | None, *, decimals: int = 2) -> float | None:
     """`value` as it is published: correctly rounded, half to even on its exact binary value. None stays None.
 
     >>> published(14.296), published(0.125), published(None)
@@ -246,11 +246,11 @@ def published(value: float | None, *, decimals: int = 2) -> float | None:
     return round(float(value), decimals) + 0.0  # adding 0 turns -0.0 into 0.0
 
 
-def format_published(value: float | None, *, decimals: int = 2, missing: str = "–") -> str:
+def format_rounded(value: float | None, *, decimals: int = 2, missing: str = "–") -> str:
     """The text of the published value with all its decimals, or `missing`.
 
     >>> format_published(14.296), format_published(None)
     ('14.30', '–')
     """
-    rounded = published(value, decimals=decimals)
-    return missing if rounded is None else f"{rounded:.{decimals}f}"
+    shown = rounded(value, decimals=decimals)
+    return missing if shown is None else f"{shown:.{decimals}f}"

@@ -43,7 +43,7 @@ from evaluator.predictions.loading import Predictions
 from evaluator.predictions.revisions import realigned
 from evaluator.problems import Findings
 from evaluator.scoring.breakdown import Details
-from evaluator.scoring.report import IntervalScore, RecordingSums, Report, format_published
+from evaluator.scoring.report import RangeScore, RecordingSums, Report, format_rounded
 from evaluator.truth.ground_truth import GroundTruth
 
 
@@ -78,13 +78,13 @@ class Scorer:
         self._truth = truth
         self._protocol = protocol
         tau = truth.ascending_ttc_s
-        self._n_out_of_range = truth.n_outside(protocol.intervals)
+        self._n_out_of_range = truth.n_outside(protocol.ranges)
         self._slices = {OVERALL: slice(0, len(tau))} | {
             i.name: slice(
                 int(np.searchsorted(tau, i.low_s, side="left")),
                 int(np.searchsorted(tau, i.high_s, side="right")),
             )
-            for i in protocol.intervals
+            for i in protocol.ranges
         }
 
     @cached_property
@@ -139,12 +139,12 @@ class Scorer:
             else None,
         )
 
-    def _score(self, errors: Mapping[str, Floats], part: slice) -> IntervalScore:
+    def _score(self, errors: Mapping[str, Floats], part: slice) -> RangeScore:
         count = part.stop - part.start
         if count == 0:
-            return IntervalScore(dict.fromkeys(errors), 0)
+            return RangeScore(dict.fromkeys(errors), 0)
         means = {name: float(np.add.reduce(values[part])) / count for name, values in errors.items()}
-        return IntervalScore(means, count)
+        return RangeScore(means, count)
 
     def _in_file_order(self, errors: Mapping[str, Floats]) -> dict[str, Floats]:
         found = {name: np.empty_like(values) for name, values in errors.items()}
@@ -221,7 +221,7 @@ predictions and not the ground truth.
         return ""
     values = {name: floor[name] for name in known_names() if floor.get(name) is not None}
     shown = [name for name, value in values.items() if value or split_name(name)[1] == OVERALL]
-    texts = {name: format_published(values[name], decimals=decimals) for name in shown}
+    texts = {name: format_rounded(values[name], decimals=decimals) for name in shown}
     parts = [f"{column_words(name)} {text}{metric_of(name).unit_of_value}" for name, text in texts.items()]
     rest = " and 0 in every other column" if len(shown) < len(values) else ""
     return (

@@ -99,13 +99,13 @@ def _caption(rows: Sequence[ResultRow]) -> str:
 
 def cells_of(row: ResultRow) -> Iterator[str]:
     """The scores as they are published, each with its interval where there is one."""
-    from evaluator.scoring.report import format_published  # noqa: PLC0415 -- loads numpy
+    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy
 
     for name, value in row.scores.items():
         decimals = metric_of(name).decimals
-        text = format_published(value, decimals=decimals, missing=ABSENT)
+        text = format_rounded(value, decimals=decimals, missing=ABSENT)
         ends = row.intervals.get(name)
-        low_high = [format_published(end, decimals=decimals) for end in ends] if ends else []
+        low_high = [format_rounded(end, decimals=decimals) for end in ends] if ends else []
         yield f"{text} [{low_high[0]}, {low_high[1]}]" if low_high else text
 
 

@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from evaluator.arguments import Source
-from evaluator.metrics.protocol import Interval
+from evaluator.metrics.protocol import TTCRange
 from evaluator.metrics.scale import Floats, exact_log, scale_ratio_10hz
 from evaluator.problems import Findings, quoted, reject
 from evaluator.truth.annotation_folders import read_annotations
@@ -237,11 +237,11 @@ class GroundTruth:
         """ln α₁₀(τ) in ascending τ, the truth's part of every MiD."""
         return exact_log(scale_ratio_10hz(self.ascending_ttc_s))
 
-    def counts_of(self, intervals: Iterable[Interval]) -> dict[str, int]:
+    def counts_of(self, intervals: Iterable[TTCRange]) -> dict[str, int]:
         """Sequences of each TTC range by its name; those at an end that two share count twice."""
         return {i.name: int(np.count_nonzero(_inside(self.ttc_s, i.low_s, i.high_s))) for i in intervals}
 
-    def n_outside(self, intervals: Iterable[Interval]) -> int:
+    def n_outside(self, intervals: Iterable[TTCRange]) -> int:
         """Sequences that lie in none of these TTC ranges."""
         inside = [_inside(self.ttc_s, i.low_s, i.high_s) for i in intervals]
         return self.n_sequences - int(np.count_nonzero(np.logical_or.reduce(inside)))

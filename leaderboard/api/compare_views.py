@@ -11,7 +11,7 @@ from rest_framework.request import Request
 from rest_framework.response import Response
 from rest_framework.views import APIView
 
-from evaluator import Difference, published
+from evaluator import Difference, rounded
 from evaluator.tables import sentences
 from leaderboard.api.authentication import require_split
 from leaderboard.api.exceptions import edition_number
@@ -73,7 +73,7 @@ class DifferenceSerializer(serializers.Serializer[Difference]):
     )
 
     def get_detectable_difference(self, found: Difference) -> float | None:
-        return published(found.detectable_difference, decimals=self.context["decimals"])
+        return rounded(found.detectable_difference, decimals=self.context["decimals"])
 
     def get_sentence(self, found: Difference) -> str:
         return sentences.sentence(
@@ -167,7 +167,7 @@ class CompareView(APIView):
         name, number = (request.query_params.get(key, "") for key in ("split", "edition"))
         require_split(request.auth, name)  # authentication does so for splits in the path alone
         split = current_split(request, name)
-        found = comparisons.of(
+        found = comparisons.compare(
             methods=[comparisons.method_id(text) for text in request.query_params.getlist("m")],
             split=split,
             viewer=request.user,

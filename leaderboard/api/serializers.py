@@ -13,15 +13,15 @@ from evaluator.metrics.protocol import (
     OVERALL,
     PROTOCOLS,
     Protocol,
-    interval_of,
-    known_intervals,
+    TTCRange,
     known_names,
+    known_ranges,
     metric_of,
+    range_of,
 )
-from evaluator.metrics.protocol import Interval as TTCRange
 from leaderboard.boards import snapshots
 from leaderboard.boards.query import Board
-from leaderboard.boards.rows import Entry, Interval
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.methods import details
 from leaderboard.methods.details import Details
 from leaderboard.models import Split, Visibility
@@ -72,15 +72,15 @@ class NamedSerializer(serializers.Serializer[Any]):
         }
 
 
-def _sequences(interval: TTCRange | None) -> str:
-    return f"those with {interval.low_s:g} s ≤ τ ≤ {interval.high_s:g} s" if interval else "all sequences"
+def _sequences(ttc_range: TTCRange | None) -> str:
+    return f"those with {ttc_range.low_s:g} s ≤ τ ≤ {ttc_range.high_s:g} s" if ttc_range else "all sequences"
 
 
 class ScoresSerializer(NamedSerializer):
     """The published scores: MiD in 10⁻⁴, RTE in percent."""
 
     def child(self, name: str, **options: Any) -> serializers.FloatField:
-        metric, of = metric_of(name), _sequences(interval_of(name))
+        metric, of = metric_of(name), _sequences(range_of(name))
         text = f"{metric.title} ({metric.unit}), mean over {of}; lower is better; null: there are none."
         return serializers.FloatField(allow_null=True, help_text=text, **options)
 
@@ -88,14 +88,14 @@ class ScoresSerializer(NamedSerializer):
 class CountsSerializer(NamedSerializer):
     """Number of sequences, overall and in each TTC range."""
 
-    known = staticmethod(lambda: (OVERALL, *known_intervals()))
+    known = staticmethod(lambda: (OVERALL, *known_ranges()))
 
     @staticmethod
     def names_of(rules: Protocol) -> Iterable[str]:
-        return rules.interval_names
+        return rules.range_names
 
     def child(self, name: str, **options: Any) -> serializers.IntegerField:
-        text = f"Number of sequences: {_sequences(known_intervals().get(name))}."
+        text = f"Number of sequences: {_sequences(known_ranges().get(name))}."
         return serializers.IntegerField(help_text=text, **options)
 
 
@@ -266,7 +266,7 @@ class DetailsSerializer(serializers.Serializer[Details]):
         return fields
 
 
-class UncertaintySerializer(serializers.Serializer[Interval]):
+class UncertaintySerializer(serializers.Serializer[ConfidenceInterval]):
     """The 95 % confidence interval and rank range of one score; null where unknown."""
 
     low = serializers.FloatField(allow_null=True, help_text="Lower end of the 95 % confidence interval.")

@@ -18,7 +18,7 @@ from leaderboard.api.serializers import (
 )
 from leaderboard.methods.visibility import notice_of
 from leaderboard.models import Status, Visibility
-from leaderboard.submissions.outcomes import SubmissionResult
+from leaderboard.submissions.outcomes import SubmissionView
 
 
 class QueueSerializer(serializers.Serializer[Any]):
@@ -42,7 +42,7 @@ class NewSubmissionSerializer(serializers.Serializer[Any]):
     commit = serializers.CharField(required=False, help_text="Commit of the code that made the file.")
 
 
-class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
+class SubmissionSerializer(serializers.Serializer[SubmissionView]):
     """A submission as its team sees it."""
 
     id = serializers.UUIDField(help_text="Permanent id of the submission.")
@@ -107,7 +107,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionResult]):
     problems = ProblemSerializer(many=True, help_text="Problems of a rejected file, equal ones in one item.")
     n_problems = serializers.IntegerField(help_text="Number of problems, equal and unlisted ones included.")
 
-    def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
+    def to_representation(self, instance: SubmissionView) -> dict[str, Any]:
         submission, progress, place = instance.submission, instance.progress, instance.place
         method = submission.method
         is_waiting = progress.n_ahead is not None
@@ -157,7 +157,7 @@ class SubmittedSerializer(SubmissionSerializer):
 
     quota = SlotsSerializer(help_text="The team's remaining quota after this submission.")
 
-    def to_representation(self, instance: SubmissionResult) -> dict[str, Any]:
+    def to_representation(self, instance: SubmissionView) -> dict[str, Any]:
         return {
             **super().to_representation(instance),
             "quota": SlotsSerializer(self.context["quota"]).data,

@@ -63,7 +63,7 @@ class SubmissionsView(APIView):
         quota = limits.state(
             team=made.method.team, user=cast("User", request.user), split=made.split, now=now
         )
-        (outcome,) = outcomes.of([made], now=now)
+        (outcome,) = outcomes.for_submissions([made], now=now)
         return Response(
             SubmittedSerializer(outcome, context={"quota": quota}).data,
             status=201 if answer.is_new else 200,
@@ -79,7 +79,7 @@ class SubmissionsView(APIView):
         """Your team's submissions, newest first, in pages; `Link` names the next page."""
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         page = pagination.page_of(rows, request, order="-submitted_at")
-        found = outcomes.of(page.rows, now=timezone.now())
+        found = outcomes.for_submissions(page.rows, now=timezone.now())
         data = SubmissionSerializer(found, many=True).data  # type: ignore[arg-type]  # many rows, as it says
         return Response(data, headers=page.headers)
 
@@ -101,7 +101,7 @@ class SubmissionView(APIView):
         """State, then scores or problems. The submission of another team gives 404."""
         rows = visible(request).prefetch_related(Prefetch("evaluations", EVALUATIONS))
         found = get_object_or_404(rows, pk=submission_id)
-        (outcome,) = outcomes.of([found], now=timezone.now())
+        (outcome,) = outcomes.for_submissions([found], now=timezone.now())
         again = {} if outcome.progress.is_final else {"Retry-After": str(ASK_AGAIN_S)}
         return Response(SubmissionSerializer(outcome).data, headers=again)
 

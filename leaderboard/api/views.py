@@ -56,7 +56,7 @@ class WithdrawView(APIView):
         submission = get_object_or_404(visible(request), pk=submission_id)
         now = timezone.now()
         intake.withdraw(submission=submission, actor=cast("User", request.user), now=now)
-        (outcome,) = outcomes.of([submission], now=now)
+        (outcome,) = outcomes.for_submissions([submission], now=now)
         return Response(SubmissionSerializer(outcome).data)
 
 

@@ -44,7 +44,7 @@ class Profile:
 
 
 @dataclass(frozen=True, slots=True)
-class Interval:
+class ConfidenceInterval:
     """Where a value may lie, and its row in that column, at 95 %; None until a worker has computed it."""
 
     low: float | None = None
@@ -58,7 +58,7 @@ class Interval:
         return None if self.rank_low is None else self.rank_low == 1
 
 
-_UNKNOWN = Interval()
+_UNKNOWN = ConfidenceInterval()
 # By the evaluation's id a pair of ranks for each column of the protocol.
 KeptRanges = Mapping[str, Sequence[Sequence[int] | None]]
 NO_RANGES: Final[KeptRanges] = {}
@@ -88,7 +88,7 @@ class Entry:
     details: Details = field(default_factory=stated)
     # Scored submissions of the team's public methods to the split; of an anonymous or private one its own.
     n_attempts: int | None = None
-    intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
+    intervals: Mapping[str, ConfidenceInterval] = field(default_factory=dict)  # by score name, where computed
     best: frozenset[str] = frozenset()
     second: frozenset[str] = frozenset()
     is_mine: bool = False
@@ -225,10 +225,10 @@ class Scored(NamedTuple):
     """The values of an evaluation by the names of its protocol, and the intervals of those that have one."""
 
     values: Mapping[str, float | None]
-    intervals: Mapping[str, Interval]
+    intervals: Mapping[str, ConfidenceInterval]
 
 
-def _scored(cells: Mapping[str, tuple[float, Interval]], rules: Protocol) -> Scored:
+def _scored(cells: Mapping[str, tuple[float, ConfidenceInterval]], rules: Protocol) -> Scored:
     """In the order of the protocol, so that a row has the same bytes whenever it is read."""
     return Scored(
         {name: cells[name][0] if name in cells else None for name in rules.score_names},
@@ -244,7 +244,7 @@ def flat_scores(evaluation: Evaluation) -> Mapping[str, float | None]:
 def scored_of(evaluation: Evaluation) -> Scored:
     """The values of one evaluation with their confidence intervals, without rank ranges."""
     cells = {
-        score_name(score.metric, score.interval): (score.value, Interval(score.low, score.high))
+        score_name(score.metric, score.ttc_range): (score.value, ConfidenceInterval(score.low, score.high))
         for score in evaluation.scores.all()
     }
     return _scored(cells, evaluation.edition.rules)
@@ -261,13 +261,13 @@ def scored_in(
     rows = Score.objects.filter(evaluation__edition=edition)
     if evaluations is not None:
         rows = rows.filter(evaluation__in=evaluations)
-    cells: dict[UUID, dict[str, tuple[float, Interval]]] = {pk: {} for pk in evaluations or ()}
-    for pk, metric, interval, value, low, high in rows.values_list(
-        "evaluation_id", "metric", "interval", "value", "low", "high"
+    cells: dict[UUID, dict[str, tuple[float, ConfidenceInterval]]] = {pk: {} for pk in evaluations or ()}
+    for pk, metric, ttc_range, value, low, high in rows.values_list(
+        "evaluation_id", "metric", "ttc_range", "value", "low", "high"
     ):
-        name = score_name(metric, interval)
+        name = score_name(metric, ttc_range)
         pair = ranges.get(str(pk), nothing)[rules.score_names.index(name)] or (None, None)
-        cells.setdefault(pk, {})[name] = value, Interval(low, high, *pair)
+        cells.setdefault(pk, {})[name] = value, ConfidenceInterval(low, high, *pair)
     return {pk: _scored(found, rules) for pk, found in cells.items()}
 
 
@@ -278,7 +278,7 @@ def ranges_in(edition: Edition) -> KeptRanges:
 
 def placed(entry: Entry, rank: int | None) -> Entry:
     """The row with its rank. A range that does not hold it is of the board before, and left out."""
-    found = entry.intervals.get(PRIMARY, Interval())
+    found = entry.intervals.get(PRIMARY, ConfidenceInterval())
     if rank is None or found.rank_low is None or found.rank_high is None:
         return replace(entry, rank=rank)
     if found.rank_low <= rank <= found.rank_high:

@@ -107,7 +107,7 @@ def _number(split: Any, edition: Any) -> int:
     for row in (split, edition):
         if hasattr(row, "board_number"):
             return row.board_number or 0
-    return board_versions.number(split.pk)
+    return board_versions.number_of(split.pk)
 
 
 # --- reading ---------------------------------------------------------------------------------------------
@@ -187,7 +187,7 @@ def attempts(edition: Edition, *, methods: MethodQuerySet) -> tuple[Attempt, ...
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
         evaluation__submission__method__in=methods,
-        interval=OVERALL,
+        ttc_range=OVERALL,
     )
     columns = (
         *("submission__method_id", "submission__method__visibility"),

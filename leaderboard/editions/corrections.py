@@ -112,7 +112,7 @@ def _imported(split: Split, digest: str | None) -> GroundTruth:
     return row
 
 
-def standing(edition: Edition) -> SubmissionQuerySet:
+def active_submissions(edition: Edition) -> SubmissionQuerySet:
     """Every standing submission of an edition's split, in the order in which they came."""
     rows = Submission.objects.standing().filter(split=edition.split_id)
     return rows.select_related("method__team").order_by("submitted_at")
@@ -123,7 +123,9 @@ def queue_active(edition: Edition) -> int:
 
     The caller holds the split's row, so that no new submission slips between.
     """
-    missing = list(standing(edition).exclude(evaluations__edition=edition).values_list("pk", flat=True))
+    missing = list(
+        active_submissions(edition).exclude(evaluations__edition=edition).values_list("pk", flat=True)
+    )
     lifecycle.enqueue_many(submission_ids=missing, edition=edition)
     return len(missing)
 
@@ -154,7 +156,7 @@ def progress(edition: Edition) -> RescoringProgress:
 def unfinished(edition: Edition) -> list[Submission]:
     """Standing submissions of the split that this edition has neither scored nor rejected."""
     done = Evaluation.objects.filter(edition=edition, status__in=[Status.SCORED, Status.REJECTED])
-    return list(standing(edition).exclude(pk__in=done.values("submission")))
+    return list(active_submissions(edition).exclude(pk__in=done.values("submission")))
 
 
 def newly_rejected(edition: Edition) -> list[Submission]:
@@ -162,7 +164,9 @@ def newly_rejected(edition: Edition) -> list[Submission]:
     here = Evaluation.objects.filter(edition=edition, status=Status.REJECTED)
     board = Evaluation.objects.filter(edition=edition.split.published_edition_id, status=Status.SCORED)
     return list(
-        standing(edition).filter(pk__in=here.values("submission")).filter(pk__in=board.values("submission"))
+        active_submissions(edition)
+        .filter(pk__in=here.values("submission"))
+        .filter(pk__in=board.values("submission"))
     )
 
 

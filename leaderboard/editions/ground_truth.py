@@ -13,7 +13,7 @@ from django.db.models import Max
 
 import evaluator
 from evaluator.counting import counted
-from evaluator.metrics.protocol import INTERVALS, OVERALL, get_protocol, known_intervals
+from evaluator.metrics.protocol import OVERALL, TTC_RANGES, get_protocol, known_ranges
 from evaluator.predictions.revisions import Comparison, compare
 from evaluator.units import RECORDING, Units
 from leaderboard import audit, board_versions
@@ -84,8 +84,8 @@ def add(*, split_name: str, path: Path, now: datetime, actor: User | None) -> Gr
                 "n_recordings": truth.manifest.n_recordings,
                 "counts": {
                     OVERALL: truth.n_sequences,
-                    **truth.counts_of(known_intervals().values()),
-                    "out_of_range": truth.n_outside(INTERVALS),
+                    **truth.counts_of(known_ranges().values()),
+                    "out_of_range": truth.n_outside(TTC_RANGES),
                 },
                 "imported_at": now,
                 "imported_by": actor,
@@ -213,7 +213,7 @@ def make_board(
         actor=actor,
         details={"edition": str(edition), "reason": reason, "left_out": list(left_out)},
     )
-    board_versions.changed(split.pk)
+    board_versions.bump(split.pk)
     return Publication.objects.create(
         split=split,
         edition=edition,

@@ -16,7 +16,7 @@ from leaderboard.models import Publication, Split, User
 _NAME: Final = re.compile(r"[a-z][a-z0-9-]{0,31}", re.ASCII)
 # What stands at the same place in addresses of maintainers' pages.
 _RESERVED: Final = frozenset(
-    {"add", "announcement", "audit", "deeds", "pages", "published", "queue", "quotas", "splits", "teams"}
+    {"add", "announcement", "audit", "actions", "pages", "published", "queue", "quotas", "splits", "teams"}
 )
 
 
@@ -84,7 +84,7 @@ def add_split(
         )
         if other is not None and other.published_edition is not None:
             _publish_like(other, split, now=now, actor=actor)
-        board_versions.changed(name)
+        board_versions.bump(name)
     return split
 
 

@@ -86,7 +86,7 @@ def change(*, split_name: str, policy: Policy, actor: User | None) -> Split:
                 actor=actor,
                 details={name: f"{old} → {new}" for name, (old, new) in pairs.items() if old != new},
             )
-            board_versions.changed(split.pk)
+            board_versions.bump(split.pk)
     return split
 
 
@@ -124,7 +124,7 @@ def announce(*, text: str, ends_at: datetime | None, now: datetime, actor: User 
             actor=actor,
             details={"text": text, "ends_at": ends_at.isoformat() if ends_at else None},
         )
-        board_versions.changed_everywhere()
+        board_versions.bump_all()
 
 
 def checked(split: Split, policy: Policy) -> Split:

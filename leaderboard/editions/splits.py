@@ -118,7 +118,7 @@ def import_published(
                 details={"added": found["added"], "replaced": found["replaced"]},
             )
             for split_id in split_ids:
-                board_versions.changed(split_id)
+                board_versions.bump(split_id)
     return Imported(**{outcome: tuple(names) for outcome, names in found.items()})
 
 
@@ -150,7 +150,7 @@ def remove_published(
             actor=actor,
             details={"reason": reason},
         )
-        board_versions.changed(split_name)
+        board_versions.bump(split_name)
     return row
 
 

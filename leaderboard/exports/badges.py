@@ -4,7 +4,7 @@ from typing import Final
 from xml.sax.saxutils import escape, quoteattr
 
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from evaluator.tables.escaping import one_line
 from leaderboard.boards.rows import Entry
 
@@ -26,7 +26,7 @@ def words(entry: Entry | None) -> str:
     if entry.scores[PRIMARY] is None:
         return "no MiD"
     rank = f"rank {entry.rank}, " if entry.rank is not None else ""
-    return f"{rank}MiD {format_published(entry.scores[PRIMARY], decimals=entry.decimals)}"
+    return f"{rank}MiD {format_rounded(entry.scores[PRIMARY], decimals=entry.decimals)}"
 
 
 def svg(*, label: str, text: str) -> str:

@@ -14,7 +14,7 @@ from django.urls import reverse
 from django.utils.feedgenerator import Atom1Feed
 
 from evaluator.metrics.protocol import grouped_names
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from evaluator.tables.escaping import one_line
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Split
@@ -49,7 +49,7 @@ def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page:
     newest = sorted(rows, key=lambda row: (_came_at(row[1]), _id(*row).int), reverse=True)[:MAX_ENTRIES]
     for split, entry in newest:
         texts = {
-            metric: format_published(entry.scores[name], decimals=entry.decimals)
+            metric: format_rounded(entry.scores[name], decimals=entry.decimals)
             for metric, (name, *_) in grouped_names(entry.scores).items()
         }
         primary = next(f"{metric.symbol} {text}" for metric, text in texts.items())

@@ -9,7 +9,7 @@ from datetime import datetime
 from typing import Final
 
 from evaluator.metrics.protocol import known_names
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.models import Evaluation, Submission
 
@@ -66,7 +66,7 @@ def rows(*, split: str = "", has_addresses: bool = False) -> Iterator[dict[str, 
 def _numbers(evaluation: Evaluation) -> dict[str, object]:
     decimals = evaluation.edition.decimals
     texts = {
-        name: format_published(value, decimals=decimals, missing="")
+        name: format_rounded(value, decimals=decimals, missing="")
         for name, value in flat_scores(evaluation).items()
     }
     return {name: float(text) if text else None for name, text in texts.items()}

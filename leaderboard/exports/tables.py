@@ -12,13 +12,13 @@ from dataclasses import replace
 from typing import Final
 
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
 from evaluator.units import RECORDING
 from leaderboard.boards.filters import BadFilter
 from leaderboard.boards.query import Board
-from leaderboard.boards.rows import Entry, Interval
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.exports import bibtex
 from leaderboard.methods.details import DETAILS
 
@@ -96,7 +96,7 @@ def _reference(board: Board, address: str) -> str:
 
 
 def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
-    ranks = entry.intervals.get(PRIMARY, Interval())
+    ranks = entry.intervals.get(PRIMARY, ConfidenceInterval())
     row: dict[str, object] = {
         "rank": entry.rank,
         "rank_low": ranks.rank_low,
@@ -104,7 +104,7 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
         **{name: getattr(entry, name) for name in ("kind", "method", "team", "n_attempts")},
         "date": entry.date_text,
         **{
-            name: format_published(value, decimals=entry.decimals, missing="")
+            name: format_rounded(value, decimals=entry.decimals, missing="")
             for name, value in entry.scores.items()
         },
         **entry.details,
@@ -115,9 +115,9 @@ def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
     }
     if has_intervals:
         for name in entry.scores:
-            found = entry.intervals.get(name, Interval())
-            row[f"{name}_low"] = format_published(found.low, decimals=entry.decimals, missing="")
-            row[f"{name}_high"] = format_published(found.high, decimals=entry.decimals, missing="")
+            found = entry.intervals.get(name, ConfidenceInterval())
+            row[f"{name}_low"] = format_rounded(found.low, decimals=entry.decimals, missing="")
+            row[f"{name}_high"] = format_rounded(found.high, decimals=entry.decimals, missing="")
     return row
 
 
@@ -136,16 +136,16 @@ def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) ->
 
 
 def _rank(entry: Entry, *, has_range: bool) -> str:
-    found = entry.intervals.get(PRIMARY, Interval()) if has_range else Interval()
+    found = entry.intervals.get(PRIMARY, ConfidenceInterval()) if has_range else ConfidenceInterval()
     return layouts.rank_text(entry.rank, low=found.rank_low, high=found.rank_high)
 
 
 def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:
-    found = entry.intervals.get(name, Interval()) if has_interval else Interval()
+    found = entry.intervals.get(name, ConfidenceInterval()) if has_interval else ConfidenceInterval()
     return layouts.Cell(
-        text=format_published(entry.scores[name], decimals=entry.decimals, missing=layouts.ABSENT),
-        low=format_published(found.low, decimals=entry.decimals, missing=""),
-        high=format_published(found.high, decimals=entry.decimals, missing=""),
+        text=format_rounded(entry.scores[name], decimals=entry.decimals, missing=layouts.ABSENT),
+        low=format_rounded(found.low, decimals=entry.decimals, missing=""),
+        high=format_rounded(found.high, decimals=entry.decimals, missing=""),
         is_best=name in entry.best,
         is_second=name in entry.second,
     )

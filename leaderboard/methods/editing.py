@@ -46,7 +46,7 @@ def edit(
             details={"fields": sorted(changed)},
         )
         if row.was_shown():
-            board_versions.changed_by_methods([row.pk])
+            board_versions.bump_for_methods([row.pk])
     return row
 
 

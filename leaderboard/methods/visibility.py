@@ -63,7 +63,7 @@ def change(
                 "reveal_at": reveal_at.isoformat() if reveal_at else None,
             },
         )
-        board_versions.changed_by_methods([row.pk])
+        board_versions.bump_for_methods([row.pk])
     log.info("method_shown", method_id=str(row.pk), visibility=row.visibility)
     return row
 
@@ -127,7 +127,7 @@ def reveal_due(*, now: datetime) -> int:
             _number_taken_name(Method.objects.get(pk=method_id))
             details: Mapping[str, str] = {"from": Visibility.ANONYMOUS, "to": Visibility.PUBLIC}
             audit.record(verb="revealed", noun="Method", noun_id=method_id, details=details)
-            board_versions.changed_by_methods([method_id])
+            board_versions.bump_for_methods([method_id])
         n_revealed += 1
     return n_revealed
 

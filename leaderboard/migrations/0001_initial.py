@@ -32,7 +32,7 @@ class Migration(migrations.Migration):
                 ('title', models.CharField(max_length=80)),
                 ('description', models.TextField(blank=True)),
                 ('position', models.PositiveSmallIntegerField(default=0, help_text='Order in which splits are listed.')),
-                ('is_hidden', models.BooleanField(default=True, help_text='Hidden ground truth: nothing finer than interval aggregates is shown.')),
+                ('is_hidden', models.BooleanField(default=True, help_text='Hidden ground truth: nothing finer than means over TTC ranges is shown.')),
                 ('is_simulated', models.BooleanField(default=False, help_text='Ground truth made by a simulation.')),
                 ('needs_admission', models.BooleanField(default=False, help_text='Only teams that a maintainer has admitted submit to it.')),
                 ('how_to_be_admitted', models.CharField(blank=True, help_text='How a team asks for it, as the end of a sentence, like “write to …”.', max_length=300)),
@@ -211,7 +211,7 @@ class Migration(migrations.Migration):
                 ('source', models.CharField(blank=True, help_text='Name of the file it was read from.', max_length=200)),
                 ('n_sequences', models.PositiveIntegerField()),
                 ('n_recordings', models.PositiveIntegerField()),
-                ('counts', models.JSONField(help_text='Sequences per interval, and out of range.')),
+                ('counts', models.JSONField(help_text='Sequences per TTC range, and out of range.')),
                 ('imported_at', models.DateTimeField(default=django.utils.timezone.now)),
                 ('imported_by', models.ForeignKey(blank=True, null=True, on_delete=django.db.models.deletion.SET_NULL, related_name='+', to=settings.AUTH_USER_MODEL)),
                 ('split', models.ForeignKey(on_delete=django.db.models.deletion.PROTECT, related_name='ground_truths', to='leaderboard.split')),
@@ -308,7 +308,7 @@ class Migration(migrations.Migration):
             fields=[
                 ('id', models.BigAutoField(auto_created=True, primary_key=True, serialize=False, verbose_name='ID')),
                 ('metric', models.CharField(max_length=32)),
-                ('interval', models.CharField(max_length=32)),
+                ('ttc_range', models.CharField(max_length=32)),
                 ('value', models.FloatField()),
                 ('low', models.FloatField(blank=True, null=True)),
                 ('high', models.FloatField(blank=True, null=True)),
@@ -579,7 +579,7 @@ class Migration(migrations.Migration):
         ),
         migrations.AddConstraint(
             model_name='score',
-            constraint=models.UniqueConstraint(fields=('evaluation', 'metric', 'interval'), name='one_score_per_metric_and_interval'),
+            constraint=models.UniqueConstraint(fields=('evaluation', 'metric', 'ttc_range'), name='one_score_per_metric_and_range'),
         ),
         migrations.AddConstraint(
             model_name='score',

@@ -99,7 +99,7 @@ class AuditText(models.Model):
 
 
 class AuditEvent(models.Model):
-    """One deed. Written by `leaderboard.audit.record`, then sealed by `leaderboard.audit.seal`."""
+    """One action. Written by `leaderboard.audit.record`, then sealed by `leaderboard.audit.seal`."""
 
     at = models.DateTimeField(default=timezone.now, db_index=True)
     actor = models.ForeignKey(User, null=True, blank=True, on_delete=models.PROTECT, related_name="+")

@@ -57,7 +57,7 @@ class Split(QuotaRules):
     description = models.TextField(blank=True)
     position = models.PositiveSmallIntegerField(default=0, help_text="Order in which splits are listed.")
     is_hidden = models.BooleanField(
-        default=True, help_text="Hidden ground truth: nothing finer than interval aggregates is shown."
+        default=True, help_text="Hidden ground truth: nothing finer than means over TTC ranges is shown."
     )
     is_simulated = models.BooleanField(default=False, help_text="Ground truth made by a simulation.")
     needs_admission = models.BooleanField(
@@ -181,7 +181,7 @@ class GroundTruth(models.Model):
     source = models.CharField(max_length=200, blank=True, help_text="Name of the file it was read from.")
     n_sequences = models.PositiveIntegerField()
     n_recordings = models.PositiveIntegerField()
-    counts = models.JSONField(help_text="Sequences per interval, and out of range.")
+    counts = models.JSONField(help_text="Sequences per TTC range, and out of range.")
     imported_at = models.DateTimeField(default=timezone.now)
     imported_by = models.ForeignKey(User, null=True, blank=True, on_delete=models.SET_NULL, related_name="+")
 

@@ -250,7 +250,7 @@ class Score(models.Model):
 
     evaluation = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="scores")
     metric = models.CharField(max_length=32)
-    interval = models.CharField(max_length=32)
+    ttc_range = models.CharField(max_length=32)
     value = models.FloatField()
     # Its confidence interval; its rank range stands in `EditionRanges`.
     low = models.FloatField(null=True, blank=True)
@@ -259,7 +259,7 @@ class Score(models.Model):
     class Meta:
         constraints = [
             models.UniqueConstraint(
-                fields=["evaluation", "metric", "interval"], name="one_score_per_metric_and_interval"
+                fields=["evaluation", "metric", "ttc_range"], name="one_score_per_metric_and_range"
             ),
             models.CheckConstraint(
                 condition=Q(value__gte=0, value__lt=FINITE), name="score_is_finite_and_not_negative"
@@ -267,4 +267,4 @@ class Score(models.Model):
         ]
 
     def __str__(self) -> str:
-        return f"{self.metric} {self.interval} = {self.value}"
+        return f"{self.metric} {self.ttc_range} = {self.value}"

@@ -38,7 +38,7 @@ def export(*, user: User) -> dict[str, Any]:
     # A team that they have left may call a method something else by now, which is not theirs to know.
     used = Method.objects.filter(submissions__submitted_by=user).select_related("team").distinct()
     names = {method.pk: method.name if method.is_named_for(user) else None for method in used}
-    deeds = AuditEvent.objects.filter(actor=user).order_by("pk")
+    actions = AuditEvent.objects.filter(actor=user).order_by("pk")
     return {
         "account": {
             "email": user.email,
@@ -92,7 +92,7 @@ def export(*, user: User) -> dict[str, Any]:
         "mails_not_wanted": user.muted_kinds.split(),
         "audit_log": [
             {"at": _moment(row.at), "action": row.verb, "object": row.noun, "id": row.noun_id}
-            for row in deeds
+            for row in actions
         ],
     }
 
@@ -135,7 +135,7 @@ def forget(*, user: User, reason: str, actor: User | None, now: datetime) -> Non
             details={"reason": reason, "team": str(team.pk) if team else None},
         )
         if team is not None:
-            board_versions.changed_by_methods(
+            board_versions.bump_for_methods(
                 Method.objects.filter(team=team).shown().values_list("pk", flat=True)
             )
 

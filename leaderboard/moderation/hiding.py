@@ -124,7 +124,7 @@ def withdraw_entry(
             actor=actor,
             details={"reason": reason},
         )
-        board_versions.changed(row.split_id)
+        board_versions.bump(row.split_id)
     return row
 
 
@@ -176,7 +176,7 @@ def _locked(method: Method) -> Method:
 
 
 def _changed(rows: MethodQuerySet) -> None:
-    board_versions.changed_by_methods(rows.shown().values_list("pk", flat=True))
+    board_versions.bump_for_methods(rows.shown().values_list("pk", flat=True))
 
 
 def _reason(text: str) -> str:

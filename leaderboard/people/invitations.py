@@ -170,7 +170,7 @@ def accept(*, secret: str, user: User, now: datetime) -> Team:
                 "brought": sorted(moved),
             },
         )
-        board_versions.changed_by_methods(
+        board_versions.bump_for_methods(
             Method.objects.shown().filter(pk__in=list(moved)).values_list("pk", flat=True)
         )
     return team

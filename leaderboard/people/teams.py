@@ -61,9 +61,7 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
         audit.record(
             verb="renamed", noun="Team", noun_id=row.pk, actor=actor, names={"from": before, "to": name}
         )
-        board_versions.changed_by_methods(
-            Method.objects.filter(team=row).shown().values_list("pk", flat=True)
-        )
+        board_versions.bump_for_methods(Method.objects.filter(team=row).shown().values_list("pk", flat=True))
     return row
 
 

@@ -68,10 +68,10 @@ class Lease:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class RunResult:
     """What a run found, ready to be written.
 
-    `scores` maps (metric, interval) to a published value; `problems` is the list shown to the submitter.
+    `scores` maps (metric, TTC range) to a published value; `problems` is the list shown to the submitter.
     """
 
     status: Status
@@ -195,7 +195,7 @@ def heartbeat(lease: Lease, *, lease_s: float) -> bool:
     return renewed == 1
 
 
-def finalise(lease: Lease, outcome: Outcome) -> bool:
+def finalise(lease: Lease, outcome: RunResult) -> bool:
     """Write the outcome: status, scores, report and audit row, all or nothing.
 
     Returns True if this call wrote it, False if an earlier call of the same lease had (its COMMIT succeeded
@@ -210,7 +210,7 @@ def finalise(lease: Lease, outcome: Outcome) -> bool:
     raise LostRace(f"evaluation {lease.evaluation_id}: attempt {lease.attempt} is no longer the valid one")
 
 
-def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
+def finalise_many(outcomes: Sequence[tuple[Lease, RunResult]]) -> set[uuid.UUID]:
     """Write many outcomes in one transaction. Returns the evaluations that were written.
 
     Those whose lease is no longer valid are left alone: somebody else decides them, or this worker had
@@ -242,9 +242,9 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
             ],
         )
         Score.objects.bulk_create(
-            Score(evaluation_id=lease.evaluation_id, metric=metric, interval=interval, value=value)
+            Score(evaluation_id=lease.evaluation_id, metric=metric, ttc_range=ttc_range, value=value)
             for lease, outcome in decided
-            for (metric, interval), value in outcome.scores.items()
+            for (metric, ttc_range), value in outcome.scores.items()
         )
         audit.record_many(
             (
@@ -253,7 +253,7 @@ def finalise_many(outcomes: Sequence[tuple[Lease, Outcome]]) -> set[uuid.UUID]:
             )
             for lease, outcome in decided
         )
-        board_versions.changed_by_evaluations(lease.evaluation_id for lease, _ in decided)
+        board_versions.bump_for_evaluations(lease.evaluation_id for lease, _ in decided)
     return {lease.evaluation_id for lease, _ in decided}
 
 

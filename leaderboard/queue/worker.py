@@ -13,14 +13,14 @@ import structlog
 from django.conf import settings
 from django.db import DataError, IntegrityError, InterfaceError, OperationalError, connection
 
-from evaluator import Rejected, Report, published
+from evaluator import Rejected, Report, rounded
 from evaluator.predictions.plausibility import warnings_of
 from evaluator.problems import FileWarning
 from evaluator.scoring.report import RecordingSums
 from evaluator.scoring.scores import Scorer
 from leaderboard.models import Edition, Evaluation, SentFile, Status
 from leaderboard.queue import lifecycle
-from leaderboard.queue.lifecycle import Lease, LostRace, Outcome, Strike
+from leaderboard.queue.lifecycle import Lease, LostRace, RunResult, Strike
 from leaderboard.sandbox import child, file_values
 from leaderboard.statistics import recording_sums
 from leaderboard.storage import truth_values
@@ -115,7 +115,7 @@ def rescore(leases: Sequence[Lease], *, edition: Edition) -> list[Lease]:
         scorer = _scorer(edition)
     except (OSError, TruthDamaged):
         return list(leases)
-    outcomes: list[tuple[Lease, Outcome]] = []
+    outcomes: list[tuple[Lease, RunResult]] = []
     sums: list[tuple[SentFile, RecordingSums | None]] = []
     rest: list[Lease] = []
     for lease in leases:
@@ -202,7 +202,7 @@ def run(
         try:
             outcome = _outcome(
                 evaluation,
-                heartbeat=Pulse(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
+                heartbeat=Heartbeat(lease, waiting=waiting, lease_s=settings.LEASE_S, wall_s=settings.WALL_S),
             )
             _retry_on_disconnect(lambda: lifecycle.finalise(lease, outcome))
         except LostRace as race:
@@ -221,7 +221,7 @@ def run(
             )
 
 
-class Pulse:
+class Heartbeat:
     """The heartbeat of one run: False once the work is somebody else's, or its time is up.
 
     A database that does not answer says neither. A run with a heartbeat keeps nothing waiting behind it.
@@ -246,7 +246,7 @@ class Pulse:
             return True
 
 
-def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> Outcome:
+def _outcome(evaluation: Evaluation, *, heartbeat: Callable[[], bool]) -> RunResult:
     """Read, check and score one file. A pure function of its bytes, its manifest and the edition."""
     edition, file = evaluation.edition, evaluation.submission.sent_file
     scorer = _scorer(edition)
@@ -273,18 +273,18 @@ def _in_words(fault: Exception) -> str:
     return str(fault) if isinstance(fault, ours) else f"{type(fault).__name__}: {fault}"
 
 
-def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = ()) -> Outcome:
+def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = ()) -> RunResult:
     """A report as its edition publishes it: values with so many decimals, counts, and nothing finer.
 
     `warnings` are those that file and manifest give: others would tell of hidden values.
     """
     values = {}
-    for interval, scores in report.scores.items():
+    for ttc_range, scores in report.scores.items():
         for metric, value in scores.means.items():
-            rounded = published(value, decimals=decimals)
-            if rounded is not None:
-                values[metric, interval] = rounded
-    return Outcome(
+            shown = rounded(value, decimals=decimals)
+            if shown is not None:
+                values[metric, ttc_range] = shown
+    return RunResult(
         status=Status.SCORED,
         scores=values,
         report={
@@ -292,20 +292,20 @@ def scored(report: Report, *, decimals: int, warnings: Sequence[FileWarning] = (
             "n_sequences": report.n_sequences,
             "n_out_of_range": report.n_out_of_range,
             "truncated": dict(report.truncated),
-            "counts": {interval: scores.count for interval, scores in report.scores.items()},
+            "counts": {ttc_range: scores.count for ttc_range, scores in report.scores.items()},
             "warnings": [asdict(warning) for warning in warnings],
         },
         report_digest=f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}",
     )
 
 
-def rejection(rejected: Rejected) -> Outcome:
+def rejection(rejected: Rejected) -> RunResult:
     """The outcome for a file that is at fault."""
     problems = [
         {"code": problem.code, "message": problem.message, "where": problem.where}
         for problem in rejected.problems[:MAX_STORED_PROBLEMS]
     ]
-    return Outcome(status=Status.REJECTED, scores={}, problems=problems, n_problems=rejected.n_problems)
+    return RunResult(status=Status.REJECTED, scores={}, problems=problems, n_problems=rejected.n_problems)
 
 
 def _fail_attempt(

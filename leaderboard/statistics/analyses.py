@@ -28,7 +28,7 @@ MAX_POINTS = 500
 MAX_RECORDINGS = 20
 
 
-def of(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | None:
+def for_submission(*, submission: Submission, viewer: User | AnonymousUser) -> Analysis | None:
     """The analysis of a submission for its own team (and maintainers).
 
     None for everybody else, on a hidden split, and until a worker has made it.

@@ -115,7 +115,7 @@ class Compared:
     reason: str
 
 
-def of(
+def compare(
     *,
     methods: Sequence[UUID],
     split: Split,

@@ -19,7 +19,7 @@ from django.db import transaction
 from django.db.models import Exists, OuterRef
 from numpy.typing import NDArray
 
-from evaluator import published
+from evaluator import rounded
 from evaluator.metrics.protocol import OVERALL, PRIMARY, score_name
 from evaluator.scoring import uncertainty
 from evaluator.scoring.ranges import Quoted, rank_ranges
@@ -77,7 +77,7 @@ def active_entries(edition: Edition) -> list[ScoredEntry]:
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
         metric=PRIMARY,
-        interval=OVERALL,
+        ttc_range=OVERALL,
     ).values_list(
         "evaluation_id",
         "evaluation__submission__digest",
@@ -196,7 +196,7 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
     column_of = {name: j for j, name in enumerate(edition.rules.score_names)}
     missing: dict[UUID, list[Score]] = {}
     for score in Score.objects.filter(evaluation__edition=edition, low=None):
-        if usable[column_of[score_name(score.metric, score.interval)]]:
+        if usable[column_of[score_name(score.metric, score.ttc_range)]]:
             missing.setdefault(score.evaluation_id, []).append(score)
     rows = [row for row in entries.rows if row.evaluation_id in missing]
     for start in range(0, len(rows), uncertainty.BATCH):
@@ -207,9 +207,9 @@ def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:
         lows, highs = disclosure.published_ends(*bootstrap_of(edition).intervals(sums), edition=edition)
         for i, row in enumerate(some):
             for score in missing[row.evaluation_id]:
-                j = column_of[score_name(score.metric, score.interval)]
+                j = column_of[score_name(score.metric, score.ttc_range)]
                 score.low, score.high = (
-                    published(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
+                    rounded(ends[i, j], decimals=edition.decimals) for ends in (lows, highs)
                 )
     return [score for row in rows for score in missing[row.evaluation_id]]
 
@@ -244,9 +244,9 @@ def _published_values(edition: Edition, wanted: Sequence[UUID]) -> Floats:
     row_of = {pk: i for i, pk in enumerate(wanted)}
     values = np.full((len(wanted), len(column_of)), np.nan)
     scores = Score.objects.filter(evaluation__edition=edition)
-    for pk, metric, interval, value in scores.values_list("evaluation_id", "metric", "interval", "value"):
+    for pk, metric, ttc_range, value in scores.values_list("evaluation_id", "metric", "ttc_range", "value"):
         if pk in row_of:
-            values[row_of[pk], column_of[score_name(metric, interval)]] = value
+            values[row_of[pk], column_of[score_name(metric, ttc_range)]] = value
     return values
 
 
@@ -311,7 +311,7 @@ def _write(
             or any(score.evaluation_id in shown for score in intervals)
         )
         if is_seen and present.published_at is not None:
-            board_versions.changed(present.split_id)
+            board_versions.bump(present.split_id)
     return True
 
 

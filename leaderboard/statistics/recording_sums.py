@@ -15,7 +15,7 @@ import structlog
 from django.conf import settings
 from numpy.typing import NDArray
 
-from evaluator import GroundTruth, published
+from evaluator import GroundTruth, rounded
 from evaluator.metrics.protocol import get_protocol
 from evaluator.scoring import scores, uncertainty
 from evaluator.scoring.report import RecordingSums
@@ -109,7 +109,7 @@ def _units(truth_digest: str, kind: str) -> Units:
 def floor_of(edition: Edition) -> dict[str, float | None]:
     """What the ground truth itself scores, as it is published. Raises `OSError` without access to it."""
     floor = scores.floor_of(truth_values.load(edition.ground_truth_id), protocol=edition.protocol)
-    return {name: published(value, decimals=edition.decimals) for name, value in floor.items()}
+    return {name: rounded(value, decimals=edition.decimals) for name, value in floor.items()}
 
 
 def scorer(truth_digest: str, protocol: str) -> Scorer:

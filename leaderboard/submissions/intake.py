@@ -13,7 +13,7 @@ from django.db.models import Q
 
 from evaluator.predictions.documents import EMPTY_MESSAGE
 from leaderboard import audit, board_versions
-from leaderboard.boards.rows import Interval, scored_of
+from leaderboard.boards.rows import ConfidenceInterval, scored_of
 from leaderboard.db import clock
 from leaderboard.errors.refusals import Refused, clean_text, shown_split
 from leaderboard.methods import editing
@@ -270,9 +270,9 @@ def withdraw(*, submission: Submission, actor: User, now: datetime) -> bool:
         lifecycle.cancel(submission=submission, actor=actor)
         audit.record(verb="withdrawn", noun="Submission", noun_id=submission.pk, actor=actor)
         # Before looking who is private: whoever shows a method holds this until it is shown.
-        board_versions.hold()
+        board_versions.lock()
         if Method.objects.shown().filter(pk=submission.method_id).exists():
-            board_versions.changed(submission.split_id)
+            board_versions.bump(submission.split_id)
     submission.withdrawn_at = now
     return True
 
@@ -293,7 +293,7 @@ class Progress:
     is_late: bool = False  # it takes longer than `LATE_AFTER`
     first_run: Evaluation | None = None  # in the first edition, where another edition's speaks for it
     scores: Mapping[str, float | None] | None = None
-    intervals: Mapping[str, Interval] = field(default_factory=dict)  # by score name, where computed
+    intervals: Mapping[str, ConfidenceInterval] = field(default_factory=dict)  # by score name, where computed
     counts: Mapping[str, int] = field(default_factory=dict)
     truncated: Mapping[str, int] = field(default_factory=dict)
     n_out_of_range: int | None = None
@@ -343,7 +343,7 @@ def progress(submission: Submission) -> Progress:
         scores=scored.values if scored else None,
         intervals=scored.intervals if scored else {},
         # PostgreSQL gives JSON back in an order of its own.
-        counts={name: counts[name] for name in evaluation.edition.rules.interval_names if name in counts},
+        counts={name: counts[name] for name in evaluation.edition.rules.range_names if name in counts},
         truncated=report.get("truncated", {}),
         n_out_of_range=report.get("n_out_of_range"),
         warnings=report.get("warnings", []),

@@ -10,7 +10,7 @@ from django.db.models import QuerySet
 from evaluator.metrics import registry
 from evaluator.metrics.protocol import OVERALL, PRIMARY
 from leaderboard.boards import snapshots
-from leaderboard.boards.rows import Entry, Interval, profile_of, scored_of, submitted_entry
+from leaderboard.boards.rows import ConfidenceInterval, Entry, profile_of, scored_of, submitted_entry
 from leaderboard.boards.snapshots import CurrentBoard
 from leaderboard.models import Edition, Evaluation, Score, Status, Submission, Visibility
 from leaderboard.statistics import confidence
@@ -22,7 +22,7 @@ AWAITED_FOR = timedelta(minutes=5)
 
 
 @dataclass(frozen=True)
-class BoardPlace:
+class BoardPosition:
     """Where a scored submission is on the present board."""
 
     edition: Edition
@@ -30,31 +30,31 @@ class BoardPlace:
     rank: int | None = None  # None where another submission of its method is the row
     n_ranked: int = 0
     is_supposed: bool = False  # the method is private, and this is the rank that it would have
-    intervals: Mapping[str, Interval] = field(default_factory=dict)
+    intervals: Mapping[str, ConfidenceInterval] = field(default_factory=dict)
     best: frozenset[str] = frozenset()
     second: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
-class SubmissionResult:
+class SubmissionView:
     """A submission, how far it is, and where it stands, if it does."""
 
     submission: Submission
     progress: Progress
-    place: BoardPlace | None
+    place: BoardPosition | None
     awaits_intervals: bool  # scored a moment ago, and they are about to come
 
     @property
-    def intervals(self) -> Mapping[str, Interval]:
+    def intervals(self) -> Mapping[str, ConfidenceInterval]:
         return published_intervals(self.progress, self.place)
 
 
-def of(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionResult, ...]:
+def for_submissions(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionView, ...]:
     """What came of these submissions, best fetched with their evaluations, editions and scores."""
     told = [(submission, intake.progress(submission)) for submission in rows]
     places = _places([each for each in told if _is_on_board(*each)])
     return tuple(
-        SubmissionResult(
+        SubmissionView(
             submission=submission,
             progress=progress,
             place=places.get(submission.pk),
@@ -64,7 +64,7 @@ def of(rows: Iterable[Submission], *, now: datetime) -> tuple[SubmissionResult, 
     )
 
 
-def place_of(submission: Submission, progress: Progress) -> BoardPlace | None:
+def board_position_of(submission: Submission, progress: Progress) -> BoardPosition | None:
     """Where one submission is; None unless it stands in the published edition."""
     return (
         _places([(submission, progress)]).get(submission.pk) if _is_on_board(submission, progress) else None
@@ -106,14 +106,14 @@ def why_no_intervals(submission: Submission, progress: Progress, *, now: datetim
     )
 
 
-def published_intervals(progress: Progress, place: BoardPlace | None) -> Mapping[str, Interval]:
+def published_intervals(progress: Progress, place: BoardPosition | None) -> Mapping[str, ConfidenceInterval]:
     """The confidence intervals of the values, and rank ranges if it is a row of the present board."""
     return place.intervals if place else _without_ranges(progress.intervals)
 
 
-def _without_ranges(intervals: Mapping[str, Interval]) -> dict[str, Interval]:
+def _without_ranges(intervals: Mapping[str, ConfidenceInterval]) -> dict[str, ConfidenceInterval]:
     return {
-        name: Interval(low=found.low, high=found.high)
+        name: ConfidenceInterval(low=found.low, high=found.high)
         for name, found in intervals.items()
         if found.low is not None
     }
@@ -126,7 +126,7 @@ def _is_on_board(submission: Submission, progress: Progress) -> bool:
     return progress.state == Status.SCORED and submission.withdrawn_at is None
 
 
-def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPlace]:
+def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPosition]:
     if not told:
         return {}
     wanted = {submission.split_id for submission, _ in told}
@@ -151,11 +151,11 @@ def _places(told: Sequence[tuple[Submission, Progress]]) -> dict[UUID, BoardPlac
 
 def _place(
     submission: Submission, progress: Progress, edition: Edition, drawn: CurrentBoard, *, best: set[UUID]
-) -> BoardPlace:
+) -> BoardPosition:
     n_ranked = sum(row.rank is not None for row in drawn.entries)
     row = next((row for row in drawn.entries if row.submission_id == submission.pk), None)
     if row is not None:
-        return BoardPlace(
+        return BoardPosition(
             edition=edition,
             rows=drawn.entries,
             rank=row.rank,
@@ -164,7 +164,7 @@ def _place(
             best=row.best,
             second=row.second,
         )
-    place = BoardPlace(
+    place = BoardPosition(
         edition=edition, rows=drawn.entries, n_ranked=n_ranked, intervals=_without_ranges(progress.intervals)
     )
     if submission.pk not in best:
@@ -192,14 +192,14 @@ def _entry_in(editions: Iterable[Edition]) -> QuerySet[Score]:
         evaluation__status=Status.SCORED,
         evaluation__submission__withdrawn_at=None,
         metric=PRIMARY,
-        interval=OVERALL,
+        ttc_range=OVERALL,
     ).order_by("value", "evaluation__submission__submitted_at")
 
 
 # --- what is beside it -----------------------------------------------------------------------------------
 
 
-def teams_best_other(submission: Submission, place: BoardPlace) -> Entry | None:
+def teams_best_other(submission: Submission, place: BoardPosition) -> Entry | None:
     """The team's best other entry on the same board, private ones included."""
     others = _entry_in([place.edition]).filter(evaluation__submission__method__team=submission.method.team_id)
     found = others.exclude(evaluation__submission=submission).values_list("evaluation", flat=True).first()
@@ -221,7 +221,7 @@ def teams_best_other(submission: Submission, place: BoardPlace) -> Entry | None:
     return replace(entry, intervals=next((row.intervals for row in rows), entry.intervals))
 
 
-def nearest_published(progress: Progress, place: BoardPlace) -> Entry | None:
+def nearest_published(progress: Progress, place: BoardPosition) -> Entry | None:
     """The row printed in a paper whose MiD is nearest; of two as near the better one."""
     mid = (progress.scores or {}).get(PRIMARY)
     near = [

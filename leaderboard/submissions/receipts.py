@@ -35,7 +35,7 @@ def receipt(*, submission: Submission, edition_number: int | None = None) -> str
         "scores": {
             name: receipts.decimal(scores[name], decimals=edition.decimals) for name in rules.score_names
         },
-        "counts": {name: counts[name] for name in rules.interval_names},
+        "counts": {name: counts[name] for name in rules.range_names},
         "scored_at": f"{evaluation.finished_at:%Y-%m-%dT%H:%M:%SZ}",
     }
     return receipts.sign(document, private_key=private_key())

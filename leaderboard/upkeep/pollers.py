@@ -81,7 +81,7 @@ def sweep(*, rng: random.Random) -> None:
     """
     lifecycle.release_expired(rng=rng)
     visibility.reveal_due(now=clock.database_now())
-    board_versions.times_passed(now=clock.database_now())
+    board_versions.bump_passed_deadlines(now=clock.database_now())
     analyses.delete_hidden()
     rate_limits.purge_expired(now=clock.database_now())
     due = Evaluation.objects.due()

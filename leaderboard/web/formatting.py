@@ -5,7 +5,7 @@ from datetime import UTC, datetime
 from django.utils.html import format_html, format_html_join
 from django.utils.safestring import SafeString
 
-from evaluator import format_published
+from evaluator import format_rounded
 from evaluator.counting import counted
 
 
@@ -33,7 +33,7 @@ def signed(value: float, *, decimals: int = 2) -> str:
     >>> signed(-4.1), signed(0.204), signed(-0.001), signed(-4.1, decimals=1)
     ('−4.10', '+0.20', '0.00', '−4.1')
     """
-    text = format_published(abs(value), decimals=decimals)
+    text = format_rounded(abs(value), decimals=decimals)
     if not float(text):
         return text
     return f"{'−' if value < 0 else '+'}{text}"

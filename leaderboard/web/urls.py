@@ -136,7 +136,11 @@ urlpatterns = [
         name="maintain_admission_end",
     ),
     path("maintain/teams/<uuid:team_id>/", moderation_views.team, name="maintain_team"),
-    path("maintain/deeds/<slug:deed_name>/<slug:subject_id>/", moderation_views.deed, name="maintain_deed"),
+    path(
+        "maintain/actions/<slug:action_name>/<slug:subject_id>/",
+        moderation_views.action,
+        name="maintain_action",
+    ),
     path("maintain/published/", published_views.published, name="maintain_published"),
     path(
         "maintain/published/<slug:split>/<slug:slug>/remove/",

@@ -26,7 +26,7 @@ OTHERS = {
     "table_name": "main-results",
     "suffix": "csv",
     "slug": "none",
-    "deed_name": "rename-team",
+    "action_name": "rename-team",
     "chosen": "csv",
     "secret": "none",
     "handle": str(UUID(int=0)),

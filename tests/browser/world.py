@@ -69,12 +69,12 @@ def populate() -> str:
     intake.withdraw(submission=gone, actor=rival, now=timezone.now())
     _spread_over_months()
     with transaction.atomic():
-        board_versions.changed(SPLIT)
+        board_versions.bump(SPLIT)
     shown = Submission.objects.get(method__name="Feature pyramid, two frames")
     second = Submission.objects.get(method__name="Dense scale matching")
     five = list(Method.objects.filter(name__in=METHODS).values_list("pk", flat=True))
     for methods in ([shown.method_id, second.method_id], five):
-        comparisons.of(
+        comparisons.compare(
             methods=methods,
             split=Split.objects.get(pk=SPLIT),
             viewer=AnonymousUser(),

@@ -71,9 +71,9 @@ class Faults:
 
     # --- the plan ----------------------------------------------------------------------------------------
 
-    def _at(self, delay_s: float, deed: Callable[[], None]) -> None:
+    def _at(self, delay_s: float, action: Callable[[], None]) -> None:
         self._n_planned += 1
-        heapq.heappush(self._plan, (time.monotonic() + delay_s, self._n_planned, deed))
+        heapq.heappush(self._plan, (time.monotonic() + delay_s, self._n_planned, action))
 
     def _repeat(self, period_s: float, fault: Callable[[], None], *, is_regular: bool = False) -> None:
         def once() -> None:

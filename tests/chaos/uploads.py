@@ -13,7 +13,7 @@ import httpx
 import numpy as np
 
 import evaluator
-from evaluator import Rejected, published
+from evaluator import Rejected, rounded
 from evaluator.limits import READY
 from leaderboard.sandbox.fork_server import environment
 from tests.chaos.processes import REPOSITORY
@@ -65,7 +65,7 @@ def _with_expectation(name: str, data: bytes, truth: evaluator.GroundTruth) -> U
     except Rejected as rejected:
         codes = tuple(problem.code for problem in rejected.problems)
         return Upload(name=name, data=data, state="REJECTED", problems=codes)
-    scores = {metric: published(value, decimals=1) for metric, value in report.flat().items()}
+    scores = {metric: rounded(value, decimals=1) for metric, value in report.flat().items()}
     return Upload(name=name, data=data, state="SCORED", scores=scores)
 
 

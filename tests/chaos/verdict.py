@@ -16,7 +16,7 @@ ROWS = """
            extract(epoch FROM e.finished_at - s.submitted_at)::float AS took_s,
            (SELECT count(*) FROM leaderboard_auditevent a WHERE a.noun_id = e.id::text
              AND a.verb IN ('scored', 'rejected', 'system_error')) AS n_decisions,
-           (SELECT json_object_agg(metric || '_' || "interval", value) FROM leaderboard_score c
+           (SELECT json_object_agg(metric || '_' || ttc_range, value) FROM leaderboard_score c
              WHERE c.evaluation_id = e.id) AS scores,
            (SELECT count(*) FROM leaderboard_score c WHERE c.evaluation_id = e.id) AS n_scores
     FROM leaderboard_submission s JOIN leaderboard_method m ON m.id = s.method_id

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 
-from evaluator import INTERVALS, PROBLEM_CODES, PROTOCOLS, GroundTruth, read_predictions
+from evaluator import PROBLEM_CODES, PROTOCOLS, TTC_RANGES, GroundTruth, read_predictions
 from evaluator.truth.csv_tables import Table
 from tests.evaluator.worlds import REPOSITORY
 
@@ -46,7 +46,7 @@ def test_every_problem_has_its_line() -> None:
 
 def test_every_protocol_and_interval_is_described() -> None:
     assert [name for name in PROTOCOLS if f"`{name}`" not in SCORING] == []
-    for interval in INTERVALS:
+    for interval in TTC_RANGES:
         low, high = (f"{value:g}".replace("-", "−") for value in (interval.low_s, interval.high_s))
         assert interval.name in SCORING
         assert f"{low} ≤ τ ≤ {high}" in SCORING

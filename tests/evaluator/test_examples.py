@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from evaluator import INTERVALS, Predictions, evaluate, read_predictions, read_truth
+from evaluator import TTC_RANGES, Predictions, evaluate, read_predictions, read_truth
 from evaluator.cli import own_commands
 from evaluator.cli.exits import Exit
 from tests.evaluator.worlds import EXAMPLES, REPOSITORY
@@ -42,7 +42,7 @@ def test_arrays_come_straight_to_a_report(tmp_path: Path) -> None:
 
 def test_a_frame_comes_straight_to_a_report(tmp_path: Path) -> None:
     values = dict(line.split() for line in printed(EXAMPLES / "from_frame.py", tmp_path))
-    assert len(values) == 2 * (1 + len(INTERVALS))
+    assert len(values) == 2 * (1 + len(TTC_RANGES))
     assert values["rte_crucial"] == "5.00", "five percent too long, where nothing is truncated"
 
 

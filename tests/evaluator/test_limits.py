@@ -44,12 +44,12 @@ def vm_readv():
     ctypes.CDLL(None).process_vm_readv(pid, ctypes.byref(ours), 1, ctypes.byref(theirs), 1, 0)
     return into.raw
 
-for name, deed in (("mem", mem), ("process_vm_readv", vm_readv),
+for name, action in (("mem", mem), ("process_vm_readv", vm_readv),
                    ("environ", lambda: open(f"/proc/{pid}/environ", "rb").read()),
                    ("fd", lambda: str(os.listdir(f"/proc/{pid}/fd")).encode() and b"secret"),
                    ("root", lambda: str(os.listdir(f"/proc/{pid}/root")).encode() and b"secret")):
     try:
-        reached = b"secret" in deed()
+        reached = b"secret" in action()
     except OSError:
         reached = False
     if reached:

@@ -35,7 +35,7 @@ def fields(**changed: Any) -> dict[str, Any]:
         "file": "sha256:" + "b" * 64,
         "method": {"id": UUID, "name": "Foo τ “++”"},
         "scores": dict.fromkeys(SCORE_NAMES, "15.03") | {"rte_negative": None},
-        "counts": dict.fromkeys(get_protocol("tsttc-1").interval_names, 120),
+        "counts": dict.fromkeys(get_protocol("tsttc-1").range_names, 120),
         "scored_at": "2026-11-21T10:00:00Z",
         **changed,
     }

@@ -99,10 +99,10 @@ from evaluator.system_calls import allow_only_reading
 allow_only_reading()
 refused = []
 libc = ctypes.CDLL(None, use_errno=True)
-for deed in (lambda: open("/etc/passwd"), lambda: os.listdir("/"), lambda: os.kill(os.getppid(), 0), os.fork,
+for act in (lambda: open("/etc/passwd"), lambda: os.listdir("/"), lambda: os.kill(os.getppid(), 0), os.fork,
              lambda: os.unlink("/nowhere"), lambda: os.stat("/"), lambda: os.dup(1), lambda: os.pipe()):
     try:
-        deed()
+        act()
     except OSError as fault:
         refused.append(fault.errno)
 ended = libc.prctl(22, 2, None), ctypes.get_errno()

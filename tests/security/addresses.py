@@ -97,7 +97,7 @@ def _filled(route: Route, scene: Scene) -> Iterator[str]:
         "guide_name": ("researchers", "api-guide", "adr/0001-the-evaluator-is-arithmetic", "nowhere"),
         "name": ("main-results", "nowhere"),
         "table_name": ("main-results", "nowhere"),
-        "deed_name": ("rename-team", "nowhere"),
+        "action_name": ("rename-team", "nowhere"),
         "suffix": ("csv", "tex", "md", "bib"),
         "operation_id": ("submit", "board", "nothing"),
         "page_name": ("rules", "contact", "privacy", "imprint", "licence"),

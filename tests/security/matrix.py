@@ -146,7 +146,7 @@ LINES: dict[str, Line] = {
     "maintain_admission_end": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     "maintain_splits": line(GET=KEEPERS),
     "maintain_team": line(GET=KEEPERS),
-    "maintain_deed": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"deed_name": "rename-team"}),
+    "maintain_action": line(GET=KEEPERS, POST="in 404 404 404 422 in in", at={"action_name": "rename-team"}),
     "maintain_published": line(GET=KEEPERS, POST="in 404 404 404 422 in in"),
     # An empty form takes the line away.
     "maintain_announcement": line(GET=KEEPERS, POST="in 404 404 404 302 in in"),

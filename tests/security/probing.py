@@ -24,7 +24,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator import Difference, published
+from evaluator import Difference, rounded
 from evaluator.scoring.differences import rounded_difference, sign_flips
 from evaluator.scoring.uncertainty import Bootstrap
 
@@ -145,7 +145,7 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
         shown = rounded_difference(gap, first=mean, second=other, decimals=1)
         told = disclosure.published_difference(gap, shown, edition=edition)
         answers.append(
-            (*map(repr, ends[i].tolist()), published(mean, decimals=1), told.low, told.high, told.p_below)
+            (*map(repr, ends[i].tolist()), rounded(mean, decimals=1), told.low, told.high, told.p_below)
         )
     return answers
 
@@ -189,7 +189,7 @@ def _fit(
     n, base = world.counts[:, column].sum(), world.base[:, column].sum()
     sums = world.moved(masks).sum(axis=0)
     truth = world.mask(column)
-    before, after = (published(total / n, decimals=decimals) for total in (base, base + sums[truth]))
+    before, after = (rounded(total / n, decimals=decimals) for total in (base, base + sums[truth]))
     assert before is not None
     assert after is not None
     # Either mean is rounded: their difference is known to one unit of the last digit.

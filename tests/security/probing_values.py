@@ -17,7 +17,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator import published
+from evaluator import rounded
 
 Floats = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def median_error(
 
 
 def _published(mean: float, places: int) -> float:
-    shown = published(mean, decimals=places)
+    shown = rounded(mean, decimals=places)
     assert shown is not None
     return shown
 

@@ -17,7 +17,7 @@ from pytest_django.fixtures import Settings
 from evaluator.tables.escaping import guarded
 from leaderboard.models import Edition, Method, Split, Status, User, Visibility
 from leaderboard.queue import lifecycle
-from leaderboard.queue.lifecycle import Outcome
+from leaderboard.queue.lifecycle import RunResult
 from tests import builders, pages
 from tests.leaderboard.web.test_every_page import assert_nothing_from_elsewhere, assert_nothing_inline
 from tests.security.hostile_names import NAMES
@@ -75,7 +75,7 @@ def named(edition: Edition, owner: User, settings: Settings) -> Named:
             refused.append(name)
             said(response)
     leases = lifecycle.claim(lease_s=60, wall_s=60, limit=1000)
-    outcome = Outcome(status=Status.SCORED, scores=SCORES, report={"counts": {}, "truncated": {}})
+    outcome = RunResult(status=Status.SCORED, scores=SCORES, report={"counts": {}, "truncated": {}})
     lifecycle.finalise_many([(lease, outcome) for lease in leases])
     Method.objects.update(visibility=Visibility.PUBLIC, shown_at=timezone.now())
     return Named(owner=owner, names=list(Method.objects.values_list("name", flat=True)), refused=refused)

@@ -26,8 +26,8 @@ WHOLE = os.environ.get("TSTTC_SECURITY_WHOLE") == "1"
 ADDRESSES_IN_THE_SUITE = 640
 # Random in every answer by its nature: the token of a form, and the name of a request in the log.
 FORM_TOKEN = re.compile(rb'(?<=name="csrfmiddlewaretoken" value=")[^"]+|(?<=X-CSRFToken": ")[^"]+')
-# The database's clock: when a person's own deeds were written down, in the file of what is kept of them.
-OWN_DEED_AT = re.compile(rb'(?<="at": ")[^"]+')
+# The database's clock: when a person's own actions were written down, in the file of what is kept of them.
+OWN_ACTION_AT = re.compile(rb'(?<="at": ")[^"]+')
 OWN_DATA = "/account/data.json"
 RANDOM_HEADERS = {"X-Request-ID"}
 RANDOM_COOKIES = {"csrftoken"}
@@ -74,7 +74,7 @@ def looked_at(directory: Path, *, has_secrets: bool, limit: int | None) -> dict[
             for role, client in (("anonymous", visitor), ("stranger", stranger)):
                 found[role, path] = seen(client.get(path))
                 if path.partition("?")[0] == OWN_DATA:
-                    body = OWN_DEED_AT.sub(b"...", found[role, path].body)
+                    body = OWN_ACTION_AT.sub(b"...", found[role, path].body)
                     found[role, path] = replace(found[role, path], body=body)
         transaction.set_rollback(True)
     return found

@@ -65,7 +65,7 @@ def test_an_anonymous_successor_is_not_told_from_its_predecessor(
 
     Method.objects.filter(pk=later).update(visibility=Visibility.PUBLIC)
     with transaction.atomic():
-        board_versions.changed("test")
+        board_versions.bump("test")
     strangers, relatives = correlation(client, other, later), correlation(client, former, later)
     assert strangers is not None
     assert relatives is not None

@@ -5,7 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from evaluator import INTERVALS
+from evaluator import TTC_RANGES
 from evaluator.metrics.scale import ttc_to_scale_ratio
 from tsttc_baselines import simulation
 from tsttc_baselines.highway import SHARES
@@ -20,15 +20,15 @@ def drawn() -> Split:
 
 
 def test_a_split_has_the_shares_of_the_dataset_to_the_sequence(drawn: Split) -> None:
-    counts = drawn.truth.counts_of(INTERVALS)
+    counts = drawn.truth.counts_of(TTC_RANGES)
     assert counts == {name: pytest.approx(share * N, abs=1) for name, share in SHARES.items()}
-    assert drawn.truth.n_outside(INTERVALS) == 0
+    assert drawn.truth.n_outside(TTC_RANGES) == 0
     assert drawn.truth.manifest.n_recordings == 50
 
 
 def test_sequences_beyond_20_s_lie_in_no_range() -> None:
     drawn = split(rng=np.random.default_rng(1), n_sequences=500, n_recordings=9, shape=SHAPES["test"])
-    assert drawn.truth.n_outside(INTERVALS) == 8
+    assert drawn.truth.n_outside(TTC_RANGES) == 8
 
 
 def test_the_same_generator_gives_the_same_split_and_another_one_another(drawn: Split) -> None:

@@ -15,7 +15,7 @@ from typing import Final
 
 import numpy as np
 
-from evaluator.metrics.protocol import INTERVALS, OVERALL
+from evaluator.metrics.protocol import OVERALL, TTC_RANGES
 from evaluator.metrics.registry import MID
 from evaluator.metrics.scale import FRAME_RATE_HZ, Floats
 from evaluator.problems import reject
@@ -83,7 +83,7 @@ def label_noise(earlier_s: Floats, later_s: Floats, *, n_frames: int = 10) -> li
     jitter = MID.errors(earlier_s - STEP_S, later_s)
     is_defined = np.isfinite(jitter)
     jitter, later_s = jitter[is_defined], later_s[is_defined]
-    ranges = [(OVERALL, -math.inf, math.inf), *((r.name, r.low_s, r.high_s) for r in INTERVALS)]
+    ranges = [(OVERALL, -math.inf, math.inf), *((r.name, r.low_s, r.high_s) for r in TTC_RANGES)]
     found = []
     for name, low_s, high_s in ranges:
         inside = jitter[(later_s >= low_s) & (later_s <= high_s)]

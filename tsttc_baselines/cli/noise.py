@@ -13,7 +13,7 @@ from evaluator.cli.failures import echo_json
 from evaluator.cli.layout import NO_VALUE, Cell, aligned
 from evaluator.cli.options import default_option, json_option
 from evaluator.cli.reading import TABLE, naming
-from evaluator.metrics.protocol import known_intervals
+from evaluator.metrics.protocol import known_ranges
 from tsttc_baselines.cli.options import TRUTH
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ def _pairs(source: Path) -> tuple[Floats, Floats]:
 
 def _in_words(found: Sequence[LabelNoise], n_frames: int) -> Iterator[str]:
     """The table, its units, and what it takes for granted."""
-    ranges = known_intervals()
+    ranges = known_ranges()
     rows = [[Cell(text, is_bold=True) for text in ("TTC range", "pairs", "jitter", "noise")]]
     for each in found:
         name = ranges[each.name].seconds if each.name in ranges else each.name

@@ -97,9 +97,9 @@ def _page(request: HttpRequest, *, status: int = 200, **context: Any) -> HttpRes
     return shown_once.render_with(request, "account/team.html", context, at="team", status=status)
 
 
-def _done(request: HttpRequest, deed: Callable[[], object], *, told: str) -> HttpResponse:
+def _done(request: HttpRequest, action: Callable[[], object], *, told: str) -> HttpResponse:
     try:
-        deed()
+        action()
     except Refused as refusal:
         return _page(request, refusal=str(refusal), status=422)
     messages.success(request, told)

@@ -99,5 +99,5 @@ def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
         edition=found,
         past=past,
         change=edition_tables.past_change(past),
-        intervals=tables.counted_ranges(found.rules, found.ground_truth.counts),
+        ttc_ranges=tables.counted_ranges(found.rules, found.ground_truth.counts),
     )

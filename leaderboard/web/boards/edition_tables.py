@@ -5,7 +5,7 @@ from typing import Any, Final
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import history
 from leaderboard.editions.corrections import RescoringProgress
@@ -114,7 +114,7 @@ def _mid(evaluation: Evaluation | None) -> str:
     if evaluation is None:
         return tables.ABSENT
     mid = flat_scores(evaluation)[PRIMARY]
-    return format_published(mid, decimals=evaluation.edition.decimals)
+    return format_rounded(mid, decimals=evaluation.edition.decimals)
 
 
 def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
@@ -197,8 +197,8 @@ def _change_row(change: Change, names: Sequence[str]) -> dict[str, Any]:
 def _difference(name: str, change: Change) -> dict[str, str]:
     delta, css = change.delta[name], column_css(name).replace("wide", "")
     return {
-        "old": format_published(change.old.get(name), decimals=change.old_decimals),
-        "new": format_published(change.new.get(name), decimals=change.new_decimals),
+        "old": format_rounded(change.old.get(name), decimals=change.old_decimals),
+        "new": format_rounded(change.new.get(name), decimals=change.new_decimals),
         "delta": delta_words(delta, decimals=max(change.old_decimals, change.new_decimals)),
         "css": css if delta else f"{css} same".strip(),
     }

@@ -12,13 +12,13 @@ from evaluator.metrics.protocol import (
     OVERALL,
     PRIMARY,
     grouped_names,
-    interval_of,
-    known_intervals,
+    known_ranges,
     metric_of,
+    range_of,
     split_name,
 )
-from evaluator.scoring.report import format_published
-from leaderboard.boards.rows import Entry, Interval
+from evaluator.scoring.report import format_rounded
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import BoardQuery
 from leaderboard.web.boards.whiskers import WhiskerScale
@@ -88,7 +88,7 @@ class Group:
 
 
 def ends_of(entry: Entry, name: str) -> whiskers.Ends | None:
-    found = entry.intervals.get(name, Interval())
+    found = entry.intervals.get(name, ConfidenceInterval())
     return None if found.low is None or found.high is None else (found.low, found.high)
 
 
@@ -99,7 +99,7 @@ def place_of(name: str) -> str:
     >>> place_of("mid"), place_of("rte_crucial")
     ('at0', 'at1')
     """
-    return f"at{(OVERALL, *known_intervals()).index(split_name(name)[1])}"
+    return f"at{(OVERALL, *known_ranges()).index(split_name(name)[1])}"
 
 
 def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, ...]:
@@ -116,7 +116,7 @@ def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, .
 
 def score_heading(name: str, query: BoardQuery | None = None, scale: WhiskerScale | None = None) -> Heading:
     """The head of a score's column."""
-    metric, interval = metric_of(name), interval_of(name)
+    metric, interval = metric_of(name), range_of(name)
     seconds = f"{interval.name} {interval.seconds}" if interval else OVERALL
     return Heading(
         name=name,
@@ -143,11 +143,11 @@ def score_cells(
     """The numbers of a result, all or those of these names, each with its interval where it has one."""
     cells = []
     for name in entry.scores if names is None else names:
-        value, found = entry.scores.get(name), entry.intervals.get(name, Interval())
+        value, found = entry.scores.get(name), entry.intervals.get(name, ConfidenceInterval())
         scale = scales.get(name)
         cells.append(
             Cell(
-                text=format_published(value, decimals=entry.decimals),
+                text=format_rounded(value, decimals=entry.decimals),
                 css=cell_css(name, value, entry.decimals),
                 place=place_of(name),
                 is_best=name in entry.best,
@@ -163,7 +163,7 @@ def score_cells(
     return tuple(cells)
 
 
-def interval_words(found: Interval, *, decimals: int = SCORED_DECIMALS) -> str:
+def interval_words(found: ConfidenceInterval, *, decimals: int = SCORED_DECIMALS) -> str:
     """From where to where a value may lie; empty where that is not known.
 
     >>> interval_words(Interval(low=13.9, high=14.523)), interval_words(Interval())
@@ -173,7 +173,7 @@ def interval_words(found: Interval, *, decimals: int = SCORED_DECIMALS) -> str:
     """
     if found.low is None or found.high is None:
         return ""
-    low, high = (format_published(end, decimals=decimals) for end in (found.low, found.high))
+    low, high = (format_rounded(end, decimals=decimals) for end in (found.low, found.high))
     return f"{low} to {high}"
 
 

@@ -11,12 +11,11 @@ from uuid import UUID
 
 from django.core.paginator import Page, Paginator
 
-from evaluator.metrics.protocol import PRIMARY, Protocol, grouped_names, interval_of
-from evaluator.metrics.protocol import Interval as TTCRange
+from evaluator.metrics.protocol import PRIMARY, Protocol, TTCRange, grouped_names, range_of
 from evaluator.scoring.scores import floor_sentence
 from leaderboard.boards import movement
 from leaderboard.boards.query import Board
-from leaderboard.boards.rows import Entry, Interval
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.exports.tables import team_of
 from leaderboard.models import Edition, Visibility
 from leaderboard.statistics import confidence
@@ -99,7 +98,7 @@ class BoardTable:
     rows: tuple[BoardRow, ...]
     moved_since: date | None  # None where no rank has moved
     sources: list[tuple[str, str]]  # what published rows are quoted from: citation and address
-    intervals: list[tuple[TTCRange, int | None]]  # with the number of sequences in each
+    ttc_ranges: list[tuple[TTCRange, int | None]]  # with the number of sequences in each
     pages: "Page[Entry]"
     has_intervals: bool
     has_one_whisker: bool  # in a column of its own before all numbers
@@ -167,7 +166,7 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         rows=rows,
         moved_since=movement.since(now=now).date() if any(row.moved for row in rows) else None,
         sources=sources,
-        intervals=counted_ranges(board.rules, counts),
+        ttc_ranges=counted_ranges(board.rules, counts),
         pages=pages,
         has_intervals=bool(scales),
         can_compare=_is_present(board) and sum(row.can_be_compared for row in rows) > 1,
@@ -227,18 +226,18 @@ def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Whisker
 def _places(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:
     sorted_by = query.sort.removeprefix("-")
     chosen = place_of(sorted_by) if sorted_by in names else place_of(PRIMARY)
-    labels = {place_of(name): found.seconds if (found := interval_of(name)) else "Overall" for name in names}
+    labels = {place_of(name): found.seconds if (found := range_of(name)) else "Overall" for name in names}
     return tuple((place, label, place == chosen) for place, label in labels.items())
 
 
 def counted_ranges(rules: Protocol, counts: Mapping[str, int]) -> list[tuple[TTCRange, int | None]]:
     """The TTC ranges of a protocol, in its order, each with the number of sequences in it."""
-    return [(each, counts.get(each.name)) for each in rules.intervals]
+    return [(each, counts.get(each.name)) for each in rules.ranges]
 
 
 def rank_range(entry: Entry) -> str:
     """Where an entry may stand at 95 %, behind its rank; empty where that is not known."""
-    found = entry.intervals.get(PRIMARY, Interval())
+    found = entry.intervals.get(PRIMARY, ConfidenceInterval())
     if found.rank_low is None or found.rank_high is None:
         return ""
     if found.rank_low == found.rank_high:

@@ -7,7 +7,7 @@ from typing import Any, Final
 from evaluator.counting import counted
 from evaluator.metrics.protocol import known_metrics
 from evaluator.metrics.registry import MID, Metric
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.models import Analysis
 from leaderboard.web.charts.chart_options import (
     Chart,
@@ -49,12 +49,12 @@ def error_analysis_tables(closer: Analysis) -> dict[str, Any]:
         "histogram": histogram(content["histogram"]),
         "errors": errors,
         "quantiles": [
-            (f"{100 * row[0]['quantile']:.0f} %", [format_published(each["value"]) for each in row])
+            (f"{100 * row[0]['quantile']:.0f} %", [format_rounded(each["value"]) for each in row])
             for row in quantiles
         ],
         "scatter": scatter(content["scatter"]),
         "worst": [
-            (row["recording"], grouped(row["n"]), [format_published(row[metric.name]) for metric in errors])
+            (row["recording"], grouped(row["n"]), [format_rounded(row[metric.name]) for metric in errors])
             for row in content["worst"]
         ],
     }
@@ -144,10 +144,10 @@ def _seconds(row: Row) -> str:
 
 
 def _value_words(row: Row, metric: Metric) -> str:
-    value, interval = format_published(row[metric.name]), _interval(row, metric)
+    value, interval = format_rounded(row[metric.name]), _interval(row, metric)
     if interval is None:
         return value
-    return f"{value} ({format_published(interval[0])} to {format_published(interval[1])})"
+    return f"{value} ({format_rounded(interval[0])} to {format_rounded(interval[1])})"
 
 
 # --- how errors are distributed --------------------------------------------------------------------------
@@ -181,8 +181,8 @@ def histogram(bins: Sequence[Row]) -> Chart:
 
 
 def _bin_words(row: Row) -> str:
-    low, high = format_published(row["low"]), row["high"]
-    return f"{low} and more" if high is None else f"{low} to {format_published(high)}"
+    low, high = format_rounded(row["low"]), row["high"]
+    return f"{low} and more" if high is None else f"{low} to {format_rounded(high)}"
 
 
 def _bar_ticks(bins: Sequence[Row]) -> list[tuple[float, str]]:

@@ -15,7 +15,7 @@ from django.utils.safestring import SafeString
 
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.metrics.registry import MID
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.exports.tables import team_of
@@ -106,7 +106,7 @@ def _value_cells(found: Sequence[_Placed]) -> list[SafeString]:
         format_html(
             '<span class="{}">{}</span>',
             decimals_css(each.entry, most).strip(),
-            format_published(each.y, decimals=each.entry.decimals),
+            format_rounded(each.y, decimals=each.entry.decimals),
         )
         for each in found
     ]

@@ -13,7 +13,7 @@ from typing import Any, Final
 from django.urls import reverse
 
 from evaluator.metrics.registry import Metric
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.boards.rows import Entry
 
 Option = dict[str, Any]
@@ -90,7 +90,7 @@ def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:
     >>> error_text(MID, 14.3, decimals=2)
     'MiD 14.30'
     """
-    return f"{metric.symbol} {format_published(value, decimals=decimals)}"
+    return f"{metric.symbol} {format_rounded(value, decimals=decimals)}"
 
 
 # --- axes ------------------------------------------------------------------------------------------------

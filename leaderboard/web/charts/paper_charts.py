@@ -92,8 +92,8 @@ def _series(
     legend: str, name: str, points: Sequence[tuple[float, float, PublishedRow]], *, place: int, grid: int
 ) -> list[Option]:
     """A line and its marks; the mark of the default is larger."""
-    metric, interval = metric_of(name), split_name(name)[1]
-    named = metric.symbol if interval == OVERALL else f"{metric.symbol} {interval}"
+    metric, ttc_range = metric_of(name), split_name(name)[1]
+    named = metric.symbol if ttc_range == OVERALL else f"{metric.symbol} {ttc_range}"
     found = [
         Mark(
             x,

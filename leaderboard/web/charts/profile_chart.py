@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from django.utils.html import format_html
 from django.utils.safestring import SafeString
 
-from evaluator.metrics.protocol import OVERALL, PRIMARY, grouped_names, interval_of, metric_of, split_name
-from evaluator.scoring.report import format_published
-from leaderboard.boards.rows import Entry, Interval
+from evaluator.metrics.protocol import OVERALL, PRIMARY, grouped_names, metric_of, range_of, split_name
+from evaluator.scoring.report import format_rounded
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.web.boards.score_columns import figure_css, interval_words
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.charts.board_charts import decimals_css
@@ -45,7 +45,7 @@ def profile(entries: Sequence[Entry]) -> Chart:
     # As if all had the most decimals: the others keep the room of the missing one.
     most = max(entry.decimals for entry in shown)
     css = figure_css(
-        format_published(entry.scores[name], decimals=most) for entry in shown for name in entry.scores
+        format_rounded(entry.scores[name], decimals=most) for entry in shown for name in entry.scores
     )
     names = ", ".join(entry.method for entry in shown)
     return Chart(
@@ -76,7 +76,7 @@ def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
         value
         for entry in shown
         for name in names
-        for found in [entry.intervals.get(name, Interval())]
+        for found in [entry.intervals.get(name, ConfidenceInterval())]
         for value in (entry.scores[name], found.low, found.high)
         if value is not None
     ]
@@ -98,7 +98,7 @@ def _profile_series(
     spans = [
         (x, interval.low, interval.high)
         for x, _, name in places
-        for interval in [entry.intervals.get(name, Interval())]
+        for ttc_range in [entry.ranges.get(name, ConfidenceInterval())]
         if interval.low is not None and interval.high is not None
     ]
     legend = _legend_name(k, entry)
@@ -107,8 +107,8 @@ def _profile_series(
 
 
 def _range_words(name: str) -> str:
-    interval = interval_of(name)
-    return f"{interval.seconds}\n{interval.name}" if interval else OVERALL
+    ttc_range = range_of(name)
+    return f"{ttc_range.seconds}\n{ttc_range.name}" if interval else OVERALL
 
 
 def _named(name: str) -> str:
@@ -116,18 +116,18 @@ def _named(name: str) -> str:
 
 
 def _value_words(entry: Entry, name: str) -> str:
-    words = interval_words(entry.intervals.get(name, Interval()), decimals=entry.decimals)
-    value = format_published(entry.scores[name], decimals=entry.decimals)
+    words = interval_words(entry.intervals.get(name, ConfidenceInterval()), decimals=entry.decimals)
+    value = format_rounded(entry.scores[name], decimals=entry.decimals)
     return f"{value} ({words})" if words else value
 
 
 def _profile_cell(entry: Entry, name: str, css: str, most: int) -> SafeString:
     """A value with its interval for a table; `css` gives what stands before the interval its width."""
-    words = interval_words(entry.intervals.get(name, Interval()), decimals=entry.decimals)
+    words = interval_words(entry.intervals.get(name, ConfidenceInterval()), decimals=entry.decimals)
     return format_html(
         '<span class="{}{}">{}</span>{}',
         css,
         decimals_css(entry, most),
-        format_published(entry.scores[name], decimals=entry.decimals),
+        format_rounded(entry.scores[name], decimals=entry.decimals),
         f" ({words})" if words else "",
     )

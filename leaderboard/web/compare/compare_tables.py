@@ -10,12 +10,12 @@ from django.utils.text import get_text_list
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from evaluator.scoring.significance import told_apart, too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell
 from evaluator.units import in_words
-from leaderboard.boards.rows import Entry, Interval
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.statistics.comparisons import Compared, Pair
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
 from leaderboard.web.charts import profile_chart, svg
@@ -51,7 +51,7 @@ def verdict(compared: Compared) -> str:
     worse, alike = _told_apart(best, tested)
     head = (
         f"Of these {_NUMBERS[len(compared.entries)]}, {best.method} has the lowest MiD, "
-        f"{format_published(best.scores[PRIMARY], decimals=best.decimals)}."
+        f"{format_rounded(best.scores[PRIMARY], decimals=best.decimals)}."
     )
     if compared.reason:
         few = in_words(compared.edition.unit)
@@ -77,7 +77,7 @@ def _told_apart(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[st
         if best not in (pair.first, pair.second):
             continue
         other = pair.second if pair.first == best else pair.first
-        on_board, of_best = (each.intervals.get(PRIMARY, Interval()) for each in (other, best))
+        on_board, of_best = (each.intervals.get(PRIMARY, ConfidenceInterval()) for each in (other, best))
         is_worse = is_apart and not on_board.is_with_best
         is_worse |= (of_best.rank_high or math.inf) < (on_board.rank_low or 0)
         (worse if is_worse else alike).append(other.method)
@@ -119,8 +119,8 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, 
     decimals = pair.first.decimals  # both are of one edition
     return {
         "heading": score_heading(name),
-        "first": format_published(pair.first.scores[name], decimals=decimals),
-        "second": format_published(pair.second.scores[name], decimals=decimals),
+        "first": format_rounded(pair.first.scores[name], decimals=decimals),
+        "second": format_rounded(pair.second.scores[name], decimals=decimals),
         "difference": signed(found.difference, decimals=decimals),
         "interval": ""
         if found.low is None or found.high is None

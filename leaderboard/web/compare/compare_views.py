@@ -39,7 +39,7 @@ def compare(request: HttpRequest) -> HttpResponse:
             raise UnknownSplit(f"There is no split {name[:60]!r}; expected one of {names}.")
         if not wanted:
             return _choose(request, split)
-        compared = comparisons.of(
+        compared = comparisons.compare(
             methods=[comparisons.method_id(text) for text in wanted],
             split=split,
             viewer=request.user,

@@ -8,7 +8,7 @@ from typing import Final
 from django.urls import reverse
 
 from evaluator.metrics.protocol import PRIMARY
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.boards import snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.editions import history
@@ -56,4 +56,4 @@ def _result(entry: Entry) -> str:
     value = entry.scores[PRIMARY]
     if entry.rank is None or value is None:
         return "no MiD"
-    return f"rank {entry.rank}, MiD {format_published(value, decimals=entry.decimals)}"
+    return f"rank {entry.rank}, MiD {format_rounded(value, decimals=entry.decimals)}"

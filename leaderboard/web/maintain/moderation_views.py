@@ -1,4 +1,4 @@
-"""Moderation for maintainers: a team with its people, methods and entries, and each deed on its own page."""
+"""Moderation for maintainers: a team with its people, methods and entries; each action has its own page."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -31,14 +31,14 @@ from leaderboard.web.maintain.maintainer_views import (
 from leaderboard.web.submissions.forms import parse_uuid
 
 
-class DeedForm(SiteForm):
+class ActionForm(SiteForm):
     reason = reason_field(
         "One sentence for the audit log, without names and addresses. The team does not see it.",
         max_length=MAX_REASON,
     )
 
 
-class RenameForm(DeedForm):
+class RenameForm(ActionForm):
     name = forms.CharField(
         label="New name",
         required=False,
@@ -50,7 +50,7 @@ class RenameForm(DeedForm):
     field_order = ("name", "reason")
 
 
-class MoveForm(DeedForm):
+class MoveForm(ActionForm):
     name = forms.CharField(
         label="New team",
         max_length=MAX_NAME,
@@ -70,14 +70,14 @@ _RENAMED: Final = (
 
 
 @dataclass(frozen=True)
-class Deed:
+class Action:
     """Something that a maintainer does to an object of others: what the page says, and what is done."""
 
     model: type[Team | Method | Submission | User]
     heading: str
     lead: str
     button: str
-    form: type[DeedForm]
+    form: type[ActionForm]
     do: Callable[..., object]
 
 
@@ -99,8 +99,8 @@ def _appoint(*, subject: User, now: object, **told: Any) -> None:
     teams.appoint(team=team, to=subject, **told)
 
 
-DEEDS: Final[Mapping[str, Deed]] = {
-    "rename-team": Deed(
+ACTIONS: Final[Mapping[str, Action]] = {
+    "rename-team": Action(
         Team,
         "Rename the team",
         _RENAMED,
@@ -108,7 +108,7 @@ DEEDS: Final[Mapping[str, Deed]] = {
         RenameForm,
         lambda subject, **told: hiding.rename_team(team=subject, **told),
     ),
-    "rename-method": Deed(
+    "rename-method": Action(
         Method,
         "Rename the method",
         _RENAMED,
@@ -116,15 +116,15 @@ DEEDS: Final[Mapping[str, Deed]] = {
         RenameForm,
         lambda subject, **told: hiding.rename_method(method=subject, **told),
     ),
-    "clear-texts": Deed(
+    "clear-texts": Action(
         Method,
         "Delete the texts of the method",
         "Description, paper link and code link are deleted. The team can write new ones.",
         "Delete texts",
-        DeedForm,
+        ActionForm,
         lambda subject, now, **told: hiding.clear_texts(method=subject, **told),
     ),
-    "move-method": Deed(
+    "move-method": Action(
         Method,
         "Move the method to another team",
         "The method, its submissions and its history belong to the other team from now on.",
@@ -132,62 +132,62 @@ DEEDS: Final[Mapping[str, Deed]] = {
         MoveForm,
         _move,
     ),
-    "withdraw": Deed(
+    "withdraw": Action(
         Submission,
         "Withdraw the submission",
         "Its values leave the board; its row stays, marked with the date. This cannot be undone.",
         "Withdraw",
-        DeedForm,
+        ActionForm,
         lambda subject, **told: hiding.withdraw_entry(submission=subject, is_hidden=False, **told),
     ),
-    "hide": Deed(
+    "hide": Action(
         Submission,
         "Hide the submission",
         "It leaves all boards, also those as of earlier dates. Its team still sees it as withdrawn. "
         "This cannot be undone.",
         "Hide",
-        DeedForm,
+        ActionForm,
         lambda subject, **told: hiding.withdraw_entry(submission=subject, is_hidden=True, **told),
     ),
-    "appoint-owner": Deed(
+    "appoint-owner": Action(
         User,
         "Make the person the owner of the team",
         "They own the team from now on, in place of the present owner, who stays a member.",
         "Make owner",
-        DeedForm,
+        ActionForm,
         _appoint,
     ),
-    "close-account": Deed(
+    "close-account": Action(
         User,
         "Close the account",
         "Nobody can sign in to it or use its tokens. Its entries stay.",
         "Close account",
-        DeedForm,
+        ActionForm,
         lambda subject, now, **told: hiding.set_active(user=subject, is_active=False, **told),
     ),
-    "open-account": Deed(
+    "open-account": Action(
         User,
         "Open the account again",
         "The person can sign in again.",
         "Open account",
-        DeedForm,
+        ActionForm,
         lambda subject, now, **told: hiding.set_active(user=subject, is_active=True, **told),
     ),
-    "revoke-tokens": Deed(
+    "revoke-tokens": Action(
         User,
         "Revoke the API tokens of the person",
         "All of them end at once. The person can create new ones.",
         "Revoke tokens",
-        DeedForm,
+        ActionForm,
         lambda subject, **told: tokens.revoke_all(user=subject, **told),
     ),
-    "forget-person": Deed(
+    "forget-person": Action(
         User,
         "Forget the person",
         "The account, its addresses, tokens and invitations are deleted, also file names and notes. "
         "A team without other members loses its name. Scores stay. This cannot be undone.",
         "Forget person",
-        DeedForm,
+        ActionForm,
         lambda subject, **told: forgetting.forget(user=subject, **told),
     ),
 }
@@ -220,11 +220,11 @@ def _with_states(sent: Iterable[Submission]) -> list[Submission]:
 
 
 @maintainers_form
-def deed(request: HttpRequest, deed_name: str, subject_id: str) -> HttpResponse:
-    """Say what a deed does, ask for the reason, and do it."""
-    if deed_name not in DEEDS:
+def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpResponse:
+    """Say what an action does, ask for the reason, and do it."""
+    if action_name not in ACTIONS:
         raise Http404
-    chosen = DEEDS[deed_name]
+    chosen = ACTIONS[action_name]
     try:
         subject: Any = get_object_or_404(chosen.model, pk=chosen.model._meta.pk.to_python(subject_id))
     except ValidationError as fault:
@@ -237,8 +237,8 @@ def deed(request: HttpRequest, deed_name: str, subject_id: str) -> HttpResponse:
             chosen.do(subject=subject, **told)
             messages.success(request, f"Done: {chosen.heading[:1].lower()}{chosen.heading[1:]}.")
             return redirect("maintain_team", team.pk) if team else redirect("maintain_quotas")
-    about = {"deed": chosen, "subject": _name_of(subject), "team": team}
-    return form_page(request, "maintain/deed.html", form, **about)
+    about = {"action": chosen, "subject": _name_of(subject), "team": team}
+    return form_page(request, "maintain/action.html", form, **about)
 
 
 def _team_of(subject: Team | Method | Submission | User) -> Team | None:

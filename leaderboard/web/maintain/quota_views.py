@@ -106,7 +106,7 @@ def admit(request: HttpRequest, team_id: UUID, split: str) -> HttpResponse:
     lead = "The team can submit to the split from now on."
     words = {"heading": "Admit a team", "lead": lead, "button": "Admit"}
     subject = f"{team.name} on {split}"
-    return form_page(request, "maintain/deed.html", form, deed=words, team=team, subject=subject)
+    return form_page(request, "maintain/action.html", form, action=words, team=team, subject=subject)
 
 
 @maintainers_form
@@ -121,7 +121,7 @@ def end_admission(request: HttpRequest, team_id: UUID, split: str) -> HttpRespon
     lead = "The team can submit nothing more to the split. What it sent stays."
     words = {"heading": "Revoke an admission", "lead": lead, "button": "Revoke the admission"}
     subject = f"{row.team.name} on {split}"
-    return form_page(request, "maintain/deed.html", form, deed=words, team=row.team, subject=subject)
+    return form_page(request, "maintain/action.html", form, action=words, team=row.team, subject=subject)
 
 
 def _form(

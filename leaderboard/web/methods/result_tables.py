@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from django.urls import reverse
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards.results import Result
 from leaderboard.boards.rows import Entry, flat_scores
@@ -81,7 +81,7 @@ def method_result(result: Result) -> dict[str, Any]:
         "attempts": [
             (
                 attempt.at,
-                [format_published(value, decimals=entry.decimals) for value in attempt.scores.values()],
+                [format_rounded(value, decimals=entry.decimals) for value in attempt.scores.values()],
                 attempt.submission_id == entry.submission_id,
                 attempt.submission_id,
             )
@@ -111,7 +111,7 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
     for submission, evaluation in evaluations:
         values, decimals = flat_scores(evaluation), evaluation.edition.decimals
         cells = [
-            (cell_css(name, value, decimals), format_published(value, decimals=decimals), symbol)
+            (cell_css(name, value, decimals), format_rounded(value, decimals=decimals), symbol)
             for name, symbol in names.items()
             for value in [values.get(name)]
         ]

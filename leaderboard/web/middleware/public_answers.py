@@ -80,7 +80,7 @@ class PublicAnswersMiddleware:
         query = _known_query(request)
         request.known_query = query  # type: ignore[attr-defined]  # our own, as `user` is Django's
         # Before the view looks: what it reads may be newer than this number, and is never older.
-        text = f"{path}?{query} {board_versions.state()} {timezone.now():%Y-%m-%d}"
+        text = f"{path}?{query} {board_versions.sum_of_all()} {timezone.now():%Y-%m-%d}"
         key = hashlib.sha256(text.encode()).hexdigest()
         cache = caches["views" if query else "boards"]
         kept = cache.get(key)

@@ -8,21 +8,26 @@ from django.urls import reverse
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
-from evaluator.scoring.report import format_published
+from evaluator.scoring.report import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
 from leaderboard.quotas.limits import Quota
 from leaderboard.submissions import outcomes
 from leaderboard.submissions.intake import Progress
-from leaderboard.submissions.outcomes import BoardPlace
+from leaderboard.submissions.outcomes import BoardPosition
 from leaderboard.web.boards.tables import rank_range
 from leaderboard.web.formatting import signed
 from leaderboard.web.methods.result_tables import result_groups
 
 
 def outcome_table(
-    submission: Submission, progress: Progress, *, place: BoardPlace | None, interval_note: str, is_mine: bool
+    submission: Submission,
+    progress: Progress,
+    *,
+    place: BoardPosition | None,
+    interval_note: str,
+    is_mine: bool,
 ) -> dict[str, Any] | None:
     """A scored submission, ready to be placed; None for any other. `is_mine`: the reader's team's."""
     if progress.scores is None:
@@ -67,7 +72,7 @@ def _order_words(names: Iterable[str]) -> str:
 
 
 def _comparison_rows(
-    submission: Submission, progress: Progress, place: BoardPlace, entry: Entry, *, is_mine: bool
+    submission: Submission, progress: Progress, place: BoardPosition, entry: Entry, *, is_mine: bool
 ) -> list[dict[str, Any]]:
     rows = []
     own = outcomes.teams_best_other(submission, place)
@@ -98,7 +103,7 @@ def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
     for name, *_ in grouped_names(entry.scores).values():
         mine, theirs = entry.scores[name], other.scores[name]
         gap = "" if mine is None or theirs is None else signed(mine - theirs, decimals=decimals)
-        errors.append((format_published(theirs, decimals=other.decimals), gap))
+        errors.append((format_rounded(theirs, decimals=other.decimals), gap))
     css = "" if other.decimals >= entry.decimals else f" d{other.decimals}"
     return {"label": other.method, "errors": errors, "css": css}
 

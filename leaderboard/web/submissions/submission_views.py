@@ -160,7 +160,7 @@ def _outcome(request: HttpRequest, found: Submission, progress: Progress) -> dic
         "result": outcome_tables.outcome_table(
             found,
             progress,
-            place=outcomes.place_of(found, progress),
+            place=outcomes.board_position_of(found, progress),
             interval_note=outcomes.why_no_intervals(found, progress, now=now),
             is_mine=is_mine,
         ),
@@ -182,7 +182,7 @@ def analysis(request: HttpRequest, submission_id: UUID) -> HttpResponse:
     progress = intake.progress(found)
     if progress.is_final and progress.state != Status.SCORED:
         raise Http404("This submission has no score.")
-    closer = analyses.of(submission=found, viewer=request.user)
+    closer = analyses.for_submission(submission=found, viewer=request.user)
     tables = analysis_charts.error_analysis_tables(closer) if closer else None
     return render(
         request, "submissions/analysis.html", {"submission": found, "tables": tables, "closer": closer}

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from evaluator import evaluate, format_published, published, read_predictions
+from evaluator import evaluate, format_rounded, read_predictions, rounded
 from evaluator.predictions.loading import sha256_digest
 from tests.evaluator.worlds import flat, make_truth
 
@@ -44,16 +44,16 @@ def test_the_json_has_the_agreed_shape_at_full_precision() -> None:
 @given(value=st.floats(0, 1e6))
 def test_published_values_are_rounded_correctly_half_to_even(value: float) -> None:
     exact = Decimal(value).quantize(Decimal("0.01"), rounding=ROUND_HALF_EVEN)
-    assert published(value) == float(exact)
-    assert format_published(value) == str(exact)
+    assert rounded(value) == float(exact)
+    assert format_rounded(value) == str(exact)
 
 
 def test_published_values_need_not_exist_but_must_be_finite() -> None:
-    assert published(None) is None
-    assert format_published(None, missing="none") == "none"
-    assert published(14.296, decimals=1) == 14.3
-    assert format_published(14.8, decimals=1) == "14.8"
-    assert math.copysign(1, published(-0.001) or 0.0) == 1
+    assert rounded(None) is None
+    assert format_rounded(None, missing="none") == "none"
+    assert rounded(14.296, decimals=1) == 14.3
+    assert format_rounded(14.8, decimals=1) == "14.8"
+    assert math.copysign(1, rounded(-0.001) or 0.0) == 1
     for value in (math.nan, math.inf):
         with pytest.raises(ValueError, match="Only finite numbers are published"):
-            published(value)
+            rounded(value)

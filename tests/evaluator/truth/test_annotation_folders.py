@@ -81,15 +81,15 @@ def three(tmp_path: Path) -> Path:
     return write_folder(tmp_path, {f"{name}.pkl": [camera({7: SIX}, bag_stamp=name)] for name in "abc"})
 
 
-def at_the_second_file(monkeypatch: pytest.MonkeyPatch, deed: Callable[[int], object]) -> None:
-    """Do the deed to the child when it has read one file and is to get the next."""
+def at_the_second_file(monkeypatch: pytest.MonkeyPatch, action: Callable[[int], object]) -> None:
+    """Do the action to the child when it has read one file and is to get the next."""
     real = annotation_folders._contents
 
     def contents(folder: Path, files: Sequence[Path]) -> Contents:
         for number, item in enumerate(real(folder, files)):
             if number == 1:
                 [pid] = children()
-                deed(pid)
+                action(pid)
             yield item
 
     monkeypatch.setattr(annotation_folders, "_contents", contents)

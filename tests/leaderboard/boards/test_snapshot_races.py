@@ -34,9 +34,9 @@ def test_no_reader_gets_a_board_that_is_half_changed(benchmark: None, tmp_path: 
 
     def set_all(value: float) -> None:
         with transaction.atomic():
-            Score.objects.filter(interval="overall", metric="mid").update(value=value)
-            Score.objects.filter(interval="overall", metric="rte").update(value=value)
-            board_versions.changed("test")
+            Score.objects.filter(ttc_range="overall", metric="mid").update(value=value)
+            Score.objects.filter(ttc_range="overall", metric="rte").update(value=value)
+            board_versions.bump("test")
 
     set_all(1.0)
     readers = [threading.Thread(target=read, args=(i,)) for i in range(3)]

@@ -47,7 +47,7 @@ def by_hand(change: Callable[[], object], *, split: str = "test") -> None:
     """Change rows past the verbs, and say so as a verb would."""
     with transaction.atomic():
         change()
-        board_versions.changed(split)
+        board_versions.bump(split)
 
 
 def n_queries(client: Client, address: str) -> int:
@@ -114,7 +114,7 @@ def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
 ) -> None:
     builders.submit(owner, builders.predictions(edition), visibility="PRIVATE")
     builders.score_all()
-    number, is_shown = board_versions.number("test"), list[bool]()
+    number, is_shown = board_versions.number_of("test"), list[bool]()
 
     def show_meanwhile(execute, sql, params, many, context):
         # Before the row of its team is held, which whoever changes a method waits for.
@@ -127,29 +127,29 @@ def test_what_a_file_says_of_a_method_that_is_shown_at_that_moment_is_counted(
     with connection.execute_wrapper(show_meanwhile):
         builders.send(owner, data, description="Said anew.")
     assert is_shown
-    assert board_versions.number("test") == number + 1
+    assert board_versions.number_of("test") == number + 1
 
 
 def test_changing_outside_of_a_transaction_is_refused() -> None:
     with pytest.raises(RuntimeError, match="outside of the transaction"):
-        board_versions.changed("test")
+        board_versions.bump("test")
 
 
 def test_nobody_hears_of_a_change_that_was_taken_back(edition: Edition, filled: list[Method]) -> None:
-    before = board_versions.state()
+    before = board_versions.sum_of_all()
     with transaction.atomic():
-        board_versions.changed("test")
+        board_versions.bump("test")
         transaction.set_rollback(True)
-    assert board_versions.state() == before
+    assert board_versions.sum_of_all() == before
 
 
 def test_editions_in_preparation_move_no_number(
     edition: Edition, entries: list[Submission], second: Edition
 ) -> None:
-    before = board_versions.state()
+    before = board_versions.sum_of_all()
     assert builders.score_all() > 0
     assert second.evaluations.filter(status=Status.SCORED).count() == len(entries)
-    assert board_versions.state() == before
+    assert board_versions.sum_of_all() == before
 
 
 # --- what it costs -----------------------------------------------------------------------------------------

@@ -27,7 +27,7 @@ from tests.services import ON_POSTGRESQL, crowd_on_postgres
 
 pytestmark = [pytest.mark.slow, *ON_POSTGRESQL]
 
-Deed = Callable[[], object]
+Action = Callable[[], object]
 BOARD, EVENT = "SET CONSTRAINTS ALL IMMEDIATE", 'INSERT INTO "leaderboard_auditevent"'
 ORDER = (
     "pg_advisory_xact_lock_shared",  # the bytes of a file
@@ -45,7 +45,7 @@ ORDER = (
 
 
 @pytest.fixture
-def verbs(entries: list[Submission], edition: Edition, maintainer: User, tmp_path: Path) -> dict[str, Deed]:
+def verbs(entries: list[Submission], edition: Edition, maintainer: User, tmp_path: Path) -> dict[str, Action]:
     """Verbs that take locks, each ready to be done once."""
     now, owner = timezone.now(), entries[0].submitted_by
     assert owner is not None
@@ -70,7 +70,7 @@ def verbs(entries: list[Submission], edition: Edition, maintainer: User, tmp_pat
         with transaction.atomic():
             address.set_as_primary()
 
-    def send(user: User, **fields: str) -> Deed:
+    def send(user: User, **fields: str) -> Action:
         return partial(builders.send, user, uuid.uuid4().bytes, method="M1.05", **fields)
 
     return {
@@ -116,7 +116,7 @@ def verbs(entries: list[Submission], edition: Edition, maintainer: User, tmp_pat
     ],
 )
 def test_what_once_waited_for_each_other_for_ever_does_not(
-    verbs: dict[str, Deed], first: str, second: str
+    verbs: dict[str, Action], first: str, second: str
 ) -> None:
     """The first ten had: one had the lock of all boards and wanted a row, the other the row and wanted it."""
     last = BOARD if first in {"submit", "finalise", "withdraw"} else EVENT
@@ -126,14 +126,14 @@ def test_what_once_waited_for_each_other_for_ever_does_not(
     assert outcome.faults == (None, None)
 
 
-def test_whoever_has_recorded_and_not_ended_keeps_nobody_waiting(verbs: dict[str, Deed]) -> None:
+def test_whoever_has_recorded_and_not_ended_keeps_nobody_waiting(verbs: dict[str, Action]) -> None:
     outcome = meet(
         verbs["make a token"], verbs["submit for the first time"], at=lambda number, sql: EVENT in sql
     )
     assert outcome == ((None, None), True, False)
 
 
-def test_locks_are_taken_in_one_order(verbs: dict[str, Deed]) -> None:
+def test_locks_are_taken_in_one_order(verbs: dict[str, Action]) -> None:
     """Of all verbs but those that end what others need."""
     n_taken = 0
     for name in [name for name in verbs if name not in {"forget", "leave alone"}]:

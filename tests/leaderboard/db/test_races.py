@@ -34,7 +34,7 @@ FIRST_DAY = datetime(2026, 11, 1, 12, 0, tzinfo=UTC)
 pytestmark = [pytest.mark.slow, *ON_POSTGRESQL]
 
 
-def at_once(n: int, deed: Callable[[int], T]) -> list[T]:
+def at_once(n: int, action: Callable[[int], T]) -> list[T]:
     """Do it `n` times, in threads with connections of their own that are let go at the same time."""
     barrier = Barrier(n, timeout=180)
 
@@ -42,7 +42,7 @@ def at_once(n: int, deed: Callable[[int], T]) -> list[T]:
         try:
             connection.ensure_connection()
             barrier.wait()
-            return deed(number)
+            return action(number)
         finally:
             connection.close()
 

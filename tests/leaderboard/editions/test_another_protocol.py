@@ -13,7 +13,7 @@ from evaluator import Protocol, receipts
 from evaluator.cli.boards import in_words
 from evaluator.cli.layout import result_in_words
 from evaluator.client.answers import Board
-from evaluator.metrics.protocol import INTERVALS, PROTOCOLS, SCORE_NAMES, Interval
+from evaluator.metrics.protocol import PROTOCOLS, SCORE_NAMES, TTC_RANGES, TTCRange
 from evaluator.metrics.registry import MID, RTE, Metric
 from evaluator.tables.formats import FORMATS
 from leaderboard.api.serializers import CountsSerializer, ScoresSerializer
@@ -37,7 +37,7 @@ FAR = Protocol(
     name="tsttc-far",
     limit_s=60.0,
     near_zero_s=(-0.15, 0.05),
-    intervals=(*INTERVALS, Interval("far", 20.0, 60.0)),
+    ranges=(*TTC_RANGES, TTCRange("far", 20.0, 60.0)),
     metrics=(MID, RTE, ABSOLUTE),
 )
 NEW = [name for name in FAR.score_names if name not in SCORE_NAMES]
@@ -134,7 +134,7 @@ def test_a_further_range_and_a_third_metric_stand_wherever_their_edition_is_show
     api = client_of(owner)
     told = document(api, f"/api/v1/submissions/{far.pk}")
     assert list(told["scores"]) == names
-    assert list(told["counts"]) == list(FAR.interval_names)
+    assert list(told["counts"]) == list(FAR.range_names)
     assert "AE_f" in "\n".join(
         result_in_words(told["scores"], counts=told["counts"], n_out_of_range=0, truncated={})
     )
@@ -173,4 +173,4 @@ def test_what_was_scored_under_the_first_protocol_stays_as_it_is(
 def test_names_fit_the_database() -> None:
     for protocol in PROTOCOLS.values():
         assert all(len(m.name) <= Score._meta.get_field("metric").max_length for m in protocol.metrics)
-        assert all(len(i.name) <= Score._meta.get_field("interval").max_length for i in protocol.intervals)
+        assert all(len(i.name) <= Score._meta.get_field("ttc_range").max_length for i in protocol.ranges)

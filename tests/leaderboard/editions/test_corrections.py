@@ -9,7 +9,7 @@ import pytest
 from django.core.management import CommandError, call_command
 from django.utils import timezone
 
-from evaluator import Predictions, Rejected, evaluate, published, read_truth
+from evaluator import Predictions, Rejected, evaluate, read_truth, rounded
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import corrections
 from leaderboard.errors.refusals import NotMaintainer, Refused
@@ -62,7 +62,7 @@ def test_rescoring_gives_what_the_evaluator_gives_without_reading_the_file_again
             ttc_s=old.ttc_s * factor, manifest=truth.manifest, digest=submission.digest
         )
         report = evaluate(values, truth, keep_bags=True)
-        expected = {name: published(value, decimals=1) for name, value in report.flat().items()}
+        expected = {name: rounded(value, decimals=1) for name, value in report.flat().items()}
         assert flat_scores(found) == expected
         # To the last bit, also of what is not published.
         assert found.report_digest == f"sha256:{hashlib.sha256(report.to_json().encode()).hexdigest()}"

@@ -318,7 +318,7 @@ def test_an_announcement_is_on_pages_and_in_the_api_until_it_ends(keeper: Client
     later = timezone.now() - timedelta(seconds=1)
     Split.objects.filter(pk="val").update(announcement_ends_at=later)
     PageVersion.announcement().update(ends_at=later)
-    assert board_versions.times_passed(now=timezone.now()) == 3
+    assert board_versions.bump_passed_deadlines(now=timezone.now()) == 3
     assert "Val only" not in visitor.get("/board/val/").text
     assert {each["announcement"] for each in visitor.get("/api/v1/splits").json()} == {""}
     assert keeper.post(page, sent | {"announcement": "Known error"}).status_code == 302

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from evaluator import Manifest, evaluate, published, read_manifest, read_predictions, read_truth
+from evaluator import Manifest, evaluate, read_manifest, read_predictions, read_truth, rounded
 from evaluator.scoring.report import Report
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import preview
@@ -71,7 +71,7 @@ def report(said: Said, path: Path) -> Report:
 
 
 def offline(said: Said, path: Path) -> dict[str, float | None]:
-    return {name: published(value, decimals=1) for name, value in report(said, path).flat().items()}
+    return {name: rounded(value, decimals=1) for name, value in report(said, path).flat().items()}
 
 
 def scores(submission: Submission, edition: Edition) -> dict[str, float | None]:

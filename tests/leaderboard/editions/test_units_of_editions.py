@@ -15,8 +15,8 @@ from evaluator import (
     Predictions,
     compare_predictions,
     confidence_intervals,
-    published,
     read_predictions,
+    rounded,
 )
 from leaderboard.editions import ground_truth
 from leaderboard.models import Edition, Split, Submission, User
@@ -66,7 +66,7 @@ def filled(edition: Edition, owner: User) -> list[Submission]:
 
 def compared(*sent: Submission, edition: Edition | None = None) -> comparisons.Compared:
     def ask() -> comparisons.Compared:
-        return comparisons.of(
+        return comparisons.compare(
             methods=[each.method_id for each in sent],
             split=Split.objects.select_related("published_edition__ground_truth").get(pk="test"),
             edition=edition,
@@ -90,7 +90,7 @@ def holds_offline(edition: Edition, sent: list[Submission], *, unit: str) -> Non
     for each in sent:
         offline = confidence_intervals(read(each, truth), truth, unit=unit)
         for name, score in scores_of(each, edition).items():
-            expected = [published(end, decimals=1) for end in offline[name] or (None, None)]
+            expected = [rounded(end, decimals=1) for end in offline[name] or (None, None)]
             assert [score.low, score.high] == expected, name
     pair = compared(*sent[:2], edition=edition).pairs[0].differences
     first, second = (read(each, truth) for each in sent[:2])

@@ -31,7 +31,7 @@ def by_hand(method: Method, **values: object) -> None:
     """Change a method past the verbs, and say so as a verb would."""
     with transaction.atomic():
         Method.objects.filter(pk=method.pk).update(**values)
-        board_versions.changed_everywhere()
+        board_versions.bump_all()
 
 
 def badge(client: Client, method: Method, query: str = "") -> str:
@@ -90,7 +90,7 @@ def test_badge_follows_the_board_and_is_kept_as_long_as_it_stands(
     assert known["Cross-Origin-Resource-Policy"] == "cross-origin"
     with transaction.atomic():
         Score.objects.filter(evaluation__submission__method=methods[0]).update(value=0.5)
-        board_versions.changed("test")
+        board_versions.bump("test")
     assert client.get(address, headers={"If-None-Match": first["ETag"]}).status_code == 200
     assert badge(client, methods[0]) == "TSTTC test: rank 1, MiD 0.5"
 

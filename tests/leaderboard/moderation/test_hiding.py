@@ -53,8 +53,8 @@ def places(client: Client, name: str, *more: str) -> list[str]:
     ]
 
 
-def do(keeper: Client, deed: str, subject: object, **fields: str) -> None:
-    address = f"/maintain/deeds/{deed}/{subject}/"
+def do(keeper: Client, action: str, subject: object, **fields: str) -> None:
+    address = f"/maintain/actions/{action}/{subject}/"
     assert_sound(keeper.get(address))
     refused = keeper.post(address, {**fields, "reason": ""})
     assert refused.status_code == 422
@@ -111,7 +111,7 @@ def test_a_method_moves_to_another_team_with_its_submissions(
     sent = published(edition, owner, method="Moves")
     other = teams.team_of(user=stranger)
     refused = keeper.post(
-        f"/maintain/deeds/move-method/{sent.method_id}/", {"name": "Nobody", "reason": "They asked."}
+        f"/maintain/actions/move-method/{sent.method_id}/", {"name": "Nobody", "reason": "They asked."}
     )
     assert "No team is called 'Nobody'" in assert_sound(refused).one("div", class_="wrong").text
     do(keeper, "move-method", sent.method_id, name=other.name)
@@ -149,7 +149,7 @@ def test_a_maintainer_makes_a_member_the_owner(
     assert Membership.objects.get(team=team, is_owner=True).user == teammate
     event = AuditEvent.objects.get(verb="appointed_owner")
     assert (event.actor, event.details["from"]) == (maintainer, [owner.pk])
-    answer = keeper.post(f"/maintain/deeds/appoint-owner/{stranger.pk}/", {"reason": "R"})
+    answer = keeper.post(f"/maintain/actions/appoint-owner/{stranger.pk}/", {"reason": "R"})
     assert "The person is in no team" in assert_sound(answer).one("div", class_="form-errors").text
 
 

@@ -50,11 +50,11 @@ def through(proxy: CuttingProxy) -> Iterator[None]:
 
 
 def every_cut(
-    proxy: CuttingProxy, deed: Callable[[], object], *, prepare: Callable[[], object]
+    proxy: CuttingProxy, action: Callable[[], object], *, prepare: Callable[[], object]
 ) -> Iterator[bool]:
-    """Prepare, then do the deed with one cut, for each round trip that it has and each kind of cut.
+    """Prepare, then do the action with one cut, for each round trip that it has and each kind of cut.
 
-    Yields, after each, whether the deed came to its end. Whatever it raises must be an outage in the eyes of
+    Yields, after each, whether the action came to its end. Whatever it raises must be an outage in the eyes
     the doors.
     """
     for cut in Cut:
@@ -64,7 +64,7 @@ def every_cut(
                 proxy.arm(at=at, cut=cut)
                 fault: Error | None = None
                 try:
-                    deed()
+                    action()
                 except Error as caught:
                     fault = caught
                 was_cut = proxy.was_cut

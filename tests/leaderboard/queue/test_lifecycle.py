@@ -12,7 +12,7 @@ from leaderboard.models import AuditEvent, Edition, Evaluation, Method, Score, S
 from leaderboard.ops import broker
 from leaderboard.people import teams
 from leaderboard.queue import lifecycle
-from leaderboard.queue.lifecycle import MAX_POISON_STRIKES, Lease, LostRace, Outcome, Strike
+from leaderboard.queue.lifecycle import MAX_POISON_STRIKES, Lease, LostRace, RunResult, Strike
 from tests.leaderboard.web.maintain import queue_rows
 from tests.leaderboard.web.maintain.queue_rows import LEASE_S, REJECTED, SCORED, WALL_S
 
@@ -162,7 +162,7 @@ def test_scores_report_status_and_audit_are_written_together(lease: Lease) -> No
     row = queue_rows.row(lease)
     assert (row.status, row.finished_attempt, row.report) == (Status.SCORED, 1, SCORED.report)
     assert row.finished_at is not None
-    assert {(s.metric, s.interval): s.value for s in row.scores.all()} == SCORED.scores
+    assert {(s.metric, s.ttc_range): s.value for s in row.scores.all()} == SCORED.scores
     assert (
         AuditEvent.objects.filter(noun="Evaluation", noun_id=lease.evaluation_id, verb="scored").count() == 1
     )
@@ -185,7 +185,7 @@ def test_a_score_that_cannot_be_kept_leaves_the_evaluation_undecided(lease: Leas
 @pytest.mark.parametrize("status", [Status.QUEUED, Status.RUNNING, Status.SYSTEM_ERROR, Status.CANCELLED])
 def test_a_run_ends_as_scored_or_rejected_only(lease: Lease, status: Status) -> None:
     with pytest.raises(ValueError, match="SCORED or REJECTED"):
-        lifecycle.finalise(lease, Outcome(status=status, scores={}))
+        lifecycle.finalise(lease, RunResult(status=status, scores={}))
     assert queue_rows.row(lease).status == Status.RUNNING
 
 

@@ -27,9 +27,9 @@ pytestmark = [
 N_ZOMBIES = 50
 
 
-def all_at_once(*deeds: Callable[[], T]) -> list[T]:
+def all_at_once(*actions: Callable[[], T]) -> list[T]:
     """Do everything at the same moment; what came of each."""
-    return at_once(len(deeds), lambda number: deeds[number]())
+    return at_once(len(actions), lambda number: actions[number]())
 
 
 def verdict(lease: Lease, value: float) -> str:

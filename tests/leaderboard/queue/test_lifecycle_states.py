@@ -33,7 +33,7 @@ from leaderboard.queue.lifecycle import (
     MAX_POISON_STRIKES,
     Lease,
     LostRace,
-    Outcome,
+    RunResult,
     Strike,
 )
 from tests.leaderboard.web.maintain import queue_rows
@@ -125,7 +125,7 @@ class Life(RuleBasedStateMachine):
             expected.is_expired = False
 
     @rule(lease=leases, outcome=OUTCOMES)
-    def finalise(self, lease: Lease, outcome: Outcome) -> None:
+    def finalise(self, lease: Lease, outcome: RunResult) -> None:
         expected = self.model[lease.evaluation_id]
         if expected.holds(lease):
             assert lifecycle.finalise(lease, outcome)
@@ -145,7 +145,7 @@ class Life(RuleBasedStateMachine):
             st.builds(lambda token: {"token": token}, st.uuids(version=4)),
         ),
     )
-    def finalise_with_half_a_lease(self, lease: Lease, outcome: Outcome, forged: dict[str, object]) -> None:
+    def finalise_with_half_a_lease(self, lease: Lease, outcome: RunResult, forged: dict[str, object]) -> None:
         changes = dict(forged)
         if "attempt" in changes:
             changes["attempt"] = lease.attempt + forged["attempt"]  # type: ignore[operator]  # an int, see above

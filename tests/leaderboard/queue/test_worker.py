@@ -6,7 +6,7 @@ import random
 import pytest
 from django.utils import timezone
 
-from evaluator import evaluate, published, read_predictions
+from evaluator import evaluate, read_predictions, rounded
 from leaderboard.editions import ground_truth
 from leaderboard.models import Edition, Evaluation, Score, Status, User
 from leaderboard.queue import worker
@@ -26,7 +26,7 @@ def test_scores_are_the_evaluators_own_with_the_editions_decimals(edition: Editi
     progress = intake.progress(submission)
     assert progress.state == Status.SCORED
     assert edition.decimals == progress.decimals == 1
-    assert progress.scores == {name: published(value, decimals=1) for name, value in offline.flat().items()}
+    assert progress.scores == {name: rounded(value, decimals=1) for name, value in offline.flat().items()}
     assert progress.counts == {name: score.count for name, score in offline.scores.items()}
     assert progress.truncated == dict(offline.truncated)
     assert progress.n_out_of_range == 1
@@ -49,7 +49,7 @@ def test_an_empty_interval_has_no_score(benchmark: None, tmp_path, owner: User) 
     assert scores is not None
     assert scores["mid"] is not None
     assert scores["mid_negative"] is None
-    assert not Score.objects.filter(interval="negative").exists()
+    assert not Score.objects.filter(ttc_range="negative").exists()
 
 
 # All that a file can have is in `tests/evaluator/faulty_files.py`.

@@ -68,25 +68,25 @@ def test_board_form_quota_and_api_say_when(edition: Edition, owner: User, client
 def test_kept_answers_hear_of_a_time_that_has_come(edition: Edition, client: Client) -> None:
     opens_at = timezone.now() + HOUR
     Split.objects.filter(pk="test").update(opens_at=opens_at, closes_at=opens_at + HOUR)
-    board_versions.times_passed(now=timezone.now())
-    before = board_versions.state()
+    board_versions.bump_passed_deadlines(now=timezone.now())
+    before = board_versions.sum_of_all()
     assert "open at" in client.get("/board/test/").text
     # It has opened; then it has closed; then a maintainer gives more time.
     for shift, said in ((-HOUR / 2, "close at"), (-3 * HOUR, "closed at"), (-HOUR / 2, "close at")):
         moment = timezone.now() + shift
         Split.objects.filter(pk="test").update(opens_at=moment, closes_at=moment + HOUR)
         pollers.sweep(rng=random.Random(0))
-        assert board_versions.state() > before
-        before = board_versions.state()
+        assert board_versions.sum_of_all() > before
+        before = board_versions.sum_of_all()
         assert said in client.get("/board/test/").text
-        assert board_versions.times_passed(now=timezone.now()) == 0
+        assert board_versions.bump_passed_deadlines(now=timezone.now()) == 0
     assert BoardVersion.objects.get(split="test").n_times_passed == 1
 
 
 def test_a_split_without_times_changes_nothing_by_itself(edition: Edition) -> None:
-    before = board_versions.state()
-    assert board_versions.times_passed(now=timezone.now() + timedelta(days=10_000)) == 0
-    assert board_versions.state() == before
+    before = board_versions.sum_of_all()
+    assert board_versions.bump_passed_deadlines(now=timezone.now() + timedelta(days=10_000)) == 0
+    assert board_versions.sum_of_all() == before
     assert admissions.sentence_of(Split.objects.get(pk="test"), now=timezone.now()) == ""
 
 

@@ -88,8 +88,8 @@ def opened(data: bytes) -> Iterator[IO[bytes]]:
         yield file
 
 
-def read_slowly(read: Read, data: bytes, deed: Callable[[int], object]) -> Predictions:
-    """Do the deed to the child in the middle of its file; only then the file comes to its end."""
+def read_slowly(read: Read, data: bytes, action: Callable[[int], object]) -> Predictions:
+    """Do the action to the child in the middle of its file; only then the file comes to its end."""
     reading, writing = os.pipe()
     rest = [data]
     beats = itertools.count()
@@ -98,7 +98,7 @@ def read_slowly(read: Read, data: bytes, deed: Callable[[int], object]) -> Predi
         assert next(beats) < MAX_BEATS, "the child does not begin to read"
         for pid in children():
             if rest and is_reading(pid):
-                deed(pid)
+                action(pid)
                 os.write(writing, rest.pop())
                 os.close(writing)
         return True

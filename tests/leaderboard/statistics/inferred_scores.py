@@ -3,14 +3,14 @@
 from dataclasses import asdict, dataclass
 
 from evaluator.metrics.protocol import score_name
-from leaderboard.boards.rows import Interval, ranges_in, scored_in
+from leaderboard.boards.rows import ConfidenceInterval, ranges_in, scored_in
 from leaderboard.models import Edition, EditionRanges, Evaluation, Score, Submission
 
 INFERRED = ("low", "high", "rank_low", "rank_high", "is_with_best")
 
 
 @dataclass(frozen=True)
-class Inferred(Interval):
+class Inferred(ConfidenceInterval):
     """A score's value with what was inferred of it."""
 
     pk: int = 0
@@ -23,8 +23,8 @@ def scores_of(submission: Submission, edition: Edition) -> dict[str, Inferred]:
     return {
         name: Inferred(**asdict(found), pk=row.pk, value=row.value)
         for row in Score.objects.filter(evaluation=evaluation)
-        for name in [score_name(row.metric, row.interval)]
-        for found in [intervals.get(name, Interval())]
+        for name in [score_name(row.metric, row.ttc_range)]
+        for found in [intervals.get(name, ConfidenceInterval())]
     }
 
 
@@ -35,7 +35,7 @@ def everything() -> list[tuple[object, ...]]:
     for row in Score.objects.select_related("evaluation__edition").order_by("pk"):
         names = row.evaluation.edition.rules.score_names
         columns = ranges.get(row.evaluation.edition_id, {}).get(str(row.evaluation_id))
-        pair = columns[names.index(score_name(row.metric, row.interval))] if columns else None
+        pair = columns[names.index(score_name(row.metric, row.ttc_range))] if columns else None
         rows.append((row.pk, row.low, row.high, *(pair or (None, None))))
     return rows
 

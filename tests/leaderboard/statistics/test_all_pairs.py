@@ -12,7 +12,7 @@ import pytest
 from evaluator.scoring.differences import sign_flips
 from evaluator.scoring.ranges import rank_ranges
 from evaluator.scoring.significance import p_below
-from leaderboard.boards.rows import Entry, Interval
+from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.statistics.comparisons import Compared, Difference, Pair
 from leaderboard.web.compare import compare_tables
 from tests.validity import margin, worlds
@@ -25,7 +25,7 @@ A, B, C = (
 
 def with_range(entry: Entry, low: int, high: int) -> Entry:
     """The entry with a rank range on the board, and its mark."""
-    found = Interval(rank_low=low, rank_high=high)
+    found = ConfidenceInterval(rank_low=low, rank_high=high)
     return replace(entry, intervals={"mid": found})
 
 

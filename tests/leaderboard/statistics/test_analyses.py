@@ -41,7 +41,7 @@ def plain(submission: Submission, edition: Edition) -> evaluator.Report:
 
 
 def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, owner: User) -> None:
-    closer = analyses.of(submission=sent, viewer=owner)
+    closer = analyses.for_submission(submission=sent, viewer=owner)
     assert closer is not None
     content, truth = closer.content, truth_values.load(val.ground_truth_id)
     sequences = plain(sent, val).sequences
@@ -75,17 +75,19 @@ def test_the_owner_sees_what_a_plain_loop_finds(sent: Submission, val: Edition, 
 def test_a_closer_look_is_for_the_team_alone(
     sent: Submission, owner: User, teammate: User, stranger: User, maintainer: User
 ) -> None:
-    assert analyses.of(submission=sent, viewer=teammate) == analyses.of(submission=sent, viewer=maintainer)
-    assert analyses.of(submission=sent, viewer=teammate) is not None
-    assert analyses.of(submission=sent, viewer=stranger) is None
-    assert analyses.of(submission=sent, viewer=ANYBODY) is None
+    assert analyses.for_submission(submission=sent, viewer=teammate) == analyses.for_submission(
+        submission=sent, viewer=maintainer
+    )
+    assert analyses.for_submission(submission=sent, viewer=teammate) is not None
+    assert analyses.for_submission(submission=sent, viewer=stranger) is None
+    assert analyses.for_submission(submission=sent, viewer=ANYBODY) is None
 
 
 def test_nothing_of_a_hidden_split_is_looked_at(entries: list[Submission], owner: User) -> None:
     builders.infer_all()
     assert Split.objects.get(pk="test").is_hidden
     assert not Analysis.objects.exists()
-    assert analyses.of(submission=entries[0], viewer=owner) is None
+    assert analyses.for_submission(submission=entries[0], viewer=owner) is None
 
 
 def test_a_split_that_is_hidden_later_shows_and_keeps_nothing(
@@ -93,7 +95,7 @@ def test_a_split_that_is_hidden_later_shows_and_keeps_nothing(
 ) -> None:
     Split.objects.filter(pk="val").update(is_hidden=True)
     sent.refresh_from_db()
-    assert analyses.of(submission=Submission.objects.get(pk=sent.pk), viewer=owner) is None
+    assert analyses.for_submission(submission=Submission.objects.get(pk=sent.pk), viewer=owner) is None
     analyses.delete_hidden()
     assert not Analysis.objects.exists()
     analyses.make(val.evaluations.get(), now=timezone.now())

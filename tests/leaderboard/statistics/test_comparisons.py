@@ -8,7 +8,7 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from evaluator import SCORE_NAMES, Difference, compare_predictions, published, read_predictions
+from evaluator import SCORE_NAMES, Difference, compare_predictions, read_predictions, rounded
 from leaderboard.models import Comparison, Edition, Method, Split, Submission, User, Visibility
 from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import BadComparison, NotOnTheBoard, UnknownMethod
@@ -23,7 +23,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("open_values")]
 def ask(
     *sent: Submission, viewer: User | AnonymousUser = ANYBODY, split: str = "test"
 ) -> comparisons.Compared:
-    return comparisons.of(
+    return comparisons.compare(
         methods=[submission.method_id for submission in sent],
         split=Split.objects.select_related("published_edition__ground_truth").get(pk=split),
         viewer=viewer,
@@ -63,9 +63,7 @@ def test_a_comparison_is_asked_for_once_and_answered_by_a_worker(
     for pair in answer.pairs:
         assert list(pair.differences) == list(SCORE_NAMES)
         for name, found in known(pair).items():
-            assert found.difference == published(
-                pair.first.scores[name] - pair.second.scores[name], decimals=1
-            )
+            assert found.difference == rounded(pair.first.scores[name] - pair.second.scores[name], decimals=1)
         overall = known(pair)["mid"]
         assert overall.low <= overall.difference <= overall.high < 0
         assert overall.is_significant
@@ -128,7 +126,7 @@ def test_unknown_and_invisible_methods_are_told_apart_by_nobody(
     unknown = uuid.uuid4()
     split = Split.objects.select_related("published_edition").get(pk="test")
     with pytest.raises(UnknownMethod) as refused:
-        comparisons.of(
+        comparisons.compare(
             methods=[unknown, entries[1].method_id], split=split, viewer=ANYBODY, now=timezone.now()
         )
     assert {*texts, str(refused.value).replace(str(unknown), "ID")} == {

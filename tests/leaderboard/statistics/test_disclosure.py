@@ -182,7 +182,7 @@ def test_an_anonymous_method_of_another_team_is_compared_once_it_is_public(
 
     set_visibility(other, Visibility.PUBLIC)
     with transaction.atomic():
-        board_versions.changed("test")
+        board_versions.bump("test")
     (pair,) = ask(entries[0], other, viewer=owner).pairs
     assert pair.withheld == ""
 

@@ -21,7 +21,7 @@ def test_the_floor_is_what_a_file_of_the_ground_truth_itself_scores(edition: Edi
     truth = truth_values.load(edition.ground_truth_id)
     builders.submit(owner, write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s), method="Oracle")
     builders.score_all()
-    rows = Score.objects.values_list("metric", "interval", "value")
+    rows = Score.objects.values_list("metric", "ttc_range", "value")
     scored = {m if i == "overall" else f"{m}_{i}": value for m, i, value in rows}
     assert floor == {name: scored.get(name) for name in SCORE_NAMES}
     assert floor["mid"], "one sequence is at 25 s, where a prediction is truncated"

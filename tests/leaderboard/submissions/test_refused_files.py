@@ -28,15 +28,15 @@ DATA = b'{"0": 1.5}'
 class Meanwhile(ContentFile):  # type: ignore[type-arg]  # of bytes
     """An upload during which something else happens: once it is admitted, and before anything is locked."""
 
-    def __init__(self, data: bytes, deed: Callable[[], object]) -> None:
+    def __init__(self, data: bytes, action: Callable[[], object]) -> None:
         super().__init__(data, name="p.json")
         # It is read twice: to be hashed, and to be stored.
-        self._deeds = [deed, lambda: None]
+        self._actions = [action, lambda: None]
 
     def chunks(self, chunk_size: int | None = None) -> Iterator[Any]:
-        """The bytes, after the deed."""
-        if self._deeds:
-            self._deeds.pop()()
+        """The bytes, after the action."""
+        if self._actions:
+            self._actions.pop()()
         return super().chunks(chunk_size)
 
 
@@ -154,11 +154,11 @@ class TestAtOnce:
             while was_held:
                 number += 1
                 data = b"%d" % number
-                deeds: dict[str, Callable[[], object]] = {
+                actions: dict[str, Callable[[], object]] = {
                     "refused": partial(refused, owner, data),
                     "accepted": partial(builders.send, stranger, file_of(data)),
                 }
-                first, second = deeds.pop(held), *deeds.values()
+                first, second = actions.pop(held), *actions.values()
                 outcome = meet(first, second, at=lambda at, _, number=number: at == number)
                 was_held = outcome.was_held
                 assert outcome.faults == (None, None)

@@ -47,14 +47,14 @@ def test_what_is_said_of_a_method_later_replaces_what_was_said(edition: Edition,
 
 def test_bytes_that_are_there_change_nothing_of_the_method(edition: Edition, owner: User) -> None:
     first = builders.submit(owner, builders.predictions(edition), description="old")
-    number, n_events = board_versions.number("test"), AuditEvent.objects.count()
+    number, n_events = board_versions.number_of("test"), AuditEvent.objects.count()
     again = builders.submit(
         owner, builders.predictions(edition), description="new", paper_url="https://x.org"
     )
     assert again == first
     method = Method.objects.get()
     assert (method.description, method.paper_url) == ("old", "")
-    assert (board_versions.number("test"), AuditEvent.objects.count()) == (number, n_events)
+    assert (board_versions.number_of("test"), AuditEvent.objects.count()) == (number, n_events)
 
 
 @pytest.mark.parametrize(

@@ -13,17 +13,17 @@ from django.utils import timezone
 from leaderboard.models import Edition, Evaluation, Method, Score, Status, Submission, User
 from leaderboard.people import teams
 from leaderboard.queue import lifecycle
-from leaderboard.queue.lifecycle import Lease, Outcome, Strike
+from leaderboard.queue.lifecycle import Lease, RunResult, Strike
 
 LEASE_S = 60.0
 WALL_S = 300.0
-SCORED = Outcome(
+SCORED = RunResult(
     status=Status.SCORED,
     scores={("mid", "overall"): 14.25, ("rte", "overall"): 9.5},
     report={"counts": {"overall": 3}},
     report_digest="sha256:0",
 )
-REJECTED = Outcome(
+REJECTED = RunResult(
     status=Status.REJECTED,
     scores={},
     problems=[{"code": "not-json", "message": "The text is not JSON.", "where": ""}],

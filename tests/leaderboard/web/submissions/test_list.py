@@ -32,7 +32,7 @@ def test_list_has_my_teams_submissions_with_state_and_errors(
         "rejectedThe outermost value is a list",
         "scored",
     ]
-    mid = scored.evaluations.get().scores.get(metric="mid", interval="overall").value
+    mid = scored.evaluations.get().scores.get(metric="mid", ttc_range="overall").value
     assert [row[4] for row in rows] == ["–", "–", f"{mid:.1f}"]
 
 

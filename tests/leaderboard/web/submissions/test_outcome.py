@@ -40,7 +40,7 @@ def beside(root: pages.Element) -> list[list[str]]:
 
 
 def mid(submission: Submission) -> float:
-    return Score.objects.get(evaluation__submission=submission, metric="mid", interval="overall").value
+    return Score.objects.get(evaluation__submission=submission, metric="mid", ttc_range="overall").value
 
 
 # --- rank ------------------------------------------------------------------------------------------------

@@ -131,7 +131,9 @@ def test_result_has_the_papers_columns_the_counts_and_the_truncations(
     for half, symbol in ((mid, "MiD"), (rte, "RTE")):
         heads = [head.all("span")[0].text for head in half.one("thead").all("th")]
         assert heads == [symbol, "0–3 s", "3–6 s", "6–20 s", "−20–0 s"]
-    scores = {f"{s.metric}-{s.interval}": f"{s.value:.1f}" for s in submission.evaluations.get().scores.all()}
+    scores = {
+        f"{s.metric}-{s.ttc_range}": f"{s.value:.1f}" for s in submission.evaluations.get().scores.all()
+    }
     values, counts = ([cell.text for cell in row.all("td")] for row in mid.one("tbody").all("tr"))
     names = ("overall", "crucial", "small", "large", "negative")
     # A value may be followed by its mark.

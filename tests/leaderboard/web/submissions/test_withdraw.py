@@ -22,7 +22,7 @@ def address(submission: Submission, part: str = "") -> str:
 
 def mid(submission: Submission, number: int) -> str:
     evaluation = submission.evaluations.get(edition__number=number)
-    return f"{evaluation.scores.get(metric='mid', interval='overall').value:.1f}"
+    return f"{evaluation.scores.get(metric='mid', ttc_range='overall').value:.1f}"
 
 
 @pytest.fixture
