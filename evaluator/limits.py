@@ -48,18 +48,10 @@ def limit(*, memory_bytes: int, cpu_s: int) -> None:
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, 0))
 
 
-def forbid_calls(*, own_limits: bool = False) -> None:
+def forbid_calls() -> None:
     """Allow only the system calls that reading needs, where the kernel can do that. Irrevocable.
 
-    `own_limits` are needed by `allow_cpu`. Raises `OSError` if the kernel takes no filter after all.
+    Raises `OSError` if the kernel takes no filter after all.
     """
     if system_calls.why_unavailable() is None:
-        system_calls.allow_only_reading(own_limits=own_limits)
-
-
-def allow_cpu(seconds: int) -> None:
-    """From now on this process may compute for so long, within what `limit` has left it."""
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    _, hard = resource.getrlimit(resource.RLIMIT_CPU)
-    soft = int(used.ru_utime + used.ru_stime) + 1 + seconds
-    resource.setrlimit(resource.RLIMIT_CPU, (min(soft, hard), hard))
+        system_calls.allow_only_reading()

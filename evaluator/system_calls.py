@@ -38,16 +38,13 @@ ALLOWED: Final[dict[str, tuple[int, int]]] = {
 }
 """The numbers of each call on x86_64 and on aarch64."""
 
-OWN_LIMITS: Final = (302, 261)
-"""`prlimit64`, which is allowed, where it is, for the process itself alone."""
-
 # By `os.uname().machine`: which of the numbers, and the kernel's name of the architecture (AUDIT_ARCH_…).
 _ARCHITECTURES: Final = {"x86_64": (0, 0xC000003E), "aarch64": (1, 0xC00000B7)}
 
 _PR_SET_SECCOMP: Final = 22
 _PR_SET_NO_NEW_PRIVS: Final = 38
 _MODE_FILTER: Final = 2
-_LOAD: Final = 0x20  # a word of `struct seccomp_data`: number at 0, architecture at 4, first argument at 16
+_LOAD: Final = 0x20  # a word of `struct seccomp_data`: number at 0, architecture at 4
 _JUMP_IF_EQUAL: Final = 0x15
 _RETURN: Final = 0x06
 _ALLOW: Final = 0x7FFF0000
@@ -73,24 +70,24 @@ def why_unavailable() -> str | None:
     return None if fault == errno.EFAULT else f"the kernel takes no filter: {os.strerror(fault)}"
 
 
-def allow_only_reading(*, own_limits: bool = False) -> None:
-    """From now on this thread may make the calls of `ALLOWED`. Irrevocable.
+def allow_only_reading() -> None:
+    """Let this thread make the calls of `ALLOWED` alone. Irrevocable.
 
-    With `own_limits` it may also lower its own limits. Raises `OSError` if the kernel takes no filter.
+    Raises `OSError` if the kernel takes no filter.
     """
-    program = program_for(os.uname().machine, own_limits=own_limits)
+    program = program_for(os.uname().machine)
     filter_ = _Program(len(program) // 8, program)
     fault = _prctl(_PR_SET_NO_NEW_PRIVS, 1) or _prctl(_PR_SET_SECCOMP, _MODE_FILTER, ctypes.byref(filter_))
     if fault:
         raise OSError(fault, os.strerror(fault))
 
 
-def program_for(machine: str, *, own_limits: bool) -> bytes:
+def program_for(machine: str) -> bytes:
     """The filter as the kernel reads it, instructions of 8 bytes. Raises `KeyError` for unknown machines."""
-    return b"".join(struct.pack("=HBBI", *one) for one in _instructions(machine, own_limits=own_limits))
+    return b"".join(struct.pack("=HBBI", *one) for one in _instructions(machine))
 
 
-def _instructions(machine: str, *, own_limits: bool) -> Iterator[tuple[int, int, int, int]]:
+def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
     """Operation, instructions to skip where the words are equal and where they are not, operand."""
     place, architecture = _ARCHITECTURES[machine]
     yield _LOAD, 0, 0, 4
@@ -99,11 +96,6 @@ def _instructions(machine: str, *, own_limits: bool) -> Iterator[tuple[int, int,
     yield _LOAD, 0, 0, 0
     for numbers in ALLOWED.values():
         yield _JUMP_IF_EQUAL, 0, 1, numbers[place]
-        yield _RETURN, 0, 0, _ALLOW
-    if own_limits:
-        yield _JUMP_IF_EQUAL, 0, 3, OWN_LIMITS[place]
-        yield _LOAD, 0, 0, 16
-        yield _JUMP_IF_EQUAL, 0, 1, 0
         yield _RETURN, 0, 0, _ALLOW
     yield _RETURN, 0, 0, _REFUSE
 

@@ -10,28 +10,20 @@ import json
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import IO, Final
+from typing import IO
 
-from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, allow_cpu, forbid_calls, limit, obey_the_parent_alone
+from evaluator.limits import EXIT_OUT_OF_MEMORY, READY, forbid_calls, limit, obey_the_parent_alone
 from evaluator.problems import Rejected
 from evaluator.truth.annotations import read_files
-
-BASE_CPU_S: Final = 1
-BYTES_PER_CPU_S: Final = 2_000_000
-"""A sixth of what a slow core reads."""
-MAX_CPU_S: Final = 24 * 3600
 
 
 def files_of(source: IO[bytes], answers: IO[bytes]) -> Iterator[tuple[str, bytes]]:
     """The files that come in, each answered when the next is asked for."""
     while line := source.readline():
         header = json.loads(line)
-        n_bytes = int(header["n_bytes"])
-        allow_cpu(BASE_CPU_S + n_bytes // BYTES_PER_CPU_S)
-        yield header["name"], source.read(n_bytes)
+        yield header["name"], source.read(int(header["n_bytes"]))
         answers.write(b"\n")
         answers.flush()
-    allow_cpu(MAX_CPU_S)
 
 
 def warm_up() -> None:
@@ -43,13 +35,12 @@ def warm_up() -> None:
 
 
 def main() -> None:
-    """Arguments: memory limit in bytes; 1 where true times are read, else 0; so for boxes and all frames."""
+    """Arguments: memory in bytes, processor time in seconds, and 1 or 0: true times, boxes, all frames."""
     obey_the_parent_alone()
     warm_up()
-    memory_bytes = int(sys.argv[1])
-    with_ttc, with_boxes, with_frames = (argument == "1" for argument in sys.argv[2:5])
-    limit(memory_bytes=memory_bytes, cpu_s=MAX_CPU_S)
-    forbid_calls(own_limits=True)
+    with_ttc, with_boxes, with_frames = (argument == "1" for argument in sys.argv[3:6])
+    limit(memory_bytes=int(sys.argv[1]), cpu_s=int(sys.argv[2]))
+    forbid_calls()
     answers = sys.stdout.buffer
     answers.write(READY)
     answers.flush()

@@ -9,7 +9,7 @@ import sys
 
 import pytest
 
-from evaluator.system_calls import ALLOWED, OWN_LIMITS, program_for, why_unavailable
+from evaluator.system_calls import ALLOWED, program_for, why_unavailable
 
 ALLOW, REFUSE, KILL = 0x7FFF0000, 0x00050000 | errno.EPERM, 0x80000000
 ARCHITECTURES = {"x86_64": 0xC000003E, "aarch64": 0xC00000B7}
@@ -31,7 +31,7 @@ DANGEROUS = {
     "execve": (59, 221),
     "prctl": (157, 167),
     "seccomp": (317, 277),
-    "prlimit64": OWN_LIMITS,
+    "prlimit64": (302, 261),
     "bpf": (321, 280),
     "memfd_create": (319, 279),
 }
@@ -41,9 +41,9 @@ needs_a_filter = pytest.mark.skipif(
 )
 
 
-def verdict(program: bytes, *, architecture: int, number: int, first_argument: int = 0) -> int:
+def verdict(program: bytes, *, architecture: int, number: int) -> int:
     """What the kernel's machine makes of the filter for this call."""
-    call = struct.pack("=iIQQ", number, architecture, 0, first_argument)
+    call = struct.pack("=iIQ", number, architecture, 0)
     instructions = [struct.unpack_from("=HBBI", program, at) for at in range(0, len(program), 8)]
     word = place = 0
     while True:
@@ -58,16 +58,11 @@ def verdict(program: bytes, *, architecture: int, number: int, first_argument: i
             return int(operand)
 
 
-@pytest.mark.parametrize("own_limits", [False, True])
 @pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
-def test_filter_allows_what_it_names_and_refuses_every_other_number(
-    place: int, machine: str, own_limits: bool
-) -> None:
-    program = program_for(machine, own_limits=own_limits)
+def test_filter_allows_what_it_names_and_refuses_every_other_number(place: int, machine: str) -> None:
+    program = program_for(machine)
     architecture = ARCHITECTURES[machine]
     allowed = {numbers[place] for numbers in ALLOWED.values()}
-    if own_limits:
-        allowed.add(OWN_LIMITS[place])
     # 1 << 30 is the bit of the calls of x32.
     for number in (*range(600), *(number | 1 << 30 for number in range(600)), -1):
         expected = ALLOW if number in allowed else REFUSE
@@ -76,7 +71,7 @@ def test_filter_allows_what_it_names_and_refuses_every_other_number(
 
 @pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
 def test_what_reaches_another_file_or_process_is_refused_by_name(place: int, machine: str) -> None:
-    program = program_for(machine, own_limits=False)
+    program = program_for(machine)
     for name, numbers in DANGEROUS.items():
         number = numbers[place]
         if number is not None:
@@ -84,19 +79,9 @@ def test_what_reaches_another_file_or_process_is_refused_by_name(place: int, mac
             assert found == REFUSE, name
 
 
-@pytest.mark.parametrize(("place", "machine"), list(enumerate(ARCHITECTURES)))
-def test_limits_of_other_processes_are_never_changed(place: int, machine: str) -> None:
-    program = program_for(machine, own_limits=True)
-    found = [
-        verdict(program, architecture=ARCHITECTURES[machine], number=OWN_LIMITS[place], first_argument=pid)
-        for pid in (0, 1, 4711, 0xFFFF_FFFF)
-    ]
-    assert found == [ALLOW, REFUSE, REFUSE, REFUSE]
-
-
 @pytest.mark.parametrize("machine", ARCHITECTURES)
 def test_calls_of_another_architecture_end_the_process(machine: str) -> None:
-    program = program_for(machine, own_limits=True)
+    program = program_for(machine)
     [other] = [number for name, number in ARCHITECTURES.items() if name != machine]
     for architecture in (I386, other):
         assert verdict(program, architecture=architecture, number=0) == KILL
