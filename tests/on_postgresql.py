@@ -24,7 +24,6 @@ SAME_ON_BOTH = {
     "tests/leaderboard/demo": "it refuses production, and its profile has SQLite",
     "tests/leaderboard/exports": "bytes of a board; boards/ reads its rows",
     "tests/leaderboard/api/test_board.py": "answers; boards/ reads the rows",
-    "tests/leaderboard/api/test_board_document.py": "answers; boards/ reads the rows",
     "tests/leaderboard/api/test_compare.py": "answers; scoring/test_questions.py asks for the rows",
     "tests/leaderboard/api/test_conditional.py": "tags of answers",
     "tests/leaderboard/api/test_outcome.py": "answers; scoring/test_confidence.py reads the rows",
