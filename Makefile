@@ -57,8 +57,8 @@ format: $(DEV_STAMP) ## put the code into the house's format
 	$(PY) -m ruff check --fix .
 	$(PY) -m ruff format .
 
-screenshots: $(DEV_STAMP) ## photograph every page (INTO=build/screenshots), and renew docs/screenshots/
-	$(PY) -m tests.browser.screenshots --keep $(if $(INTO),--into $(INTO))
+screenshots: $(DEV_STAMP) ## photograph the demo for the README, into docs/screenshots/
+	$(PY) -m tests.browser.screenshots
 
 # Universal: one file for every platform and Python; hashes, and no index host. Existing pins stay unless
 # `make lock UPGRADE=--upgrade` asks for newer ones.

@@ -1,7 +1,7 @@
 """A headless Chromium, and what a page may not do in it."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
@@ -100,33 +100,6 @@ FOCUSED_NAME = """() => {
 
 OVERFLOW_PX = "() => document.documentElement.scrollWidth - document.documentElement.clientWidth"
 
-
-def least_shift(page: Page, load: Callable[[], object], *, allowed: float) -> float:
-    """How far the page moves while it loads: the least of a few times, if it is more than is allowed.
-
-    A busy browser draws a long table in pieces, and its columns settle as they come. What moves whenever the
-    page is loaded is the page's own fault.
-    """
-    load()
-    shift: float = page.evaluate(LAYOUT_SHIFT)
-    if shift <= allowed:
-        return shift
-    page.route("**/*", lambda route: route.continue_())  # so nothing comes from the cache
-    shifts = [shift]
-    while len(shifts) < N_LOADS and shifts[-1] > allowed:
-        load()
-        shifts.append(page.evaluate(LAYOUT_SHIFT))
-    page.unroute("**/*")
-    return min(shifts)
-
-
-LAYOUT_SHIFT = """() => new Promise(resolve => {
-  let sum = 0;
-  new PerformanceObserver(list => {
-    for (const entry of list.getEntries()) if (!entry.hadRecentInput) sum += entry.value;
-  }).observe({type: "layout-shift", buffered: true});
-  requestAnimationFrame(() => requestAnimationFrame(() => resolve(sum)));
-})"""
 
 # What moved, from where to where: x, y, width, height.
 MOVED = """() => new Promise(resolve => {

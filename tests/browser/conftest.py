@@ -9,8 +9,9 @@ import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import evaluator
+from tests import services
 from tests.browser.chromium import WIDE, Complaints, chromium
-from tests.browser.site import PASSWORD, open_split, site_to_look_at
+from tests.browser.site import PASSWORD, open_split, web_alone
 from tests.journeys.production import Site
 
 PATIENCE_MS = 120_000
@@ -18,13 +19,40 @@ MAX_PREDICTIONS_BYTES = 200_000
 
 NewPage = Callable[..., Page]
 
+BOARD_OWNER = "board-owner@example.org"
+N_SHOWN = 65  # to visitors, of a board with one private row more
+FILL = f"""
+from datetime import timedelta
+from allauth.account.models import EmailAddress
+from django.db import transaction
+from django.utils import timezone
+from leaderboard import versions
+from leaderboard.models import Method, Split, Submission, User
+from leaderboard.people import teams
+from tests import board_rows
+user = User.objects.create_user({BOARD_OWNER!r}, {PASSWORD!r}, name="Owners")
+EmailAddress.objects.create(user=user, email=user.email, verified=True, primary=True)
+methods = board_rows.fill(Split.objects.get(pk="demo").published_edition, n={N_SHOWN + 1}, user=user)
+Method.objects.filter(pk=methods[0].pk).update(name="A" * 80)
+own = Method.objects.filter(pk=methods[1].pk)
+own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))
+earlier = Submission.objects.filter(method__in=methods[::2])
+earlier.update(submitted_at=timezone.now() - timedelta(days=40))
+with transaction.atomic():
+    versions.changed("demo")
+"""
+
 
 @pytest.fixture(scope="session")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
     """A site without a worker; nothing is started where there is no browser to look at it."""
     limits = {"TSTTC_MAX_PREDICTIONS_BYTES": str(MAX_PREDICTIONS_BYTES), "TSTTC_QUOTAS": "0"}
     limits |= {"TSTTC_THROTTLES": "0"}
-    with site_to_look_at(tmp_path_factory.mktemp("site"), **limits) as running:
+    try:
+        services.chromium()
+    except services.ServiceMissing as missing:
+        services.skip_or_fail(missing)
+    with web_alone(tmp_path_factory.mktemp("site"), **limits) as running:
         yield running
 
 
@@ -32,6 +60,13 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
 def truth(site: Site) -> evaluator.GroundTruth:
     """Ground truth of the split `test`, which is open from here on."""
     return open_split(site, "test")
+
+
+@pytest.fixture(scope="session")
+def board(site: Site) -> None:
+    """Rows of `demo` on two dates, two with names of 80 letters and no break, one of these private."""
+    open_split(site, "demo")
+    site.manage("shell", "-v0", "-c", FILL)
 
 
 @pytest.fixture(scope="module")
@@ -88,16 +123,3 @@ def submit(page: Page, data: bytes, *, method: str, split: str = "test") -> None
     expect(page.get_by_text("Checking the file…")).to_have_count(0)
     page.get_by_role("button", name="Submit").click()
     page.wait_for_url("**/submissions/*/")
-
-
-def show(page: Page) -> None:
-    """Make the method of the submission that the page shows public, as its team does; then go back to it."""
-    submission = page.url
-    page.locator(".facts-list a[href^='/methods/']").click()
-    page.get_by_role("link", name="Publish…").click()
-    page.locator("input[value=PUBLIC]").check()
-    page.get_by_role("button", name="Preview").click()
-    page.get_by_role("checkbox").check()
-    page.get_by_role("button", name="Publish", exact=True).click()
-    page.wait_for_url("**/methods/*/")
-    page.goto(submission)

@@ -13,7 +13,6 @@ import numpy as np
 
 import evaluator
 from leaderboard.demo.runs import simulate
-from tests import services
 from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, end, free_port, running, start
 from tests.prepared import put_sqlite, static_files
 
@@ -60,17 +59,6 @@ def _answers(url: str) -> bool:
         return httpx.get(f"{url}/docs/", trust_env=False).status_code == 200
     except httpx.TransportError:
         return False
-
-
-@contextmanager
-def site_to_look_at(directory: Path, **settings: str) -> Iterator[Site]:
-    """The same, for a browser: nothing is started where there is none."""
-    try:
-        services.chromium()
-    except services.ServiceMissing as missing:
-        services.skip_or_fail(missing)
-    with web_alone(directory, **settings) as site:
-        yield site
 
 
 @contextmanager

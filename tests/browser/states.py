@@ -1,4 +1,4 @@
-"""What a demo shows for seconds or never, made to stand still so that it can be looked at.
+"""What a site shows for seconds or never, made to stand still so that it can be looked at.
 
 Both functions run in a process of the site (`manage.py shell`), because the site's database is its own; its
 worker stands still meanwhile.
@@ -75,7 +75,7 @@ def _sent(user: User, split: str) -> dict[str, Submission]:
     for name in ("withdrawn", "cancelled"):
         submissions.withdraw(submission=made[name], actor=user, now=timezone.now())
     for name in ("running", "queued"):
-        _move(made[name], LONG)  # so it does not become late while it is photographed
+        _move(made[name], LONG)  # so it does not become late while it is looked at
         _move(made[f"{name}-late"], -LONG)
     return made
 

@@ -1,40 +1,18 @@
 """The board on every screen: it fits, its heads stay, it answers at once, and it keeps what is ticked."""
 
 import re
-from collections.abc import Iterator
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from tests.browser.chromium import NARROW, OVERFLOW_PX, WIDE, sign_in, timers_at_rest
-from tests.browser.conftest import NewPage
-from tests.browser.site import PASSWORD, open_split, site_to_look_at
-from tests.journeys.production import Site
+from tests.browser.conftest import BOARD_OWNER, NewPage
 
 pytestmark = pytest.mark.browser
 
 BOARD = "/board/demo/"
 WIDTHS = (320, 360, 768, 960, 1024, 1280, 1366, 1440, 1920)
-N_ROWS = 66
 N_COMPARED = 5
-OWNER = "board-owner@example.org"
-UNBROKEN = "A" * 80
-FILL = f"""
-from allauth.account.models import EmailAddress
-from django.db import transaction
-from leaderboard import versions
-from leaderboard.models import Method, Split, User
-from leaderboard.people import teams
-from tests import board_rows
-user = User.objects.create_user({OWNER!r}, {PASSWORD!r}, name="Owners")
-EmailAddress.objects.create(user=user, email=user.email, verified=True, primary=True)
-methods = board_rows.fill(Split.objects.get(pk="demo").published_edition, n={N_ROWS}, user=user)
-Method.objects.filter(pk=methods[0].pk).update(name={UNBROKEN!r})
-own = Method.objects.filter(pk=methods[1].pk)
-own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))
-with transaction.atomic():
-    versions.changed("demo")
-"""
 # Cells whose text is wider than they are: it would lie over its neighbour. Italics lean into their padding.
 SPILLED = """() => [...document.querySelectorAll("table.board :is(td, th):not(.interval, .choose)")]
   .filter(cell => cell.checkVisibility() && cell.scrollWidth > cell.clientWidth + 3)
@@ -46,20 +24,6 @@ HEAD_TOP_PX = """() => {
   scrollTo(0, document.querySelector("table.board tbody tr:nth-child(40)").offsetTop);
   return document.querySelector("table.board thead").getBoundingClientRect().top;
 }"""
-
-
-@pytest.fixture(scope="module")
-def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    """A site of this module's own, since the charts' module fills the same split."""
-    with site_to_look_at(tmp_path_factory.mktemp("board"), TSTTC_QUOTAS="0", TSTTC_THROTTLES="0") as running:
-        yield running
-
-
-@pytest.fixture(scope="module")
-def full(site: Site) -> None:
-    """A board of 66 rows, two of them with names of 80 letters and no break, one of these private."""
-    open_split(site, "demo")
-    site.manage("shell", "-v0", "-c", FILL)
 
 
 def faults_at_every_width(page: Page) -> list[str]:
@@ -77,16 +41,16 @@ def faults_at_every_width(page: Page) -> list[str]:
 
 
 def test_board_fits_every_screen_with_names_of_80_letters_and_its_heads_stay(
-    new_page: NewPage, full: None
+    new_page: NewPage, board: None
 ) -> None:
     assert faults_at_every_width(new_page()) == []
     page = new_page()
-    sign_in(page, OWNER)
+    sign_in(page, BOARD_OWNER)
     assert faults_at_every_width(page) == []
     expect(page.get_by_text("would be")).to_have_count(1)
 
 
-def test_phone_shows_one_range_and_the_visitor_chooses_which(new_page: NewPage, full: None) -> None:
+def test_phone_shows_one_range_and_the_visitor_chooses_which(new_page: NewPage, board: None) -> None:
     page = new_page(viewport=NARROW)
     page.goto(BOARD)
     heads = page.locator("table.board thead tr").last.locator("th:visible")
@@ -98,7 +62,7 @@ def test_phone_shows_one_range_and_the_visitor_chooses_which(new_page: NewPage, 
     expect(page.get_by_role("complementary", name="Selected for comparison")).to_be_visible()
 
 
-def test_board_answers_while_one_types_and_says_at_the_field_what_is_wrong(page: Page, full: None) -> None:
+def test_board_answers_while_one_types_and_says_at_the_field_what_is_wrong(page: Page, board: None) -> None:
     page.goto(BOARD)
     rows = page.locator("table.board tbody tr")
     page.get_by_role("searchbox").press_sequentially("method 12 ")
@@ -118,7 +82,7 @@ def test_board_answers_while_one_types_and_says_at_the_field_what_is_wrong(page:
     expect(page).to_have_url(only_what_is_set)
 
 
-def test_ticks_survive_sorting_and_searching_and_end_at_five(page: Page, full: None) -> None:
+def test_ticks_survive_sorting_and_searching_and_end_at_five(page: Page, board: None) -> None:
     page.goto(BOARD)
     boxes = page.locator("table.board tbody input[type=checkbox]")
     tray = page.get_by_role("complementary", name="Selected for comparison")
@@ -143,7 +107,7 @@ def test_ticks_survive_sorting_and_searching_and_end_at_five(page: Page, full: N
 
 
 def test_menu_and_legend_open_and_close_by_keyboard_and_an_export_is_copied(
-    new_page: NewPage, full: None
+    new_page: NewPage, board: None
 ) -> None:
     page = new_page(viewport=WIDE, permissions=["clipboard-read", "clipboard-write"])
     page.goto(BOARD)

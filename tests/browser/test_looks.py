@@ -7,7 +7,6 @@ import evaluator
 from tests.browser.chromium import NARROW, WIDE, tab_to
 from tests.browser.conftest import NewPage
 from tests.browser.inspection import draw_all
-from tests.journeys.production import Site
 
 pytestmark = pytest.mark.browser
 
@@ -36,36 +35,6 @@ def test_first_tab_offers_to_skip_to_the_content(page: Page, truth: evaluator.Gr
     assert page.evaluate("document.activeElement.id") == "main"
 
 
-FIVE_SPLITS = """
-from leaderboard.models import Split
-for name, title in (("late-1", "Winter challenge 2027, night drives"), ("late-2", "Summer challenge 2027")):
-    Split.objects.get_or_create(name=name, defaults={"title": title})
-"""
-NO_MORE = "from leaderboard.models import Split; Split.objects.filter(name__startswith='late-').delete()"
-
-
-def test_five_splits_fit_a_phone(new_page: NewPage, site: Site, truth: evaluator.GroundTruth) -> None:
-    site.manage("shell", "-v0", "-c", FIVE_SPLITS)
-    try:
-        page = new_page(viewport={"width": 390, "height": 800})
-        for address in ("/board/late-1/", "/board/late-1/charts/"):
-            page.goto(address)
-            assert page.evaluate("document.documentElement.scrollWidth") <= 390, address
-            for link in page.locator("nav.splits a").all():
-                box = link.bounding_box()
-                assert box is not None
-                assert box["x"] + box["width"] <= 390
-    finally:
-        site.manage("shell", "-v0", "-c", NO_MORE)
-
-
-def test_meanings_of_codes_take_the_width_of_the_page(page: Page, truth: evaluator.GroundTruth) -> None:
-    page.goto("/docs/")
-    meaning = page.locator("dl.codes dd").first.bounding_box()
-    assert meaning is not None
-    assert meaning["width"] > 400
-
-
 def test_what_has_the_focus_can_be_seen(page: Page, truth: evaluator.GroundTruth) -> None:
     page.goto("/")
     for _ in range(30):
@@ -84,39 +53,6 @@ def test_print_has_the_whole_table_and_no_navigation(page: Page, truth: evaluato
         # The rank, the method, ten scores, and the intervals once some are computed.
         assert heads.count() >= 12
         expect(heads.filter(visible=True)).to_have_count(heads.count())
-
-
-def test_site_has_an_icon_of_its_own(page: Page, truth: evaluator.GroundTruth) -> None:
-    page.goto("/")
-    icon = page.locator("link[rel=icon]").get_attribute("href")
-    assert icon is not None
-    answer = page.request.get(icon)
-    assert (answer.status, answer.headers["content-type"]) == (200, "image/svg+xml")
-
-
-# A board of 18 columns, which a protocol may have: eight of this one's are shown twice.
-WIDER = """() => {
-  document.querySelector(".board-scroll").classList.add("scrolls");
-  const numbers = row => [...row.children].filter(cell => /\\bat[0-9]/.test(cell.className)
-    && !cell.matches(".interval"));
-  for (const row of document.querySelectorAll("table.board :is(colgroup, thead tr:last-child, tbody tr)"))
-    for (const cell of numbers(row).slice(0, 8)) row.append(cell.cloneNode(true));
-  document.querySelector(".board .groups th:last-child").colSpan += 8;
-}"""
-OUTSIDE = """() => [...document.querySelectorAll("table.board :is(td, th)")]
-  .filter(cell => cell.checkVisibility() && cell.getBoundingClientRect().right > innerWidth)
-  .map(cell => cell.textContent.trim())"""
-
-
-def test_board_with_more_columns_than_fit_is_printed_whole(page: Page, truth: evaluator.GroundTruth) -> None:
-    page.goto("/board/test/")
-    page.evaluate(WIDER)
-    first = page.locator("table.board tbody tr").first
-    expect(first.locator("td:not(.choose, .interval, .rank)")).to_have_count(18)
-    page.emulate_media(media="print")
-    page.set_viewport_size({"width": 1047, "height": 700})  # A4 on its side
-    assert page.evaluate(OUTSIDE) == []
-    assert page.evaluate("getComputedStyle(document.querySelector('.board-scroll')).overflow") == "visible"
 
 
 # The inks that show something: drawings, and lines in the place of tints.
@@ -160,20 +96,3 @@ def test_in_colours_that_the_visitor_chose_marks_buttons_and_the_focus_are_seen(
         "all => all.map(e => [e.matches('[aria-current]'), getComputedStyle(e).outlineStyle])"
     )
     assert {(is_current, style) for is_current, style in styles} == {(True, "solid"), (False, "none")}
-
-
-LEFT_PX = """() => ["h1", ".site-name", ".site-footer p"]
-  .map(name => Math.round(document.querySelector(name).getBoundingClientRect().left))"""
-
-
-def test_head_content_and_foot_of_every_kind_of_page_begin_at_one_edge(
-    page: Page, truth: evaluator.GroundTruth
-) -> None:
-    edges: dict[int, set[int]] = {1280: set(), 1440: set(), 1920: set()}
-    boards = ("/board/test/", "/board/test/charts/", "/board/test/editions/", "/compare/")
-    for address in (*boards, "/privacy/", "/accounts/login/"):
-        page.goto(address)
-        for width_px, seen in edges.items():
-            page.set_viewport_size({"width": width_px, "height": 900})
-            seen.update(page.evaluate(LEFT_PX))
-    assert [len(seen) for seen in edges.values()] == [1, 1, 1]

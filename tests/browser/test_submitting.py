@@ -3,17 +3,15 @@
 import gzip
 import json
 import re
-import sqlite3
-from contextlib import closing
 from pathlib import Path
 
 import pytest
 from playwright.sync_api import Browser, Page, expect
 
 import evaluator
-from tests.browser.chromium import NARROW, tab_to
+from tests.browser.chromium import tab_to
 from tests.browser.conftest import MAX_PREDICTIONS_BYTES, PASSWORD, NewPage, sign_up, submit
-from tests.browser.site import DATABASE, predictions, worker
+from tests.browser.site import predictions, worker
 from tests.journeys.production import Site, await_that, get
 
 pytestmark = pytest.mark.browser
@@ -271,54 +269,6 @@ def test_state_moves_without_a_reload(page: Page, site: Site, truth: evaluator.G
         expect(page.locator(".result .span").first).to_contain_text("–")
     expect(page.locator("[aria-current=step]")).not_to_have_class(re.compile("moving"))
     assert page.evaluate("window.isTheSamePage") is True
-
-
-def test_polling_ends_with_the_intervals(page: Page, site: Site, truth: evaluator.GroundTruth) -> None:
-    page.clock.install()
-    sign_up(page, email="ends@example.org", name="Ends")
-    submit(page, predictions(truth, factor=1.2), method="Ending")
-    with worker(site):
-        await_step(page, "Scored")
-        expect(page.locator("[aria-current=step] .note")).to_have_count(0)
-    asked: list[str] = []
-    page.on("request", lambda request: asked.append(request.url))
-    page.clock.fast_forward(10_000)
-    assert asked == []
-
-
-def test_nothing_is_announced_while_nothing_moves(
-    page: Page, site: Site, truth: evaluator.GroundTruth
-) -> None:
-    sign_up(page, email="quiet@example.org", name="Quiet")
-    submit(page, predictions(truth, factor=1.3), method="Quiet")
-    expect(page.locator("[aria-current=step] .note")).to_contain_text("next in line")
-    # It waits for a day already: the open page says by itself that it takes longer than usual, once.
-    with closing(sqlite3.connect(site.directory / DATABASE, timeout=60)) as database, database:
-        database.execute("UPDATE leaderboard_evaluation SET queued_at = datetime(queued_at, '-1 day')")
-    expect(page.locator("[aria-current=step] .note")).to_contain_text("longer than usual")
-    page.evaluate(
-        """() => { window.nChanges = 0;
-        new MutationObserver(() => window.nChanges++).observe(document.getElementById("state"),
-          {childList: true, subtree: true, characterData: true}); }"""
-    )
-    for _ in range(2):
-        with page.expect_response(re.compile("/state/")) as answer:
-            pass
-        assert answer.value.status == 204
-    assert page.evaluate("window.nChanges") == 0
-
-
-def test_problems_of_a_bad_file_appear_by_themselves(
-    new_page: NewPage, site: Site, truth: evaluator.GroundTruth
-) -> None:
-    page = new_page(viewport=NARROW)
-    sign_up(page, email="bad@example.org", name="Bad")
-    submit(page, b'{"0": 0, "1": "fast", "nowhere": 1}', method="Broken")
-    with worker(site):
-        await_step(page, "Rejected")
-    expect(page.locator("#outcome h2")).to_contain_text("problems in the file")
-    expect(page.locator(".problems li")).not_to_have_count(0)
-    expect(page.locator("#outcome pre")).to_contain_text("tsttc check predictions.json")
 
 
 def test_file_over_the_limit_is_stopped_before_it_is_sent(page: Page, truth: evaluator.GroundTruth) -> None:

@@ -21,17 +21,16 @@ from leaderboard.editions import ground_truth
 from leaderboard.models import BoxSource, Edition, Evaluation, Method, Split, Submission, User, Visibility
 from leaderboard.scoring import comparisons
 from leaderboard.submissions import submissions
-from tests import builders
+from tests import builders, editions
 from tests.browser.site import PASSWORD
 from tests.journeys.production import Site
 from tests.leaderboard.web.maintain import queue_rows
-from tests.noisy_estimates import Estimator
 
 SPLIT = "val"
 OWNER, RIVAL, MAINTAINER = "owner@example.org", "rival@example.org", "maintainer@example.org"
 N_SEQUENCES, N_RECORDINGS = 1_500, 60
 LONG_NAME = "A method with a rather long name, of the kind that papers like: cross-attention"
-# Whose it is, its noise, its latency in ms; the last sent is the best.
+# Whose it is, its noise in per cent, its latency in ms; the last sent is the best.
 METHODS: dict[str, tuple[str, float, float | None]] = {
     LONG_NAME: (OWNER, 50.0, None),
     "Optical flow expansion": (RIVAL, 36.0, 31.0),
@@ -81,6 +80,8 @@ def populate() -> str:
             viewer=AnonymousUser(),
             now=timezone.now(),
         )
+    editions.open_edition(split=SPLIT, protocol="toolkit")  # a correction that maintainers look at
+    builders.score_all()
     builders.infer_all()
     _give_maintainers_something_to_do(owner, maintainer)
     return json.dumps(
@@ -113,8 +114,8 @@ def _truth() -> evaluator.GroundTruth:
 
 
 def _file(truth: evaluator.GroundTruth, *, noise: float) -> bytes:
-    estimator = Estimator(noise=noise, recording_noise=noise / 3)
-    ttc_s = estimator.predict(truth=truth, rng=np.random.default_rng(round(10 * noise)))
+    rng = np.random.default_rng(round(10 * noise))
+    ttc_s = truth.ttc_s * np.exp(rng.normal(scale=noise / 100, size=truth.n_sequences))
     return evaluator.write_predictions(manifest=truth.manifest, ttc_s=ttc_s)
 
 
@@ -134,7 +135,7 @@ def _describe(method: Method, *, latency_ms: float | None) -> None:
 
 def _give_maintainers_something_to_do(owner: User, maintainer: User) -> None:
     """Something that failed by our fault, something that waits, and a team with rules of its own."""
-    edition = Edition.objects.get(split=SPLIT)
+    edition = Edition.objects.get(split=SPLIT, number=1)
     failed = queue_rows.queued(edition, owner)
     queue_rows.strike_out()
     waiting = queue_rows.queued(edition, owner, priority=Evaluation.PRIORITY_RESCORE)
