@@ -1,4 +1,4 @@
-"""Links between documents lead somewhere, here as at GitHub, and no document is left out of a list."""
+"""Documents name what is there: links, headings, modules, rooms; and none is left out of a list."""
 
 import re
 from urllib.parse import unquote
@@ -8,6 +8,9 @@ from tests.services import REPOSITORY
 
 DOCS = REPOSITORY / "docs"
 LINK = re.compile(r"\]\((?!https?:|mailto:)([^)#\s]*)(?:#([^)\s]*))?\)")
+PATH = re.compile(
+    r"`((?:leaderboard|evaluator|baselines|tests|benchmarks|examples|docs|deploy)/[\w./-]+\.(?:py|md|yml|html|csv))`"
+)
 CODE = re.compile(r"```.*?```|`[^`\n]*`", re.DOTALL)
 
 
@@ -30,3 +33,25 @@ def test_every_document_is_in_the_navigation_and_every_decision_in_its_list() ->
     names = {path: name for name, path in guides.files().items()}
     assert [path.name for path in DOCS.glob("*.md") if names[path] not in listed] == []
     assert [path.name for path in DOCS.glob("adr/0*.md") if f"({path.name})" not in decisions] == []
+
+
+def test_files_that_documents_and_docstrings_name_are_there() -> None:
+    sources = [*REPOSITORY.glob("*.md"), *REPOSITORY.glob("docs/**/*.md")]
+    for folder in ("leaderboard", "evaluator", "baselines", "tests"):
+        sources += (REPOSITORY / folder).rglob("*.py")
+    missing = [
+        f"{source.relative_to(REPOSITORY)}: {name}"
+        for source in sources
+        if source.name not in {"CHANGELOG.md", "peers.md"}  # the past, and files of other projects
+        for name in PATH.findall(source.read_text(encoding="utf-8"))
+        if not (REPOSITORY / name).exists() and not (REPOSITORY / "tests" / name).exists()
+    ]
+    assert missing == []
+
+
+def test_the_page_of_the_architecture_lists_every_room() -> None:
+    page = (DOCS / "architecture.md").read_text(encoding="utf-8")
+    rooms = {path.parent.name for path in (REPOSITORY / "leaderboard").glob("*/__init__.py")}
+    table = page.partition("## The rooms")[2].partition("## ")[0]
+    first_cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
+    assert set(re.findall(r"`(\w+)/`", " ".join(first_cells))) == rooms

@@ -1,7 +1,6 @@
 """What `check --deploy` says, and that scripts and targets are there; `make lint` holds the style."""
 
 import re
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -67,17 +66,3 @@ def test_production_does_not_start_without_a_variable_that_it_needs(production: 
     needed = ("TSTTC_SECRET_KEY", "TSTTC_RECEIPT_KEY", "TSTTC_ALLOWED_HOSTS", *services)
     complaint = says(sys.executable, "manage.py", "check", environment=production | dict.fromkeys(needed, ""))
     assert [name for name in needed if f"{name} is not set" not in complaint] == []
-
-
-@pytest.mark.skipif(shutil.which("bash") is None, reason="bash is not installed")
-@pytest.mark.parametrize("script", [".ci/run"])
-def test_shell_scripts_parse(script: str) -> None:
-    assert says("bash", "-n", script) == ""
-
-
-def test_every_target_that_the_readme_names_exists() -> None:
-    makefile = (REPOSITORY / "Makefile").read_text()
-    readme = (REPOSITORY / "README.md").read_text()
-    named = {line.split()[1] for line in readme.splitlines() if line.startswith("make ")}
-    assert {"demo", "test"} <= named
-    assert not {target for target in named if f"\n{target}:" not in makefile}
