@@ -169,13 +169,3 @@ def shared_data() -> Path | None:
         if candidate and (Path(candidate) / "README.md").is_file():
             return Path(candidate)
     return None
-
-
-@pytest.fixture(scope="module")
-def redis_url() -> Iterator[str]:
-    """An empty Redis database of this module's own."""
-    try:
-        with throwaway_redis() as url:
-            yield url
-    except ServiceMissing as missing:
-        skip_or_fail(missing)

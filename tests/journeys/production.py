@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -44,8 +44,6 @@ def get(url: str, **headers: str) -> httpx.Response:
 
 @dataclass(frozen=True)
 class Site:
-    """A running leaderboard."""
-
     url: str
     directory: Path
     environment: dict[str, str]
@@ -138,11 +136,15 @@ def running(site: Site, name: str, *command: str) -> Iterator[subprocess.Popen[b
         end(process)
 
 
+GUNICORN = (str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application")
+
+
 @contextmanager
-def web_process(site: Site, name: str = "web") -> Iterator[subprocess.Popen[bytes]]:
+def web_process(
+    site: Site, name: str = "web", command: Sequence[str] = GUNICORN
+) -> Iterator[subprocess.Popen[bytes]]:
     """The web server of a site, once it answers."""
-    gunicorn = (str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py", "leaderboard.wsgi:application")
-    with running(site, name, *gunicorn) as process:
+    with running(site, name, *command) as process:
         await_that(lambda: _answers(site, name), what="the web server answers")
         yield process
 

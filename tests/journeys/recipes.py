@@ -1,6 +1,6 @@
 """The recipes for CI as a runner reads them: their jobs' shell steps, in order."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,33 +19,26 @@ class Recipe:
     environment: dict[str, str]
     steps: list[str]
     n_installing: int
-    actions: list[str] = field(default_factory=list)
-    secret: str = ""
 
 
 def github() -> Recipe:
-    """The workflow of GitHub Actions."""
     document = _read("github-actions.yml")
     (job,) = document["jobs"].values()
     runs = [step["run"] for step in job["steps"] if "run" in step]
-    secrets = [text for step in job["steps"] for text in step.get("env", {}).values()]
-    actions = [step["uses"] for step in job["steps"] if "uses" in step]
-    return _recipe(job["env"], runs, actions=actions, secret=" ".join(secrets))
+    return _recipe(job["env"], runs)
 
 
 def gitlab() -> Recipe:
-    """The job of GitLab CI."""
     (job,) = _read("gitlab-ci.yml").values()
     return _recipe(job["variables"], [*job["before_script"], *job["script"], *job["after_script"]])
 
 
-def _recipe(environment: dict[str, Any], runs: list[str], **more: Any) -> Recipe:
+def _recipe(environment: dict[str, Any], runs: list[str]) -> Recipe:
     steps = [run for run in runs if run.strip() != INSTALL]
     return Recipe(
         environment={name: str(value) for name, value in environment.items()},
         steps=steps,
         n_installing=len(runs) - len(steps),
-        **more,
     )
 
 

@@ -100,14 +100,3 @@ def test_curl_and_python_of_every_page_of_the_api_run_as_they_stand(world: World
         pytest.skip("there is no curl")
     for operation in EXAMPLES:
         world.run(operation)
-
-
-def test_every_page_with_python_makes_its_client_by_itself(client: Client, benchmark: None) -> None:
-    for operation, example in EXAMPLES.items():
-        if example.python:
-            blocks = [
-                pre.raw_text for pre in pages.get(client, f"/docs/api/{operation}/").one("main").all("pre")
-            ]
-            (python,) = (block for block in blocks if block.startswith("import "))
-            assert "with evaluator.Client(url=" in python
-            assert example.python.splitlines()[-1].strip().removeprefix("print(") in python

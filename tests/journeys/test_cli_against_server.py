@@ -9,7 +9,6 @@ import pytest
 from django.utils import timezone
 from pytest_django.live_server_helper import LiveServer
 
-from evaluator.client.client import Client
 from evaluator.metrics.protocol import SCORE_NAMES
 from leaderboard.editions import ground_truth
 from leaderboard.models import Submission, User
@@ -21,7 +20,6 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture
 def owner(transactional_db: None) -> User:
-    """Somebody who submits."""
     return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
 
 
@@ -72,29 +70,6 @@ def test_rejection_has_the_words_of_check(tsttc: Tsttc) -> None:
     assert "7 problems" in done.stderr.splitlines()[0]
 
 
-def test_same_file_again_is_the_first_submission(tsttc: Tsttc) -> None:
-    first = submitted(tsttc, "predictions.json")
-    again = submit(tsttc, "predictions.json")
-    assert again.returncode == 0
-    assert again.stdout.splitlines()[0].startswith(f"Submission {first}  http")
-    assert "You already submitted this file" in again.stdout
-    assert Submission.objects.count() == 1
-
-
-def test_what_is_said_of_a_method_arrives(tsttc: Tsttc) -> None:
-    said = {"description": "A try", "paper-url": "https://p.example/", "code-url": "https://c.example/"}
-    said |= {"note": "third", "commit": "c0ffee"}
-    submitted(
-        tsttc, "predictions.json", *[part for name, text in said.items() for part in (f"--{name}", text)]
-    )
-    submission = Submission.objects.select_related("method").get()
-    method = submission.method
-    assert (method.name, method.description) == ("Foo++", "A try")
-    assert (method.paper_url, method.code_url) == ("https://p.example/", "https://c.example/")
-    assert (submission.note, submission.commit) == ("third", "c0ffee")
-    assert submission.filename == "predictions.json"
-
-
 def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     submitted(tsttc, "predictions.json")
     builders.score_all()
@@ -116,13 +91,6 @@ def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     assert tuple(document["entries"][0]["scores"]) == SCORE_NAMES
 
 
-def test_manifest_of_the_server_checks_files_like_the_local_one(
-    live_server: LiveServer, tsttc: Tsttc
-) -> None:
-    with Client(url=live_server.url) as client:
-        assert client.manifest("val") == (EXAMPLES / "manifest.csv").read_bytes()
-
-
 def test_refusal_of_the_server_is_told_by_whose_fault_it_is(tsttc: Tsttc) -> None:
     send = ["submit", "predictions.json", "--split"]
     nothing = "There is nothing at this address"
@@ -139,11 +107,3 @@ def test_refusal_of_the_server_is_told_by_whose_fault_it_is(tsttc: Tsttc) -> Non
         assert done.returncode == code, done.stderr
         assert words in done.stderr
         assert "Traceback" not in done.stderr
-
-
-def test_token_that_the_server_does_not_know_is_told(
-    live_server: LiveServer, tsttc: Tsttc, tmp_path: Path
-) -> None:
-    done = submit(command(live_server.url, "tsttc_" + "0" * 64, home=tmp_path), "predictions.json")
-    assert done.returncode == 4
-    assert f"Create a token at {live_server.url}/tokens/" in done.stderr

@@ -10,16 +10,14 @@ compared with the evaluator's own.
 """
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 import evaluator
 from tests.journeys.people import Program, Visitor
-from tests.journeys.production import Site, await_that, production_site
-from tests.prepared import migrated_database
-from tests.services import ServiceMissing, skip_or_fail, throwaway_redis
+from tests.journeys.production import Site, await_that
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -35,26 +33,6 @@ N_WAITING = (
     "print(corrections.progress(Edition.objects.get(split='val', number=2)).n_waiting)"
 )
 PUBLISH = f"{_IMPORTS}editions.publish(Edition.objects.get(split='val', number=2))"
-
-
-@pytest.fixture(scope="module")
-def driving_site(tmp_path_factory: pytest.TempPathFactory, kitti: Path) -> Iterator[Site]:
-    """A production site with this ground truth, on a database of its own."""
-    try:
-        with (
-            migrated_database() as postgres,
-            throwaway_redis() as redis,
-            production_site(
-                tmp_path_factory.mktemp("driving"),
-                postgres_url=postgres,
-                redis_url=redis,
-                truth=kitti / "truth.csv",
-                split="val",
-            ) as site,
-        ):
-            yield site
-    except ServiceMissing as missing:
-        skip_or_fail(missing)
 
 
 def toolkit_scores(kitti: Path, estimator: str) -> dict[str, float]:
@@ -81,14 +59,15 @@ def own_scores(kitti: Path, data: bytes, *, protocol: str) -> dict[str, float | 
 
 
 def test_four_estimators_in_both_forms_through_both_doors_score_as_in_the_toolkit(
-    driving_site: Site,
+    site: Site,
     kitti: Path,
     people: Callable[[Site], Visitor],
     programs: Callable[[Site, str], Program],
 ) -> None:
-    person = people(driving_site)
+    site.manage("import_truth", "val", str(kitti / "truth.csv"))
+    person = people(site)
     person.sign_up(email=EMAIL, name="Driving school")
-    program = programs(driving_site, EMAIL)
+    program = programs(site, EMAIL)
     files = {
         (e, f): (kitti / "predictions" / f"{e}.{f}.json").read_bytes() for e in ESTIMATORS for f in FORMS
     }
@@ -115,9 +94,7 @@ def test_four_estimators_in_both_forms_through_both_doors_score_as_in_the_toolki
         assert program.outcome(submission)["state"] == "SCORED"
         program.show(submission)
     check("tsttc-1")
-    driving_site.manage("shell", "-v0", "-c", OPEN)
-    await_that(
-        lambda: driving_site.manage("shell", "-v0", "-c", N_WAITING).strip() == "0", what="it is re-scored"
-    )
-    driving_site.manage("shell", "-v0", "-c", PUBLISH)
+    site.manage("shell", "-v0", "-c", OPEN)
+    await_that(lambda: site.manage("shell", "-v0", "-c", N_WAITING).strip() == "0", what="it is re-scored")
+    site.manage("shell", "-v0", "-c", PUBLISH)
     check("toolkit")
