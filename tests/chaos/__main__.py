@@ -29,7 +29,6 @@ PATIENCE_S = 300.0  # with what was acknowledged, once nothing goes wrong any mo
 
 
 def arguments() -> argparse.Namespace:
-    """From the command line."""
     parser = argparse.ArgumentParser(prog="python -m tests.chaos", description=__doc__)
     parser.add_argument("--uploads", type=int, default=200)
     parser.add_argument("--bombs", type=int, default=2, help="so many kill the process that reads them")
@@ -45,7 +44,6 @@ def arguments() -> argparse.Namespace:
 
 
 def say(text: str) -> None:
-    """A line of the report."""
     sys.stdout.write(f"chaos: {text}\n")
     sys.stdout.flush()
 
@@ -71,7 +69,8 @@ def run(options: argparse.Namespace, directory: Path) -> bool:
         _drain(site, faults)
         say(f"all was decided after {time.monotonic() - started_s:.0f} s")
         with site.postgres.connect() as connection:
-            verdict = judge(clients.receipts, n_uploads=options.uploads, connection=connection)
+            files = site.directory / "files" / "predictions"
+            verdict = judge(clients.receipts, n_uploads=options.uploads, connection=connection, files=files)
         _tell(verdict, faults, clients, site)
     n_kills = faults.counts["worker_kills"] + faults.counts["pool_process_kills"]
     say(
@@ -115,7 +114,6 @@ def _tell(verdict: Verdict, faults: Faults, clients: Clients, site: Site) -> Non
 
 
 def main() -> int:
-    """0 if the run was good."""
     options = arguments()
     directory = Path(tempfile.mkdtemp(prefix="tsttc-chaos-site-"))
     is_good = False
