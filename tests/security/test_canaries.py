@@ -172,9 +172,10 @@ def _correct(edition: Edition, private: Path, keeper: User) -> Edition:
 def _look(people: list[User]) -> dict[str, bytes]:
     """Every page, table and document that visitors, the owner and a maintainer come to by following links."""
     plain = ["/" + route.pattern for route in routes() if not route.parameters and "(" not in route.pattern]
-    start = [path for path in plain if "logout" not in path]
-    start += [f"/api/v1/splits/test/{name}" for name in ("board", "manifest", "editions", "changelog")]
-    start += [f"/api/v1/submissions/{pk}" for pk in Evaluation.objects.values_list("submission", flat=True)]
+    start = [f"/api/v1/splits/test/{name}" for name in ("board", "manifest", "editions", "changelog")]
+    for pk in Evaluation.objects.values_list("submission", flat=True):
+        start += [f"/api/v1/submissions/{pk}", f"/submissions/{pk}/"]
+    start += [path for path in plain if "logout" not in path]
     found: dict[str, bytes] = {}
     for user in (None, *people):
         client = Client(raise_request_exception=False)
@@ -186,7 +187,7 @@ def _look(people: list[User]) -> dict[str, bytes]:
             body = response.getvalue() if response.streaming else response.content
             return body + repr(response.headers).encode()
 
-        limit = 120 if user is not None and user.is_staff else 50
+        limit = 160 if user is not None and user.is_staff else 90
         found |= {f"{user} {path}": body for path, body in crawl(get, start=start, limit=limit).items()}
     return found
 
