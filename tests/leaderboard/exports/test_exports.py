@@ -134,12 +134,6 @@ def test_intervals_come_for_who_asks(edition: Edition, owner: User, client: Clie
         assert client.get(f"/board/test.{form}?intervals=perhaps", follow=True).status_code == 400
 
 
-def test_columns_of_one_error_are_taken_alone(edition: Edition, owner: User, client: Client) -> None:
-    board_rows.fill(edition, n=2, user=owner)
-    assert "RTE" not in text_of(client, "tex", "?columns=mid")
-    assert "MiD" not in text_of(client, "md", "?columns=rte").partition("TSTTC")[0]
-
-
 def test_tables_say_what_they_were_taken_from(edition: Edition, owner: User, client: Client) -> None:
     board_rows.fill(edition, n=2, user=owner)
     for form in ("tex", "md"):
@@ -168,28 +162,6 @@ def test_editions_are_taken_along_at_an_address_that_stays(
         assert response.status_code == 200
         assert form == "json" or f"tsttc-test-edition-1.{form}" in response["Content-Disposition"]
     assert client.get("/board/test/editions/9.csv").status_code == 404
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_a_board_without_ground_truth_has_its_published_rows(
-    benchmark: None, client: Client, form: str
-) -> None:
-    text = text_of(client, form)
-    assert ("Deep Scale" in text) == (form != "bib")
-
-
-@pytest.mark.parametrize(
-    ("address", "status"),
-    [
-        ("/board/nowhere.csv", 404),
-        ("/board/test.xls", 404),
-        ("/board/test.tex?sort=beauty", 400),
-        ("/board/test.md?at=yesterday", 400),
-        ("/board/test.csv?nerf=perhaps", 400),
-    ],
-)
-def test_what_cannot_be_is_said_clearly(edition: Edition, client: Client, address: str, status: int) -> None:
-    assert client.get(address).status_code == status
 
 
 # --- who may see what --------------------------------------------------------------------------------------
@@ -229,10 +201,6 @@ def test_no_name_is_markup_in_a_note(hostile: list[Method], client: Client) -> N
     for name in (*HOSTILE, "- a", "1. b", "=c", "+ d", "http://x.org_a_", "#12 & &amp; $x$ ~~y~~"):
         shown = renderer.render(markdown(name)).strip()
         assert html.unescape(shown.removeprefix("<p>").removesuffix("</p>")) == one_line(name)
-
-
-def test_json_holds_the_names_as_they_are(hostile: list[Method], client: Client) -> None:
-    assert set(HOSTILE) < {entry["method"] for entry in json.loads(text_of(client, "json"))["entries"]}
 
 
 def test_bibtex_has_no_unbalanced_brace_and_no_key_twice(hostile: list[Method], client: Client) -> None:

@@ -90,18 +90,6 @@ def test_the_spreadsheet_says_who_sees_each_row(own: list[Method], owner: User, 
     assert seen("?mine=1") == {"Secretissimo": "PRIVATE", "Maskenball": "ANONYMOUS", **others}
 
 
-def test_private_rows_take_nobody_s_rank_and_no_mark(own: list[Method], owner: User, client: Client) -> None:
-    client.force_login(owner)
-
-    def lines(query: str) -> set[str]:
-        body = text_of(client, "tex", query).partition("\\midrule\n")[2]
-        return {re.sub(r"& .*? & .*? &", "&", line, count=1) for line in body.splitlines()}
-
-    added = lines("?mine=1") - lines("")
-    assert len(added) == 1
-    assert not re.search("textbf|underline", added.pop())
-
-
 @pytest.mark.parametrize("form", SUFFIXES)
 def test_nobody_s_own_rows_are_a_clear_refusal(own: list[Method], form: str, client: Client) -> None:
     answer = client.get(f"/board/test.{form}?mine=1")
@@ -109,11 +97,6 @@ def test_nobody_s_own_rows_are_a_clear_refusal(own: list[Method], form: str, cli
     assert "you are not signed in" in pages.page(answer).one("main").text
     assert client.get(f"/board/test.{form}?mine=1", headers={"Authorization": "Bearer x"}).status_code == 400
     assert client.get(f"/board/test.{form}?mine=perhaps").status_code == 400
-
-
-def test_who_has_no_such_rows_gets_everybody_s(own: list[Method], stranger: User, client: Client) -> None:
-    client.force_login(stranger)
-    assert text_of(client, "tex", "?mine=1") == text_of(client, "tex")
 
 
 def links(client: Client, address: str = "/board/test/") -> dict[str, list[str]]:

@@ -50,8 +50,3 @@ def test_format_of_one_row_is_on_the_page_at_its_address_and_on_the_command_line
         site.put("GET /api/v1/splits/test/board", Reply(client.get("/api/v1/splits/test/board").json()))
         asked = CliRunner().invoke(boards.board, ["--format", "names", "--url", site.url])
     assert asked.stdout == text
-
-
-def test_names_and_suffixes_of_formats_are_told_apart() -> None:
-    for each in ("name", "title", "suffix"):
-        assert len({getattr(row, each) for row in formats.FORMATS}) == len(formats.FORMATS)

@@ -31,12 +31,3 @@ def test_a_page_over_a_board_of_hundreds_and_all_that_it_loads_stay_below_100_kb
     files = {name: finders.find(name) for name in names if not ONE_OF_THEM.match(name)}
     sizes = {name: len(gzip.compress(Path(str(path)).read_bytes())) for name, path in files.items()}
     assert len(page.content) + sum(sizes.values()) < MAX_BYTES, sizes
-
-
-def test_every_variant_of_the_landing_pages_figure_is_as_small() -> None:
-    sizes = [
-        len(gzip.compress(Path(str(finders.find(f"task/{size}-{theme}.svg"))).read_bytes()))
-        for size in ("wide", "narrow")
-        for theme in ("light", "dark")
-    ]
-    assert max(sizes) < 60_000

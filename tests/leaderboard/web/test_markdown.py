@@ -68,11 +68,6 @@ def test_a_part_has_the_text_below_its_heading() -> None:
     ]
 
 
-def test_cells_of_a_table_stand_apart_in_its_text_and_those_without_a_word_are_left_out() -> None:
-    (part,) = markdown.page("## A\n\n| peer | price |\n|---|---|\n| B | ? |\n| C | 3 |\n").parts
-    assert part.text == "peer · price · B · C · 3 ·"
-
-
 def test_code_in_columns_is_a_box_that_scrolls_and_other_code_wraps() -> None:
     boxed = '<code class="aligned" tabindex="0">a    1'
     for text in ("```\na    1\nbb   2\n```\n", "    a    1\n    bb   2\n"):

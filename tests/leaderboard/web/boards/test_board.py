@@ -7,14 +7,12 @@ from django.test import Client
 from django.urls import reverse
 
 from leaderboard.models import Edition, PublishedResult, Split, User
-from leaderboard.people import teams
 from tests import builders, pages
 from tests.pages import get
 
 pytestmark = pytest.mark.slow
 
 RANK, METHOD, MID = range(3)
-N_COLUMNS = 12
 ISSUE_COLUMNS = [
     *("Rank", "Method"),
     *("MiD", "0–3 s", "3–6 s", "6–20 s", "−20–0 s"),
@@ -55,12 +53,6 @@ def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, be
         assert source.one("a").attributes["href"] == "https://arxiv.org/abs/2309.01539"
 
 
-def test_every_row_has_every_column(client: Client, edition: Edition, owner: User) -> None:
-    builders.submit(owner, builders.predictions(edition))
-    builders.score_all()
-    assert {len(row) for row in pages.board_rows(get(client))} == {N_COLUMNS}
-
-
 def test_submissions_are_ranked_among_published_rows(client: Client, edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition, factor=1.02), method="Near")
     builders.submit(owner, builders.predictions(edition, factor=1.9), method="Far")
@@ -83,31 +75,6 @@ def test_submitted_values_have_the_decimals_of_their_edition(
     assert all(len(cell.partition(".")[2]) == decimals for cell in cells), cells
 
 
-def test_values_of_fewer_decimals_keep_the_room_of_the_missing_one(client: Client, benchmark: None) -> None:
-    cells = row_of(get(client), "SOT").all("td")[1:]
-    assert all("d1" in cell.classes for cell in cells)
-
-
-def test_best_and_second_are_marked_for_eye_and_ear(client: Client, benchmark: None) -> None:
-    root = get(client)
-    best = [(s.text) for s in root.one("tbody").all("strong")]
-    assert len(best) >= 10
-    for row in root.one("tbody").all("tr"):
-        for cell in row.all("td"):
-            if cell.all("strong"):
-                assert cell.text.endswith("best")
-            if cell.all("u"):
-                assert cell.text.endswith("second")
-    first = row_of(root, "Deep Scale")
-    assert first.all("td", class_="primary")[0].text == "14.8 best"
-    assert row_of(root, "Deep Scale (NeRF)").all("td", class_="primary")[0].text == "14.9 second"
-
-
-def test_sorting_keeps_the_ranks(client: Client, benchmark: None) -> None:
-    root = get(client, "/board/test/?sort=-mid")
-    assert pages.column(root, RANK) == ["5", "4", "3", "2", "1"]
-
-
 def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) -> None:
     root = get(client, "/board/test/?sort=mid_crucial")
     (decisive,) = [head for head in root.all("th") if "aria-sort" in head.attributes]
@@ -117,27 +84,6 @@ def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) 
     (decisive,) = [head for head in turned.all("th") if "aria-sort" in head.attributes]
     assert decisive.attributes["aria-sort"] == "descending"
     assert decisive.one("a").attributes["href"] == "?sort=mid_crucial"
-
-
-def test_the_newest_come_first_when_sorting_by_date(client: Client, benchmark: None) -> None:
-    (date,) = [link for link in get(client).one("thead").all("a") if link.text == "Date"]
-    assert date.attributes["href"] == "?sort=-date"
-
-
-@pytest.mark.parametrize("sort", ["nothing", "mid;drop", "--mid", "-", "<script>alert(1)</script>"])
-def test_sorting_by_no_column_is_a_clear_400(client: Client, benchmark: None, sort: str) -> None:
-    response = client.get("/board/test/", {"sort": sort})
-    assert response.status_code == 400
-    said = pages.page(response).one("main").text
-    assert "cannot be sorted by" in said
-    assert "mid_crucial" in said
-    assert b"<script>alert" not in response.content
-
-
-def test_split_without_ground_truth_says_that_it_is_not_open(client: Client, benchmark: None) -> None:
-    root = get(client, "/board/val/")
-    assert "not open yet" in root.one("main").text
-    assert len(pages.board_rows(root)) == 5
 
 
 def test_open_split_without_submissions_says_how_to_be_the_first(client: Client, edition: Edition) -> None:
@@ -190,19 +136,6 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
     assert seen == {"Owls": (True, True), "Mate": (True, True), "Strangers": (False, False)}
 
 
-def test_names_are_text_never_markup(client: Client, edition: Edition, owner: User) -> None:
-    name = "<img src=x onerror=alert(1)>"
-    team = teams.team_of(user=owner)
-    team.name = "</td><script>alert(2)</script>"
-    team.save()
-    builders.submit(owner, builders.predictions(edition), method=name)
-    builders.score_all()
-    root = get(client)
-    assert root.all("img") == []
-    assert root.one("tbody").all("script") == []
-    assert any(row[METHOD].startswith(name) for row in pages.board_rows(root))
-
-
 def test_links_to_strangers_sites_are_not_endorsed(client: Client, edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition), method="Foo", code_url="https://example.org/code")
     builders.score_all()
@@ -215,13 +148,3 @@ def test_interval_without_sequences_has_a_dash(client: Client, benchmark: None) 
     result.scores = {**result.scores, "mid_crucial": None}
     result.save()
     assert pages.board_rows(get(client))[3][MID + 1] == "–"
-
-
-def test_splits_are_listed_in_their_order(client: Client, benchmark: None) -> None:
-    Split.objects.filter(pk="demo").update(position=0)
-    Split.objects.filter(pk="test").update(position=9)
-    assert [a.text for a in get(client).one("nav", class_="splits").all("a")] == [
-        "Demo",
-        "Validation",
-        "Test",
-    ]

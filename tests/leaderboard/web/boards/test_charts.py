@@ -95,25 +95,6 @@ def test_the_options_of_the_progress_are_those_of_the_page(client: Client, entri
     assert client.get("/board/nowhere/charts/progress.json").status_code == 404
 
 
-def test_marks_lead_to_their_methods(client: Client, entries: list[Submission]) -> None:
-    figure = get(client, "/board/test/charts/").one("figure", **{"data-chart": "progress"})
-    marks = [mark for series in options_of(figure)["series"] for mark in series["data"] if "read" in mark]
-    links = {mark["href"] for mark in marks if "href" in mark}
-    assert links == {f"/methods/{entry.method_id}/" for entry in entries}
-
-
-def test_every_attempt_has_its_own_day_in_the_table(
-    client: Client, edition: Edition, entries: list[Submission], owner: User
-) -> None:
-    first, method = entries[0], entries[0].method
-    first.submitted_at -= timedelta(days=40)
-    first.save(update_fields=["submitted_at"])
-    later = builders.submit(owner, builders.predictions(edition, factor=1.9), method=method.name)
-    builders.score_all()
-    days = [row[0] for row in rows(client, "progress") if row[1] == method.name]
-    assert days == [f"{attempt.submitted_at:%Y-%m-%d}" for attempt in (first, later)]
-
-
 def test_with_an_anonymous_method_the_progress_tells_days_alone(
     edition: Edition, entries: list[Submission]
 ) -> None:
@@ -262,13 +243,6 @@ def test_hidden_split_has_no_closer_look(client: Client, open_split: Submission,
     client.force_login(owner)
     assert client.get(f"/submissions/{open_split.pk}/analysis/").status_code == 404
     assert "analysis" not in client.get(f"/submissions/{open_split.pk}/").content.decode()
-
-
-def test_rejected_file_has_no_closer_look(client: Client, open_split: Submission, owner: User) -> None:
-    sent = builders.submit(owner, b"{}", split="val", method="Broken")
-    builders.score_all()
-    client.force_login(owner)
-    assert client.get(f"/submissions/{sent.pk}/analysis/").status_code == 404
 
 
 def test_of_a_large_board_the_front_and_the_lowest_are_drawn_and_the_chart_says_so(

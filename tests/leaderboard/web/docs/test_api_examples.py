@@ -19,10 +19,10 @@ import evaluator
 from evaluator.cli import main
 from leaderboard.editions import corrections
 from leaderboard.models import Edition, Split, User
-from leaderboard.web.docs import api_examples, api_reference
+from leaderboard.web.docs import api_reference
 from leaderboard.web.docs.api_examples import DRAFT, EXAMPLES, METHOD, OTHER, SITE, SUBMISSION
 from tests import api_examples as sent
-from tests import builders, pages
+from tests import builders
 from tests.leaderboard.web.test_every_page import assert_sound
 
 OPERATIONS = [operation["id"] for operation in api_reference.reference()["operations"]]
@@ -119,10 +119,6 @@ def test_every_operation_has_a_page_with_a_request_an_answer_and_an_error(
     assert len(codes) == 1
 
 
-def test_an_operation_that_there_is_not_has_no_page(client: Client, benchmark: None) -> None:
-    assert client.get("/docs/api/nothing/").status_code == 404
-
-
 @pytest.mark.parametrize("name", [name for name, example in EXAMPLES.items() if example.command])
 def test_the_command_of_an_example_is_one_that_tsttc_knows(name: str) -> None:
     program, command, *arguments = shlex.split(EXAMPLES[name].command)
@@ -143,25 +139,3 @@ def test_the_python_of_an_example_calls_the_client_as_it_wants_to_be(name: str) 
     method = getattr(evaluator.Client, ast.unparse(call.func).removeprefix("client."))
     named = {each.arg: each.value for each in call.keywords if each.arg}
     inspect.signature(method).bind(None, *call.args, **named)
-
-
-def test_the_address_of_the_site_is_in_no_recorded_answer_but_as_the_example(benchmark: None) -> None:
-    hosts = set(re.findall(r"https?://[^/\"]+", sent.ANSWERS.read_text()))
-    assert SITE in hosts
-    assert not any("127.0.0.1" in host or "testserver" in host for host in hosts)
-
-
-def test_the_list_of_operations_leads_to_each_page(client: Client, benchmark: None) -> None:
-    links = {
-        a.attributes["href"]
-        for a in pages.get(client, "/docs/api/").one("table", class_="operations").all("a")
-    }
-    assert links == {f"/docs/api/{name}/" for name in OPERATIONS}
-
-
-def test_curl_sends_the_token_and_the_file_where_they_are_needed() -> None:
-    assert api_examples.EXAMPLES["submit"].call.curl(SITE) == (
-        f'curl "{SITE}/api/v1/submissions" \\\n'
-        '  -H "Authorization: Bearer $TSTTC_TOKEN" \\\n'
-        "  -F split='val' \\\n  -F method='Deep TTC' \\\n  -F note='lr 1e-4' \\\n  -F file=@predictions.json"
-    )

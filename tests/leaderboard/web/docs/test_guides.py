@@ -1,6 +1,5 @@
 """The guides of `docs/` are pages of the site, with navigation and search, and their links lead somewhere."""
 
-import re
 from urllib.parse import urlsplit
 
 import pytest
@@ -12,21 +11,6 @@ from leaderboard.models import Edition, Split
 from leaderboard.web.docs import guides, search
 from tests import pages
 from tests.leaderboard.web.test_every_page import assert_sound
-
-OLD_PLACES = {
-    "/docs/": [
-        "submit",
-        "format",
-        "manifest",
-        "problems",
-        "metrics",
-        "scoring",
-        "uncertainty",
-        "published",
-        "api",
-    ],
-    "/docs/api/": ["problem-quota-exceeded", "problem-nan", "submit", "board", "shape-Error"],
-}
 
 
 @pytest.fixture(scope="module")
@@ -67,25 +51,12 @@ def test_every_page_of_the_documentation_has_the_navigation_and_marks_where_one_
         } <= listed
 
 
-def test_the_chapters_of_a_guide_stand_below_it_in_the_navigation(client: Client, benchmark: None) -> None:
-    root = pages.get(client, "/docs/scoring/")
-    chapters = [a.attributes["href"] for a in root.one("ul", class_="chapters").all("a")]
-    assert chapters == [f"#{h2.attributes['id']}" for h2 in root.one("article").all("h2")]
-
-
 def test_the_address_of_a_guide_without_its_slash_leads_to_it_and_others_are_not_found(
     client: Client, benchmark: None
 ) -> None:
     assert client.get("/docs/researchers").headers["Location"] == "/docs/researchers/"
     for name in ("nowhere", "../settings", "adr", "_site", "index.md"):
         assert client.get(f"/docs/{name}/").status_code == 404
-
-
-@pytest.mark.parametrize(("address", "ids"), OLD_PLACES.items())
-def test_places_that_were_linked_before_are_still_there(
-    client: Client, benchmark: None, address: str, ids: list[str]
-) -> None:
-    assert [each for each in ids if each not in places(client, address, {})] == []
 
 
 def test_a_guide_asks_the_database_for_nothing_and_is_compressed(
@@ -132,12 +103,6 @@ def test_what_people_look_for_is_among_the_first_five(
     assert any(place.startswith(address) for place in first), first
 
 
-def test_what_a_word_means_comes_before_the_examples_that_have_it() -> None:
-    assert search.find("what is MiD")[0].address == "/docs/faq/#what-is-mid"
-    assert search.find("time to contact")[0].address == "/docs/faq/#what-is-time-to-contact"
-    assert search.find("rank range")[0].address.endswith("#rank-ranges")
-
-
 def test_every_address_that_the_search_gives_is_a_place(
     client: Client, benchmark: None, anchors: dict[str, set[str]]
 ) -> None:
@@ -153,35 +118,6 @@ def test_the_words_asked_for_are_marked_and_are_never_markup(client: Client, ben
         assert answer.status_code == 200
         assert "<script>alert" not in answer.text
         assert "<img src=x" not in answer.text
-
-
-def test_without_words_there_is_a_form_and_without_a_find_there_is_advice(
-    client: Client, benchmark: None
-) -> None:
-    assert found(client, "") == []
-    assert "Try fewer words" in client.get("/docs/search/?q=xyzzyq").text
-
-
-def test_a_text_that_is_too_long_is_answered_with_the_limit(client: Client, benchmark: None) -> None:
-    answer = client.get("/docs/search/", {"q": "quota " * 1000})
-    assert "at most 100 characters, and this text has 5,999" in answer.text
-    assert found(client, "quota " * 1000) == []
-
-
-def test_a_short_word_stands_for_itself_and_its_plural() -> None:
-    marked = {m.lower() for hit in search.find("to") for m in re.findall("<mark>(.*?)</mark>", hit.snippet)}
-    assert marked == {"to"}
-    assert "boxes" in "".join(hit.snippet.lower() for hit in search.find("box"))
-    assert search.find("xyz toke")
-
-
-def test_the_changelog_of_the_software_is_a_page_that_every_page_links(
-    client: Client, benchmark: None
-) -> None:
-    root = pages.get(client, "/docs/changelog/")
-    assert root.one("article").one("h1").text == "Changelog"
-    footer = pages.get(client, "/board/test/").one("footer")
-    assert "/docs/changelog/" in [a.attributes["href"] for a in footer.all("a")]
 
 
 def test_the_first_page_names_a_split_that_is_open_or_says_that_none_is(

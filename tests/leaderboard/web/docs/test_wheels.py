@@ -105,12 +105,6 @@ def test_the_wheel_installs_into_an_empty_environment_and_prints_its_version(
     assert Path(place.stdout.strip()).is_relative_to(home)
 
 
-def test_the_same_sources_make_the_same_wheel(dist: Path) -> None:
-    before = dist.read_bytes()
-    assert build_wheel.build() == dist
-    assert dist.read_bytes() == before
-
-
 def test_without_a_wheel_the_page_says_so_in_words(client: Client, benchmark: None, tmp_path: Path) -> None:
     with override_settings(DIST_DIR=tmp_path / "none"):
         answer = client.get("/dist/")

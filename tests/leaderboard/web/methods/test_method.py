@@ -4,10 +4,8 @@ from pathlib import Path
 
 import pytest
 from django.test import Client
-from django.utils import timezone
 
-from leaderboard.models import Edition, Method, Submission, User, Visibility
-from leaderboard.submissions import submissions
+from leaderboard.models import Edition, Method, User, Visibility
 from tests import builders, pages
 
 pytestmark = pytest.mark.slow
@@ -28,11 +26,6 @@ def method(edition: Edition, owner: User) -> Method:
 
 def get(client: Client, method: Method) -> pages.Element:
     return pages.get(client, f"/methods/{method.pk}/")
-
-
-def test_board_leads_to_the_method(client: Client, method: Method) -> None:
-    links = [a.attributes["href"] for a in pages.page(client.get("/board/test/")).one("tbody").all("a")]
-    assert f"/methods/{method.pk}/" in links
 
 
 def test_it_says_what_it_is_and_where_to_read_more(client: Client, method: Method) -> None:
@@ -60,15 +53,6 @@ def test_its_values_are_those_of_the_board(client: Client, method: Method) -> No
     assert f"rank {row[0]} of 6" in main.one("h2").text
 
 
-def test_standing_submissions_are_dated_and_withdrawn_ones_are_not(
-    client: Client, method: Method, owner: User
-) -> None:
-    assert "2 scored submissions" in get(client, method).one("section").text
-    withdrawn = Submission.objects.earliest("submitted_at")
-    submissions.withdraw(submission=withdrawn, actor=owner, now=timezone.now())
-    assert "1 scored submission," in get(client, method).one("section").text
-
-
 def test_each_split_stands_in_its_own_section(
     client: Client, method: Method, owner: User, tmp_path: Path
 ) -> None:
@@ -79,12 +63,6 @@ def test_each_split_stands_in_its_own_section(
     assert [section.one("h2").one("a").text for section in sections] == ["Test", "Demo"]
     assert "Simulated data" in sections[1].text
     assert "Simulated" not in sections[0].text
-
-
-def test_method_without_a_score_says_so(client: Client, edition: Edition, owner: User) -> None:
-    submission = builders.submit(owner, b"[]")
-    builders.score_all()
-    assert "no scored submission" in get(client, submission.method).one("main").text
 
 
 def test_method_without_a_score_leads_to_the_board_that_its_file_was_sent_to(
