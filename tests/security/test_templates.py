@@ -39,11 +39,9 @@ def test_every_text_in_data_for_search_engines_is_escaped_for_a_script() -> None
     assert [name for name in filled if not name.strip().endswith("|escapejs")] == []
 
 
-# The two places that trust a text which is not empty: one puts a drawing of numbers into another, one has
-# what a parser made of Markdown, which escapes all markup in it. All others join pieces by
-# `format_html_join`, which escapes what is no markup already.
+# The place that trusts a text which is not empty has what a parser made of Markdown, which escapes all markup
+# in it. All others join pieces by `format_html_join`, which escapes what is no markup already.
 TRUSTING = {
-    "leaderboard/web/boards/svg.py": ['SafeString(drawn.replace(">", f">{zero}", 1))'],
     "leaderboard/web/markdown.py": ["SafeString(html)"],
 }
 

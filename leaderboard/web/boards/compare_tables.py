@@ -18,9 +18,7 @@ from leaderboard.boards.rows import Entry, Interval
 from leaderboard.scoring.comparisons import Compared, Pair
 from leaderboard.web.boards import profile_chart, svg
 from leaderboard.web.boards.score_columns import Group, figure_css, score_groups, score_heading
-from leaderboard.web.boards.svg import Scale
 
-_DIFFERENCE_PX: Final = 150.0
 _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
@@ -118,14 +116,14 @@ def _difference_group(
     """One of the metrics: its rows on one scale."""
     found = [differences[name] for name in names]
     ends = [end for each in found for end in (each.low, each.high, each.difference) if end is not None]
-    scale = svg.zero_scale(ends, width_px=_DIFFERENCE_PX)
+    scale_end = svg.scale_end(ends)
     # Both ends as wide as the widest, so that points stand in line.
     css = figure_css(signed(end, decimals=pair.first.decimals) for end in ends)
-    rows = [_difference_row(name, pair, differences[name], scale, css) for name in names]
-    return {"group": group, "axis": svg.axis(scale), "rows": rows}
+    rows = [_difference_row(name, pair, differences[name], scale_end, css) for name in names]
+    return {"group": group, "axis": svg.axis(scale_end), "rows": rows}
 
 
-def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css: str) -> dict[str, Any]:
+def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, css: str) -> dict[str, Any]:
     """One column of the board: both values, and first minus second."""
     decimals = pair.first.decimals  # both are of one edition
     return {
@@ -145,7 +143,7 @@ def _difference_row(name: str, pair: Pair, found: Difference, scale: Scale, css:
         # why there is neither interval nor p
         "reason": "" if found.p_below is not None else too_few_units(found.n_effective, unit=found.unit),
         "is_significant": found.is_significant,
-        "drawn": svg.difference(scale, found.difference, found.low, found.high),
+        "drawn": svg.difference(scale_end, found.difference, found.low, found.high),
     }
 
 
