@@ -4,11 +4,13 @@ The feed says what everybody sees, under the names that everybody sees.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Final
 from uuid import NAMESPACE_URL, UUID, uuid5
 from xml.etree import ElementTree as ET
+
+from django.conf import settings
+from django.urls import reverse
 
 from evaluator.metrics.protocol import grouped_names
 from evaluator.scoring.report import format_published
@@ -19,30 +21,8 @@ from leaderboard.models import Split
 MAX_ENTRIES: Final = 50
 _ATOM: Final = "http://www.w3.org/2005/Atom"
 _SITEMAP: Final = "http://www.sitemaps.org/schemas/sitemap/0.9"
-# What the format of sitemaps allows in one file.
-MAX_PAGES: Final = 50_000
 # Of a feed in which nothing has happened yet: when the benchmark was published.
 _BEGINNING: Final = datetime(2023, 9, 4, tzinfo=UTC)
-
-
-@dataclass(frozen=True)
-class Item:
-    """A row of a board, and where it is told of."""
-
-    split: Split
-    entry: Entry
-    address: str
-
-    @property
-    def at(self) -> datetime:
-        """When it came: a method that was private has been tried long before anybody could see it."""
-        return self.entry.listed_at or _BEGINNING
-
-    @property
-    def id(self) -> UUID:
-        """The same as long as the method is on the board, whatever it is called and has scored."""
-        assert self.entry.method_id is not None  # noqa: S101 - for the type checker: rows of submissions have one
-        return uuid5(self.entry.method_id, self.split.pk)
 
 
 def is_news(entry: Entry) -> bool:
@@ -50,33 +30,44 @@ def is_news(entry: Entry) -> bool:
     return entry.kind == "submission" and entry.withdrawn_at is None
 
 
-def atom(items: Iterable[Item], *, title: str, address: str, page: str) -> bytes:
-    """The newest of these as a feed at `address`, which tells of what `page` shows."""
-    newest = sorted(items, key=lambda item: (item.at, item.id.int), reverse=True)[:MAX_ENTRIES]
+def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page: str) -> bytes:
+    """The newest of these rows of boards as a feed at `address`, which tells of what `page` shows."""
+    newest = sorted(rows, key=lambda row: (_came_at(row[1]), _id(*row).int), reverse=True)[:MAX_ENTRIES]
     feed = ET.Element("feed", xmlns=_ATOM)
     _text(feed, "id", uuid5(NAMESPACE_URL, address).urn)
     _text(feed, "title", title)
-    _text(feed, "updated", _moment(newest[0].at if newest else _BEGINNING))
+    _text(feed, "updated", _moment(_came_at(newest[0][1]) if newest else _BEGINNING))
     ET.SubElement(feed, "link", rel="self", type="application/atom+xml", href=address)
     ET.SubElement(feed, "link", rel="alternate", type="text/html", href=page)
-    for item in newest:
-        _entry(feed, item)
+    for split, entry in newest:
+        _entry(feed, split, entry)
     return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(feed, encoding="utf-8")
 
 
-def _entry(feed: ET.Element, item: Item) -> None:
-    entry = item.entry
+def _came_at(entry: Entry) -> datetime:
+    """When it was first shown: a method that was private has been tried long before anybody could see it."""
+    return entry.listed_at or _BEGINNING
+
+
+def _id(split: Split, entry: Entry) -> UUID:
+    """The same as long as the method is on the board, whatever it is called and has scored."""
+    assert entry.method_id is not None  # noqa: S101 - for the type checker: rows of submissions have one
+    return uuid5(entry.method_id, split.pk)
+
+
+def _entry(feed: ET.Element, split: Split, entry: Entry) -> None:
     element = ET.SubElement(feed, "entry")
-    _text(element, "id", item.id.urn)
+    _text(element, "id", _id(split, entry).urn)
     texts = {
         metric: format_published(entry.scores[name], decimals=entry.decimals)
         for metric, (name, *_) in grouped_names(entry.scores).items()
     }
     primary = next(f"{metric.symbol} {text}" for metric, text in texts.items())
-    _text(element, "title", f"{entry.method} on {item.split.pk}: {primary}")
-    _text(element, "updated", _moment(item.at))
+    _text(element, "title", f"{entry.method} on {split.pk}: {primary}")
+    _text(element, "updated", _moment(_came_at(entry)))
     _text(ET.SubElement(element, "author"), "name", entry.team)
-    ET.SubElement(element, "link", rel="alternate", type="text/html", href=item.address)
+    page = settings.SITE_URL + reverse("method", args=[entry.method_id])
+    ET.SubElement(element, "link", rel="alternate", type="text/html", href=page)
     rank = f"Rank {entry.rank}. " if entry.rank is not None else ""
     values = ", ".join(f"{metric.symbol} {text} {metric.unit}".rstrip() for metric, text in texts.items())
     _text(element, "summary", f"{rank}{values}; lower is better.")
@@ -90,20 +81,12 @@ def _moment(at: datetime) -> str:
     return at.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-@dataclass(frozen=True)
-class SitemapEntry:
-    """A public page: its absolute address, and when it last changed."""
-
-    address: str
-    changed_at: datetime | None = None
-
-
-def xml(entries: Iterable[SitemapEntry]) -> bytes:
-    """These pages, at most as many as the format allows."""
+def sitemap(pages: Iterable[tuple[str, datetime | None]]) -> bytes:
+    """Public pages: the absolute address of each, and when it last changed where that is known."""
     root = ET.Element("urlset", xmlns=_SITEMAP)
-    for page in list(entries)[:MAX_PAGES]:
+    for address, changed_at in pages:
         element = ET.SubElement(root, "url")
-        ET.SubElement(element, "loc").text = page.address
-        if page.changed_at is not None:
-            ET.SubElement(element, "lastmod").text = f"{page.changed_at.astimezone(UTC):%Y-%m-%d}"
+        ET.SubElement(element, "loc").text = address
+        if changed_at is not None:
+            ET.SubElement(element, "lastmod").text = f"{changed_at.astimezone(UTC):%Y-%m-%d}"
     return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(root, encoding="utf-8")

@@ -22,8 +22,6 @@ from leaderboard.boards.rows import Entry, Interval
 from leaderboard.exports import bibtex
 from leaderboard.methods.details import DETAILS
 
-short_authors = layouts.short_authors
-
 WITH_INTERVALS: Final = {"1": True, "yes": True, "0": False, "no": False}
 
 
@@ -32,6 +30,11 @@ def is_asked_for(name: str, text: str) -> bool:
     if text and text not in WITH_INTERVALS:
         raise BadFilter(name, text, f"one of {', '.join(WITH_INTERVALS)}")
     return WITH_INTERVALS.get(text, False)
+
+
+def team_of(entry: Entry) -> str:
+    """The team of an entry, or the short form of a paper's authors."""
+    return layouts.short_authors(entry.team) if entry.kind == "published" else entry.team
 
 
 def mark_of(entry: Entry) -> str:
@@ -127,7 +130,7 @@ def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) ->
     return layouts.Row(
         rank=_rank(entry, has_range=has_intervals),
         method=entry.method,
-        team=short_authors(entry.team) if entry.kind == "published" else entry.team,
+        team=team_of(entry),
         cells=tuple(_cell(entry, name, has_interval=has_intervals) for name in columns),
     )
 

@@ -15,7 +15,6 @@ from django.urls import reverse
 from evaluator.metrics.metrics import Metric
 from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import Entry
-from leaderboard.exports.tables import short_authors
 
 Option = dict[str, Any]
 
@@ -82,11 +81,6 @@ def call(name: str, of: Any = None) -> Option:
 def method_href(entry: Entry) -> str:
     """The page of an entry's method; a row quoted from a paper has none."""
     return reverse("method", args=[entry.method_id]) if entry.method_id else ""
-
-
-def team_of(entry: Entry) -> str:
-    """The team of an entry, or the short form of a paper's authors."""
-    return short_authors(entry.team) if entry.kind == "published" else entry.team
 
 
 def error_text(metric: Metric, value: float | None, *, decimals: int) -> str:

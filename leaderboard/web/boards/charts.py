@@ -18,6 +18,7 @@ from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import Attempt
+from leaderboard.exports.tables import team_of
 from leaderboard.models import Visibility
 from leaderboard.web.boards.chart_options import (
     Chart,
@@ -29,15 +30,9 @@ from leaderboard.web.boards.chart_options import (
     error_text,
     log_axis,
     method_href,
-    team_of,
     x_axis,
 )
-from leaderboard.web.boards.chart_series import (
-    Look,
-    marks,
-    named_marks,
-    staircase,
-)
+from leaderboard.web.boards.chart_series import Look, marks, named_marks, staircase
 
 # Below the front, where its names are: this part of the whole height.
 _ROOM: Final = 0.15

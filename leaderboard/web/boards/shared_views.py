@@ -11,7 +11,7 @@ from django.views.decorators.http import require_safe
 from leaderboard.boards import snapshots
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import badges, feeds
-from leaderboard.models import Method, Split
+from leaderboard.models import Method
 from leaderboard.web.boards.board_views import MAIN_SPLIT
 from leaderboard.web.context_processors import split_or_404
 
@@ -36,18 +36,14 @@ def feed(request: HttpRequest, split: str = "") -> HttpResponse:
     rows = [split_or_404(request, split)] if split else splits_of(request)
     where = f": {rows[0].title}" if split else ""
     text = feeds.atom(
-        _items(rows),
+        (
+            (split, entry)
+            for split, shown in snapshots.shown_on(rows)
+            for entry in shown.entries
+            if feeds.is_news(entry)
+        ),
         title=f"{settings.SITE_NAME}{where}, new entries",
         address=settings.SITE_URL + request.path,
         page=settings.SITE_URL + (reverse("board", args=[split]) if split else reverse("home")),
     )
     return HttpResponse(text, content_type="application/atom+xml; charset=utf-8")
-
-
-def _items(rows: list[Split]) -> list[feeds.Item]:
-    return [
-        feeds.Item(split, entry, settings.SITE_URL + reverse("method", args=[entry.method_id]))
-        for split, drawn in snapshots.shown_on(rows)
-        for entry in drawn.entries
-        if feeds.is_news(entry)
-    ]

@@ -11,10 +11,8 @@ from django.urls import reverse
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
-from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import splits_of
 from leaderboard.exports import feeds
-from leaderboard.exports.feeds import SitemapEntry
 from leaderboard.models import Edition, Split, Visibility
 from leaderboard.pages import pages
 from leaderboard.web.docs import api_examples, guides
@@ -23,17 +21,15 @@ from leaderboard.web.docs import api_examples, guides
 _NAMED: Final = ("home", "published", "docs", "api_reference")
 # Pages of one's own, and views of a page that the page itself offers: its orders, filters and days.
 _NOT_FOR_CRAWLERS: Final = (
-    *(
-        "/account/",
-        "/accounts/",
-        "/admin/",
-        "/api/",
-        "/maintain/",
-        "/submissions/",
-        "/team/",
-        "/tokens/",
-        "/*?",
-    ),
+    "/account/",
+    "/accounts/",
+    "/admin/",
+    "/api/",
+    "/maintain/",
+    "/submissions/",
+    "/team/",
+    "/tokens/",
+    "/*?",
 )
 
 
@@ -57,34 +53,32 @@ def favicon(request: HttpRequest) -> HttpResponse:
 @require_safe
 def sitemap(request: HttpRequest) -> HttpResponse:
     """Every public page. Private and anonymous methods and withdrawn rows are left out."""
-    found = [
-        *(SitemapEntry(_absolute(name)) for name in _NAMED),
-        *(SitemapEntry(_absolute("site_page", name)) for name in pages.PAGES),
-        *(SitemapEntry(_absolute("guide", name)) for name in guides.files()),
-        *(SitemapEntry(_absolute("api_operation", name)) for name in api_examples.EXAMPLES),
-        *_of_boards(splits_of(request)),
+    fixed = [
+        *map(_absolute, _NAMED),
+        *(_absolute("site_page", name) for name in pages.PAGES),
+        *(_absolute("guide", name) for name in guides.files()),
+        *(_absolute("api_operation", name) for name in api_examples.EXAMPLES),
     ]
-    return HttpResponse(feeds.xml(found), content_type="application/xml; charset=utf-8")
+    found = [*((address, None) for address in fixed), *_of_boards(splits_of(request))]
+    return HttpResponse(feeds.sitemap(found), content_type="application/xml; charset=utf-8")
 
 
-def _of_boards(splits: Sequence[Split]) -> Iterator[SitemapEntry]:
+def _of_boards(splits: Sequence[Split]) -> Iterator[tuple[str, datetime | None]]:
     for split in splits:
         for name in ("board", "charts", "editions"):
-            yield SitemapEntry(_absolute(name, split.pk))
+            yield _absolute(name, split.pk), None
     editions = Edition.objects.filter(split__in=splits).exclude(published_at=None).order_by("split", "number")
     for split_id, number, published_at in editions.values_list("split", "number", "published_at"):
-        yield SitemapEntry(_absolute("edition", split_id, number), published_at)
+        yield _absolute("edition", split_id, number), published_at
     methods: dict[str, datetime | None] = {}
     for _, drawn in snapshots.shown_on(splits):
-        methods |= {str(entry.method_id): entry.listed_at for entry in drawn.entries if _is_listed(entry)}
+        methods |= {
+            str(entry.method_id): entry.listed_at
+            for entry in drawn.entries
+            if entry.method_id and entry.visibility == Visibility.PUBLIC and entry.withdrawn_at is None
+        }
     for method_id, listed_at in sorted(methods.items()):
-        yield SitemapEntry(_absolute("method", method_id), listed_at)
-
-
-def _is_listed(entry: Entry) -> bool:
-    return (
-        entry.method_id is not None and entry.visibility == Visibility.PUBLIC and entry.withdrawn_at is None
-    )
+        yield _absolute("method", method_id), listed_at
 
 
 def _absolute(name: str, *args: object) -> str:

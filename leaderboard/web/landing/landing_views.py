@@ -1,7 +1,6 @@
 """The landing page, and the way to the main board."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 from urllib.parse import urlencode
@@ -25,24 +24,14 @@ from leaderboard.web.landing.news import latest
 from leaderboard.web.submissions.forms import offers_for
 
 
-@dataclass(frozen=True)
-class SplitDates:
-    """A split, and in a sentence when it takes submissions: from its reader's team where that is known."""
-
-    split: Split
-    sentence: str
-
-
 @require_safe
 def home(request: HttpRequest) -> HttpResponse:
-    """The landing page. It was the main board once: addresses with a board's questions still lead there."""
-    if any(request.GET.get(name) for name in board_query.NAMES):
-        return main_board(request)
+    """The landing page."""
     splits = splits_of(request)
     main = main_split(splits)
     source = bibtex.benchmark_source()
     context = {
-        "dates": dates(splits, reader=request.user, now=timezone.now()),
+        "dates": _dates(splits, reader=request.user, now=timezone.now()),
         "news": latest(splits),
         "citation": bibtex.of_benchmark(),
         "source": source,
@@ -68,13 +57,14 @@ def main_split(splits: Sequence[Split]) -> Split | None:
     return next((split for split in splits if split.pk == MAIN_SPLIT), next(iter(splits), None))
 
 
-def dates(splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetime) -> list[SplitDates]:
-    """Every split with its dates; for a person who is signed in with what their team has left."""
+def _dates(
+    splits: Sequence[Split], *, reader: User | AnonymousUser, now: datetime
+) -> list[tuple[Split, str]]:
+    """Every split and when it takes submissions; for who is signed in with what their team has left."""
     if reader.is_authenticated:
-        offers = offers_for(reader, now=now)
-        return [SplitDates(offer.split, offer.sentence) for offer in offers]
+        return [(offer.split, offer.sentence) for offer in offers_for(reader, now=now)]
     return [
-        SplitDates(split, admissions.sentence_of(split, now=now) or f"Submissions to {split.pk} are open.")
+        (split, admissions.sentence_of(split, now=now) or f"Submissions to {split.pk} are open.")
         for split in splits
     ]
 
@@ -83,11 +73,10 @@ def _leading(main: Split) -> dict[str, Any]:
     """What the page tells of the main board: only what everybody sees, whoever reads."""
     board = snapshots.board(split=main, viewer=AnonymousUser())
     progress = chart_views.progress(board)
-    fronts = [row for row in progress.rows if row[-1]]
     return {
         "board": board,
         "leaders": leaders(board),
         "lead": lead_words(board),
-        "fronts": fronts,
+        "fronts": [row for row in progress.rows if row[-1]],
         "note": progress.note,
     }

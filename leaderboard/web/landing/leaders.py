@@ -1,14 +1,13 @@
 """The first rows of a board, and in a sentence whether the lead is certain."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
 from leaderboard.boards.boards import Board
 from leaderboard.boards.rows import Entry, Interval
-from leaderboard.exports.tables import short_authors
+from leaderboard.exports.tables import team_of
 from leaderboard.scoring import verdicts
 from leaderboard.web.boards.score_columns import interval_words
 from leaderboard.web.boards.tables import rank_range
@@ -18,30 +17,18 @@ N_LEADERS: Final = 3
 _MAX_NAMED: Final = 2
 
 
-@dataclass(frozen=True)
-class Leader:
-    """One of the first rows. `interval` and `rank_range` are empty where they are not known."""
-
-    entry: Entry
-    team: str
-    value: str
-    interval: str
-    rank_range: str
-
-
-def leaders(board: Board) -> tuple[Leader, ...]:
-    """The first rows of a board that is in the order of its ranks."""
-    return tuple(_leader(entry) for entry in _ranked(board)[:N_LEADERS])
-
-
-def _leader(entry: Entry) -> Leader:
-    return Leader(
-        entry=entry,
-        team=short_authors(entry.team) if entry.kind == "published" else entry.team,
-        value=format_published(entry.scores[PRIMARY], decimals=entry.decimals),
-        interval=interval_words(entry.intervals.get(PRIMARY, Interval()), decimals=entry.decimals),
-        rank_range=rank_range(entry).strip("()"),
-    )
+def leaders(board: Board) -> list[dict[str, Any]]:
+    """The first rows of a board that is in the order of its ranks, as the page tells them."""
+    return [
+        {
+            "entry": entry,
+            "team": team_of(entry),
+            "value": format_published(entry.scores[PRIMARY], decimals=entry.decimals),
+            "interval": interval_words(entry.intervals.get(PRIMARY, Interval()), decimals=entry.decimals),
+            "rank_range": rank_range(entry).strip("()"),
+        }
+        for entry in _ranked(board)[:N_LEADERS]
+    ]
 
 
 def _ranked(board: Board) -> list[Entry]:
@@ -67,16 +54,12 @@ def lead_words(board: Board) -> str:
         )
     if found.rank_high == 1:
         return f"The lead of {leader.method} is certain: at 95 % confidence its rank is 1."
-    also = [entry.method for entry in ranked[1:] if _may_lead(entry)]
+    also = [e.method for e in ranked[1:] if e.intervals.get(PRIMARY, Interval()).rank_low == 1]
     others = f" {_listed(also)} may also be first." if also else ""
     return (
         f"The lead of {leader.method} is not certain: at 95 % confidence its rank is "
         f"{found.rank_low} to {found.rank_high}.{others}"
     )
-
-
-def _may_lead(entry: Entry) -> bool:
-    return entry.intervals.get(PRIMARY, Interval()).rank_low == 1
 
 
 def _why_unknown(board: Board, leader: Entry) -> str:

@@ -1,8 +1,8 @@
 """What happened last, on all boards: editions that were published or rolled back, and new entries."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from datetime import datetime
+from operator import itemgetter
 from typing import Final
 
 from django.urls import reverse
@@ -17,33 +17,20 @@ from leaderboard.models import Publication, Split
 from leaderboard.web.boards import edition_tables
 
 N_NEWS: Final = 5
+News = tuple[datetime, str, str, str]
+"""When, the address of a link, its text, and the words behind it."""
 
 
-@dataclass(frozen=True)
-class NewsItem:
-    """One thing that happened: `name` is a link to `href`, `words` go on."""
-
-    at: datetime
-    name: str
-    href: str
-    words: str
-
-
-def latest(splits: Sequence[Split]) -> list[NewsItem]:
+def latest(splits: Sequence[Split]) -> list[News]:
     """The newest first, of these splits; what everybody sees of them, under the names that everybody sees."""
-    items = [*_editions(), *_entries(splits)]
-    return sorted(items, key=lambda item: (item.at, item.href), reverse=True)[:N_NEWS]
+    return sorted([*_editions(), *_entries(splits)], key=itemgetter(0), reverse=True)[:N_NEWS]
 
 
-def _editions() -> Iterator[NewsItem]:
+def _editions() -> Iterator[News]:
     for publication in history.latest_changes(N_NEWS):
         split, edition = publication.split, publication.edition
-        yield NewsItem(
-            at=publication.at,
-            name=f"{split.title}, edition {edition.number}",
-            href=reverse("edition", args=[split.pk, edition.number]),
-            words=_change(publication),
-        )
+        href = reverse("edition", args=[split.pk, edition.number])
+        yield publication.at, href, f"{split.title}, edition {edition.number}", _change(publication)
 
 
 def _change(publication: Publication) -> str:
@@ -56,21 +43,13 @@ def _change(publication: Publication) -> str:
     return f"replaced edition {former.number}" + (f": {change}" if change else "")
 
 
-def _entries(splits: Sequence[Split]) -> Iterator[NewsItem]:
-    for split, drawn in snapshots.shown_on(splits):
-        told = [entry for entry in drawn.entries if feeds.is_news(entry) and entry.listed_at]
-        for entry in sorted(told, key=_came_at, reverse=True)[:N_NEWS]:
-            yield NewsItem(
-                at=_came_at(entry),
-                name=entry.method,
-                href=reverse("method", args=[entry.method_id]),
-                words=f"by {entry.team}, {_result(entry)} on {split.title}",
-            )
-
-
-def _came_at(entry: Entry) -> datetime:
-    assert entry.listed_at is not None  # noqa: S101 - for the type checker: the others are left out
-    return entry.listed_at
+def _entries(splits: Sequence[Split]) -> Iterator[News]:
+    for split, shown in snapshots.shown_on(splits):
+        for entry in shown.entries:
+            if feeds.is_news(entry) and entry.listed_at:
+                href = reverse("method", args=[entry.method_id])
+                words = f"by {entry.team}, {_result(entry)} on {split.title}"
+                yield entry.listed_at, href, entry.method, words
 
 
 def _result(entry: Entry) -> str:

@@ -85,7 +85,7 @@ def _comparison_rows(
         )
     printed = outcomes.nearest_published(progress, place)
     if printed is not None:
-        about = f"nearest row from a paper, {tables.short_authors(printed.team)} {printed.date_text}"
+        about = f"nearest row from a paper, {tables.team_of(printed)} {printed.date_text}"
         rows.append(_comparison_row(entry, printed, href=printed.paper_url, about=about))
     return rows
 
