@@ -25,7 +25,7 @@ def test_every_link_of_a_document_leads_to_a_file_and_a_heading_in_it() -> None:
 
 
 def test_every_document_is_in_the_navigation_and_every_decision_in_its_list() -> None:
-    listed = {entry.name for section in guides.navigation() for entry in section.entries}
+    listed = {entry.name for _, links in guides.navigation() for entry in links}
     decisions = (DOCS / "adr" / "README.md").read_text(encoding="utf-8")
     names = {path: name for name, path in guides.files().items()}
     assert [path.name for path in DOCS.glob("*.md") if names[path] not in listed] == []

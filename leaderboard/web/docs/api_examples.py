@@ -7,8 +7,7 @@ member is shown.
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from functools import cache
+from dataclasses import dataclass
 from pathlib import Path
 from textwrap import indent
 from typing import Any, Final
@@ -68,7 +67,7 @@ class Example:
     refused: Call
     command: str = ""
     python: str = ""
-    by: str = field(default="owner")  # who asks: "maintainer" has a token of theirs
+    by: str = "owner"  # who asks: "maintainer" has a token of theirs
 
     def script(self, site: str) -> str:
         """The Python that runs as it stands; empty where there is none."""
@@ -214,24 +213,9 @@ EXAMPLES: Final[Mapping[str, Example]] = {
 }
 
 
-@dataclass(frozen=True)
-class RecordedAnswer:
-    """What a request was answered: a status and its phrase, headers worth a line, and the body as text."""
-
-    status: str
-    headers: Mapping[str, str]
-    body: str
-
-
-@cache
-def _recorded() -> dict[str, dict[str, Any]]:
-    found: dict[str, dict[str, Any]] = json.loads(_ANSWERS.read_text(encoding="utf-8"))
-    return found
-
-
 def shown(operation_id: str) -> dict[str, Any]:
     """What the page of an operation shows: the requests as commands, and their answers."""
-    example, recorded = EXAMPLES[operation_id], _recorded()[operation_id]
+    example, recorded = EXAMPLES[operation_id], json.loads(_ANSWERS.read_text(encoding="utf-8"))[operation_id]
     return {
         "curl": example.call.curl(settings.SITE_URL),
         "command": example.command,
@@ -243,8 +227,9 @@ def shown(operation_id: str) -> dict[str, Any]:
     }
 
 
-def _answer(recorded: Mapping[str, Any]) -> RecordedAnswer:
+def _answer(recorded: Mapping[str, Any]) -> dict[str, Any]:
+    """A status with its phrase, headers worth a line, and the body as text, with this site's address."""
     body = recorded["body"]
     text = body if isinstance(body, str) else json.dumps(body, indent=2, ensure_ascii=False)
     ours = {name: value.replace(SITE, settings.SITE_URL) for name, value in recorded["headers"].items()}
-    return RecordedAnswer(recorded["status"], ours, text.replace(SITE, settings.SITE_URL))
+    return {"status": recorded["status"], "headers": ours, "body": text.replace(SITE, settings.SITE_URL)}

@@ -4,8 +4,6 @@ The documentation asks the database for nothing but the splits of the first page
 well. Long pages are compressed here: not every site has a proxy that does so.
 """
 
-from typing import Any
-
 from django.http import FileResponse, Http404, HttpRequest, HttpResponse, HttpResponseBase
 from django.shortcuts import render
 from django.urls import reverse
@@ -37,23 +35,24 @@ def guide(request: HttpRequest, guide_name: str) -> HttpResponse:
     if guide_name not in guides.files():
         raise Http404(f"There is no guide {guide_name!r}.")
     before, after = guides.neighbours(guide_name)
-    context: dict[str, Any] = {"guide": guides.guide(guide_name), "before": before, "after": after}
-    if guide_name.startswith("adr/"):
-        context["above"] = reverse("guide", args=["decisions"])
-    return render(request, "docs/guide.html", {"navigation": guides.navigation(), **context})
+    context = {
+        "navigation": guides.navigation(),
+        "guide": guides.guide(guide_name),
+        "before": before,
+        "after": after,
+        "above": reverse("guide", args=["decisions"]) if guide_name.startswith("adr/") else "",
+    }
+    return render(request, "docs/guide.html", context)
 
 
 @gzip_page
 @require_safe
 def find(request: HttpRequest) -> HttpResponse:
     """What the documentation says about some words."""
-    query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())
-    context: dict[str, Any] = {"query": query, "hits": []}
-    if len(query) > search.MAX_QUERY:
-        context = {"query": "", "n_typed": len(query), "longest": search.MAX_QUERY}
-    elif query:
-        context["hits"] = search.find(query)
-    return render(request, "docs/search.html", {"navigation": guides.navigation(), **context})
+    query = " ".join(request.GET.get("q", "").replace("\x00", " ").split())[: search.MAX_QUERY]
+    hits = search.find(query) if query else []
+    context = {"navigation": guides.navigation(), "query": query, "hits": hits}
+    return render(request, "docs/search.html", context)
 
 
 @gzip_page
@@ -65,11 +64,12 @@ def api_operation(request: HttpRequest, operation_id: str) -> HttpResponse:
     if operation is None:
         raise Http404(f"There is no operation {operation_id!r}.")
     context = {
+        "navigation": guides.navigation(),
         "operation": operation,
         "example": api_examples.shown(operation_id),
         "above": reverse("api_reference"),
     }
-    return render(request, "docs/api_operation.html", {"navigation": guides.navigation(), **context})
+    return render(request, "docs/api_operation.html", context)
 
 
 @gzip_page
@@ -106,9 +106,7 @@ def dist(request: HttpRequest) -> HttpResponse:
 @require_safe
 def dist_file(request: HttpRequest, wheel_name: str) -> HttpResponseBase:
     """A wheel, for pip."""
-    wheel = wheels.named(wheel_name)
-    if wheel is None:
+    path = next((each for each in wheels.paths() if each.name == wheel_name), None)
+    if path is None:
         raise Http404(f"There is no wheel {wheel_name!r}.")
-    return FileResponse(
-        wheel.path.open("rb"), as_attachment=True, filename=wheel.name, content_type="application/zip"
-    )
+    return FileResponse(path.open("rb"), as_attachment=True, content_type="application/zip")

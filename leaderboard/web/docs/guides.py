@@ -68,14 +68,6 @@ class GuideLink:
     name: str = ""
 
 
-@dataclass(frozen=True)
-class Section:
-    """Some lines of the navigation below a common title, which may be empty."""
-
-    title: str
-    entries: tuple[GuideLink, ...]
-
-
 @cache
 def files() -> dict[str, Path]:
     """Every guide by its name in addresses."""
@@ -93,17 +85,17 @@ def _names() -> dict[Path, str]:
 
 
 @cache
-def navigation() -> tuple[Section, ...]:
-    """The side of every page of the documentation."""
-    first = (
+def navigation() -> list[tuple[str, list[GuideLink]]]:
+    """The side of every page of the documentation: links below titles, of which the first is empty."""
+    first = [
         GuideLink("At a glance", reverse("docs")),
         GuideLink("Install", reverse("dist")),
         _entry("Overview", "overview"),
-    )
-    sections = (
-        Section(title, tuple(_entry(*each) for each in inside.items())) for title, inside in _SECTIONS.items()
-    )
-    return (Section("", first), *sections)
+    ]
+    return [
+        ("", first),
+        *((title, [_entry(*each) for each in pages.items()]) for title, pages in _SECTIONS.items()),
+    ]
 
 
 def _entry(title: str, name: str) -> GuideLink:
@@ -113,7 +105,7 @@ def _entry(title: str, name: str) -> GuideLink:
 
 def neighbours(name: str) -> tuple[GuideLink | None, GuideLink | None]:
     """The guides before and after this one in the navigation."""
-    entries = [entry for section in navigation() for entry in section.entries]
+    entries = [entry for _, links in navigation() for entry in links]
     at = next((n for n, entry in enumerate(entries) if entry.name == name), None)
     if at is None:
         return None, None
