@@ -10,7 +10,7 @@ from evaluator.counting import counted
 from evaluator.metrics.protocol import known_metrics
 from leaderboard.boards import boards, filters
 from leaderboard.boards.boards import Board
-from leaderboard.boards.filters import FILTERS, Filter, Filters
+from leaderboard.boards.filters import FILTERS, Filters
 from leaderboard.scoring import comparisons
 from leaderboard.templatetags.board import grouped
 
@@ -124,31 +124,29 @@ def tools(
     day as of which there is a board to be asked for; None where there is no other time.
     """
     given = {name: asked.get(name, "").strip() for name in FILTERS}
-    chosen = {name: each for name, each in FILTERS.items() if each.kind.options}
-    typed = {name: each for name, each in FILTERS.items() if name not in chosen and name != _SEARCH}
+    fields = [
+        {"name": name, "filter": each, "given": given[name], "fault": faults.get(name, "")}
+        for name, each in FILTERS.items()
+        if name != _SEARCH
+    ]
     return {
         "columns": [
             (label, query.href(columns=value), (value or ALL_COLUMNS) == query.columns)
             for value, label in (("", "All"), *((each.name, each.symbol) for each in board.rules.metrics))
         ],
-        "choosers": [
-            (
-                name,
-                each.label,
-                [(value, option.words) for option in each.kind.options for value in [option.text.lower()]],
-                given[name].lower(),
-                faults.get(name, ""),
-            )
-            for name, each in chosen.items()
-        ],
-        "typed": [(name, each, given[name], faults.get(name, "")) for name, each in typed.items()],
+        # What is chosen from a list comes before what is typed.
+        "fields": sorted(fields, key=lambda field: not field["filter"].kind.options),
         "fault_ids": ",".join(f"#fault-{name}" for name in FILTERS),
         "text": given[_SEARCH],
         "text_fault": faults.get(_SEARCH, ""),
         "faults": [sentence for name, sentence in faults.items() if name not in FILTERS],
         "kept": query.kept("sort", "at", "columns"),
         "is_filtered": query.filters.is_set,
-        "chips": chips(query),
+        "chips": [
+            (f"{_label(name)}: {_words(name, query.given[name])}", query.href(**{name: ""}))
+            for name in FILTERS
+            if name in query.filters.wanted
+        ],
         # Whether any filter is set, besides the text to find: else they need no room.
         "has_choices": any(text for name, text in given.items() if name != _SEARCH),
         "sentence": sentence(len(board.entries), board.n_in_all, is_filtered=query.filters.is_set),
@@ -162,21 +160,13 @@ def tools(
     }
 
 
-def chips(query: BoardQuery) -> list[tuple[str, str]]:
-    """What is set, each in words and with the address of the same view without it."""
-    return [
-        (f"{_label(name, each)}: {_words(each, query.given[name])}", query.href(**{name: ""}))
-        for name, each in FILTERS.items()
-        if name in query.filters.wanted
-    ]
+def _label(name: str) -> str:
+    return "Search" if name == _SEARCH else FILTERS[name].label
 
 
-def _label(name: str, each: Filter) -> str:
-    return "Search" if name == _SEARCH else each.label
-
-
-def _words(each: Filter, text: str) -> str:
-    return next((option.words for option in each.kind.options if option.text.lower() == text.lower()), text)
+def _words(name: str, text: str) -> str:
+    options = FILTERS[name].kind.options
+    return next((option.words for option in options if option.text.lower() == text.lower()), text)
 
 
 def sentence(n_shown: int, n_in_all: int, *, is_filtered: bool) -> str:

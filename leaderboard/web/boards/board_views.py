@@ -9,7 +9,7 @@ from django.utils import timezone
 from django.utils.functional import SimpleLazyObject
 from django.views.decorators.http import require_safe
 
-from leaderboard.boards import movement, snapshots
+from leaderboard.boards import snapshots
 from leaderboard.boards.boards import Board, UnknownColumn
 from leaderboard.editions import history
 from leaderboard.models import Edition, Split
@@ -40,13 +40,9 @@ def draw_board(
     now = timezone.now()
     query, faults = board_query.forgiving(request.GET, now=now, has_time=edition is None)
     shown, query = _shown(request, split, edition, query, faults)
-    news = tables.BoardNews(
-        today=now.date(), since=movement.since(now=now).date(), moved=movement.moved(shown, now=now)
-    )
-    table = edition_tables.with_reasons(tables.board_table(shown, query=query, news=news), shown)
     context = {
         "board": shown,
-        "table": table,
+        "table": tables.board_table(shown, query=query, now=now),
         "tools": tools(
             shown,
             query,

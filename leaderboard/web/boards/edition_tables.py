@@ -1,13 +1,11 @@
 """Tables of editions: changes in words, progress of re-scoring, and the preview."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
-from leaderboard.boards.boards import Board
 from leaderboard.boards.rows import flat_scores
 from leaderboard.editions import history
 from leaderboard.editions.corrections import RescoringProgress
@@ -16,13 +14,7 @@ from leaderboard.models import Edition, Evaluation, GroundTruth, Publication, Sp
 from leaderboard.templatetags.board import duration, grouped
 from leaderboard.web.boards import tables
 from leaderboard.web.boards.score_columns import column_css, score_heading
-from leaderboard.web.boards.tables import BoardTable
 
-_WHY_UNSCORABLE: Final = {
-    "missing-keys": "Edition {} added sequences that its file does not predict.",
-    "unknown-keys": "Edition {} removed sequences that its file predicts.",
-    "undefined-error": "The protocol of edition {} has no MiD for predictions that are too close to 0.",
-}
 _ENDED_BADLY: Final = (Status.REJECTED, Status.SYSTEM_ERROR, Status.CANCELLED)
 _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
@@ -76,29 +68,6 @@ def news(split: Split) -> str:
     return f"edition {publication.edition.number}, {words}"
 
 
-def with_reasons(table: BoardTable, board: Board) -> BoardTable:
-    """A former board whose rows say why the present edition cannot score them, where that is so."""
-    present = board.split.published_edition
-    if present is None or not any(row.entry.is_unscorable for row in table.rows):
-        return table
-    rows = [
-        replace(row, note=unscorable_words(row.entry.unscorable, present.number))
-        if row.entry.is_unscorable and not row.entry.withdrawn_at
-        else row
-        for row in table.rows
-    ]
-    return replace(table, rows=tuple(rows))
-
-
-def unscorable_words(code: str, number: int) -> str:
-    """Why an edition cannot score a file that a former one scored; nothing of the file itself is told.
-
-    >>> unscorable_words("missing-keys", 3), unscorable_words("other", 3)
-    ('Edition 3 added sequences that its file does not predict.', 'Edition 3 cannot score its file.')
-    """
-    return _WHY_UNSCORABLE.get(code, "Edition {} cannot score its file.").format(number)
-
-
 def past_change(past: history.EditionRecord) -> str:
     """What changed since the edition that this one followed."""
     return _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
@@ -149,28 +118,8 @@ def _mid(evaluation: Evaluation | None) -> str:
     return format_published(mid, decimals=evaluation.edition.decimals)
 
 
-@dataclass(frozen=True)
-class Running:
-    """How far the re-scoring of an edition is. `seen` changes exactly when what is shown does."""
-
-    edition: Edition
-    progress: RescoringProgress
-    counts: str
-    pace: str
-
-    @property
-    def is_final(self) -> bool:
-        """Whether nothing waits any more."""
-        return self.progress.n_waiting == 0
-
-    @property
-    def seen(self) -> str:
-        """What a waiting page sends along, to be told only what is new."""
-        return f"{self.progress.n_done}-{self.progress.n_total}"
-
-
-def running(edition: Edition, progress: RescoringProgress) -> Running:
-    """A progress, ready to be drawn."""
+def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
+    """How far the re-scoring of an edition is; a waiting page sends `seen` along, to be told what is new."""
     parts = [f"{grouped(progress.n_done)} of {grouped(progress.n_total)}"]
     if progress.n_rejected:
         parts.append(f"{grouped(progress.n_rejected)} rejected")
@@ -181,7 +130,14 @@ def running(edition: Edition, progress: RescoringProgress) -> Running:
     pace = ""
     if progress.rate_per_s is not None:
         pace = f"{rate_words(progress.rate_per_s)}, about {duration(progress.left_s)} left"
-    return Running(edition=edition, progress=progress, counts=", ".join(parts), pace=pace)
+    return {
+        "edition": edition,
+        "progress": progress,
+        "counts": ", ".join(parts),
+        "pace": pace,
+        "is_final": progress.n_waiting == 0,
+        "seen": f"{progress.n_done}-{progress.n_total}",
+    }
 
 
 def rate_words(rate_per_s: float) -> str:

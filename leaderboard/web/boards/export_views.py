@@ -4,8 +4,8 @@ They hold what everybody sees, whoever takes them, since they end up in papers. 
 one's own that others do not see, or not under their name, each marked.
 """
 
-from collections.abc import Sequence
-from typing import Final, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, Final
 from urllib.parse import urlencode
 
 from django.conf import settings
@@ -28,25 +28,10 @@ from leaderboard.web.boards import board_query
 from leaderboard.web.boards.board_query import BoardQuery
 from leaderboard.web.context_processors import split_or_404
 
-# What of a page's address changes what is taken along; a page of it is no table of its own.
-_NOT_OURS: Final = ("page",)
 NOBODYS: Final = (
     "The address asks for the rows of your team as well (mine=1), but you are not signed in; sign in, or use "
     "the address without mine=1."
 )
-
-
-class ExportLink(NamedTuple):
-    """One way to export this view: its address, what it is in words, and the name of its file."""
-
-    format: Format
-    href: str
-    about: str
-    file_name: str
-
-
-# What stands before some of them, and these.
-LabelledLinks = tuple[str, list[ExportLink]]
 
 
 class FormatConverter(StringConverter):
@@ -127,7 +112,8 @@ def address(board: Board, query: BoardQuery) -> str:
 
 def _asked(query: BoardQuery, **more: str) -> str:
     """The end of an address that asks for the same view, and for `more`."""
-    given = {name: value for name, value in query.given.items() if name not in _NOT_OURS} | more
+    # A page of the table is no table of its own.
+    given = {name: value for name, value in query.given.items() if name != "page"} | more
     return f"?{urlencode(given)}" if given else ""
 
 
@@ -140,43 +126,35 @@ def of_method(results: Sequence[Result]) -> dict[str, str]:
     return {"bibtex": bibtex.of_entry(first.entry, page=page), "badge_split": first.split.pk}
 
 
-def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, list[LabelledLinks]]:
+def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, Any]:
     """What a board's page offers to take along: what everybody sees, and for a team its own rows as well.
 
-    All are of the same view. `board` is it as the reader sees it.
+    All are of the same view: labels, each with its links. `board` is it as the reader sees it.
     """
     path = reverse("board", args=[board.split.pk])
     if edition is not None:
         path = reverse("edition", args=[edition.split_id, edition.number])
-    has_intervals = any(entry.intervals for entry in board.entries)
     has_own = any(tables.mark_of(entry) for entry in board.entries)
-    on_site = [each for each in formats.FORMATS if each.on_site]
+    variants: dict[str, dict[str, str]] = {"": {}}
+    if any(entry.intervals for entry in board.entries):
+        variants["with confidence intervals"] = {"intervals": "1"}
 
-    def asked(form: Format, more: dict[str, str]) -> str:
-        # The API's document has the rows of whoever asks, unless it is asked for without.
-        is_public = has_own and form.is_api_document and "mine" not in more
-        return _asked(query, **more, **({"mine": "0"} if is_public else {}))
+    def links(label: str, about: str, **more: str) -> Iterator[dict[str, Any]]:
+        for each in formats.FORMATS:
+            if each.on_site and (each.has_values or not label):
+                # The API's document has the rows of whoever asks, unless it is asked for without.
+                public = {"mine": "0"} if has_own and each.is_api_document and "mine" not in more else {}
+                yield {
+                    "format": each,
+                    "href": f"{path.rstrip('/')}.{each.suffix}{_asked(query, **more, **public)}",
+                    "about": ", ".join(filter(None, (f"{each.title}{about}", label))),
+                    "file_name": f"tsttc-{board.split.pk}.{each.suffix}",
+                }
 
-    def offered(label: str, about: str, these: Sequence[Format], **more: str) -> LabelledLinks:
-        return label, [
-            ExportLink(
-                each,
-                f"{path.rstrip('/')}.{each.suffix}{asked(each, more)}",
-                f"{each.title}{about}",
-                f"tsttc-{board.split.pk}.{each.suffix}",
-            )
-            for each in these
-        ]
-
-    def variants(about: str, these: Sequence[Format], **more: str) -> list[LabelledLinks]:
-        plain = offered("", about, these, **more)
-        if not has_intervals:
-            return [plain]
-        label = "with confidence intervals"
-        with_values = [each for each in these if each.has_values]
-        return [plain, offered(label, f"{about}, {label}", with_values, **more, intervals="1")]
+    def offered(about: str, **own: str) -> list[tuple[str, list[dict[str, Any]]]]:
+        return [(label, list(links(label, about, **own, **more))) for label, more in variants.items()]
 
     return {
-        "public": variants("", on_site),
-        "with_own": variants(" including your private rows", on_site, mine="1") if has_own else [],
+        "public": offered(""),
+        "with_own": offered(" including your private rows", mine="1") if has_own else [],
     }

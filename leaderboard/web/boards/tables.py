@@ -4,25 +4,21 @@ Templates only place what they are given; a thousand rows of number filters woul
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from datetime import date, timedelta
+from dataclasses import dataclass
+from datetime import date, datetime, timedelta
 from typing import Final
 from uuid import UUID
 
 from django.core.paginator import Page, Paginator
 
-from evaluator.metrics.protocol import (
-    PRIMARY,
-    Protocol,
-    grouped_names,
-    interval_of,
-)
+from evaluator.metrics.protocol import PRIMARY, Protocol, grouped_names, interval_of
 from evaluator.metrics.protocol import Interval as TTCRange
 from evaluator.scoring.scoring import floor_sentence
+from leaderboard.boards import movement
 from leaderboard.boards.boards import Board
 from leaderboard.boards.rows import Entry, Interval
-from leaderboard.exports.tables import short_authors
-from leaderboard.models import Visibility
+from leaderboard.exports.tables import team_of
+from leaderboard.models import Edition, Visibility
 from leaderboard.scoring import verdicts
 from leaderboard.web.boards import whiskers
 from leaderboard.web.boards.board_query import PER_PAGE, BoardQuery
@@ -42,6 +38,11 @@ from leaderboard.web.boards.whiskers import WhiskerScale
 
 ABSENT: Final = "–"
 NEW_FOR: Final = timedelta(days=14)
+_WHY_UNSCORABLE: Final = {
+    "missing-keys": "Edition {} added sequences that its file does not predict.",
+    "unknown-keys": "Edition {} removed sequences that its file predicts.",
+    "undefined-error": "The protocol of edition {} has no MiD for predictions that are too close to 0.",
+}
 
 
 @dataclass(frozen=True)
@@ -49,15 +50,14 @@ class BoardRow:
     """One entry, ready to be placed."""
 
     entry: Entry
-    rank: str
     team: str
     cells: tuple[Cell, ...]
-    rank_range: str = ""
-    source_number: int | None = None
-    note: str = ""  # why it stays in a former edition
-    attempts: str = ""
-    is_new: bool = False
-    moved: int = 0  # ranks risen in a month; fallen: below 0
+    rank_range: str
+    source_number: int | None
+    note: str  # why it stays in a former edition
+    attempts: str
+    is_new: bool
+    moved: int  # ranks risen in a month; fallen: below 0
 
     @property
     def n_moved(self) -> int:
@@ -87,33 +87,13 @@ class BoardRow:
 
 
 @dataclass(frozen=True)
-class BoardNews:
-    """What a board tells of its rows as of a day: which are new, and how far ranks have moved since."""
-
-    today: date
-    since: date
-    moved: Mapping[UUID, int] = field(default_factory=dict)
-
-    def new_among(self, entries: Sequence[Entry]) -> frozenset[UUID]:
-        """The methods that are new; none where most rows are, of which it would say nothing."""
-        found = frozenset(each.method_id for each in entries if each.method_id and self._is_new(each))
-        return found if 2 * len(found) <= len(entries) else frozenset()
-
-    def _is_new(self, entry: Entry) -> bool:
-        if entry.listed_at is None or entry.withdrawn_at or not entry.is_visible_to_all:
-            return False
-        return self.today - entry.listed_at.date() < NEW_FOR
-
-
-@dataclass(frozen=True)
 class BoardTable:
     """Everything that the board's template places."""
 
     query: BoardQuery
     text_headings: dict[str, Heading]
-    places: tuple[
-        tuple[str, str, bool], ...
-    ]  # the ranges that a narrow screen shows one of: class, label, chosen
+    # The ranges that a narrow screen shows one of: class, label, chosen.
+    places: tuple[tuple[str, str, bool], ...]
     groups: tuple[Group, ...]
     score_headings: tuple[Heading, ...]
     rows: tuple[BoardRow, ...]
@@ -151,7 +131,7 @@ class BoardTable:
         return self.query.href(page=str(number) if number > 1 else "")
 
 
-def board_table(board: Board, *, query: BoardQuery, news: BoardNews) -> BoardTable:
+def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable:
     """The board, ready to be drawn; its links keep what else the address asks for."""
     names = board.rules.names_of(query.columns)
     is_of_one = len(grouped_names(names)) == 1
@@ -161,12 +141,19 @@ def board_table(board: Board, *, query: BoardQuery, news: BoardNews) -> BoardTab
     numbers = {citation: i for i, (citation, _) in enumerate(sources, 1)}
     counts = board.edition.ground_truth.counts if board.edition else {}
     # Among all rows: no filter makes a row new, or old.
-    new = news.new_among(board.unfiltered) if not board.at else frozenset()
+    new = _new_among(board.unfiltered, today=now.date()) if not board.at else frozenset()
+    moved = movement.moved(board, now=now)
     rows = tuple(
-        replace(
-            _row(entry, names, numbers, scales),
+        BoardRow(
+            entry=entry,
+            rank_range=rank_range(entry),
+            team=team_of(entry),
+            cells=score_cells(entry, names=names, scales=scales),
+            source_number=numbers.get(entry.source),
+            note=_note(entry, board.split.published_edition),
+            attempts=_attempts(entry),
             is_new=entry.method_id in new,
-            moved=news.moved.get(entry.method_id, 0) if entry.method_id else 0,
+            moved=moved.get(entry.method_id, 0) if entry.method_id else 0,
         )
         for entry in pages.object_list
     )
@@ -178,7 +165,7 @@ def board_table(board: Board, *, query: BoardQuery, news: BoardNews) -> BoardTab
         has_one_whisker=bool(scales) and not is_of_one,
         score_headings=tuple(score_heading(name, query, scales.get(name)) for name in names),
         rows=rows,
-        moved_since=news.since if any(row.moved for row in rows) else None,
+        moved_since=movement.since(now=now).date() if any(row.moved for row in rows) else None,
         sources=sources,
         intervals=counted_ranges(board.rules, counts),
         pages=pages,
@@ -187,6 +174,24 @@ def board_table(board: Board, *, query: BoardQuery, news: BoardNews) -> BoardTab
         reason=_reason(board, has_intervals=bool(scales)),
         floor=floor_sentence(board.edition.floor, decimals=board.edition.decimals) if board.edition else "",
     )
+
+
+def _new_among(entries: Sequence[Entry], *, today: date) -> frozenset[UUID]:
+    """The methods that are new; none where most rows are, of which it would say nothing."""
+    new = frozenset(
+        entry.method_id
+        for entry in entries
+        if entry.method_id and entry.listed_at and not entry.withdrawn_at and entry.is_visible_to_all
+        if today - entry.listed_at.date() < NEW_FOR
+    )
+    return new if 2 * len(new) <= len(entries) else frozenset()
+
+
+def _note(entry: Entry, present: Edition | None) -> str:
+    """Why the present edition cannot score a row of a former one; nothing of the file itself is told."""
+    if present is None or not entry.is_unscorable or entry.withdrawn_at:
+        return ""
+    return _WHY_UNSCORABLE.get(entry.unscorable, "Edition {} cannot score its file.").format(present.number)
 
 
 def _is_present(board: Board) -> bool:
@@ -250,21 +255,6 @@ def _text_heading(name: str, query: BoardQuery) -> Heading:
         href=sort_href(name, query),
         aria_sort=aria_sort_of(name, query),
         css=name,
-    )
-
-
-def _row(
-    entry: Entry, names: Sequence[str], source_numbers: Mapping[str, int], scales: Mapping[str, WhiskerScale]
-) -> BoardRow:
-    is_published = entry.kind == "published"
-    return BoardRow(
-        entry=entry,
-        rank=ABSENT if entry.rank is None else str(entry.rank),
-        rank_range=rank_range(entry),
-        team=short_authors(entry.team) if is_published else entry.team,
-        cells=score_cells(entry, names=names, scales=scales),
-        source_number=source_numbers.get(entry.source),
-        attempts=_attempts(entry),
     )
 
 

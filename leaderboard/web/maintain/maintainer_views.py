@@ -73,7 +73,7 @@ def hub(request: HttpRequest) -> HttpResponse:
         (desk, [edition_tables.running(*each) for each in desk.in_preparation])
         for desk in map(history.maintainer_overview, splits)
     ]
-    is_running = any(not shown.is_final for _, running in desks for shown in running)
+    is_running = any(not shown["is_final"] for _, running in desks for shown in running)
     context = {
         "desks": desks,
         "is_running": is_running,
@@ -116,12 +116,12 @@ def edition_progress(request: HttpRequest, split: str, number: int) -> HttpRespo
     """What a waiting page asks for: nothing new, how far it is, or at the end not to ask any more."""
     found = _edition(split, number)
     running = edition_tables.running(found, corrections.progress(found))
-    if request.GET.get("seen") == running.seen and not running.is_final:
+    if request.GET.get("seen") == running["seen"] and not running["is_final"]:
         return HttpResponse(status=204)
     context: dict[str, Any] = {"running": running}
-    if running.is_final and "comparison" in request.GET:
+    if running["is_final"] and "comparison" in request.GET:
         context |= _comparison(found)
-    status = STOP_POLLING if running.is_final else 200
+    status = STOP_POLLING if running["is_final"] else 200
     return render(request, "maintain/progress_state.html", context, status=status)
 
 
