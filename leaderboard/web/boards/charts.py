@@ -19,7 +19,6 @@ from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import Entry
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.exports.tables import team_of
-from leaderboard.models import Visibility
 from leaderboard.web.boards.chart_options import (
     Chart,
     Frame,
@@ -46,8 +45,6 @@ MAX_BEHIND: Final = 500
 
 @dataclass(frozen=True)
 class _Placed:
-    """An entry's MiD at a place of the level axis: a time, or a latency."""
-
     x: float
     y: float
     entry: Entry
@@ -122,12 +119,9 @@ def decimals_css(entry: Entry, most: int) -> str:
 
 # --- progress over time ----------------------------------------------------------------------------------
 
-# Where all of it happened within so long, the time of day is told as well.
-_SHORT: Final = timedelta(days=3)
-
 
 def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Chart:
-    """MiD of every submission by time, with the lowest MiD so far, and rows quoted from papers.
+    """MiD of every submission by day, with the lowest MiD so far, and rows quoted from papers.
 
     Papers say a year and no day: their rows stand in its middle.
     """
@@ -138,23 +132,18 @@ def progress(entries: Sequence[Entry], attempts: Iterable[Attempt] = ()) -> Char
         if entry.kind == "published" and entry.year and (value := entry.scores[PRIMARY]) is not None
     ]
     sent = [
-        (by_method[attempt.method_id], value, attempt.at.astimezone(UTC))
+        (by_method[attempt.method_id], value, _day(attempt.at))
         for attempt in attempts
         if attempt.method_id in by_method and (value := attempt.scores[PRIMARY]) is not None
     ]
     if not quoted and not sent:
         return empty("progress")
-    moments = [at for _, _, at in sent]
-    # Within a short span the axis has hours, unless a method is anonymous: of these only the day is told.
-    is_anonymous = any(entry.visibility == Visibility.ANONYMOUS for entry, *_ in sent)
-    is_short = not (quoted or is_anonymous) and max(moments) - min(moments) < _SHORT
-    told = _minute if is_short else _day
     placed = [
         (_ms(datetime(year, 7, 1, tzinfo=UTC)), value, entry, str(year)) for entry, value, year in quoted
     ]
-    placed += [(_ms(told(at)), value, entry, _time_words(at, is_short=is_short)) for entry, value, at in sent]
+    placed += [(_ms(day), value, entry, f"{day:%Y-%m-%d}") for entry, value, day in sent]
     found, note = _drawn(_with_front(placed))
-    first, last = _time_range([told(at) for at in moments], [year for *_, year in quoted])
+    first, last = _time_range([day for *_, day in sent], [year for *_, year in quoted])
     series, names = _front_series(found, line="Best so far", praise="the best when it came", end=_ms(last))
     frame = Frame(
         x_axes=[x_axis(_time_title(first, last), _time_axis(first, last))],
@@ -195,7 +184,6 @@ ZOOMABLE: Final = {
 
 
 def _front_words(found: Sequence[_Placed]) -> str:
-    """The ends of a front in a sentence."""
     front = [each for each in found if each.is_front]
     texts = [f"{each.entry.method} {error_text(MID, each.y, decimals=each.entry.decimals)}" for each in front]
     return texts[0] if len(texts) == 1 else f"from {texts[0]} to {texts[-1]}"
@@ -206,52 +194,28 @@ def _ms(at: datetime) -> float:
 
 
 def _day(at: datetime) -> datetime:
-    return at.replace(hour=0, minute=0, second=0, microsecond=0)
+    return at.astimezone(UTC).replace(hour=0, minute=0, second=0, microsecond=0)
 
 
-def _minute(at: datetime) -> datetime:
-    return at.replace(second=0, microsecond=0)
-
-
-def _time_words(at: datetime, *, is_short: bool) -> str:
-    """When it came: the day; within a short span the minute as well."""
-    return f"{at:%Y-%m-%d %H:%M} UTC" if is_short else f"{at:%Y-%m-%d}"
-
-
-def _time_range(moments: Sequence[datetime], years: Sequence[int]) -> tuple[datetime, datetime]:
+def _time_range(days: Sequence[datetime], years: Sequence[int]) -> tuple[datetime, datetime]:
     """From where to where the axis goes: whole years around papers, a margin around submissions."""
     ends = [datetime(year, 1, 1, tzinfo=UTC) for year in years]
     ends += [datetime(year + 1, 1, 1, tzinfo=UTC) for year in years]
-    span = max([*ends, *moments]) - min([*ends, *moments])
-    margin = max(0.04 * span, timedelta(hours=1))
-    ends += [at - margin for at in moments] + [at + margin for at in moments]
+    margin = max(0.04 * (max([*ends, *days]) - min([*ends, *days])), timedelta(days=1))
+    ends += [day - margin for day in days] + [day + margin for day in days]
     return min(ends), max(ends)
 
 
 def _time_axis(first: datetime, last: datetime) -> Option:
-    """An axis of time with years, months, days or hours, whatever its span asks for."""
     label = {
-        "year": "{yyyy}",
-        "month": "{MMM} {yyyy}",
-        "day": "{d} {MMM}",
-        "hour": "{HH}:{mm}",
-        "minute": "{HH}:{mm}",
+        "formatter": {"year": "{yyyy}", "month": "{MMM} {yyyy}", "day": "{d} {MMM}"},
+        "showMinLabel": first.month == first.day == 1,
+        "showMaxLabel": False,
     }
-    return {
-        "type": "time",
-        "min": _ms(first),
-        "max": _ms(last),
-        "axisLabel": {
-            "formatter": label,
-            "showMinLabel": first.month == first.day == 1,
-            "showMaxLabel": False,
-        },
-        "splitNumber": 5,
-    }
+    return {"type": "time", "min": _ms(first), "max": _ms(last), "axisLabel": label, "splitNumber": 5}
 
 
 def _time_title(first: datetime, last: datetime) -> str:
-    """What the axis says; the year where its labels say days."""
     if last - first > timedelta(days=60):
         return "Date"
     years = sorted({f"{first:%Y}", f"{last:%Y}"})
