@@ -3,7 +3,8 @@
 A chart has the errors over the setting that is varied, one line for each method.
 """
 
-from collections import Counter
+from collections import defaultdict
+from collections.abc import Sequence
 from typing import Final
 
 from django.http import Http404, HttpRequest, HttpResponse
@@ -13,7 +14,7 @@ from django.views.decorators.http import require_safe
 
 from evaluator.metrics.metrics import Metric
 from evaluator.metrics.protocol import OVERALL, SCORE_NAMES, metric_of, split_name
-from evaluator.papers.tables import PublishedRow, published_tables
+from evaluator.papers.tables import PublishedRow, PublishedTable, published_tables
 from evaluator.tables import published
 from evaluator.tables.formats import FORMATS
 from evaluator.tables.published import PrintedTable, method_name, setting_text
@@ -36,26 +37,42 @@ _MIN_SETTINGS: Final = 3
 def sweep(shown: PrintedTable) -> Chart:
     """MiD and RTE of a table over the setting that it varies; empty for a table that varies none."""
     table = shown.table
-    per_method = Counter(row.method for row in table.rows if _is_number(row))
-    if not table.is_result or min(per_method.values(), default=0) < _MIN_SETTINGS:
+    rows: dict[str | None, list[PublishedRow]] = defaultdict(list)
+    for row in table.rows:
+        if isinstance(row.setting, int | float) and not isinstance(row.setting, bool):
+            rows[row.method].append(row)
+    if not table.is_result or min(map(len, rows.values()), default=0) < _MIN_SETTINGS:
         return empty("published")
-    settings = sorted({float(row.setting or 0) for row in table.rows})
-    lines = _lines(shown)
-    metrics = dict.fromkeys(metric_of(name) for _, name in lines)
-    low, high = settings[0], settings[-1]
-    room = 0.04 * (high - low)
-    places = [(setting, f"{setting:,g}") for setting in settings]
-    heading = shown.headings[shown.n_names - 1]
-    series = [
-        each
-        for number, (method, name) in enumerate(lines)
-        for each in _series(shown, number, method, name, grid=list(metrics).index(metric_of(name)))
+    scores = [name for name in table.columns if name in SCORE_NAMES]
+    metrics = list(dict.fromkeys(map(metric_of, scores)))
+    # Lines of one panel are told apart by the method, or by the TTC range where there is one method.
+    has_ranges = any(split_name(name)[1] != OVERALL for name in scores)
+    lines = [
+        (split_name(name)[1] if has_ranges else method_name(of_method[0]), name, of_method)
+        for of_method in rows.values()
+        for name in scores
     ]
+    names = list(dict.fromkeys(legend for legend, *_ in lines))
+    settings = sorted({_setting(row) for of_method in rows.values() for row in of_method})
+    room = 0.04 * (settings[-1] - settings[0])
+    places = places_axis(
+        [(setting, f"{setting:,g}") for setting in settings], low=settings[0] - room, high=settings[-1] + room
+    )
     frame = Frame(
-        x_axes=[x_axis(heading, places_axis(places, low=low - room, high=high + room)) for _ in metrics],
-        y_axes=[error_axis(metric, _values(shown, metric)) for metric in metrics],
-        series=series,
-        names=list(dict.fromkeys(_legend(shown, *each) for each in lines)),
+        x_axes=[x_axis(shown.headings[shown.n_names - 1], places) for _ in metrics],
+        y_axes=[error_axis(metric, _values(table, metric)) for metric in metrics],
+        series=[
+            series
+            for legend, name, of_method in lines
+            for series in _series(
+                legend,
+                name,
+                [(_setting(row), float(row.values[table.columns.index(name)]), row) for row in of_method],
+                place=names.index(legend) % len(SERIES_INKS),
+                grid=metrics.index(metric_of(name)),
+            )
+        ],
+        names=names,
     )
     symbols = " and ".join(metric.symbol for metric in metrics)
     return Chart(
@@ -67,62 +84,37 @@ def sweep(shown: PrintedTable) -> Chart:
     )
 
 
-def _is_number(row: PublishedRow) -> bool:
-    return isinstance(row.setting, int | float) and not isinstance(row.setting, bool)
+def _setting(row: PublishedRow) -> float:
+    return float(row.setting or 0)
 
 
-def _lines(shown: PrintedTable) -> list[tuple[str, str]]:
-    """Method and score of each line. One method with its TTC ranges has a line for each range."""
-    methods = dict.fromkeys(row.method or "" for row in shown.table.rows)
-    scores = [name for name in shown.table.columns if name in SCORE_NAMES]
-    return [(method, name) for method in methods for name in scores]
-
-
-def _legend(shown: PrintedTable, method: str, name: str) -> str:
-    """What tells lines of one panel apart: the method, or the TTC range where there is one method."""
-    row = next(row for row in shown.table.rows if (row.method or "") == method)
-    interval = split_name(name)[1]
-    has_ranges = any(split_name(each)[1] != OVERALL for each in shown.table.columns if each in SCORE_NAMES)
-    return interval if has_ranges else method_name(row)
-
-
-def _series(shown: PrintedTable, number: int, method: str, name: str, *, grid: int) -> list[Option]:
+def _series(
+    legend: str, name: str, points: Sequence[tuple[float, float, PublishedRow]], *, place: int, grid: int
+) -> list[Option]:
     """A line and its marks; the mark of the default is larger."""
-    legend = _legend(shown, method, name)
-    names = list(dict.fromkeys(_legend(shown, *each) for each in _lines(shown)))
-    place = names.index(legend) % len(SERIES_INKS)
-    column = shown.table.columns.index(name)
-    rows = [row for row in shown.table.rows if (row.method or "") == method and _is_number(row)]
-    points = [(float(row.setting or 0), float(row.values[column])) for row in rows]
-    ink, symbol = SERIES_INKS[place], SERIES_SYMBOLS[place]
+    metric, interval = metric_of(name), split_name(name)[1]
+    named = metric.symbol if interval == OVERALL else f"{metric.symbol} {interval}"
     found = [
-        Mark(x, y, (f"{legend}, {setting_text(row)}", f"{_named(name)} {y:.1f}", *_default(row)))
-        for (x, y), row in zip(points, rows, strict=True)
+        Mark(
+            x,
+            y,
+            (f"{legend}, {setting_text(row)}", f"{named} {y:.1f}")
+            + (("the paper's default",) if row.is_default else ()),
+        )
+        for x, y, row in points
     ]
-    drawn = marks(legend, found, Look(ink, symbol, 8.0), grid=grid)
-    for item, row in zip(drawn["data"], rows, strict=True):
+    drawn = marks(legend, found, Look(SERIES_INKS[place], SERIES_SYMBOLS[place], 8.0), grid=grid)
+    for item, (*_, row) in zip(drawn["data"], points, strict=True):
         if row.is_default:
             item["symbolSize"] = 13.0
-    return [line(legend, points, ink, grid=grid), drawn]
+    return [line(legend, [(x, y) for x, y, _ in points], SERIES_INKS[place], grid=grid), drawn]
 
 
-def _default(row: PublishedRow) -> tuple[str, ...]:
-    return ("the paper's default",) if row.is_default else ()
-
-
-def _named(name: str) -> str:
-    interval = split_name(name)[1]
-    symbol = metric_of(name).symbol
-    return symbol if interval == OVERALL else f"{symbol} {interval}"
-
-
-def _values(shown: PrintedTable, metric: Metric) -> list[float]:
+def _values(table: PublishedTable, metric: Metric) -> list[float]:
     columns = [
-        place
-        for place, name in enumerate(shown.table.columns)
-        if name in SCORE_NAMES and metric_of(name) == metric
+        place for place, name in enumerate(table.columns) if name in SCORE_NAMES and metric_of(name) == metric
     ]
-    return [float(row.values[place]) for row in shown.table.rows for place in columns]
+    return [float(row.values[place]) for row in table.rows for place in columns]
 
 
 # A table has no papers of its own to cite, and its document is the API's.
