@@ -34,11 +34,10 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """What stands below one heading, as plain text, its blocks of code apart: what a search looks through."""
+    """What stands below one heading, as plain text, its blocks of code last: what a search looks through."""
 
     heading: TextHeading
     text: str
-    code: str
 
 
 @dataclass(frozen=True)
@@ -111,7 +110,7 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
     heading, texts, code, anchors = TextHeading(0, "", ""), list[str](), list[str](), set[str]()
     for at, token in enumerate(tokens):
         if token.type == "heading_open":
-            parts.append(Part(heading, " ".join(filter(None, texts)), " ".join(code)))
+            parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
             words = _plain(tokens[at + 1])
             heading, texts = TextHeading(int(token.tag[1]), words, _anchor(words, anchors)), []
             code = []
@@ -128,12 +127,12 @@ def _document(tokens: list[Token], parser: MarkdownIt) -> Document:
                 token.attrSet("class", "number")
             if not tokens[at + 1].content:
                 token.tag = tokens[at + 2].tag = "td"  # a head without words names nothing
-    parts.append(Part(heading, " ".join(filter(None, texts)), " ".join(code)))
+    parts.append(Part(heading, " ".join(filter(None, [*texts, *code]))))
     html = parser.renderer.render(tokens, parser.options, {})
     html = html.replace("<table>\n", _TABLE).replace("</table>", "</table>\n</div>")
     # The parser escapes what is no markup of its own.
     drawn = SafeString(html)
-    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text or part.code))
+    return Document(drawn, tuple(part for part in parts if part.heading.level or part.text))
 
 
 def _plain(token: Token) -> str:

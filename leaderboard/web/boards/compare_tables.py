@@ -113,7 +113,6 @@ def _pair_table(pair: Pair) -> dict[str, Any]:
 def _difference_group(
     group: Group, names: Sequence[str], pair: Pair, differences: Mapping[str, Difference]
 ) -> dict[str, Any]:
-    """One of the metrics: its rows on one scale."""
     found = [differences[name] for name in names]
     ends = [end for each in found for end in (each.low, each.high, each.difference) if end is not None]
     scale_end = svg.scale_end(ends)
@@ -124,7 +123,6 @@ def _difference_group(
 
 
 def _difference_row(name: str, pair: Pair, found: Difference, scale_end: float, css: str) -> dict[str, Any]:
-    """One column of the board: both values, and first minus second."""
     decimals = pair.first.decimals  # both are of one edition
     return {
         "heading": score_heading(name),

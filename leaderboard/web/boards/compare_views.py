@@ -88,7 +88,6 @@ def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None
 def _refused(
     request: HttpRequest, split: Split | None, refusal: comparisons.BadComparison | questions.AskedTooOften
 ) -> HttpResponse:
-    """What is wrong with the choice, and the choice again."""
     status = NOT_FOUND if isinstance(refusal, UnknownSplit | comparisons.UnknownMethod) else UNPROCESSABLE
     context = _choice(request, split, refusal) if split else {"refusal": refusal}
     response = render(request, "boards/compare/choose.html", context, status=status)

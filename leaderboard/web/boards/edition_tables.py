@@ -97,7 +97,6 @@ def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:
 
 
 def _outcome(old: Evaluation | None, new: Evaluation | None, former: int) -> str:
-    """What became of one submission, by its MiD."""
     before, after = _mid(old), _mid(new)
     if new and new.status == Status.SCORED:
         return f"MiD stays {after}." if before == after else f"MiD {before} → {after}."
@@ -180,7 +179,6 @@ def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
 
 
 def _change_row(change: Change, names: Sequence[str]) -> dict[str, Any]:
-    """What a new edition does to one entry."""
     old_status, new_status = (_STATUS_LABELS[s] for s in (change.old_status, change.new_status))
     is_news = change.problems and change.old_status != change.new_status
     reason = change.problems[0]["message"] if is_news else ""
@@ -197,7 +195,6 @@ def _change_row(change: Change, names: Sequence[str]) -> dict[str, Any]:
 
 
 def _difference(name: str, change: Change) -> dict[str, str]:
-    """One number before and after."""
     delta, css = change.delta[name], column_css(name).replace("wide", "")
     return {
         "old": format_published(change.old.get(name), decimals=change.old_decimals),

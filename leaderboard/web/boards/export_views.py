@@ -111,7 +111,6 @@ def address(board: Board, query: BoardQuery) -> str:
 
 
 def _asked(query: BoardQuery, **more: str) -> str:
-    """The end of an address that asks for the same view, and for `more`."""
     # A page of the table is no table of its own.
     given = {name: value for name, value in query.given.items() if name != "page"} | more
     return f"?{urlencode(given)}" if given else ""

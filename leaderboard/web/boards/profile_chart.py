@@ -78,7 +78,6 @@ def _legend_name(k: int, entry: Entry) -> str:
 
 
 def _all_ends(shown: Sequence[Entry], names: Sequence[str]) -> list[float]:
-    """Every value of these columns, and both ends of its interval."""
     return [
         value
         for entry in shown
@@ -114,7 +113,6 @@ def _profile_series(
 
 
 def _range_words(name: str) -> str:
-    """A TTC range in two lines, as over the columns of a board."""
     interval = interval_of(name)
     return f"{interval.seconds}\n{interval.name}" if interval else OVERALL
 

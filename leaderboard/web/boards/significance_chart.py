@@ -40,8 +40,6 @@ _INKS: Final = dict(
 
 @dataclass(frozen=True)
 class _Cell:
-    """A pair, where it stands, and what is told of it."""
-
     column: int
     row: int
     pair: Pair
@@ -115,7 +113,6 @@ def _series(name: str, found: Sequence[_Cell]) -> Option:
 
 
 def _entries(pairs: Sequence[Pair]) -> list[Entry]:
-    """The entries of these pairs, in the order of their ranks."""
     return [pairs[0].first, *(pair.second for pair in pairs if pair.first is pairs[0].first)]
 
 

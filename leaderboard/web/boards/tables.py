@@ -225,7 +225,6 @@ def _scales(entries: Sequence[Entry], names: Sequence[str]) -> dict[str, Whisker
 
 
 def _places(names: Sequence[str], query: BoardQuery) -> tuple[tuple[str, str, bool], ...]:
-    """The TTC ranges of these columns; chosen is that of the column by which the board is sorted."""
     sorted_by = query.sort.removeprefix("-")
     chosen = place_of(sorted_by) if sorted_by in names else place_of(PRIMARY)
     labels = {place_of(name): found.seconds if (found := interval_of(name)) else "Overall" for name in names}

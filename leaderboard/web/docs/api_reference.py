@@ -112,7 +112,6 @@ def _field(name: str, node: Node, is_required: bool) -> Node:
 
 
 def _target(node: Node) -> str:
-    """The name of the object that a reference names."""
     return str(node["$ref"]).rpartition("/")[2]
 
 

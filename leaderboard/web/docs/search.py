@@ -42,7 +42,7 @@ def find(query: str) -> list[Hit]:
         # Decisions and changes say why something is as it is: they come after what says how to use it.
         is_background = name.startswith("adr/") or name == "changelog"
         for part in guide.parts:
-            heading, text = part.heading, " ".join(f"{part.text} {part.code}".split())
+            heading, text = part.heading, " ".join(part.text.split())
             counts = [len(word.findall(f"{guide.title} {heading.text} {text}")) for word in asked]
             if any(counts):
                 in_heading = sum(bool(word.search(heading.text)) for word in asked)
@@ -64,7 +64,6 @@ def _pattern(word: str) -> re.Pattern[str]:
 
 
 def _snippet(text: str, asked: list[re.Pattern[str]]) -> SafeString:
-    """The text around the first word asked for."""
     marked = re.compile("(" + "|".join(word.pattern for word in asked) + ")", re.IGNORECASE)
     first = marked.search(text)
     begin = text.rfind(" ", 0, max(0, first.start() - 60)) + 1 if first else 0

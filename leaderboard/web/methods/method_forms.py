@@ -51,7 +51,6 @@ class MethodForm(DetailsForm):
 
 
 def _field_of(detail: Detail) -> forms.CharField:
-    """A text: what is wrong with it `methods.edit` says."""
     kind = detail.kind
     example = detail.filter_example or detail.example
     typed = {"maxlength": kind.limits.get("max_length"), "placeholder": f"e.g. {example}"}
@@ -66,7 +65,6 @@ def _field_of(detail: Detail) -> forms.CharField:
 
 
 def _stated(method: Method) -> dict[str, Any]:
-    """The method's fields as the form has them."""
     found = {name: getattr(method, name) for name in methods.FIELDS}
     for detail in DETAILS:
         texts = {option.value: option.text for option in detail.kind.options}
@@ -133,7 +131,6 @@ def _day(moment: datetime | None) -> str:
 
 
 def _moment(text: str) -> datetime | None:
-    """The beginning of a day."""
     if not text.strip():
         return None
     try:

@@ -117,7 +117,6 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 
 def _published_sentence(method_id: UUID) -> str:
-    """What has just become of a method."""
     method = Method.objects.get(pk=method_id)
     if method.visibility == Visibility.PUBLIC:
         return f"{method.name} is now public."

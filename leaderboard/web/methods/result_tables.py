@@ -120,7 +120,6 @@ def submission_table(submissions: Iterable[Submission]) -> dict[str, Any]:
 
 
 def _reason(evaluation: Evaluation) -> str:
-    """Why there is no score, in a sentence for a list; empty for what is scored or waits."""
     if evaluation.status == Status.SYSTEM_ERROR:
         return "An error on our side; a maintainer will retry it."
     if evaluation.status != Status.REJECTED or not evaluation.problems:
