@@ -6,7 +6,7 @@ import pytest
 from django.test import Client
 from django.urls import reverse
 
-from leaderboard.models import Edition, PublishedResult, Split, User
+from leaderboard.models import Edition, PublishedResult, User
 from tests import builders, pages
 from tests.pages import get
 
@@ -51,28 +51,6 @@ def test_published_rows_are_marked_and_lead_to_their_citation(client: Client, be
         source = root.one("li", id=tag.attributes["href"].removeprefix("#"))
         assert "Yuheng Shi" in source.text
         assert source.one("a").attributes["href"] == "https://arxiv.org/abs/2309.01539"
-
-
-def test_submissions_are_ranked_among_published_rows(client: Client, edition: Edition, owner: User) -> None:
-    builders.submit(owner, builders.predictions(edition, factor=1.02), method="Near")
-    builders.submit(owner, builders.predictions(edition, factor=1.9), method="Far")
-    builders.score_all()
-    root = get(client)
-    assert pages.column(root, METHOD)[0].startswith("Near")
-    values = [float(value) for value in pages.column(root, MID)]
-    assert values == sorted(values)
-    assert pages.column(root, RANK) == [str(1 + sum(v < w for v in values)) for w in values]
-
-
-@pytest.mark.parametrize("decimals", [1, 2])
-def test_submitted_values_have_the_decimals_of_their_edition(
-    client: Client, benchmark: None, tmp_path: Path, owner: User, decimals: int
-) -> None:
-    Split.objects.filter(pk="test").update(decimals=decimals)
-    builders.submit(owner, builders.predictions(builders.import_truth(tmp_path)), method="Foo")
-    builders.score_all()
-    cells = next(row for row in pages.board_rows(get(client)) if row[METHOD].startswith("Foo"))[MID:]
-    assert all(len(cell.partition(".")[2]) == decimals for cell in cells), cells
 
 
 def test_heads_are_plain_links_that_turn_round(client: Client, benchmark: None) -> None:
@@ -134,13 +112,6 @@ def test_my_teams_rows_are_marked_and_its_private_ones_stand_on_its_own_board_al
         root = get(client)
         seen[user.name] = "mine" in row_of(root, "Foo").classes, "private" in root.one("tbody").text
     assert seen == {"Owls": (True, True), "Mate": (True, True), "Strangers": (False, False)}
-
-
-def test_links_to_strangers_sites_are_not_endorsed(client: Client, edition: Edition, owner: User) -> None:
-    builders.submit(owner, builders.predictions(edition), method="Foo", code_url="https://example.org/code")
-    builders.score_all()
-    (link,) = [a for a in row_of(get(client), "Foo").all("a") if a.text == "code"]
-    assert link.attributes["rel"] == "nofollow ugc"
 
 
 def test_interval_without_sequences_has_a_dash(client: Client, benchmark: None) -> None:

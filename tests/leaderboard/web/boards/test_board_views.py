@@ -8,7 +8,6 @@ from django.test import Client
 
 from evaluator import SCORE_NAMES
 from leaderboard.models import Method, Submission, User, Visibility
-from leaderboard.web.boards import board_query
 from tests import builders, pages
 from tests.leaderboard.web.boards.test_board import MID, row_of
 from tests.pages import get
@@ -154,10 +153,3 @@ def test_rows_to_compare_are_ticked_in_a_form_that_needs_no_script(
     Method.objects.exclude(pk=inferred[0].method_id).update(visibility=Visibility.PRIVATE)
     builders.board_changed("test")
     assert get(client).all("form", class_="board-form") == []
-
-
-def test_links_keep_the_view_and_forget_the_page() -> None:
-    query = board_query.BoardQuery(given={"sort": "mid", "at": "2026-01-01", "q": "a&b", "page": "3"})
-    assert query.href(sort="-mid") == "?at=2026-01-01&sort=-mid&q=a%26b"
-    assert query.href(page="4").endswith("page=4")
-    assert query.kept("sort", "columns") == (("sort", "mid"),)

@@ -108,10 +108,9 @@ def test_past_board_leads_to_its_edition_and_to_the_board_now(client: Client, re
     ("change", "words"),
     [
         (lambda tmp_path: open_edition(corrected(tmp_path, factor=1.3)), "edition 2, 5 labels corrected"),
-        (lambda tmp_path: open_edition(corrected(tmp_path, drop="0003")), "edition 2, 5 sequences removed"),
         (lambda _: open_edition(None, protocol="toolkit"), "edition 2, protocol toolkit instead of tsttc-1"),
     ],
-    ids=["labels", "sequences", "protocol"],
+    ids=["labels", "protocol"],
 )
 def test_head_says_what_changed_and_leads_to_the_changelog(
     client: Client, entries: list[Submission], tmp_path: Path, change: Callable[[Path], Edition], words: str

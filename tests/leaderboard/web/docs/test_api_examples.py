@@ -1,7 +1,5 @@
 """Each operation of the API has a page with a request and the answer that the API gives to it."""
 
-import ast
-import inspect
 import json
 import os
 import re
@@ -15,7 +13,6 @@ from django.test import Client
 from django.utils import timezone
 from pytest_django.fixtures import Settings
 
-import evaluator
 from evaluator.cli import main
 from leaderboard.editions import corrections
 from leaderboard.models import Edition, Split, User
@@ -127,15 +124,3 @@ def test_the_command_of_an_example_is_one_that_tsttc_knows(name: str) -> None:
     assert found is not None, command
     options = {option for parameter in found.params for option in parameter.opts}
     assert {argument for argument in arguments if argument.startswith("--")} <= options
-
-
-@pytest.mark.parametrize("name", [name for name, example in EXAMPLES.items() if example.python])
-def test_the_python_of_an_example_calls_the_client_as_it_wants_to_be(name: str) -> None:
-    (call,) = (
-        node
-        for node in ast.walk(ast.parse(EXAMPLES[name].python))
-        if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("client.")
-    )
-    method = getattr(evaluator.Client, ast.unparse(call.func).removeprefix("client."))
-    named = {each.arg: each.value for each in call.keywords if each.arg}
-    inspect.signature(method).bind(None, *call.args, **named)

@@ -73,16 +73,6 @@ def test_every_field_and_parameter_is_on_the_page_with_its_description(
     assert undescribed == []
 
 
-def test_schema_comes_as_yaml_or_json(client: Client, benchmark: None) -> None:
-    address = reverse("api-schema")
-    as_yaml = client.get(address)
-    assert as_yaml["Content-Type"] == "application/vnd.oai.openapi; charset=utf-8"
-    assert as_yaml.text.startswith("openapi: 3.1.0\n")
-    as_json = client.get(f"{address}?format=json")
-    assert as_json["Content-Type"].startswith("application/vnd.oai.openapi+json")
-    assert as_json.json()["openapi"] == "3.1.0"
-
-
 def test_every_code_has_a_place_that_errors_lead_to(client: Client, benchmark: None) -> None:
     ids = {e.attributes["id"] for e in get(client).everything() if "id" in e.attributes}
     assert {f"problem-{code}" for code in (*API_CODES, *PROBLEM_CODES)} <= ids
