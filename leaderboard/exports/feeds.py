@@ -11,6 +11,7 @@ from xml.etree import ElementTree as ET
 
 from django.conf import settings
 from django.urls import reverse
+from django.utils.feedgenerator import Atom1Feed
 
 from evaluator.metrics.protocol import grouped_names
 from evaluator.scoring.report import format_published
@@ -19,7 +20,6 @@ from leaderboard.boards.rows import Entry
 from leaderboard.models import Split
 
 MAX_ENTRIES: Final = 50
-_ATOM: Final = "http://www.w3.org/2005/Atom"
 _SITEMAP: Final = "http://www.sitemaps.org/schemas/sitemap/0.9"
 # Of a feed in which nothing has happened yet: when the benchmark was published.
 _BEGINNING: Final = datetime(2023, 9, 4, tzinfo=UTC)
@@ -30,18 +30,40 @@ def is_news(entry: Entry) -> bool:
     return entry.kind == "submission" and entry.withdrawn_at is None
 
 
-def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page: str) -> bytes:
+class _Feed(Atom1Feed):
+    """A feed that says the same for as long as nothing happens."""
+
+    def latest_post_date(self) -> datetime:
+        return super().latest_post_date() if self.items else _BEGINNING
+
+
+def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page: str) -> str:
     """The newest of these rows of boards as a feed at `address`, which tells of what `page` shows."""
+    feed = _Feed(
+        title=one_line(title),
+        link=page,
+        description=None,
+        feed_url=address,
+        feed_guid=uuid5(NAMESPACE_URL, address).urn,
+    )
     newest = sorted(rows, key=lambda row: (_came_at(row[1]), _id(*row).int), reverse=True)[:MAX_ENTRIES]
-    feed = ET.Element("feed", xmlns=_ATOM)
-    _text(feed, "id", uuid5(NAMESPACE_URL, address).urn)
-    _text(feed, "title", title)
-    _text(feed, "updated", _moment(_came_at(newest[0][1]) if newest else _BEGINNING))
-    ET.SubElement(feed, "link", rel="self", type="application/atom+xml", href=address)
-    ET.SubElement(feed, "link", rel="alternate", type="text/html", href=page)
     for split, entry in newest:
-        _entry(feed, split, entry)
-    return b'<?xml version="1.0" encoding="utf-8"?>\n' + ET.tostring(feed, encoding="utf-8")
+        texts = {
+            metric: format_published(entry.scores[name], decimals=entry.decimals)
+            for metric, (name, *_) in grouped_names(entry.scores).items()
+        }
+        primary = next(f"{metric.symbol} {text}" for metric, text in texts.items())
+        rank = f"Rank {entry.rank}. " if entry.rank is not None else ""
+        values = ", ".join(f"{metric.symbol} {text} {metric.unit}".rstrip() for metric, text in texts.items())
+        feed.add_item(
+            title=one_line(f"{entry.method} on {split.pk}: {primary}"),
+            link=settings.SITE_URL + reverse("method", args=[entry.method_id]),
+            description=f"{rank}{values}; lower is better.",
+            unique_id=_id(split, entry).urn,
+            updateddate=_came_at(entry),
+            author_name=one_line(entry.team),
+        )
+    return feed.writeString("utf-8")
 
 
 def _came_at(entry: Entry) -> datetime:
@@ -53,32 +75,6 @@ def _id(split: Split, entry: Entry) -> UUID:
     """The same as long as the method is on the board, whatever it is called and has scored."""
     assert entry.method_id is not None  # noqa: S101 - for the type checker: rows of submissions have one
     return uuid5(entry.method_id, split.pk)
-
-
-def _entry(feed: ET.Element, split: Split, entry: Entry) -> None:
-    element = ET.SubElement(feed, "entry")
-    _text(element, "id", _id(split, entry).urn)
-    texts = {
-        metric: format_published(entry.scores[name], decimals=entry.decimals)
-        for metric, (name, *_) in grouped_names(entry.scores).items()
-    }
-    primary = next(f"{metric.symbol} {text}" for metric, text in texts.items())
-    _text(element, "title", f"{entry.method} on {split.pk}: {primary}")
-    _text(element, "updated", _moment(_came_at(entry)))
-    _text(ET.SubElement(element, "author"), "name", entry.team)
-    page = settings.SITE_URL + reverse("method", args=[entry.method_id])
-    ET.SubElement(element, "link", rel="alternate", type="text/html", href=page)
-    rank = f"Rank {entry.rank}. " if entry.rank is not None else ""
-    values = ", ".join(f"{metric.symbol} {text} {metric.unit}".rstrip() for metric, text in texts.items())
-    _text(element, "summary", f"{rank}{values}; lower is better.")
-
-
-def _text(parent: ET.Element, name: str, text: str) -> None:
-    ET.SubElement(parent, name).text = one_line(text)
-
-
-def _moment(at: datetime) -> str:
-    return at.astimezone(UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def sitemap(pages: Iterable[tuple[str, datetime | None]]) -> bytes:

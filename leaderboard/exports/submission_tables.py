@@ -4,37 +4,39 @@ The numbers are those that are published, with the decimals of their edition. Fi
 among them. Addresses are there only if asked for.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
 from typing import Final
 
 from evaluator.metrics.protocol import known_names
 from evaluator.scoring.report import format_published
 from leaderboard.boards.rows import flat_scores
-from leaderboard.models import Evaluation
+from leaderboard.models import Evaluation, Submission
 
-_FACTS: Final = (
-    "submission",
-    "split",
-    "edition",
-    "protocol",
-    "ground_truth",
-    "is_board",
-    "status",
-    "method_id",
-    "method",
-    "visibility",
-    "team_id",
-    "team",
-    "submitted_by",
-    "submitted_at",
-    "finished_at",
-    "withdrawn_at",
-    "hidden_at",
-    "via",
-    "file",
-    "size_bytes",
-    "manifest",
-)
+_Fact = Callable[[Evaluation, Submission], object]
+_FACTS: Final[Mapping[str, _Fact]] = {
+    "submission": lambda _, submission: str(submission.pk),
+    "split": lambda evaluation, _: evaluation.edition.split_id,
+    "edition": lambda evaluation, _: evaluation.edition.number,
+    "protocol": lambda evaluation, _: evaluation.edition.protocol,
+    "ground_truth": lambda evaluation, _: evaluation.edition.ground_truth_id,
+    "is_board": lambda evaluation, _: evaluation.edition.split.published_edition_id == evaluation.edition_id,
+    "status": lambda evaluation, _: evaluation.status,
+    "method_id": lambda _, submission: str(submission.method_id),
+    "method": lambda _, submission: submission.method.name,
+    "visibility": lambda _, submission: submission.method.visibility,
+    "team_id": lambda _, submission: str(submission.method.team_id),
+    "team": lambda _, submission: submission.method.team.name,
+    "submitted_by": lambda _, submission: str(submission.submitted_by.pk),
+    "submitted_at": lambda _, submission: submission.submitted_at,
+    "finished_at": lambda evaluation, _: evaluation.finished_at,
+    "withdrawn_at": lambda _, submission: submission.withdrawn_at,
+    "hidden_at": lambda _, submission: submission.hidden_at,
+    "via": lambda _, submission: submission.via,
+    "file": lambda _, submission: submission.digest,
+    "size_bytes": lambda _, submission: submission.size_bytes,
+    "manifest": lambda _, submission: submission.manifest_digest,
+}
 
 
 def columns() -> tuple[str, ...]:
@@ -54,38 +56,11 @@ def rows(*, split: str = "", has_addresses: bool = False) -> Iterator[dict[str, 
         evaluations = evaluations.filter(edition__split=split)
     ordered = evaluations.order_by("submission__submitted_at", "submission", "edition__number")
     for evaluation in ordered.iterator(chunk_size=500):
-        yield _facts(evaluation, has_addresses=has_addresses) | _numbers(evaluation)
-
-
-def _facts(evaluation: Evaluation, *, has_addresses: bool) -> dict[str, object]:
-    submission, edition = evaluation.submission, evaluation.edition
-    by = submission.submitted_by
-    times = {
-        "submitted_at": submission.submitted_at,
-        "finished_at": evaluation.finished_at,
-        "withdrawn_at": submission.withdrawn_at,
-        "hidden_at": submission.hidden_at,
-    }
-    return {
-        "submission": str(submission.pk),
-        "split": edition.split_id,
-        "edition": edition.number,
-        "protocol": edition.protocol,
-        "ground_truth": edition.ground_truth_id,
-        "is_board": edition.split.published_edition_id == edition.pk,
-        "status": evaluation.status,
-        "method_id": str(submission.method_id),
-        "method": submission.method.name,
-        "visibility": submission.method.visibility,
-        "team_id": str(submission.method.team_id),
-        "team": submission.method.team.name,
-        "submitted_by": by.email if has_addresses else str(by.pk),
-        **{name: at.isoformat() if at else None for name, at in times.items()},
-        "via": submission.via,
-        "file": submission.digest,
-        "size_bytes": submission.size_bytes,
-        "manifest": submission.manifest_digest,
-    }
+        facts = {name: fact(evaluation, evaluation.submission) for name, fact in _FACTS.items()}
+        row = {name: f.isoformat() if isinstance(f, datetime) else f for name, f in facts.items()}
+        if has_addresses:
+            row["submitted_by"] = evaluation.submission.submitted_by.email
+        yield row | _numbers(evaluation)
 
 
 def _numbers(evaluation: Evaluation) -> dict[str, object]:

@@ -5,13 +5,13 @@ maintainers write.
 """
 
 import re
-import unicodedata
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Final
 
 from django.utils.safestring import SafeString
+from django.utils.text import slugify
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
@@ -155,8 +155,7 @@ def _anchor(words: str, taken: set[str]) -> str:
     >>> _anchor("Who sees a method?", set()), _anchor("`check`", {"check"})
     ('who-sees-a-method', 'check_1')
     """
-    plain = unicodedata.normalize("NFKD", words).encode("ascii", "ignore").decode()
-    first = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", plain).strip().lower()) or "part"
+    first = slugify(words) or "part"
     found, n_before = first, 0
     while found in taken:
         n_before += 1

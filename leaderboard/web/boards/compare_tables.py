@@ -6,6 +6,7 @@ from typing import Any, Final
 from uuid import UUID
 
 from django.utils.html import format_html
+from django.utils.text import get_text_list
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
@@ -55,7 +56,7 @@ def verdict(compared: Compared) -> str:
         few = in_words(compared.edition.unit)
         return f"{head} There are too few {few} for confidence intervals and p-values."
     relations = (("significantly better than", worse), ("not significantly better than", alike))
-    parts = [f"{relation} {_listed(names)}" for relation, names in relations if names]
+    parts = [f"{relation} {get_text_list(names, 'and')}" for relation, names in relations if names]
     together = f", with all {len(tested)} pairs tested together," if len(tested) > 1 else ""
     said = [head, f"On these recordings{together} it is {', and '.join(parts)}."] if parts else [head]
     return " ".join([*said, *dict.fromkeys(pair.withheld for pair in compared.pairs if pair.withheld)])
@@ -80,15 +81,6 @@ def _told_apart(best: Entry, tested: Sequence[Pair]) -> tuple[list[str], list[st
         is_worse |= (of_best.rank_high or math.inf) < (on_board.rank_low or 0)
         (worse if is_worse else alike).append(other.method)
     return worse, alike
-
-
-def _listed(names: Sequence[str]) -> str:
-    """Names in a sentence.
-
-    >>> _listed(["A"]), _listed(["A", "B", "C"])
-    ('A', 'A, B and C')
-    """
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def _pair_table(pair: Pair) -> dict[str, Any]:

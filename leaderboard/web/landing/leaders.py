@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from typing import Any, Final
 
+from django.utils.text import get_text_list
+
+from evaluator.counting import counted
 from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring.report import format_published
 from leaderboard.boards.boards import Board
@@ -73,10 +76,9 @@ def _why_unknown(board: Board, leader: Entry) -> str:
 def _listed(names: Sequence[str]) -> str:
     """Names in a sentence.
 
-    >>> _listed(["A"]), _listed(["A", "B"]), _listed(["A", "B", "C"]), _listed(["A", "B", "C", "D"])
-    ('A', 'A and B', 'A, B and 1 other method', 'A, B and 2 other methods')
+    >>> _listed(["A", "B"]), _listed(["A", "B", "C"])
+    ('A and B', 'A, B and 1 other method')
     """
-    if len(names) <= _MAX_NAMED:
-        return " and ".join(names)
     n_more = len(names) - _MAX_NAMED
-    return f"{', '.join(names[:_MAX_NAMED])} and {n_more} other method{'' if n_more == 1 else 's'}"
+    rest = [counted(n_more, "other method")] if n_more > 0 else []
+    return get_text_list([*names[:_MAX_NAMED], *rest], "and")

@@ -6,7 +6,6 @@ from typing import Any, Final
 from django import forms
 from django.http import HttpRequest
 
-from leaderboard.errors.refusals import Refused
 from leaderboard.methods import methods, visibility
 from leaderboard.methods.details import DETAILS, Detail
 from leaderboard.models import Method, Visibility
@@ -79,9 +78,10 @@ class ShowForm(SiteForm):
         required=False,
         widget=forms.RadioSelect(choices=[(choice.value, choice.label) for choice in Visibility]),
     )
-    reveal_on = forms.CharField(
+    reveal_on = forms.DateField(
         label="Becomes public on",
         required=False,
+        error_messages={"invalid": "Enter a date such as 2027-03-01."},
         help_text="Optional, for anonymous methods: the day (UTC) on which the method becomes public.",
         widget=forms.DateInput(attrs={"type": "date"}),
     )
@@ -97,15 +97,13 @@ class ShowForm(SiteForm):
             return cls(initial={"visibility": method.visibility, "reveal_on": _day(method.reveal_at)})
         return cls({"visibility": chosen, "reveal_on": request.GET.get("reveal_on", "")})
 
-    def wanted(self, *, now: datetime) -> dict[str, Any]:
-        """What was chosen, under the domain function's names. Raises `Refused`."""
-        if not self.is_valid():
-            raise Refused("bad-value", "The form cannot be read.")
-        fields = self.cleaned_data
-        is_anonymous = fields["visibility"] == Visibility.ANONYMOUS
+    def wanted(self) -> dict[str, Any]:
+        """What was chosen, under the domain function's names: the day begins at midnight UTC."""
+        chosen, day = self.cleaned_data["visibility"], self.cleaned_data["reveal_on"]
+        has_day = day is not None and chosen == Visibility.ANONYMOUS
         return {
-            "visibility": fields["visibility"],
-            "reveal_at": _moment(fields["reveal_on"]) if is_anonymous else None,
+            "visibility": chosen,
+            "reveal_at": datetime(day.year, day.month, day.day, tzinfo=UTC) if has_day else None,
         }
 
     def refuse(self, refusal: Exception) -> None:
@@ -115,30 +113,6 @@ class ShowForm(SiteForm):
         else:
             super().refuse(refusal)
 
-    def require_confirmation(self) -> None:
-        """Raise `Refused` for somebody who has not said that they know."""
-        if not self.cleaned_data["confirm"]:
-            raise Refused(
-                "not-confirmed",
-                "Confirm that this cannot be undone; expected a tick.",
-                field="confirm",
-                advice="Confirm that this cannot be undone: tick the box.",
-            )
-
 
 def _day(moment: datetime | None) -> str:
     return f"{moment:%Y-%m-%d}" if moment else ""
-
-
-def _moment(text: str) -> datetime | None:
-    if not text.strip():
-        return None
-    try:
-        return datetime.fromisoformat(text.strip()[:10]).replace(tzinfo=UTC)
-    except ValueError:
-        raise Refused(
-            "bad-value",
-            f"The field 'reveal_on' is {text[:60]!r}; expected a date such as 2027-03-01.",
-            field="reveal_on",
-            advice="Enter a date such as 2027-03-01.",
-        ) from None

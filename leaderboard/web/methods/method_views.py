@@ -97,13 +97,14 @@ def change_visibility(request: HttpRequest, method_id: UUID) -> HttpResponse:
     now = timezone.now()
     form = ShowForm.of_method(request, method=found)
     preview = None
-    if form.is_bound:
+    if form.is_valid():
         with form.refusals():
-            wanted = form.wanted(now=now)
+            wanted = form.wanted()
             visibility.require_possible(found, now=now, **wanted)
             preview = visibility_preview.preview(method=found, visibility=wanted["visibility"], now=now)
-            if request.method == "POST":
-                form.require_confirmation()
+            if request.method == "POST" and not form.cleaned_data["confirm"]:
+                form.add_error("confirm", "Confirm that this cannot be undone: tick the box.")
+            elif request.method == "POST":
                 visibility.change(method=found, actor=cast("User", request.user), now=now, **wanted)
                 messages.success(request, _published_sentence(found.pk))
                 return redirect("method", found.pk)
