@@ -60,7 +60,7 @@ def atom(rows: Iterable[tuple[Split, Entry]], *, title: str, address: str, page:
             link=settings.SITE_URL + reverse("method", args=[entry.method_id]),
             description=f"{rank}{values}; lower is better.",
             unique_id=_id(split, entry).urn,
-            updateddate=_came_at(entry),
+            updateddate=_came_at(entry).replace(microsecond=0),
             author_name=one_line(entry.team),
         )
     return feed.writeString("utf-8")

@@ -23,7 +23,7 @@ News = tuple[datetime, str, str, str]
 
 def latest(splits: Sequence[Split]) -> list[News]:
     """The newest first, of these splits; what everybody sees of them, under the names that everybody sees."""
-    return sorted([*_editions(), *_entries(splits)], key=itemgetter(0), reverse=True)[:N_NEWS]
+    return sorted([*_entries(splits), *_editions()], key=itemgetter(0), reverse=True)[:N_NEWS]
 
 
 def _editions() -> Iterator[News]:
