@@ -37,9 +37,7 @@ _CROWD = 20230901
 ON_POSTGRESQL = [
     pytest.mark.services,
     pytest.mark.django_db(transaction=True),
-    pytest.mark.skipif(
-        "connection.vendor != 'postgresql'", reason="runs with: python -m tests.everything"
-    ),
+    pytest.mark.skipif("connection.vendor != 'postgresql'", reason="runs with: python -m tests.everything"),
 ]
 
 
