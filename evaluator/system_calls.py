@@ -1,9 +1,8 @@
 """What a process that reads untrusted bytes may still ask of the kernel: a seccomp filter.
 
-The filter allows what a single thread needs that computes, reads what it has open, and writes its answer.
-Everything else is answered EPERM: to open, list, connect, signal, unlink, look into another process, start
-one. A process of another architecture's calls ends. EPERM and not the end of the process, so that a library
-that asks for more than it needs, as `fstat` before a read, goes on without.
+The filter allows what a single thread needs that computes, reads what it has open, and writes its answer. All
+else is answered EPERM, so that a library that asks for more than it needs goes on without; a process of
+another architecture's calls ends.
 """
 
 import ctypes

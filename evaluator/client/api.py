@@ -220,6 +220,10 @@ class Client:
         address = self._address("submissions", submission_id, "withdraw")
         return one(self._retry(lambda: self._http.post(address)), Submission)
 
+    def method(self, method_id: str) -> Method:
+        """A method, as one may see it."""
+        return self._get(Method, "methods", method_id)
+
     def foreseen(self, method_id: str, visibility: str) -> Foreseen:
         """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS"."""
         return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})

@@ -12,13 +12,7 @@ from typing import Any, Final
 
 from evaluator.problems import quoted, reject
 
-N_MAGIC_BYTES: Final = 4
 _MAGIC: Final = b"PAR1"
-
-
-def is_parquet(data: bytes) -> bool:
-    """Whether these bytes begin as a Parquet table does."""
-    return data.startswith(_MAGIC)
 
 
 def as_sent(data: bytes) -> bytes:
@@ -27,7 +21,7 @@ def as_sent(data: bytes) -> bytes:
     The same table gives the same bytes. Raises `Rejected` for a table that is damaged or has other columns
     than keys and numbers, `ModuleNotFoundError` where pyarrow is not installed.
     """
-    if not is_parquet(data):
+    if not data.startswith(_MAGIC):
         return data
     if find_spec("pyarrow") is None:
         raise ModuleNotFoundError(

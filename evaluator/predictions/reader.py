@@ -1,10 +1,8 @@
 """The child process in which untrusted bytes are parsed: `python -m evaluator.predictions.reader`.
 
-It writes `READY` to its standard output, reads a prediction file from its standard input, and writes one line
-of JSON, followed, if the file is good, by the aligned values in seconds as little-endian float64. Before the
-first untrusted byte is read it gives up memory, processor time, new processes and the right to open anything,
-sockets included, and where the kernel can do that all system calls but those that reading needs. A child that
-ends before `READY` has seen nothing of the file.
+It gives up its rights (`evaluator.limits`), writes `READY` to its standard output, reads a prediction file
+from its standard input, and writes one line of JSON, followed, if the file is good, by the aligned values in
+seconds as little-endian float64.
 """
 
 import json

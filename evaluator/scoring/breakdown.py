@@ -43,8 +43,7 @@ CURVE_EDGES_S: Final = (
     15,
     20,
 )
-"""Edges of the true time to contact in seconds: finer where it matters, the ends of the paper's ranges among
-them."""
+"""Edges of the true time to contact in seconds, the ends of the paper's ranges among them."""
 
 NOT_STATED: Final = "not stated"
 
@@ -152,8 +151,7 @@ def groups_of(details: Details, *, by: str) -> dict[str, Rows]:
 
 
 def curve_of(details: Details) -> dict[Ends, Rows]:
-    """The rows of every bin [low, high) of true times, by its ends in seconds, for a curve; empty ones left
-    out."""
+    """The rows of every bin [low, high) of true times that has some, by its ends in seconds."""
     bins = np.digitize(details.truth.ttc_s, CURVE_EDGES_S)
     ends = itertools.pairwise(CURVE_EDGES_S)
     found = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}

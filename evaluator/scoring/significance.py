@@ -97,8 +97,7 @@ class Difference:
 def best_of(n: int) -> float:
     """By how much the best of `n` equally good variants looks better than it is, in standard errors.
 
-    The standard error is that of the difference of two of them: the mean of the largest of n independent
-    normal variables, divided by √2.
+    That is, of the difference of two: the mean of the largest of n normal variables, divided by √2.
 
     >>> [round(best_of(n), 2) for n in (1, 3, 10, 30, 100)]
     [0.0, 0.6, 1.09, 1.44, 1.77]
@@ -119,8 +118,6 @@ def told_apart(found: Sequence[Difference]) -> list[bool]:
 
     >>> told_apart([Difference(-1, -2, -0.1, p) for p in (0.02, 0.01, 0.6)])
     [True, True, False]
-    >>> told_apart([Difference(-1, -2, -0.1, p) for p in (0.02, 0.03, 0.6)])
-    [False, False, False]
     >>> told_apart([Difference(-1, -2, -0.1, p_below=below) for below in (0.01, 0.01, 1.0)])
     [True, True, False]
     """
@@ -143,12 +140,8 @@ def _upper(found: Difference) -> float | None:
 def too_few_units(n_effective: float | None, *, unit: str = RECORDING) -> str:
     """Why there is no interval and no p.
 
-    >>> too_few_units(5.34)
-    'too few recordings (effective number 5.3; at least 8 needed)'
     >>> too_few_units(7.99, unit="day")
     'too few days (effective number 7.9; at least 8 needed)'
-    >>> too_few_units(None)
-    'too few recordings'
     """
     few = f"too few {in_words(unit)}"
     if n_effective is None:

@@ -23,7 +23,7 @@ class Format:
     """The end of its address and of its file."""
     media_type: str
     write: Callable[[Export], str] | None
-    """None where it is the API's own document, which holds the rows of whoever asks."""
+    """None where it is the API's own document, with the rows of the team that asks."""
     has_values: bool = True
     """Whether it can have confidence intervals."""
     is_pasted: bool = False

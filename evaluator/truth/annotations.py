@@ -3,8 +3,6 @@
 An annotation file holds a list of dictionaries, one per camera: timestamp -> list of attribute-dicts with
 `bag_stamp, box2d, cam_id, id, occ_ratio, same_lane, ts, ttc_imu`. A sequence is six frames of one id, exactly
 0.1 s apart, cut without overlap; its target is the last frame.
-
-How the files of a folder are found and numbered, `annotation_folders` says.
 """
 
 from __future__ import annotations

@@ -121,9 +121,6 @@ def name_fault(text: str) -> str | None:
     """Why `text` cannot be a bag_stamp, cam_id or track_id; None when it can.
 
     These words are joined by "/" in natural keys and by "," in tables, so they must be free of both.
-
-    >>> name_fault("0007"), name_fault("a/b")
-    (None, 'it contains "/"')
     """
     if not text:
         return "it is empty"

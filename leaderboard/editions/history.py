@@ -1,6 +1,6 @@
 """The history of editions: when each was published, what replaced it, how a correction changed an entry."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -76,11 +76,17 @@ def latest_changes(n: int) -> list[Publication]:
 def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionRecord, ...]:
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
-    return tuple(record_of(each, publications) for each in published.order_by("-number"))
+    # All at once, since each edition that followed another asks for one.
+    compared = list(TruthComparison.objects.filter(new__split=split.truth_split_id).order_by("pk"))
+    return tuple(record_of(each, publications, compared) for each in published.order_by("-number"))
 
 
-def record_of(edition: Edition, publications: Iterable[Publication] | None = None) -> EditionRecord:
-    """What became of one published edition; with the changelog where that is at hand."""
+def record_of(
+    edition: Edition,
+    publications: Iterable[Publication] | None = None,
+    compared: Sequence[TruthComparison] | None = None,
+) -> EditionRecord:
+    """What became of one published edition; with the changelog and the comparisons where they are at hand."""
     log = changelog(edition.split) if publications is None else publications
     own = tuple(each for each in log if each.edition_id == edition.pk)
     replaced_by = next((each for each in log if each.replaced_id == edition.pk), None)
@@ -89,21 +95,26 @@ def record_of(edition: Edition, publications: Iterable[Publication] | None = Non
     return EditionRecord(
         edition=edition,
         followed=followed,
-        change=change_of_truth(followed.ground_truth, edition.ground_truth) if followed else None,
+        change=change_of_truth(followed.ground_truth, edition.ground_truth, compared) if followed else None,
         replaced_by=None if is_board else replaced_by,
         publications=own,
     )
 
 
-def change_of_truth(before: GroundTruth, after: GroundTruth) -> TruthChange | None:
+def change_of_truth(
+    before: GroundTruth, after: GroundTruth, compared: Sequence[TruthComparison] | None = None
+) -> TruthChange | None:
     """What differs between two ground truths; None if these two were never compared.
 
     They are counted by the command that reads one of them in, against the board's of that moment, or else by
-    a worker.
+    a worker. `compared` are the comparisons to look among, where they are at hand.
     """
     if before.pk == after.pk:
         return TruthChange(0, 0, 0, 0)
-    found = TruthComparison.objects.between(before, after).order_by("pk").last()
+    if compared is None:
+        compared = list(TruthComparison.objects.between(before, after).order_by("pk"))
+    pair = {before.pk, after.pk}
+    found = next((row for row in reversed(compared) if {row.old_id, row.new_id} == pair), None)
     if found is None:
         return None
     added, removed = found.n_added, found.n_removed

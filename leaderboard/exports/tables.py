@@ -68,7 +68,12 @@ def export(board: Board, *, address: str, metric: str = "", has_intervals: bool 
             *(f"{name}_{end}" for name in names if has_intervals for end in ("low", "high")),
         ),
         records=(_csv_row(entry, has_intervals=has_intervals) for entry in board.entries),
-        references=bibtex.references(board.entries, of_board=_reference(board, address)),
+        references=bibtex.references(
+            board.entries,
+            of_board=bibtex.of_edition(board.edition, address=address, at=board.at or board.updated_at)
+            if board.edition
+            else "",
+        ),
     )
 
 
@@ -88,11 +93,6 @@ def _origin(board: Board, *, address: str) -> layouts.Origin:
         moment=board.at or board.updated_at,
         has_own_rows=any(mark_of(entry) for entry in board.entries if entry.withdrawn_at is None),
     )
-
-
-def _reference(board: Board, address: str) -> str:
-    at = board.at or board.updated_at
-    return bibtex.of_edition(board.edition, address=address, at=at) if board.edition else ""
 
 
 def _csv_row(entry: Entry, *, has_intervals: bool) -> dict[str, object]:
@@ -127,17 +127,13 @@ def latex_row(entry: Entry) -> str:
 
 
 def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) -> layouts.Row:
+    ranks = entry.intervals.get(PRIMARY, Interval()) if has_intervals else Interval()
     return layouts.Row(
-        rank=_rank(entry, has_range=has_intervals),
+        rank=layouts.rank_text(entry.rank, low=ranks.rank_low, high=ranks.rank_high),
         method=entry.method,
         team=team_of(entry),
         cells=tuple(_cell(entry, name, has_interval=has_intervals) for name in columns),
     )
-
-
-def _rank(entry: Entry, *, has_range: bool) -> str:
-    found = entry.intervals.get(PRIMARY, ConfidenceInterval()) if has_range else ConfidenceInterval()
-    return layouts.rank_text(entry.rank, low=found.rank_low, high=found.rank_high)
 
 
 def _cell(entry: Entry, name: str, *, has_interval: bool) -> layouts.Cell:

@@ -67,11 +67,6 @@ def checks() -> tuple[Check, ...]:
     return (*_database(), broker())
 
 
-def ready() -> tuple[Check, ...]:
-    """Ask the database alone, without which no page and no submission works; never raises."""
-    return (database(),)
-
-
 def database() -> Check:
     """Whether a new connection to the database answers."""
     started_s = time.monotonic()

@@ -18,7 +18,6 @@ import random
 import uuid
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
 from enum import Enum
 from typing import Any
 
@@ -222,25 +221,17 @@ def finalise_many(outcomes: Sequence[tuple[Lease, RunResult]]) -> set[uuid.UUID]
     with transaction.atomic():
         held = _locked([lease for lease, _ in outcomes])
         decided = [(lease, outcome) for lease, outcome in outcomes if lease.evaluation_id in held]
-        Evaluation.objects.bulk_update(
-            [
-                Evaluation(
-                    pk=lease.evaluation_id,
-                    status=outcome.status,
-                    finished_at=held[lease.evaluation_id],
-                    finished_attempt=lease.attempt,
-                    report=outcome.report,
-                    report_digest=outcome.report_digest,
-                    problems=list(outcome.problems),
-                    n_problems=outcome.n_problems,
-                )
-                for lease, outcome in decided
-            ],
-            [
-                *("status", "finished_at", "finished_attempt", "last_error"),
-                *("report", "report_digest", "problems", "n_problems"),
-            ],
-        )
+        for lease, outcome in decided:
+            Evaluation.objects.filter(pk=lease.evaluation_id).update(
+                status=outcome.status,
+                finished_at=Now(),
+                finished_attempt=lease.attempt,
+                last_error="",
+                report=outcome.report,
+                report_digest=outcome.report_digest,
+                problems=list(outcome.problems),
+                n_problems=outcome.n_problems,
+            )
         Score.objects.bulk_create(
             Score(evaluation_id=lease.evaluation_id, metric=metric, ttc_range=ttc_range, value=value)
             for lease, outcome in decided
@@ -257,17 +248,14 @@ def finalise_many(outcomes: Sequence[tuple[Lease, RunResult]]) -> set[uuid.UUID]
     return {lease.evaluation_id for lease, _ in decided}
 
 
-def _locked(leases: Sequence[Lease]) -> dict[uuid.UUID, datetime]:
-    """The evaluations that are still these leases' to decide, locked until the transaction ends.
-
-    With each the present time, by the database's clock.
-    """
+def _locked(leases: Sequence[Lease]) -> set[uuid.UUID]:
+    """The evaluations that are still these leases' to decide, locked until the transaction ends."""
     valid = {(lease.evaluation_id, lease.attempt, lease.token) for lease in leases}
     ids = [lease.evaluation_id for lease in leases]
     rows = Evaluation.objects.select_for_update(no_key=True).filter(pk__in=ids, status=Status.RUNNING)
     # Every batch locks in the same order, so that two cannot wait for each other.
-    found = rows.order_by("pk").values_list("pk", "attempt", "lease_token", Now())
-    return {row[0]: row[3] for row in found if row[:3] in valid}
+    found = rows.order_by("pk").values_list("pk", "attempt", "lease_token")
+    return {row[0] for row in found if row in valid}
 
 
 def fail_attempt(

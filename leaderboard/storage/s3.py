@@ -9,7 +9,6 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 from urllib.parse import parse_qsl, urlsplit
@@ -28,21 +27,11 @@ READ_TIMEOUT_S = 15
 _FULL = frozenset({"InsufficientStorage", "QuotaExceeded", "XMinioStorageFull", "507"})
 
 
-@dataclass(frozen=True)
-class Address:
-    """Where the files are."""
+def parsed(url: str) -> dict[str, str | None]:
+    """The settings in `s3://bucket/folder?endpoint=…&region=…`. Raises `ImproperlyConfigured`.
 
-    bucket: str
-    folder: str
-    endpoint: str | None
-    region: str
-
-
-def parsed(url: str) -> Address:
-    """The parts of `s3://bucket/folder?endpoint=…&region=…`. Raises `ImproperlyConfigured`.
-
-    >>> parsed("s3://tsttc/files?endpoint=http://127.0.0.1:9000")
-    Address(bucket='tsttc', folder='files', endpoint='http://127.0.0.1:9000', region='us-east-1')
+    >>> parsed("s3://tsttc/files")
+    {'bucket_name': 'tsttc', 'location': 'files', 'endpoint_url': None, 'region_name': 'us-east-1'}
     """
     parts = urlsplit(url)
     if "@" in parts.netloc:
@@ -57,12 +46,12 @@ def parsed(url: str) -> Address:
             f"TSTTC_FILES_URL is {url!r}; expected s3://bucket/folder?endpoint=https://…&region=…, of which "
             "folder, endpoint and region may be left out."
         )
-    return Address(
-        bucket=parts.netloc,
-        folder=parts.path.strip("/"),
-        endpoint=options.get("endpoint"),
-        region=options.get("region", "us-east-1"),
-    )
+    return {
+        "bucket_name": parts.netloc,
+        "location": parts.path.strip("/"),
+        "endpoint_url": options.get("endpoint"),
+        "region_name": options.get("region", "us-east-1"),
+    }
 
 
 @contextmanager
@@ -90,17 +79,14 @@ class S3FileStore(S3Storage):
     def __init__(self, *, url: str) -> None:
         address = parsed(url)
         super().__init__(
-            bucket_name=address.bucket,
-            location=address.folder,
-            endpoint_url=address.endpoint,
-            region_name=address.region,
+            **address,
             default_acl=None,
             file_overwrite=True,  # equal names hold equal bytes here
             client_config=Config(
                 signature_version="s3v4",
                 # Servers of one's own seldom have a host name for each bucket.
                 s3={
-                    "addressing_style": "path" if address.endpoint else "auto",
+                    "addressing_style": "path" if address["endpoint_url"] else "auto",
                     # The server compares the body with its digest, whether or not TLS is there.
                     "payload_signing_enabled": True,
                 },

@@ -11,47 +11,29 @@ from leaderboard.boards.snapshots import site_line_of, splits_of
 from leaderboard.models import PageVersion
 from leaderboard.web.lookups import page_before
 
+# The first that a path begins with is its section in the navigation.
 _SECTIONS = {
-    "home": "home",
-    "board": "board",
-    "edition": "board",
-    "editions": "board",
-    "method": "board",
-    "compare": "board",
-    "charts": "board",
-    "submit": "submit",
-    "submissions": "submissions",
-    "submission": "submissions",
-    "analysis": "submissions",
-    "withdraw": "submissions",
-    "method_edit": "board",
-    "method_visibility": "board",
-    "method_delete": "board",
-    "team": "account",
-    "join_team": "account",
-    "invite": "account",
-    "tokens": "account",
-    "account_data": "account",
-    "docs": "docs",
-    "docs_search": "docs",
-    "guide": "docs",
-    "dist": "docs",
-    "api_reference": "api",
-    "api_operation": "api",
-}
-_PREFIXES = {
-    "account_": "account",
-    "mfa_": "account",
-    "socialaccount_": "account",
-    "published": "published",
-    "maintain": "maintain",
+    "/board/": "board",
+    "/methods/": "board",
+    "/compare/": "board",
+    "/submit/": "submit",
+    "/submissions/": "submissions",
+    "/account": "account",
+    "/team/": "account",
+    "/tokens/": "account",
+    "/mails/": "account",
+    "/docs/api/": "api",
+    "/docs/": "docs",
+    "/dist/": "docs",
+    "/published/": "published",
+    "/maintain/": "maintain",
 }
 
 
 def _board_split(request: HttpRequest) -> str:
     """The split whose board the page is about; empty where it is about none that there is."""
     match = getattr(request, "resolver_match", None)
-    name = match.kwargs.get("split", "") if match and _SECTIONS.get(match.url_name or "") == "board" else ""
+    name = match.kwargs.get("split", "") if match and _section(request) == "board" else ""
     return name if name and any(split.pk == name for split in splits_of(request)) else ""
 
 
@@ -90,11 +72,7 @@ def _announcements(request: HttpRequest) -> list[tuple[str, str]]:
 
 
 def _section(request: HttpRequest) -> str:
-    match = getattr(request, "resolver_match", None)
-    name = (match.url_name or "") if match else ""
-    return next(
-        (section for prefix, section in _PREFIXES.items() if name.startswith(prefix)), _SECTIONS.get(name, "")
-    )
+    return next((name for start, name in _SECTIONS.items() if request.path_info.startswith(start)), "")
 
 
 def _came_from(request: HttpRequest) -> str:

@@ -11,18 +11,7 @@ PROGRAMS = ("evaluator", "tsttc_baselines", "leaderboard")
 CODE = ("evaluator", "leaderboard", "tests", "benchmarks")
 MAX_LINES = 600
 # A name that says nothing collects everything.
-FORBIDDEN_NAMES = {
-    "util",
-    "utils",
-    "helper",
-    "helpers",
-    "common",
-    "misc",
-    "service",
-    "services",
-    "manager",
-    "managers",
-}
+FORBIDDEN_NAMES = {"utils", "helpers", "common", "misc", "services", "managers"}
 STATUS_WRITERS = {Path("leaderboard/queue/lifecycle.py")}
 
 

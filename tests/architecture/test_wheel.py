@@ -100,13 +100,6 @@ def test_installed_command_prints_its_version_and_what_the_examples_show(environ
         assert recorded(text, run) == text
 
 
-def test_installed_command_lists_the_baselines_and_says_how_to_install_opencv(environment: Path) -> None:
-    missing = "Error: The baselines need OpenCV; install it with: pip install '.[baselines]' in a checkout."
-    with shell([str(environment / "tsttc")], {}) as run:
-        assert "as published with --measure area" in run("tsttc baseline list")
-        assert run("tsttc baseline run detection . --out p.json; echo $?") == f"{missing}\n2\n"
-
-
 def version_of(environment: Path) -> str:
     return subprocess.run(
         [environment / "python", "-c", "import importlib.metadata as m; print(m.version('tsttc'))"],

@@ -26,7 +26,7 @@ from datetime import timedelta
 from allauth.account.models import EmailAddress
 from django.db import transaction
 from django.utils import timezone
-from leaderboard import versions
+from leaderboard import board_versions
 from leaderboard.models import Method, Split, Submission, User
 from leaderboard.people import teams
 from tests import board_rows
@@ -39,7 +39,7 @@ own.update(name="B" * 80, visibility="PRIVATE", team=teams.team_of(user=user))
 earlier = Submission.objects.filter(method__in=methods[::2])
 earlier.update(submitted_at=timezone.now() - timedelta(days=40))
 with transaction.atomic():
-    versions.changed("demo")
+    board_versions.bump("demo")
 """
 
 

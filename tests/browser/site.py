@@ -13,7 +13,7 @@ import numpy as np
 
 import evaluator
 from leaderboard.demo.runs import simulate
-from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, end, free_port, running, start
+from tests.journeys.production import BIN, PATIENCE_S, Site, end, free_port, start, web_process
 from tests.prepared import put_sqlite, static_files
 
 PASSWORD = "kestrel-altimeter-9"
@@ -46,19 +46,9 @@ def web_alone(directory: Path, **settings: str) -> Iterator[Site]:
     site = Site(url=url, directory=directory, environment=environment(directory, url=url, **settings))
     put_sqlite(directory / DATABASE)
     listen = f"--listen={url.removeprefix('http://')}"
-    with running(site, "web", *WEB, listen, "leaderboard.wsgi:application") as web:
-        await_that(lambda: web.poll() is not None or _answers(url), what="the web server answers")
-        assert web.poll() is None, (directory / "web.log").read_text()
-        with ExitStack() as ends:
-            ends.callback(_end_worker, site)
-            yield site
-
-
-def _answers(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/docs/", trust_env=False).status_code == 200
-    except httpx.TransportError:
-        return False
+    with web_process(site, command=(*WEB, listen, "leaderboard.wsgi:application")), ExitStack() as ends:
+        ends.callback(_end_worker, site)
+        yield site
 
 
 @contextmanager

@@ -6,14 +6,14 @@ worker stands still meanwhile.
 
 import json
 from datetime import timedelta
-from typing import Any, Final
+from typing import Final
 
 from django.template.loader import render_to_string
 from django.utils import timezone
 
 import evaluator
 from leaderboard.errors import outages
-from leaderboard.models import Edition, Evaluation, Split, Status, Submission, User
+from leaderboard.models import Edition, Evaluation, Status, Submission, User
 from leaderboard.ops import rate_limits
 from leaderboard.people import invitations, teams
 from leaderboard.storage import truth_values
@@ -23,22 +23,12 @@ from tests.leaderboard.web.maintain import queue_rows
 
 LONG: Final = timedelta(hours=1)
 MANY_FAULTS: Final = b'{"0": NaN, "1": 0, "2": "near", "3": null, "4": 1e999, "x": 3, "0": 5}'
-# Without quotas, whose days would be over after half of these.
-FREE: Final[dict[str, Any]] = {
-    "quota_limit": None,
-    "quota_min_gap": timedelta(0),
-    "quota_rejected_limit": None,
-}
 
 
 def make(split: str, email: str) -> str:
     """Make one submission in each state; the addresses of what there is to see by name, as JSON."""
     user = User.objects.get(email=email)
-    row = Split.objects.get(pk=split)
-    former = {name: getattr(row, name) for name in FREE}
-    Split.objects.filter(pk=split).update(**FREE)
     shown = {f"submission-{name}": f"/submissions/{each.pk}/" for name, each in _sent(user, split).items()}
-    Split.objects.filter(pk=split).update(**former)
     empty = Submission.objects.get(method__name="Many problems").method_id
     invitation, secret = invitations.make(team=teams.team_of(user=user), actor=user, now=timezone.now())
     invitations.revoke(invitation=invitation, actor=user, now=timezone.now())

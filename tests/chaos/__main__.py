@@ -29,32 +29,27 @@ PATIENCE_S = 300.0  # with what was acknowledged, once nothing goes wrong any mo
 
 
 def arguments() -> argparse.Namespace:
-    """From the command line."""
     parser = argparse.ArgumentParser(prog="python -m tests.chaos", description=__doc__)
     parser.add_argument("--uploads", type=int, default=200)
     parser.add_argument("--bombs", type=int, default=2, help="so many kill the process that reads them")
     parser.add_argument("--seconds", type=float, default=100.0, help="over which the uploads are spread")
-    parser.add_argument("--sequences", type=int, default=1_000, help="in the made-up ground truth")
     parser.add_argument("--workers", type=int, default=3, help="with two processes each")
     parser.add_argument("--clients", type=int, default=4)
     parser.add_argument("--worst-s", type=float, default=120.0, help="nobody may wait longer for a result")
     parser.add_argument("--rarity", type=float, default=1.0, help="stretches the time between faults")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--keep", action="store_true", help="keep the logs")
     return parser.parse_args()
 
 
 def say(text: str) -> None:
-    """A line of the report."""
     sys.stdout.write(f"chaos: {text}\n")
     sys.stdout.flush()
 
 
 def run(options: argparse.Namespace, directory: Path) -> bool:
     """The whole run; whether it was good."""
-    n_sequences = options.sequences
     rng = np.random.default_rng(options.seed)
-    truth = simulate(rng=rng, n_sequences=n_sequences, n_recordings=max(n_sequences // 40, 2))
+    truth = simulate(rng=rng, n_sequences=1_000, n_recordings=25)
     uploads = make_uploads(truth, n=options.uploads, n_bombs=options.bombs, seed=options.seed)
     with running_site(directory, truth=truth, n_workers=options.workers) as site:
         token = site.manage("create_token", "chaos@example.org", "--name", "chaos").strip()
@@ -71,7 +66,8 @@ def run(options: argparse.Namespace, directory: Path) -> bool:
         _drain(site, faults)
         say(f"all was decided after {time.monotonic() - started_s:.0f} s")
         with site.postgres.connect() as connection:
-            verdict = judge(clients.receipts, n_uploads=options.uploads, connection=connection)
+            files = site.directory / "files" / "predictions"
+            verdict = judge(clients.receipts, n_uploads=options.uploads, connection=connection, files=files)
         _tell(verdict, faults, clients, site)
     n_kills = faults.counts["worker_kills"] + faults.counts["pool_process_kills"]
     say(
@@ -115,14 +111,13 @@ def _tell(verdict: Verdict, faults: Faults, clients: Clients, site: Site) -> Non
 
 
 def main() -> int:
-    """0 if the run was good."""
     options = arguments()
     directory = Path(tempfile.mkdtemp(prefix="tsttc-chaos-site-"))
     is_good = False
     try:
         is_good = run(options, directory)
     finally:
-        if options.keep or not is_good:
+        if not is_good:
             sys.stderr.write(f"chaos: the logs are in {directory}\n")
         else:
             shutil.rmtree(directory)

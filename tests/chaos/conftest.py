@@ -24,7 +24,6 @@ def installed() -> None:
 
 @pytest.fixture(scope="module")
 def truth() -> evaluator.GroundTruth:
-    """300 made-up sequences."""
     return simulate(rng=np.random.default_rng(3), n_sequences=300, n_recordings=20)
 
 

@@ -35,20 +35,13 @@ class Process:
 
     @property
     def pid(self) -> int:
-        """The number of the process, and of its group."""
         if self._child is None:
             raise RuntimeError(f"{self.name} was never started")
         return self._child.pid
 
     @property
     def is_alive(self) -> bool:
-        """Whether it runs, or is stopped."""
         return self._child is not None and self._child.poll() is None
-
-    @property
-    def returncode(self) -> int | None:
-        """How it ended; None while it has not."""
-        return self._child.poll() if self._child is not None else None
 
     def start(self) -> None:
         """Start it, in a session of its own."""
@@ -87,7 +80,6 @@ class Process:
         self.kill_if_started()
 
     def wait(self) -> None:
-        """Until it has ended. Raises `subprocess.TimeoutExpired`."""
         if self._child is not None:
             self._child.wait(PATIENCE_S)
 
@@ -96,7 +88,6 @@ class Process:
         return children_of(self.pid)
 
     def said(self) -> str:
-        """Everything that it has written so far."""
         return self.log_path.read_text(errors="replace") if self.log_path.exists() else ""
 
 

@@ -86,7 +86,6 @@ class Postgres:
         return psycopg.connect(self.url, autocommit=True, connect_timeout=60)
 
     def start(self) -> None:
-        """Start it, and wait until it answers."""
         self._server.start()
         await_that(self._answers, what="PostgreSQL answers")
 
@@ -141,7 +140,6 @@ class Redis:
         return f"redis://127.0.0.1:{self.port}/0"
 
     def start(self) -> None:
-        """Start it, and wait until it answers."""
         self.server.start()
         await_that(self._answers, what="Redis answers")
 

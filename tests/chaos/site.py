@@ -1,18 +1,17 @@
 """The leaderboard with everything it needs, as processes that may be killed one by one."""
 
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import httpx
 
 import evaluator
-from tests.chaos.processes import REPOSITORY, Process
+from tests.chaos.processes import Process
 from tests.chaos.services import Postgres, Redis
 from tests.chaos.uploads import reader_memory_bytes
-from tests.journeys.production import BIN, await_that, free_port, get, settings_for
+from tests.journeys import production
+from tests.journeys.production import BIN, GUNICORN, await_that, free_port, get, settings_for
 from tests.prepared import static_files
 
 # Seconds. Lease, heartbeat and wall are a tenth of the real ones, so that a run of minutes sees many of them.
@@ -42,13 +41,7 @@ class Site:
         )
         self.environment |= {**PACE, "TSTTC_STATIC_ROOT": str(static_files())}
         self.environment["TSTTC_CHILD_MEMORY_BYTES"] = str(memory_bytes)
-        gunicorn = [
-            str(BIN / "gunicorn"),
-            "--config",
-            "deploy/gunicorn.conf.py",
-            "leaderboard.wsgi:application",
-        ]
-        self.web = self._process("web", gunicorn)
+        self.web = self._process("web", GUNICORN)
         celery = [str(BIN / "celery"), "--app=leaderboard"]
         options = ["--concurrency=2", "--without-gossip", "--without-mingle", "--loglevel=info"]
         self.workers = [
@@ -58,25 +51,14 @@ class Site:
 
     @property
     def processes(self) -> list[Process]:
-        """All but the services."""
         return [self.web, *self.workers]
 
-    def _process(self, name: str, command: list[str]) -> Process:
+    def _process(self, name: str, command: Sequence[str]) -> Process:
         return Process(name, command, directory=self.directory, environment=self.environment)
 
     def manage(self, *arguments: str) -> str:
-        """Run a management command; returns what it printed."""
-        command = [sys.executable, "manage.py", *arguments]
-        done = subprocess.run(
-            command, cwd=REPOSITORY, env=self.environment, capture_output=True, text=True, check=False
-        )
-        if done.returncode != 0:
-            raise RuntimeError(f"{' '.join(arguments)}: {done.stdout}{done.stderr}")
-        return done.stdout
-
-    def await_web(self) -> None:
-        """Return once the web server answers."""
-        await_that(self.answers, what="the web server answers")
+        here = production.Site(url=self.url, directory=self.directory, environment=self.environment)
+        return here.manage(*arguments)
 
     def answers(self) -> bool:
         """Whether a web process serves at the moment, and the database with it."""
@@ -104,5 +86,5 @@ def running_site(directory: Path, *, truth: evaluator.GroundTruth, n_workers: in
         site.manage("import_truth", SPLIT, str(table))
         for process in site.processes:
             process.start()
-        site.await_web()
+        await_that(site.answers, what="the web server answers")
         yield site

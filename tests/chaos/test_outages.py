@@ -1,14 +1,8 @@
 """The services beneath a running site go away: the site says so, or does without."""
 
-import hashlib
-import os
-import random
-import shutil
 import signal
-import threading
-import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -16,10 +10,9 @@ import numpy as np
 import pytest
 
 import evaluator
-from tests.chaos.processes import Process
 from tests.chaos.site import SPLIT, Site
-from tests.chaos.uploads import Clients, Upload, bomb_file
-from tests.journeys.production import BIN, PATIENCE_S, await_that, free_port
+from tests.journeys import production
+from tests.journeys.production import GUNICORN, PATIENCE_S, await_that, free_port
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -104,26 +97,15 @@ def test_with_a_broker_that_hangs_files_are_taken_and_scored(
         site.redis.server.send(signal.SIGCONT)
 
 
-def test_flushed_broker_delays_and_loses_nothing(
-    site: Site, http: httpx.Client, new_file: Callable[[], bytes]
-) -> None:
-    site.workers[0].kill()
-    answer = post(http, new_file())
-    site.redis.client.flushall()
-    site.workers[0].start()
-    assert await_state(http, answer) == "SCORED"
-
-
 # --- the database ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("crash", [False, True], ids=["stopped", "crashed"])
 def test_without_a_database_the_answer_is_503_on_every_door_and_then_all_is_well(
-    site: Site, http: httpx.Client, new_file: Callable[[], bytes], crash: bool
+    site: Site, http: httpx.Client, new_file: Callable[[], bytes]
 ) -> None:
     data = new_file()
     assert http.get("/").status_code == 200
-    site.postgres.stop(crash=crash)
+    site.postgres.stop(crash=True)
     try:
         for _ in range(8):  # more often than there are connections to find dead
             refused = post(http, data)
@@ -141,19 +123,6 @@ def test_without_a_database_the_answer_is_503_on_every_door_and_then_all_is_well
 # --- the worker ------------------------------------------------------------------------------------------
 
 
-def test_hostile_file_is_given_up_and_the_next_healthy_one_is_scored(
-    http: httpx.Client, new_file: Callable[[], bytes]
-) -> None:
-    bomb = post(http, bomb_file(0))
-    healthy = post(http, new_file())
-    assert await_state(http, healthy) == "SCORED"
-    assert await_state(http, bomb) == "SYSTEM_ERROR"
-    told = http.get(f"/api/v1/submissions/{bomb.json()['id']}").json()
-    assert told["fault_is_ours"]
-    assert told["scores"] is None
-    assert await_state(http, post(http, new_file())) == "SCORED"
-
-
 def test_worker_that_is_asked_to_stop_finishes_what_it_has_in_hand(
     site: Site, http: httpx.Client, new_file: Callable[[], bytes]
 ) -> None:
@@ -168,100 +137,27 @@ def test_worker_that_is_asked_to_stop_finishes_what_it_has_in_hand(
     assert {await_state(http, answer) for answer in answers} == {"SCORED"}
 
 
-# --- the web process -------------------------------------------------------------------------------------
-
-
-def test_killed_web_processes_leave_no_partial_file_and_no_row_without_its_bytes(
-    site: Site, token: str, truth: evaluator.GroundTruth, new_file: Callable[[], bytes]
-) -> None:
-    clients = Clients(url=site.url, token=token, split=SPLIT)
-    rng = random.Random(0)
-    uploads: list[Upload] = []
-    threads: list[threading.Thread] = []
-    n_kills = 0
-    while n_kills <= 5 or any(thread.is_alive() for thread in threads):
-        if not any(thread.is_alive() for thread in threads):
-            # Large, so that most kills meet an upload on its way; each byte of the padding is a valid space.
-            numbers = range(len(uploads), len(uploads) + 30)
-            more = [Upload(f"killed-{i}", new_file() + b" " * 2_000_000, "SCORED") for i in numbers]
-            uploads += more
-            threads = clients.start(more, n_clients=4, seconds=8)
-        # Dead processes interrupt no uploads: one must be at work again before it is killed.
-        site.await_web()
-        time.sleep(rng.uniform(0.0, 0.5))
-        for pid in site.web.children()[:1]:
-            with suppress(ProcessLookupError):  # the former one's, which was just buried
-                os.kill(pid, signal.SIGKILL)
-                n_kills += 1
-    assert not clients.refused
-    assert len({receipt.submission_id for receipt in clients.receipts}) == len(uploads)
-    kept = {path.stem: path for path in (site.directory / "files" / "predictions").rglob("*.json")}
-    for digest, path in kept.items():
-        assert hashlib.sha256(path.read_bytes()).hexdigest() == digest
-    with site.postgres.connect() as connection:
-        rows = connection.execute("SELECT digest FROM leaderboard_submission").fetchall()
-    assert {str(digest).removeprefix("sha256:") for (digest,) in rows} <= kept.keys()
-
-
 # --- the disk --------------------------------------------------------------------------------------------
 
 
-def mounted(folder: Path) -> list[str]:
-    """A command's prefix: the folder is a file system of 1 MB, seen by that command alone."""
-    script = 'mount -t tmpfs -o size=1m tmpfs "$0" && exec "$@"'
-    return ["unshare", "--mount", "sh", "-c", script, str(folder)]
-
-
-def limited(folder: Path) -> list[str]:
-    """A command's prefix: no file that it writes may be larger than 1 MB."""
-    return ["prlimit", "--fsize=1000000"]
-
-
 @contextmanager
-def another_web(site: Site, *, prefix: list[str], **environment: str) -> Iterator[str]:
-    """The address of a second web server of the site, of one process, with other directories."""
+def another_web(site: Site, **environment: str) -> Iterator[str]:
+    """The address of a second web server of the site, of one process, that writes no file over 1 MB."""
     url = f"http://127.0.0.1:{free_port()}"
     bind = {"TSTTC_WEB_BIND": url.removeprefix("http://"), "WEB_CONCURRENCY": "1"}
-    changed = site.environment | environment | bind
-    command = [*prefix, str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py"]
-    web = Process(
-        f"web-{url[-5:]}",
-        [*command, "leaderboard.wsgi:application"],
-        directory=site.directory,
-        environment=changed,
-    )
-    web.start()
-    try:
-        await_that(lambda: answers(url), what="the second web server answers")
+    other = production.Site(url, site.directory, site.environment | environment | bind)
+    with production.web_process(other, f"web-{url[-5:]}", command=("prlimit", "--fsize=1000000", *GUNICORN)):
         yield url
-    finally:
-        web.kill()
 
 
-def answers(url: str) -> bool:
-    try:
-        return httpx.get(f"{url}/healthz", trust_env=False).status_code == 200
-    except httpx.TransportError:
-        return False
-
-
-@pytest.mark.parametrize("means", [mounted, limited])
 @pytest.mark.parametrize("where", ["TSTTC_FILES_DIR", "TMPDIR"])
 def test_full_disk_is_a_507_and_leaves_no_row(
-    site: Site,
-    token: str,
-    new_file: Callable[[], bytes],
-    tmp_path: Path,
-    where: str,
-    means: Callable[[Path], list[str]],
+    site: Site, token: str, new_file: Callable[[], bytes], tmp_path: Path, where: str
 ) -> None:
-    prefix = means(tmp_path)
-    if shutil.which(prefix[0]) is None or (means is mounted and not may_mount(tmp_path)):
-        pytest.skip(f"this machine does not allow {prefix[0]}")
     n_before = n_submissions(site)
     too_much = new_file() + b" " * 3_000_000
     with (
-        another_web(site, prefix=prefix, **{where: str(tmp_path)}) as url,
+        another_web(site, **{where: str(tmp_path)}) as url,
         httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False) as http,
     ):
         http.headers["Authorization"] = f"Bearer {token}"
@@ -275,11 +171,3 @@ def test_full_disk_is_a_507_and_leaves_no_row(
         assert n_submissions(site) == n_before
         assert post(http, new_file()).status_code == 201
         assert n_submissions(site) == n_before + 1
-
-
-def may_mount(folder: Path) -> bool:
-    """Whether this process may have a file system of its own."""
-    probe = Process("probe", [*mounted(folder), "true"], directory=folder.parent, environment=os.environ)
-    probe.start()
-    probe.wait()
-    return probe.returncode == 0

@@ -70,7 +70,6 @@ def _with_expectation(name: str, data: bytes, truth: evaluator.GroundTruth) -> U
 
 
 def _faulty(good: bytes, *, kind: int) -> bytes:
-    """The file with one of four faults."""
     values = json.loads(good)
     first = next(iter(values))
     if kind == 0:

@@ -1,8 +1,10 @@
 """What came of a chaos run: every acknowledged file against its one right result."""
 
+import hashlib
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import psycopg
@@ -45,13 +47,14 @@ class Verdict:
 
 
 def n_open(connection: "psycopg.Connection[Any]") -> int:
-    """Evaluations that nobody has decided yet."""
     query = "SELECT count(*) FROM leaderboard_evaluation WHERE status IN ('QUEUED', 'RUNNING')"
     return int(connection.execute(query).fetchone()[0])  # type: ignore[index]  # count(*) has a row
 
 
-def judge(receipts: Sequence[Receipt], *, n_uploads: int, connection: "psycopg.Connection[Any]") -> Verdict:
-    """Compare the database with the receipts."""
+def judge(
+    receipts: Sequence[Receipt], *, n_uploads: int, connection: "psycopg.Connection[Any]", files: Path
+) -> Verdict:
+    """Compare the database and the folder of prediction files with the receipts."""
     with connection.cursor(row_factory=dict_row) as cursor:
         rows = cursor.execute(ROWS).fetchall()
     by_id: dict[str, list[dict[str, Any]]] = {}
@@ -67,6 +70,7 @@ def judge(receipts: Sequence[Receipt], *, n_uploads: int, connection: "psycopg.C
             reasons["doubled"].append(f"doubled: {method}: {n} evaluations of one upload")
     for _ in range(n_uploads - len(receipts)):
         reasons["lost"].append("lost: an upload was never acknowledged")
+    reasons["lost"] += faulty_files(files, connection=connection)
     waits_s = sorted(row["took_s"] for row in rows if row["took_s"] is not None)
     return Verdict(
         n_uploads=n_uploads,
@@ -79,6 +83,15 @@ def judge(receipts: Sequence[Receipt], *, n_uploads: int, connection: "psycopg.C
         most_attempts=max((row["attempt"] or 0 for row in rows), default=0),
         reasons=[reason for kind in reasons.values() for reason in kind],
     )
+
+
+def faulty_files(folder: Path, *, connection: "psycopg.Connection[Any]") -> list[str]:
+    """Kept prediction files that are not the bytes of their digest, and digests of rows without a file."""
+    kept = {path.stem: path for path in folder.rglob("*.json")}
+    rows = connection.execute("SELECT digest FROM leaderboard_submission").fetchall()
+    lacking = {str(digest).removeprefix("sha256:") for (digest,) in rows} - kept.keys()
+    partial = [d for d, path in kept.items() if hashlib.sha256(path.read_bytes()).hexdigest() != d]
+    return [*(f"lost: the file {d}" for d in lacking), *(f"lost: half of the file {d}" for d in partial)]
 
 
 def _faults(receipt: Receipt, rows: Sequence[dict[str, Any]]) -> list[tuple[str, str]]:

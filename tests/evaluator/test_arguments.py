@@ -206,10 +206,6 @@ def test_a_dict_is_told_the_call_that_takes_one(truth: GroundTruth) -> None:
     )
     with pytest.raises(TypeError, match=words):
         Predictions.from_arrays(ttc_s=values, manifest=truth.manifest)
-    with pytest.raises(TypeError, match=words):
-        evaluator.write_predictions(ttc_s=values, manifest=truth.manifest)
-    with pytest.raises(TypeError, match=r"scale_ratio is of type dict; .* and scale_ratio=list"):
-        Predictions.from_arrays(scale_ratio=values, frame_gap=5, manifest=truth.manifest)
     data = evaluator.write_predictions(keys=list(values), ttc_s=list(values.values()))
     assert read_predictions(data, manifest=truth.manifest).ttc_s.tolist() == truth.ttc_s.tolist()
 

@@ -1,6 +1,5 @@
 """The unit of inference: which it is, where the ground truth names it, and what offline answers say of it."""
 
-import hashlib
 import io
 import json
 from datetime import date, timedelta
@@ -93,15 +92,6 @@ def test_a_kind_that_the_recordings_do_not_have_is_refused_in_words() -> None:
 # --- the column ---------------------------------------------------------------------------------------------
 
 
-def test_a_table_without_units_has_the_digests_that_it_always_had() -> None:
-    plain = table(names(2))
-    text = plain.text(("anno_id", "bag_stamp", "cam_id", "ts", "track_id", "ttc"))
-    found = GroundTruth.from_table(plain)
-    assert found.digest == f"sha256:{hashlib.sha256(text.encode()).hexdigest()}"
-    assert "unit" not in found.to_csv().decode()
-    assert "unit" not in found.manifest.to_csv().decode()
-
-
 def test_units_are_a_part_of_both_digests_and_survive_every_form(tmp_path: Path) -> None:
     recordings = names(2)
     truth = GroundTruth.from_table(table(recordings, unit=["a", "b", "b", "c", "c", "c"]))
@@ -131,14 +121,6 @@ def test_a_recording_in_two_units_is_refused_with_the_row() -> None:
     assert problem.message == (
         'The recording "r" has the unit "b" here and "a" at line 2; expected one unit for a recording.'
     )
-
-
-def test_a_row_without_a_unit_is_refused_where_others_have_one() -> None:
-    text = "anno_id,bag_stamp,cam_id,ts,track_id,ttc,unit\n0,r,1,1,1,5.0,a\n1,s,1,2,1,5.0,\n"
-    with pytest.raises(Rejected) as refused:
-        read_truth(io.BytesIO(text.encode()))
-    (problem,) = refused.value.problems
-    assert (problem.message, problem.where) == ('unit is "": it is empty.', "line 3")
 
 
 # --- what is computed ---------------------------------------------------------------------------------------

@@ -89,21 +89,3 @@ def test_board_shows_published_rows_and_the_owner_s_own(tsttc: Tsttc) -> None:
     errors = [entry["scores"]["rte"] for entry in document["entries"]]
     assert errors == sorted(errors, reverse=True)
     assert tuple(document["entries"][0]["scores"]) == SCORE_NAMES
-
-
-def test_refusal_of_the_server_is_told_by_whose_fault_it_is(tsttc: Tsttc) -> None:
-    send = ["submit", "predictions.json", "--split"]
-    nothing = "There is nothing at this address"
-    for arguments, code, words in (
-        ([*send, "trial", "--method", "Foo"], 2, "There is no split 'trial'"),
-        ([*send, "test", "--method", "Foo"], 8, "are not open yet"),
-        ([*send, "val", "--method", " "], 2, "method"),
-        ([*send, "val", "--method", "F", "--code-url", "x"], 2, "code_url"),
-        (["board", "val", "--sort", "x"], 2, "cannot be sorted by 'x'"),
-        (["board", "trial"], 8, nothing),
-        (["status", "00000000-0000-4000-8000-000000000000"], 8, nothing),
-    ):
-        done = tsttc(*arguments)
-        assert done.returncode == code, done.stderr
-        assert words in done.stderr
-        assert "Traceback" not in done.stderr

@@ -8,7 +8,6 @@ three places where they may begin within it.
 import base64
 import struct
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +18,6 @@ N_CANARIES = 200
 # So many digits of a number are nobody else's: two published decimals have at most four.
 N_DIGITS = 9
 ALPHABETS = {"": base64.b64encode, " for addresses": base64.urlsafe_b64encode}
-
-
-@dataclass(frozen=True)
-class Form:
-    """One way in which one canary may be written."""
-
-    value: float
-    how: str
-    pattern: bytes
 
 
 def plant(path: Path, *, n: int = 480, seed: int = 7) -> tuple[float, ...]:
@@ -57,18 +47,18 @@ def corrected(path: Path, *, to: Path) -> None:
     to.write_text("\n".join(lines) + "\n")
 
 
-def forms(values: Iterable[float]) -> Iterator[Form]:
-    """Every way in which these may be written."""
+def forms(values: Iterable[float]) -> Iterator[tuple[str, bytes]]:
+    """Every way in which these may be written: its name, and the bytes."""
     for value in values:
-        yield Form(value, "digits", digits(value))
+        yield "digits", digits(value)
         for order, data in (("little", struct.pack("<d", value)), ("big", struct.pack(">d", value))):
-            yield Form(value, f"{order}-endian bytes", data)
-            yield Form(value, f"{order}-endian hex", data.hex().encode())
-            yield Form(value, f"{order}-endian HEX", data.hex().upper().encode())
+            yield f"{order}-endian bytes", data
+            yield f"{order}-endian hex", data.hex().encode()
+            yield f"{order}-endian HEX", data.hex().upper().encode()
             for shift in range(3):
                 for alphabet, encode in ALPHABETS.items():
-                    how = f"{order}-endian base64{alphabet}, place {shift}"
-                    yield Form(value, how, _inner(data, shift, encode(bytes(shift) + data)))
+                    encoded = _inner(data, shift, encode(bytes(shift) + data))
+                    yield f"{order}-endian base64{alphabet}, place {shift}", encoded
 
 
 def digits(value: float) -> bytes:
@@ -84,27 +74,21 @@ def _inner(data: bytes, shift: int, encoded: bytes) -> bytes:
     return encoded[first:last]
 
 
-@dataclass(frozen=True)
-class Hit:
-    """A canary that was found."""
-
-    where: str
-    how: str
-    around: bytes
+# Where a canary was found, how it was written, and what is around it.
+Hit = tuple[str, str, bytes]
 
 
 class Search:
     """Looks for all forms at once: by the first eight bytes of each, then the whole of it."""
 
     def __init__(self, values: Iterable[float]) -> None:
-        self._by_key: dict[int, list[Form]] = {}
-        for form in forms(values):
-            assert len(form.pattern) >= 8, form
-            self._by_key.setdefault(int.from_bytes(form.pattern[:8], "little"), []).append(form)
+        self._by_key: dict[int, list[tuple[str, bytes]]] = {}
+        for how, pattern in forms(values):
+            assert len(pattern) >= 8, how
+            self._by_key.setdefault(int.from_bytes(pattern[:8], "little"), []).append((how, pattern))
         self._keys = np.array(sorted(self._by_key), dtype="<u8")
 
     def in_bytes(self, data: bytes, *, where: str) -> list[Hit]:
-        """Every canary in this."""
         found: list[Hit] = []
         for offset in range(8):
             n_words = (len(data) - offset) // 8
@@ -115,14 +99,13 @@ class Search:
             for index in np.flatnonzero(self._keys[places] == words):
                 at = offset + 8 * int(index)
                 found += [
-                    Hit(where, form.how, data[max(0, at - 40) : at + 40])
-                    for form in self._by_key[int(words[index])]
-                    if data.startswith(form.pattern, at)
+                    (where, how, data[max(0, at - 40) : at + 40])
+                    for how, pattern in self._by_key[int(words[index])]
+                    if data.startswith(pattern, at)
                 ]
         return found
 
     def in_all(self, haystacks: Mapping[str, bytes]) -> list[Hit]:
-        """Every canary in these."""
         return [hit for where, data in haystacks.items() for hit in self.in_bytes(data, where=where)]
 
 

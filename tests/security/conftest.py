@@ -13,7 +13,6 @@ from tests.security.people import World
 
 @pytest.fixture
 def owner(db: None) -> User:
-    """Somebody who submits."""
     return User.objects.create_user("owner@example.org", "correct horse", name="Owls")
 
 

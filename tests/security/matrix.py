@@ -57,7 +57,6 @@ def line(
 
 
 def all_of(status: str) -> str:
-    """The same for every role."""
     return " ".join([status] * len(ROLES))
 
 

@@ -1,4 +1,4 @@
-"""What one more submission tells of hidden labels: the attack, and what it gets before and after the defence.
+"""What one more submission tells of hidden labels, with two decimals and with the one that is published.
 
     python -m tests.security.probing          the table of docs/scoring.md, some minutes
     python -m tests.security.probing --quick  a small one
@@ -14,7 +14,6 @@ range of each sequence. `bits` is what it has learnt: −log2 of the share of hy
 """
 
 import argparse
-import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -57,7 +56,6 @@ class World:
 
     @property
     def n_chosen(self) -> int:
-        """K."""
         return len(self.amounts)
 
     def mask(self, column: int) -> int:
@@ -96,35 +94,13 @@ Answers = Sequence[tuple[float | str | None, ...]]
 Channel = Callable[[World, int, Masks], Answers]
 
 
-def own_pair(world: World, column: int, masks: Masks) -> Answers:
-    """As it was: interval and p of one's own two files, from random signs that everybody can draw."""
-    gaps, counts = world.moved(masks), np.repeat(world.counts[:, [column]], len(masks), axis=1)
-    found = sign_flips(gaps, counts, rng=np.random.default_rng(1))
-    shown = [
-        rounded_difference(
-            Difference(float(gaps[:, i].sum() / counts[:, i].sum()), *ends),
-            first=None,
-            second=None,
-            decimals=2,
-        )
-        for i in range(len(masks))
-        for ends in [(float(found.low[i]), float(found.high[i]), float(found.p[i]))]
-    ]
-    return [(each.low, each.high, each.p) for each in shown]
-
-
-def own_p(world: World, column: int, masks: Masks) -> Answers:
-    """Of that the p alone."""
-    return [each[2:] for each in own_pair(world, column, masks)]
-
-
 def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
-    """All that is told now, to somebody who knows the secret and every other label: more than there can be.
+    """All that is told, to somebody who knows the secret and every other label: more than there can be.
 
     The mean and its interval, and difference, interval and class of p beside another team's public method.
     """
-    from leaderboard.models import Edition, Split  # noqa: PLC0415 - as above
-    from leaderboard.statistics import disclosure  # noqa: PLC0415 - needs Django's settings
+    from leaderboard.models import Edition, Split  # noqa: PLC0415 - needs Django's settings
+    from leaderboard.statistics import disclosure  # noqa: PLC0415 - likewise
 
     edition = Edition(split=Split(is_hidden=True), decimals=1)
     counts = world.counts[:, [column]]
@@ -221,11 +197,9 @@ def _either(one: Floats, other: Floats) -> Floats:
 # --- the table -------------------------------------------------------------------------------------------
 
 WAYS: Final[dict[str, tuple[int, Channel | None]]] = {
-    "before: means": (2, None),
-    "before: means, p of one's own pair": (2, own_p),
-    "before: means, p and interval": (2, own_pair),
-    "now: means": (1, None),
-    "now: bound, if all but the chosen labels were known": (1, all_that_is_left),
+    "means, two decimals": (2, None),
+    "means, one decimal, as published": (1, None),
+    "bound, if all but the chosen labels were known": (1, all_that_is_left),
 }
 
 
@@ -260,39 +234,7 @@ def measured(
     }
 
 
-def bits_moved_alike(
-    *, n_chosen: int, n_sequences: int, n_readouts: int, decimals: int = 1, seed: int = 0
-) -> Mean:
-    """The bits of a file that moves many sequences by one amount, the largest: how many are in each range.
-
-    They are −log2 of the share of all counts that give what is published. No sequence is named by them.
-    """
-    rng = np.random.default_rng((seed, n_chosen))
-    shares = np.append(SHARES, 1 - SHARES.sum())
-    found = []
-    for _ in range(n_readouts):
-        counts = rng.multinomial(n_chosen, shares)[:4]
-        before = rng.uniform(5_000, 6_000, 4)
-        step = LARGEST / (SHARES * n_sequences)
-        unit = 10.0**-decimals
-        told = np.round((before + step * counts) / unit) - np.round(before / unit)
-        off = np.floor((told + 1) * unit / step + 1e-9), np.ceil((told - 1) * unit / step - 1e-9)
-        fits = [np.arange(max(low, 0), min(high, n_chosen) + 1) for high, low in zip(*off, strict=True)]
-        vectors = np.stack(np.meshgrid(*fits, indexing="ij"), axis=-1).reshape(-1, 4)
-        found.append(-float(np.log2(_probability(vectors, n_chosen, shares))))
-    return _mean(found)
-
-
-def _probability(vectors: Floats, n: int, shares: Floats) -> float:
-    """The probability of any of these numbers of sequences in the ranges, of `n` in all."""
-    rest = n - vectors.sum(axis=1)
-    whole = np.column_stack([vectors, rest])[rest >= 0]
-    logs = [math.lgamma(n + 1) - sum(math.lgamma(k + 1) for k in row) for row in whole.tolist()]
-    return float(np.exp(np.array(logs) + whole @ np.log(shares)).sum())
-
-
 def main() -> None:
-    """Print the table."""
     os.environ.setdefault("DJANGO_SETTINGS_MODULE", "leaderboard.settings")
     import django  # noqa: PLC0415 - the settings have to be named first
 
@@ -317,9 +259,6 @@ def main() -> None:
             )
             for name, (n_right, bits) in table.items():
                 sys.stdout.write(f"  {name:<52} {n_right} right, {bits} bits\n")
-    for n_chosen in (100, 1_000):
-        bits = bits_moved_alike(n_chosen=n_chosen, n_sequences=28_600, n_readouts=200)
-        sys.stdout.write(f"28,600 sequences, {n_chosen:,} moved alike: {bits} bits\n")
 
 
 if __name__ == "__main__":

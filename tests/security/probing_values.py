@@ -99,7 +99,6 @@ def _published(mean: float, places: int) -> float:
 
 
 def main(n_readouts: int = 2_000) -> None:
-    """Print the table."""
     for n_sequences in (3_000, 28_600):
         sys.stdout.write(f"\n{n_sequences:,} sequences, {n_readouts:,} readouts, median error in s\n\n")
         sys.stdout.write(f"| told | {' | '.join(RANGES)} |\n|---|{'---|' * len(RANGES)}\n")

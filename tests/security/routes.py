@@ -26,12 +26,10 @@ class Route:
 
     @property
     def is_api(self) -> bool:
-        """Whether programs use it."""
         return self.pattern.startswith(API.lstrip("/"))
 
     @property
     def is_admin(self) -> bool:
-        """Whether it is Django's administration."""
         return self.pattern.startswith("admin/")
 
     @property

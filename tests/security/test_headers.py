@@ -31,7 +31,7 @@ ANYBODYS = re.compile(r"public, (?:no-cache|max-age=\d+)|max-age=\d+, public")
 PERSONAL = re.compile(r"^/(?:accounts|admin|healthz|healthy|readyz|metrics)")
 
 
-ROLES = ("anonymous", "stranger", "owner", "maintainer", "token without scope", "expired token")
+ROLES = ("anonymous", "owner", "maintainer", "expired token")
 Answers = list[tuple[str, str, HttpResponse]]
 _asked: Answers = []
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +11,7 @@ import pytest
 
 import evaluator
 from tests import builders
-from tests.journeys.production import BIN, PATIENCE_S, Site, await_that, free_port, running
+from tests.journeys.production import PATIENCE_S, Site, free_port, web_process
 from tests.prepared import put_sqlite, static_files
 from tests.security.crawler import crawl
 from tests.security.hostile_files import corpus
@@ -21,7 +20,7 @@ from tests.services import environment_of_its_own
 
 pytestmark = pytest.mark.slow
 MAX_GROWTH_MB = 64
-# Every third in the suite, which other tests send all of; `python -m tests.security` sends them all here too.
+# Every third in the suite, which other tests send all of.
 NAMES_SENT = NAMES if os.environ.get("TSTTC_SECURITY_WHOLE") == "1" else NAMES[::3]
 SET_UP = """
 import json, sys
@@ -46,7 +45,6 @@ class Alone:
     good: bytes
 
     def client(self) -> httpx.Client:
-        """A program with a token."""
         headers = {"Authorization": f"Bearer {self.token}"}
         return httpx.Client(base_url=self.site.url, headers=headers, timeout=PATIENCE_S, trust_env=False)
 
@@ -84,17 +82,7 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Alone]:
     site = Site(url=url, directory=directory, environment=webs)
     truth = evaluator.read_truth(directory / "truth.csv")
     good = evaluator.write_predictions(manifest=truth.manifest, ttc_s=truth.ttc_s * 1.1)
-    gunicorn = (sys.executable, str(BIN / "gunicorn"), "--config", "deploy/gunicorn.conf.py")
-    with running(site, "web", *gunicorn, "leaderboard.wsgi:application") as process:
-
-        def answers() -> bool:
-            assert process.poll() is None, (directory / "web.log").read_text()
-            try:
-                return httpx.get(f"{url}/healthz", trust_env=False).status_code == 200
-            except httpx.TransportError:
-                return False
-
-        await_that(answers, what="the web server answers")
+    with web_process(site) as process:
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
         yield Alone(site=site, pid=int(children[0]), token=token, good=good)
 

@@ -97,7 +97,6 @@ def ids_from(seed: str) -> Iterator[None]:
 
 
 def build(directory: Path, *, has_secrets: bool) -> Scene:
-    """One of the two worlds."""
     directory.mkdir()
     settings.GROUND_TRUTH_DIR = directory / "ground-truth"
     # The random numbers of hidden splits come from it: what differs by chance alone is not to differ.
@@ -227,7 +226,6 @@ def _ids(model: type[Submission] | type[Method]) -> set[UUID]:
 
 
 def _renamed(made: Submission, pk: uuid.UUID) -> Submission:
-    """The same submission under another id."""
     old = made.pk
     copy = Submission.objects.get(pk=old)
     copy.pk = pk

@@ -143,9 +143,10 @@ def tools(
         "kept": query.kept("sort", "at", "columns"),
         "is_filtered": query.filters.is_set,
         "chips": [
-            (f"{_label(name)}: {_words(name, query.given[name])}", query.href(**{name: ""}))
-            for name in FILTERS
+            (f"{label}: {_words(name, query.given[name])}", query.href(**{name: ""}))
+            for name, each in FILTERS.items()
             if name in query.filters.wanted
+            for label in ["Search" if name == _SEARCH else each.label]
         ],
         # Whether any filter is set, besides the text to find: else they need no room.
         "has_choices": any(text for name, text in given.items() if name != _SEARCH),
@@ -158,10 +159,6 @@ def tools(
         "now_href": query.href(at=""),
         "max_methods": comparisons.MAX_METHODS,
     }
-
-
-def _label(name: str) -> str:
-    return "Search" if name == _SEARCH else FILTERS[name].label
 
 
 def _words(name: str, text: str) -> str:

@@ -3,7 +3,7 @@
 Templates only place what they are given; a thousand rows of number filters would cost more than the query.
 """
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime, timedelta
 from typing import Final
@@ -112,11 +112,6 @@ class BoardTable:
         return any(not row.entry.is_visible_to_all for row in self.rows)
 
     @property
-    def n_scores(self) -> int:
-        """How many columns of numbers there are."""
-        return len(self.score_headings)
-
-    @property
     def next_href(self) -> str:
         """The next page's address; empty on the last."""
         return self._page_href(self.pages.number + 1) if self.pages.has_next() else ""
@@ -136,9 +131,11 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
     is_of_one = len(grouped_names(names)) == 1
     scales = _scales(board.entries, names if is_of_one else names[:1])
     pages = Paginator(board.entries, PER_PAGE).get_page(query.page)
-    sources = _sources(pages.object_list)
+    sources = sorted({entry.source: entry.paper_url for entry in pages.object_list if entry.source}.items())
     numbers = {citation: i for i, (citation, _) in enumerate(sources, 1)}
-    counts = board.edition.ground_truth.counts if board.edition else {}
+    edition = board.edition
+    is_present = edition is not None and edition.pk == board.split.published_edition_id and not board.at
+    counts = edition.ground_truth.counts if edition else {}
     # Among all rows: no filter makes a row new, or old.
     new = _new_among(board.unfiltered, today=now.date()) if not board.at else frozenset()
     moved = movement.moved(board, now=now)
@@ -169,9 +166,9 @@ def board_table(board: Board, *, query: BoardQuery, now: datetime) -> BoardTable
         ttc_ranges=counted_ranges(board.rules, counts),
         pages=pages,
         has_intervals=bool(scales),
-        can_compare=_is_present(board) and sum(row.can_be_compared for row in rows) > 1,
+        can_compare=is_present and sum(row.can_be_compared for row in rows) > 1,
         reason=_reason(board, has_intervals=bool(scales)),
-        floor=floor_sentence(board.edition.floor, decimals=board.edition.decimals) if board.edition else "",
+        floor=floor_sentence(edition.floor, decimals=edition.decimals) if edition else "",
     )
 
 
@@ -193,17 +190,10 @@ def _note(entry: Entry, present: Edition | None) -> str:
     return _WHY_UNSCORABLE.get(entry.unscorable, "Edition {} cannot score its file.").format(present.number)
 
 
-def _is_present(board: Board) -> bool:
-    return board.edition is not None and board.edition.pk == board.split.published_edition_id and not board.at
-
-
-def _is_scored(entry: Entry) -> bool:
-    return entry.kind == "submission" and entry.scores.get(PRIMARY) is not None
-
-
 def _reason(board: Board, *, has_intervals: bool) -> str:
     """Why no value has an interval, where something was scored at all."""
-    if has_intervals or board.edition is None or not any(map(_is_scored, board.entries)):
+    is_scored = any(e.kind == "submission" and e.scores.get(PRIMARY) is not None for e in board.entries)
+    if has_intervals or board.edition is None or not is_scored:
         return ""
     return confidence.why_no_interval(board.edition) or ("The confidence intervals are being computed.")
 
@@ -263,7 +253,3 @@ def _attempts(entry: Entry) -> str:
     noun = "attempt" if entry.n_attempts == 1 else "attempts"
     is_of_team = entry.visibility == Visibility.PUBLIC
     return f"{entry.n_attempts:,} {'team ' if is_of_team else ''}{noun}"
-
-
-def _sources(entries: Iterable[Entry]) -> list[tuple[str, str]]:
-    return sorted({entry.source: entry.paper_url for entry in entries if entry.source}.items())

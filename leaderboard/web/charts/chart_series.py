@@ -35,18 +35,18 @@ class Look:
 
 def marks(name: str, found: Iterable[Mark], look: Look, *, grid: int = 0, z: int = 2) -> Option:
     """A series of marks."""
+    shape = {"symbol": look.symbol, "symbolSize": look.size, "itemStyle": look.style()}
+    return _read("scatter", name, found) | shape | {"xAxisIndex": grid, "yAxisIndex": grid, "z": z}
+
+
+def _read(kind: str, name: str, found: Iterable[Mark]) -> Option:
+    """What all series have whose marks are read."""
     return {
-        "type": "scatter",
+        "type": kind,
         "name": name,
-        "xAxisIndex": grid,
-        "yAxisIndex": grid,
-        "symbol": look.symbol,
-        "symbolSize": look.size,
-        "itemStyle": look.style(),
         "data": [mark.item() for mark in found],
         "emphasis": {"disabled": True},
         "cursor": "inherit",
-        "z": z,
     }
 
 
@@ -130,26 +130,13 @@ def _custom(
 
 def cells(name: str, found: Iterable[Mark], ink: str) -> Option:
     """Cells of a heat map, at the places of their column and row."""
-    return {
-        "type": "heatmap",
-        "name": name,
-        "itemStyle": {"color": ink, "borderColor": "--ground", "borderWidth": 1},
-        # ECharts draws no cell without a third value.
-        "data": [{**mark.item(), "value": [mark.x, mark.y, 0]} for mark in found],
-        "emphasis": {"disabled": True},
-        "cursor": "inherit",
-    }
+    series = _read("heatmap", name, found)
+    for item in series["data"]:
+        item["value"].append(0)  # ECharts draws no cell without a third value
+    return series | {"itemStyle": {"color": ink, "borderColor": "--ground", "borderWidth": 1}}
 
 
 def bars(name: str, found: Iterable[Mark], ink: str) -> Option:
     """A bar for each mark, read wherever the pointer is above or below its top."""
-    return {
-        "type": "bar",
-        "name": name,
-        "barCategoryGap": "12%",
-        "itemStyle": {"color": ink},
-        "data": [mark.item() for mark in found],
-        "emphasis": {"disabled": True},
-        "cursor": "inherit",
-        "upright": True,
-    }
+    series = _read("bar", name, found)
+    return series | {"barCategoryGap": "12%", "itemStyle": {"color": ink}, "upright": True}

@@ -35,7 +35,9 @@ STATES: Final[Mapping[str, State]] = {
 
 def totals(*, split: str = "") -> dict[str, Any]:
     """How many there are in each list, and how long the oldest that waits has waited."""
-    rows = _of(split).order_by().values_list("status").annotate(n=Count("pk"), oldest_at=Min("queued_at"))
+    queue = Evaluation.objects.filter(status__in=[state.status for state in STATES.values()])
+    queue = queue.filter(submission__split=split) if split else queue
+    rows = queue.order_by().values_list("status").annotate(n=Count("pk"), oldest_at=Min("queued_at"))
     by_status = {status: (n, oldest_at) for status, n, oldest_at in rows}
     counts = {name: by_status.get(state.status, (0, None))[0] for name, state in STATES.items()}
     _, oldest_at = by_status.get(Status.QUEUED, (0, None))
@@ -68,15 +70,11 @@ def queue_table(*, state: str = "", split: str = "", number: Any = 1) -> dict[st
     }
 
 
-def _of(split: str) -> QuerySet[Evaluation]:
-    rows = Evaluation.objects.filter(status__in=[state.status for state in STATES.values()])
-    return rows.filter(submission__split=split) if split else rows
-
-
 def _listed(state: State, *, split: str) -> QuerySet[Evaluation]:
     """One of the lists, without the columns that are large and not shown."""
-    rows = _of(split).filter(status=state.status)
+    rows = Evaluation.objects.filter(status=state.status)
     rows = rows.order_by(*state.order) if state.order else rows.in_turn()
+    rows = rows.filter(submission__split=split) if split else rows
     people = rows.select_related("submission__method__team", "submission__submitted_by", "edition")
     return people.defer("report", "problems")
 

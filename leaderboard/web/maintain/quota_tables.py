@@ -5,7 +5,7 @@ from typing import Any
 
 from django.db.models import Q, QuerySet
 
-from leaderboard.models import QuotaOverride, Split, Team, User
+from leaderboard.models import Split, Team, User
 from leaderboard.models.quotas import QuotaRules
 from leaderboard.moderation import forgetting
 from leaderboard.people import names
@@ -46,12 +46,6 @@ def sentence_of(row: QuotaRules) -> str:
     submissions = "submission" if row.quota_limit == 1 else "submissions"
     files = "file" if row.quota_rejected_limit == 1 else "files"
     return f"{sent} {submissions}{within}{apart}; {turned_away} rejected or cancelled {files}{within_a_day}"
-
-
-def overrides() -> QuerySet[QuotaOverride]:
-    """All rules of single teams, split by split."""
-    rows = QuotaOverride.objects.select_related("team", "set_by")
-    return rows.order_by("split__position", "split", "team__name")
 
 
 def team_rows(team: Team, *, viewer: User, now: datetime) -> list[dict[str, Any]]:

@@ -31,7 +31,9 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
     lookup = TeamLookup(request.GET)
     text = lookup.cleaned_data["team"] if lookup.is_valid() else ""
     found = quota_tables.teams_like(text) if text else []
-    page = Paginator(quota_tables.overrides(), PER_PAGE).get_page(request.GET.get("page"))
+    overrides = QuotaOverride.objects.select_related("team", "set_by")
+    overrides = overrides.order_by("split__position", "split", "team__name")
+    page = Paginator(overrides, PER_PAGE).get_page(request.GET.get("page"))
     context = {
         "form": lookup,
         "text": text,

@@ -19,7 +19,7 @@ class UnnamedFileUploadHandler(TemporaryFileUploadHandler):
         """Begin a file."""
         FileUploadHandler.new_file(self, *args, **kwargs)
         file = tempfile.TemporaryFile()  # noqa: SIM115 - the request closes it, or else this handler
-        self.file = UploadedFile(
+        self.file = UploadedFile(  # type: ignore[assignment]  # Django's has a name
             file, self.file_name, self.content_type, 0, self.charset, self.content_type_extra
         )
 

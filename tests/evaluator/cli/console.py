@@ -179,7 +179,7 @@ def put_documented_answers(site: RecordedSite) -> None:
 
 
 def put_more_documented_answers(site: RecordedSite) -> None:
-    """Of the same leaderboard: quotas, a comparison, a receipt, a method, a split with a manifest."""
+    """Of the same leaderboard: quotas, a comparison, a receipt, a split with a manifest."""
     window_s = 30 * 86400.0
     quotas = [
         {"split": "val", "limit": 50, "used": 2, "left": 48, "next_slot_at": None, "is_open": True},
@@ -207,41 +207,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
     pair = {"differences": differences, "sentence": sentence}
     site.put("GET /api/v1/compare", Reply(compared | {"pairs": [pair]}))
     site.put(f"GET /api/v1/submissions/{ID}/receipt", Reply(RECEIPT.encode()))
-    mine = {"id": METHOD_ID, "name": "Foo++", "visibility": "PRIVATE", "pseudonym": "Anonymous 5d2c1f"}
-    site.put("GET /api/v1/methods", Reply([mine]))
-    site.put(f"GET /api/v1/methods/{METHOD_ID}", Reply(mine))
-    url = f"https://leaderboard.example.org/methods/{METHOD_ID}/"
-    site.put(f"GET /api/v1/methods/{METHOD_ID}/visibility", Reply(_foreseen()))
-    site.put(
-        f"POST /api/v1/methods/{METHOD_ID}/visibility", Reply(mine | {"visibility": "PUBLIC", "url": url})
-    )
-
-
-def _foreseen() -> dict[str, Any]:
-    """What everybody would see of the one submission: the board of test as it is documented."""
-    board = published_board("test", dict(zip(SCORE_NAMES, VALUES, strict=True)))
-    rows = board["entries"]
-    assert isinstance(rows, list)
-    own = next(row for row in rows if row["method"] == "Foo++")
-    moved = [
-        {
-            "method": row["method"],
-            "method_id": None,
-            "rank_before": row["rank"] - 1,
-            "rank_after": row["rank"],
-        }
-        for row in rows
-        if row["rank"] > own["rank"]
-    ]
-    sight = {
-        "split": "test",
-        "edition": 2,
-        "n_ranked": len(rows),
-        "before": None,
-        "after": own,
-        "moved": moved,
-    }
-    return {"visibility": "PUBLIC", "name": "Foo++", "team": "TJU-V", "splits": [sight]}
+    site.put("GET /api/v1/methods", Reply([]))
 
 
 def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object]:

@@ -14,7 +14,6 @@ from typing import Any, Self
 CUT = "cut"  # close the connection without an answer
 CUT_SHORT = "cut short"  # promise more bytes than are sent
 IS_LEADERBOARD = "GET /api/v1/splits"
-REFUSE_EARLY = "refuse early"  # answer before the body has been read, then close
 
 
 @dataclass(frozen=True)
@@ -112,7 +111,7 @@ class RecordedSite:
             def answer(self) -> None:
                 reply = site.next_reply(f"{self.command} {self.path}")
                 n_bytes = int(self.headers.get("Content-Length", 0))
-                body = b"" if reply.fault == REFUSE_EARLY else self.rfile.read(n_bytes)
+                body = self.rfile.read(n_bytes)
                 if f"{self.command} {self.path}" != IS_LEADERBOARD:
                     site.requests.append(Request(self.command, self.path, self.headers, body))
                 self.close_connection = bool(reply.fault)
@@ -125,13 +124,6 @@ class RecordedSite:
                     self.send_header(name, value)
                 self.end_headers()
                 self.wfile.write(content)
-                if reply.fault == REFUSE_EARLY:
-                    self._drain(n_bytes)
-
-            def _drain(self, n_bytes: int) -> None:
-                """Take what is still on its way, as a server with a lingering close does."""
-                while n_bytes > 0 and (block := self.rfile.read1(1 << 16)):
-                    n_bytes -= len(block)
 
             do_GET = do_POST = answer  # noqa: N815 -- the names that http.server calls
 

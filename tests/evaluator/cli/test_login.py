@@ -61,14 +61,6 @@ def test_token_that_the_server_refuses_is_not_kept(
     assert TOKEN not in result.output
 
 
-@pytest.mark.parametrize("text", ["", "\n", "to ken", "tökén"])
-def test_what_is_no_token_is_not_sent(
-    tsttc: Tsttc, site: RecordedSite, ring: RememberingKeyring, text: str
-) -> None:
-    result = tsttc("login", "--server", site.url, stdin=text.encode())
-    assert (result.exit_code, site.requests) == (4, [])
-
-
 def test_machine_without_a_keyring_keeps_the_token_in_a_file_that_only_its_owner_can_read(
     tsttc: Tsttc, site: RecordedSite, places: Path
 ) -> None:

@@ -14,13 +14,6 @@ def test_the_tables_are_listed(tsttc: Tsttc) -> None:
     assert len(json.loads(tsttc("published", "--json").stdout)) == 12
 
 
-def test_a_table_has_its_default_its_notes_and_its_source(tsttc: Tsttc) -> None:
-    text = tsttc("published", "ablation-kernel-size").stdout
-    assert "7 (default)   14.4  12.1" in text
-    assert "Note: A kernel of 9 has a lower error than the default of 7" in text
-    assert text.endswith("section E Ablation Study: https://arxiv.org/abs/2309.01539\n")
-
-
 def test_a_table_is_printed_in_other_formats(tsttc: Tsttc) -> None:
     assert tuple(WRITERS) == FORMATS
     for name, start in (

@@ -1,12 +1,11 @@
 """What Windows does otherwise: paths, line ends, byte order marks, the place of settings."""
 
-from pathlib import Path, PureWindowsPath
+from pathlib import Path
 
 import pytest
 
 from evaluator import read_manifest, read_predictions, read_truth
 from evaluator.cli import tokens
-from evaluator.cli.submissions import _name_to_send
 from tests.evaluator.worlds import EXAMPLES, Tsttc
 
 MARK = b"\xef\xbb\xbf"
@@ -15,19 +14,6 @@ MARK = b"\xef\xbb\xbf"
 def windows_text(name: str) -> bytes:
     """A file of the examples as Notepad saves it."""
     return MARK + (EXAMPLES / name).read_bytes().replace(b"\r\n", b"\n").replace(b"\n", b"\r\n")
-
-
-@pytest.mark.parametrize(
-    ("path", "name"),
-    [
-        (r"C:\Users\Ada Lovelace\mine.json", "mine.json"),
-        (r"\\server\share\epoch 3.PARQUET", "epoch 3.json"),
-        (r"D:mine.json.gz", "mine.json.gz"),
-        (r"..\out\mine.csv", "mine.csv"),
-    ],
-)
-def test_a_file_is_sent_under_its_name_without_its_folder(path: str, name: str) -> None:
-    assert _name_to_send(PureWindowsPath(path)) == name  # type: ignore[arg-type]
 
 
 def test_files_saved_by_windows_editors_mean_the_same(tsttc: Tsttc, tmp_path: Path) -> None:

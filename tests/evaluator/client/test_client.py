@@ -7,7 +7,7 @@ import pytest
 from evaluator.client.answers import BadAnswer, Refused, Unreachable
 from evaluator.client.api import Client
 from evaluator.client.exchange import RetryPolicy
-from tests.evaluator.cli.recorded_site import CUT, CUT_SHORT, REFUSE_EARLY, RecordedSite, Reply
+from tests.evaluator.cli.recorded_site import CUT, CUT_SHORT, RecordedSite, Reply
 from tests.evaluator.fake_time import FakeTime
 
 SUBMISSIONS = "POST /api/v1/submissions"
@@ -129,14 +129,6 @@ def test_redirect_is_reported_and_not_followed(client: Client, site: RecordedSit
     with pytest.raises(BadAnswer, match=r"a redirect to https://elsewhere\.example/, which is not followed"):
         send(client)
     assert len(site.requests) == 1
-
-
-def test_refusal_before_the_upload_is_over_is_understood(client: Client, site: RecordedSite) -> None:
-    document = {"title": "Too large", "detail": "The file is larger than 20 MB."}
-    site.put(SUBMISSIONS, Reply(document, status=413, fault=REFUSE_EARLY))
-    with pytest.raises(Refused) as caught:
-        send(client, b" " * 3_000_000)
-    assert (caught.value.status, caught.value.detail) == (413, "The file is larger than 20 MB.")
 
 
 def test_names_cannot_lead_out_of_their_place_in_the_address(client: Client, site: RecordedSite) -> None:

@@ -107,8 +107,6 @@ def test_flipped_signs_are_seen_without_the_truth() -> None:
 def test_submit_warns_before_it_sends_and_sends_all_the_same(
     tsttc: Tsttc, site: RecordedSite, at_site: None, driven: GroundTruth, tmp_path: Path
 ) -> None:
-    rows = [{"edition": 1, "is_board": True, "manifest": driven.manifest.digest}]
-    site.put("GET /api/v1/splits/val/editions", Reply(rows))
     site.put(
         "GET /api/v1/splits/val/manifest",
         Reply(driven.manifest.to_csv(), headers={"Content-Type": "text/csv"}),

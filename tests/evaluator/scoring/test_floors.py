@@ -42,11 +42,3 @@ def test_an_interval_without_sequences_has_no_floor() -> None:
     floor = floor_of(make_truth([1.0, 2.0, 30.0]))
     assert floor["mid_negative"] is None
     assert "every other column" in floor_sentence(floor)
-
-
-def test_words_name_every_column_that_is_not_0() -> None:
-    floor: dict[str, float | None] = dict.fromkeys(SCORE_NAMES, 0.0)
-    assert floor_sentence(None) == floor_sentence({}) == floor_sentence(floor) == ""
-    assert "scores MiD 0.10, RTE 0.00 % and 0 in every other column." in floor_sentence(floor | {"mid": 0.1})
-    said = floor_sentence(floor | {"mid": 0.4, "mid_negative": 0.2, "rte": 0.7}, decimals=1)
-    assert "scores MiD 0.4, MiD on negative 0.2, RTE 0.7 % and 0 in every other column." in said

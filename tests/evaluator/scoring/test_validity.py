@@ -3,22 +3,17 @@
 Here few repetitions, with room for their own chance; the command makes thousands.
 """
 
-import itertools
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
 from tests import error_models
 from tests.error_models import Drawn, Model
-from tests.validity import __main__ as tables
 from tests.validity import coverage, fields, margin, worlds
 from tests.validity.coverage import Coverage
 
 pytestmark = pytest.mark.slow
-
-DOCUMENTATION = Path(__file__).resolve().parents[3] / "docs" / "uncertainty.md"
 
 # Cells in which no interval of this kind holds 95 %: docs/uncertainty.md gives their coverage.
 SKEWED = {"Pareto", "unequal"}
@@ -111,37 +106,3 @@ def test_recordings_of_alike_days_need_days_as_units() -> None:
     recordings, days = found(coverage.as_drawn), found(coverage.days_of(35))
     assert recordings.all.of_difference < 0.8 < days.all.of_difference
     assert min(recordings.all.of_means) < 0.8 < min(days.all.of_means)
-
-
-# --- the tables of the documentation ---------------------------------------------------------------------
-
-
-def documented(head: Sequence[object]) -> list[list[str]]:
-    """The rows of the documentation's table with this head."""
-    lines = DOCUMENTATION.read_text(encoding="utf-8").splitlines()
-    (start,) = [i for i, text in enumerate(lines) if text == tables.line(head)]
-    rows = itertools.takewhile(lambda text: text.startswith("|"), lines[start + 2 :])
-    return [text.strip("| ").split(" | ") for text in rows]
-
-
-def test_the_documented_tables_have_the_rows_of_the_command() -> None:
-    names = [*map(str, error_models.MODELS), str(error_models.ONE_FAILS)]
-    found = documented(tables.COVERAGE_HEAD)
-    assert [row[:2] for row in found] == [[name, str(g)] for name in names for g in tables.N_RECORDINGS]
-    of_days = [row[:4] for row in documented(tables.DAYS_HEAD)]
-    units = "recording", "day"
-    assert of_days == [[*map(str, setting), unit] for setting in tables.DAYS for unit in units]
-    odd = [row[0] for row in documented(tables.RANKS_HEAD) if "one odd" in row[0]]
-    assert odd == [f"10, one odd: {name}" for name in ("informative", "one fails") for _ in range(3)]
-
-
-@pytest.mark.parametrize("name", ["exponential", "one fails"])
-def test_a_documented_row_is_what_the_command_finds(name: str) -> None:
-    model = next(model for model in (*error_models.MODELS, error_models.ONE_FAILS) if model.name == name)
-    n = 500
-    again = tables.coverage_row(model, 50, tables.coverage_of(model, 50, n=n))
-    (told,) = [row for row in documented(tables.COVERAGE_HEAD) if row[:2] == [name, "50"]]
-    for cell, other in zip(told[3:], again[3:], strict=True):
-        (value, half), (found, its_half) = (map(float, str(each).split(" ± ")) for each in (cell, other))
-        # Seven cells, each at 95 %: half as much again.
-        assert abs(value - found) <= 1.5 * (half + its_half) + 0.1, (cell, other)

@@ -159,7 +159,11 @@ class TestAtOnce:
                     "accepted": partial(builders.send, stranger, file_of(data)),
                 }
                 first, second = actions.pop(held), *actions.values()
-                outcome = meet(first, second, at=lambda at, _, number=number: at == number)
+
+                def is_here(found: int, sql: str, number: int = number) -> bool:
+                    return found == number
+
+                outcome = meet(first, second, at=is_here)
                 was_held = outcome.was_held
                 assert outcome.faults == (None, None)
                 [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)

@@ -8,7 +8,6 @@ from evaluator.problems import Rejected
 from tests.tsttc_baselines.annotation.made_tracks import tracks_of
 from tsttc_baselines.annotation.choice import choose
 from tsttc_baselines.annotation.pipeline import DEPTHS, Depth, annotate, frame_ttc
-from tsttc_baselines.annotation.tracks import Tracks
 
 N_FRAMES = 12
 
@@ -100,21 +99,10 @@ def test_a_track_that_was_lost_begins_anew() -> None:
     assert found.table.ttc_s[2] == pytest.approx(7.5)
 
 
-def test_what_stands_still_and_short_tracks_are_counted_and_left_out() -> None:
+def test_what_stands_still_is_counted_and_left_out() -> None:
     standing = annotate(tracks_of(np.hstack([steady(), np.full((N_FRAMES, 1), 20.0)])))
     assert standing.counts["standing_still"] == 2
     assert len(standing.table.ttc_s) == 2
-    short = steady(2)
-    tracks = tracks_of(short[:4]), tracks_of(short[4:, :1])
-    assert annotate(joined(*tracks)).counts["short_tracks"] == 1
-
-
-def joined(first: Tracks, second: Tracks) -> Tracks:
-    """The second goes on where the first ends."""
-    second.ts_ns[:] += int(first.ts_ns[-1]) + 100_000_000
-    names = ("ts_ns", "centre_m", "size_m", "yaw_rad", "box_px", "is_truncated", "radar_mps")
-    arrays = {name: np.concatenate([getattr(first, name), getattr(second, name)]) for name in names}
-    return Tracks(key=first.key + second.key, has_radar=False, **arrays)
 
 
 def test_tracks_without_any_sequence_are_a_problem() -> None:

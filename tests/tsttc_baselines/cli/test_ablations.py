@@ -71,12 +71,3 @@ def test_what_cannot_be_drawn_is_said_in_a_sentence(
     assert result.exit_code == 2
     assert sentence in result.stderr
     assert not (tmp_path / name).exists()
-
-
-def test_a_sequence_without_an_image_is_not_drawn(tsttc: Tsttc, frames: Path, tmp_path: Path) -> None:
-    for image in (frames / "images").rglob("*.jpg"):
-        image.unlink()
-    result = tsttc("baseline", "show", frames, "1", "-o", tmp_path / "1.svg")
-    assert result.exit_code == 1
-    assert "The image is missing" in result.stderr
-    assert not (tmp_path / "1.svg").exists()

@@ -60,14 +60,3 @@ def test_without_texture_the_estimate_stays_at_a_start(operations: Operations) -
     grey = np.full((240, 320, 3), 90, dtype=np.uint8)
     found = fitted_scale_ratio(operations, (grey, grey), boxes, near=0.93)
     assert min(abs(found - 0.93), abs(found - 0.95)) < 1e-6
-
-
-@pytest.mark.parametrize(
-    "sides", [((4.5, 4.5), (220, 160)), ((220, 160), (4.5, 4.5)), ((300, 4.2), (4.2, 200))]
-)
-def test_boxes_that_do_not_belong_together_give_a_number(
-    operations: Operations, sides: tuple[tuple[float, float], tuple[float, float]]
-) -> None:
-    frames, _ = pair(planted(0.95))
-    reference, target = (box_around(np.array([160.0, 120.0]), np.array(each)) for each in sides)
-    assert 0.25 < fitted_scale_ratio(operations, frames, (reference, target), near=0.95) < 4

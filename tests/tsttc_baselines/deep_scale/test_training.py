@@ -10,7 +10,6 @@ import pytest
 from numpy.typing import NDArray
 
 from evaluator import GroundTruth, read_truth
-from evaluator.problems import Rejected
 from tests.tsttc_baselines.made_folders import made_folder, stamp
 from tsttc_baselines.clips import Clip
 from tsttc_baselines.deep_scale.samples import (
@@ -172,10 +171,3 @@ def test_a_folder_is_learned_from_in_the_order_of_its_truth(tmp_path: Path) -> N
     clips: list[Clip] = [source.clip(row) for row in range(2)]
     assert [clip.anno_id for clip in clips] == truth.manifest.anno_id.tolist()
     assert usable_pair(source, 0, scale_ratio=0.8).reference.ndim == 3
-
-
-def test_a_truth_without_boxes_is_a_problem(tmp_path: Path) -> None:
-    folder = made_folder(tmp_path)
-    (folder / "truth.csv").write_text(TRUTH + f"0,0007,1,{stamp(9, 5)},0,2.0\n")
-    with pytest.raises(Rejected, match="The ground truth has 1 sequence without boxes, the first is 0007/1/"):
-        FolderSequences.of(read_folder(folder), read_truth(folder / "truth.csv"))

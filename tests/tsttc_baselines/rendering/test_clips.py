@@ -62,9 +62,3 @@ def test_a_view_of_the_whole_image_shows_the_same_scene(drawn: Split) -> None:
         : part.clip.grey(5).shape[0], : part.clip.grey(5).shape[1]
     ]
     assert np.corrcoef(cut.ravel(), part.clip.grey(5).ravel())[0, 1] > 0.98
-
-
-def test_the_vehicle_grows_by_the_scale_ratio(drawn: Split) -> None:
-    rendered = render(drawn, anno_id=3, seed=SEED)
-    side = rendered.true_boxes[:, 2] - rendered.true_boxes[:, 0]
-    np.testing.assert_allclose(side[0] / side[5], drawn.gap_m[3, 5] / drawn.gap_m[3, 0])
