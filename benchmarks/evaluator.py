@@ -50,7 +50,7 @@ def true_values(truth: GroundTruth) -> dict[int, float]:
 
 
 def plain_loop(data: bytes, true_s: dict[int, float]) -> dict[str, tuple[float, float]]:
-    """Scoring as the dataset's toolkit does it: json, dictionaries, math, a list per interval."""
+    """Scoring as the dataset's toolkit does it: json, dictionaries, math, a list per TTC range."""
     errors: dict[int, tuple[float, float]] = {}
     predictions = json.loads(data)
     assert {int(key) for key in predictions} == set(true_s)

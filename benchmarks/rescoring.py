@@ -97,7 +97,7 @@ def check(truth: evaluator.GroundTruth, new: evaluator.GroundTruth) -> None:
         metric, _, ttc_range = name.partition("_")
         mid, rte = expected[ttc_range or "overall"]
         decimals = evaluation.edition.decimals
-        assert value == evaluator.published(mid if metric == "mid" else rte, decimals=decimals), name
+        assert value == evaluator.rounded(mid if metric == "mid" else rte, decimals=decimals), name
 
 
 def perturbed(truth: evaluator.GroundTruth, *, seed: int) -> evaluator.GroundTruth:

@@ -45,7 +45,7 @@ def published_scores(
     """
     values = predictions(truth, number)
     report = evaluator.evaluate(values, against or truth)
-    return {name: evaluator.published(value, decimals=decimals) for name, value in report.flat().items()}
+    return {name: evaluator.rounded(value, decimals=decimals) for name, value in report.flat().items()}
 
 
 def join(*, split_name: str, truth: evaluator.GroundTruth, n: int, n_files: int) -> None:

@@ -9,7 +9,7 @@ from django.utils import timezone
 
 from evaluator import GroundTruth, evaluate, read_manifest, read_predictions, rounded
 from evaluator.metrics.protocol import SCORE_NAMES
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.editions import corrections, splits
 from leaderboard.models import (
     Edition,
@@ -96,9 +96,9 @@ def quote(slug: str = "later", *, mid: float = 1.0) -> splits.Imported:
     return splits.import_published(document=document, now=timezone.now(), is_replacing=True)
 
 
-def board_now() -> query.Board:
+def board_now() -> listing.Board:
     split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
-    return query.board(split=split, viewer=ANYBODY)
+    return listing.board(split=split, viewer=ANYBODY)
 
 
 def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) -> dict[str, float | None]:

@@ -42,7 +42,7 @@ def units(scores: Iterable[str]) -> str:
     """
     groups = grouped_names(scores)
     found = dict.fromkeys(range_of(name) for names in groups.values() for name in names)
-    ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for interval in found if interval)
+    ranges = ", ".join(f"{ttc_range.letter} {ttc_range.ends}" for ttc_range in found if ttc_range)
     said = f"{', '.join(metric.heading for metric in groups)}, lower is better"
     return f"{said}; TTC ranges in s: {ranges}" if ranges else said
 

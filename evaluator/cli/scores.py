@@ -328,7 +328,7 @@ def _shown(found: Sequence[_Scored], rows: Sequence[ResultRow], *, by: str | Non
 def _in_words(report: Report, row: ResultRow) -> Iterator[str]:
     yield from result_in_words(
         report.flat(),
-        counts={name: interval.count for name, interval in report.scores.items()},
+        counts={name: score.count for name, score in report.scores.items()},
         n_out_of_range=report.n_out_of_range,
         truncated=report.truncated,
         intervals=row.intervals,

@@ -40,7 +40,7 @@ class TTCRange:
     def ends(self) -> str:
         """Its ends, without their unit.
 
-        >>> [ttc_range.ends for ttc_range in INTERVALS]
+        >>> [ttc_range.ends for ttc_range in TTC_RANGES]
         ['0–3', '3–6', '6–20', '−20–0']
         """
         return f"{self.low_s:g}–{self.high_s:g}".replace("-", "−")

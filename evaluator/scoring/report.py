@@ -218,9 +218,9 @@ class Report:
     def flat(self) -> dict[str, float | None]:
         """The numbers under the protocol's `score_names`, in that order."""
         return {
-            score_name(metric, interval): score.means[metric]
+            score_name(metric, range_name): score.means[metric]
             for metric in self.scores[OVERALL].means
-            for interval, score in self.scores.items()
+            for range_name, score in self.scores.items()
         }
 
 
@@ -249,7 +249,7 @@ def rounded(value: float | None, *, decimals: int = 2) -> float | None:
 def format_rounded(value: float | None, *, decimals: int = 2, missing: str = "–") -> str:
     """The text of the published value with all its decimals, or `missing`.
 
-    >>> format_published(14.296), format_published(None)
+    >>> format_rounded(14.296), format_rounded(None)
     ('14.30', '–')
     """
     shown = rounded(value, decimals=decimals)

@@ -141,7 +141,7 @@ def setting_text(row: PublishedRow) -> str:
 
 def _heading(table: PublishedTable, column: str) -> str:
     if column in SCORE_NAMES:
-        metric, (_, interval) = metric_of(column), split_name(column)
+        metric, (_, ttc_range) = metric_of(column), split_name(column)
         return metric.symbol if ttc_range == OVERALL else f"{metric.symbol} {ttc_range}"
     return _LABELS.get(column, column)
 

@@ -112,9 +112,10 @@ def cells_of(row: ResultRow) -> Iterator[str]:
 def _titles(scores: Sequence[str]) -> list[str]:
     """The heads of scores; where none is of a range, nothing is said of ranges."""
     parts = [split_name(name) for name in scores]
-    has_ranges = any(interval != OVERALL for _, interval in parts)
+    has_ranges = any(range_name != OVERALL for _, range_name in parts)
     return [
-        f"{metric_of(metric).symbol} {interval if has_ranges else ''}".rstrip() for metric, interval in parts
+        f"{metric_of(metric).symbol} {range_name if has_ranges else ''}".rstrip()
+        for metric, range_name in parts
     ]
 
 

@@ -13,7 +13,7 @@ from leaderboard.api.schema import errors
 from leaderboard.api.serializers import BoardSerializer
 from leaderboard.api.throttling import AsOfThrottle
 from leaderboard.api.views import current_split, published_edition
-from leaderboard.boards import filters, snapshots
+from leaderboard.boards import filters, listing, snapshots
 from leaderboard.exports import tables
 from leaderboard.models import Edition, Split
 
@@ -67,7 +67,7 @@ class BoardView(APIView):
     def get(self, request: Request, split: str) -> Response:
         """Submissions and quoted rows, ranked by published MiD; filters do not change the ranks."""
         query = request.query_params
-        at = query.parse_time(query["at"]) if query.get("at") else None
+        at = listing.parse_time(query["at"]) if query.get("at") else None
         return _board(request, split=current_split(request, split), at=at)
 
 

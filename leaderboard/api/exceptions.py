@@ -13,7 +13,7 @@ from rest_framework.views import APIView
 from rest_framework.views import exception_handler as default_handler
 
 from leaderboard.api.throttling import UnauthorizedThrottle
-from leaderboard.boards import filters, query
+from leaderboard.boards import filters, listing
 from leaderboard.errors import outages, problem_codes
 from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.ops import rate_limits
@@ -86,8 +86,8 @@ REFUSED_STATUS: dict[str, int] = {
 }
 # What the domain raises besides `Refused`: status, code, and the input at fault.
 DOMAIN_ERRORS: dict[type[Exception], tuple[int, str, str]] = {
-    query.UnknownColumn: (400, "unknown-column", "sort"),
-    query.BadTime: (400, "bad-moment", "at"),
+    listing.UnknownColumn: (400, "unknown-column", "sort"),
+    listing.BadTime: (400, "bad-moment", "at"),
     NotMaintainer: (403, "not-maintainer", ""),
     comparisons.BadComparison: (400, comparisons.BadComparison.code, "m"),
     comparisons.UnknownMethod: (404, comparisons.UnknownMethod.code, "m"),

@@ -20,7 +20,7 @@ from evaluator.metrics.protocol import (
     range_of,
 )
 from leaderboard.boards import snapshots
-from leaderboard.boards.query import Board
+from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.methods import details
 from leaderboard.methods.details import Details

@@ -13,7 +13,7 @@ from django.db import connection
 from django.db.migrations.recorder import MigrationRecorder
 
 from evaluator.tables import formats
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.exports import tables
 from leaderboard.models import Edition, GroundTruth, Submission
 from leaderboard.storage import files, truth_values
@@ -46,7 +46,7 @@ class Contents:
     ground_truth: dict[str, str]
     missing: list[str]
     keys: dict[str, Any]
-    query: dict[str, str]
+    boards: dict[str, str]
     audit: str
 
     def write(self, folder: Path) -> None:
@@ -150,7 +150,7 @@ def board_digests() -> dict[str, str]:
     found = {}
     editions = Edition.objects.exclude(published_at=None).select_related("split", "ground_truth")
     for edition in editions.order_by("split", "number"):
-        shown = query.board(split=edition.split, edition=edition, viewer=AnonymousUser())
+        shown = listing.board(split=edition.split, edition=edition, viewer=AnonymousUser())
         text = formats.as_csv(tables.export(shown, address="", has_intervals=True))
         found[f"{edition.split_id}/{edition.number}"] = hashlib.sha256(text.encode()).hexdigest()
     return found

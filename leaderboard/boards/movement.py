@@ -7,8 +7,8 @@ from uuid import UUID
 
 from django.core.cache import caches
 
-from leaderboard.boards import query
-from leaderboard.boards.query import Board
+from leaderboard.boards import listing
+from leaderboard.boards.listing import Board
 
 MONTH: Final = timedelta(days=30)
 
@@ -43,9 +43,9 @@ def _ranks_before(board: Board, *, at: datetime) -> dict[UUID, int]:
         return {}
 
     def ranks() -> dict[UUID, int]:
-        if query.edition_at(split, at) != edition:
+        if listing.edition_at(split, at) != edition:
             return {}
-        rows = query.public_rows(split=split, edition=edition, at=at)
+        rows = listing.public_rows(split=split, edition=edition, at=at)
         return {row.method_id: row.rank for row in rows if row.method_id and row.rank}
 
     key = f"ranks:{split.pk}:{edition.pk}:{at.isoformat()}"

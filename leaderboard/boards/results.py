@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from django.contrib.auth.models import AnonymousUser
 
 from evaluator.metrics.protocol import PRIMARY
-from leaderboard.boards import query, snapshots
+from leaderboard.boards import listing, snapshots
 from leaderboard.boards.rows import Entry, Profile, profile_of
 from leaderboard.boards.snapshots import Attempt
 from leaderboard.models import Edition, Method, Split, User
@@ -39,7 +39,7 @@ def results(
     found = []
     for split, drawn in snapshots.shown_on(splits if splits is not None else snapshots.splits()):
         edition = split.published_edition
-        entries = query.with_own(drawn.entries, split=split, edition=edition, viewer=viewer)
+        entries = listing.with_own(drawn.entries, split=split, edition=edition, viewer=viewer)
         entry = next((entry for entry in entries if entry.method_id == method.pk), None)
         if entry is None or edition is None:
             continue

@@ -21,7 +21,7 @@ from django.http import HttpRequest
 
 from evaluator.metrics.protocol import OVERALL
 from leaderboard import board_versions
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.boards.rows import Entry
 from leaderboard.models import (
     Edition,
@@ -117,19 +117,19 @@ def _public_rows(*, split: Split, edition: Edition | None, at: datetime | None) 
     if at is not None:
         return _as_of(split, edition, at)
     if edition is None:
-        return query.public_rows(split=split, edition=None)
+        return listing.public_rows(split=split, edition=None)
     return shown(split=split, edition=edition).entries
 
 
-board = partial(query.board, read=_public_rows)
-"""The same as `query.board`, from what is kept; `split` is of `splits()` or `editions()`."""
+board = partial(listing.board, read=_public_rows)
+"""The same as `listing.board`, from what is kept; `split` is of `splits()` or `editions()`."""
 
 
 def _as_of(split: Split, edition: Edition | None, at: datetime) -> tuple[Entry, ...]:
     """What everybody saw at that time."""
 
     def rows() -> CurrentBoard:
-        return CurrentBoard(query.public_rows(split=split, edition=edition, at=at))
+        return CurrentBoard(listing.public_rows(split=split, edition=edition, at=at))
 
     key = f"{split.pk}:{edition and edition.pk}:{_number(split, edition)}:{at.isoformat()}"
     return _kept(key, rows, cache="views").entries
@@ -164,7 +164,7 @@ def _encoded(read: Callable[[], CurrentBoard]) -> bytes:
 def _now(edition_id: int) -> CurrentBoard:
     """The edition as the database has it at this moment."""
     edition = Edition.objects.select_related("split__published_edition", "ground_truth").get(pk=edition_id)
-    entries = query.public_rows(split=edition.split, edition=edition)
+    entries = listing.public_rows(split=edition.split, edition=edition)
     return CurrentBoard(entries=entries, attempts=attempts(edition, methods=Method.objects.shown()))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from uuid import UUID
 
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.boards.rows import Entry, Profile, profile_of
 from leaderboard.models import Edition, Method, Split, Visibility
 
@@ -55,10 +55,10 @@ def preview(*, method: Method, visibility: str, now: datetime) -> VisibilityPrev
     )
     for split in splits:
         edition = split.published_edition
-        rows = query.public_rows(split=split, edition=edition, assuming_visible=assuming_visible)
+        rows = listing.public_rows(split=split, edition=edition, assuming_visible=assuming_visible)
         entry = next((row for row in rows if row.method_id == method.pk), None)
         if entry is not None and edition is not None:
-            before = query.public_rows(split=split, edition=edition)
+            before = listing.public_rows(split=split, edition=edition)
             sights.append(
                 BoardPreview(
                     split=split,

@@ -7,7 +7,7 @@ from uuid import UUID
 
 from django.contrib.auth.models import AnonymousUser
 
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.boards.rows import scored_in
 from leaderboard.editions import corrections, history
 from leaderboard.errors.refusals import Refused
@@ -207,7 +207,7 @@ class _Side:
 
 
 def _side(edition: Edition) -> _Side:
-    board = query.board(split=edition.split, edition=edition, viewer=AnonymousUser())
+    board = listing.board(split=edition.split, edition=edition, viewer=AnonymousUser())
     rows = Evaluation.objects.filter(edition=edition, submission__withdrawn_at=None)
     return _Side(
         edition=edition,

@@ -17,7 +17,7 @@ from evaluator.tables import layouts
 from evaluator.tables.layouts import Export
 from evaluator.units import RECORDING
 from leaderboard.boards.filters import BadFilter
-from leaderboard.boards.query import Board
+from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.exports import bibtex
 from leaderboard.methods.details import DETAILS
@@ -127,7 +127,7 @@ def latex_row(entry: Entry) -> str:
 
 
 def _layout_row(entry: Entry, *, columns: Sequence[str], has_intervals: bool) -> layouts.Row:
-    ranks = entry.intervals.get(PRIMARY, Interval()) if has_intervals else Interval()
+    ranks = entry.intervals.get(PRIMARY, ConfidenceInterval()) if has_intervals else ConfidenceInterval()
     return layouts.Row(
         rank=layouts.rank_text(entry.rank, low=ranks.rank_low, high=ranks.rank_high),
         method=entry.method,

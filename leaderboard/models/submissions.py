@@ -246,7 +246,7 @@ class Evaluation(models.Model):
 
 
 class Score(models.Model):
-    """One published value: evaluation × metric × interval, rounded as the protocol says."""
+    """One published value: evaluation × metric × TTC range, rounded as the protocol says."""
 
     evaluation = models.ForeignKey(Evaluation, on_delete=models.CASCADE, related_name="scores")
     metric = models.CharField(max_length=32)

@@ -19,7 +19,7 @@ from evaluator.metrics.protocol import PRIMARY
 from evaluator.scoring import differences
 from evaluator.scoring.significance import Influence
 from evaluator.tables import sentences
-from leaderboard.boards import query, rows, snapshots
+from leaderboard.boards import listing, rows, snapshots
 from leaderboard.boards.rows import Entry
 from leaderboard.models import Comparison, Edition, Method, Split, User
 from leaderboard.statistics import confidence, disclosure, questions, recording_sums
@@ -154,7 +154,7 @@ def compare(
     )
 
 
-def of_first(*, board: query.Board) -> tuple[Pair, ...]:
+def of_first(*, board: listing.Board) -> tuple[Pair, ...]:
     """All pairs of the first rows of a board that everybody sees, each with the better rank first.
 
     What is not known yet is noted, for workers to compute after all that somebody waits for. Empty for a
@@ -181,7 +181,7 @@ def neighbours(pairs: Sequence[Pair]) -> list[Pair]:
     return [pair for pair in pairs if is_first.pop(pair.first.evaluation_id, False)]
 
 
-def _chosen(board: query.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
+def _chosen(board: listing.Board, methods: Sequence[UUID], viewer: User | AnonymousUser) -> list[Entry]:
     """The methods' rows, in the order that was asked for."""
     if not MIN_METHODS <= len(methods) <= MAX_METHODS:
         raise BadComparison(

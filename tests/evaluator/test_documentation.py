@@ -46,9 +46,9 @@ def test_every_problem_has_its_line() -> None:
 
 def test_every_protocol_and_interval_is_described() -> None:
     assert [name for name in PROTOCOLS if f"`{name}`" not in SCORING] == []
-    for interval in TTC_RANGES:
-        low, high = (f"{value:g}".replace("-", "−") for value in (interval.low_s, interval.high_s))
-        assert interval.name in SCORING
+    for ttc_range in TTC_RANGES:
+        low, high = (f"{value:g}".replace("-", "−") for value in (ttc_range.low_s, ttc_range.high_s))
+        assert ttc_range.name in SCORING
         assert f"{low} ≤ τ ≤ {high}" in SCORING
     for boundary in PROTOCOLS["tsttc-1"].boundaries:
         assert boundary.replace("-", "−") in SCORING

@@ -98,7 +98,7 @@ def errors_of_the_toolkit(predicted_s: float, true_s: float) -> dict[str, float]
 def means_of_the_toolkit(
     predicted_s: Sequence[float], true_s: Sequence[float]
 ) -> dict[str, dict[str, float | int | None]]:
-    """Mean errors and counts by interval, sequence after sequence; None where an interval is empty."""
+    """Mean errors and counts by TTC range, sequence after sequence; None where a range is empty."""
     ranges = {"crucial": (0, 3), "small": (3, 6), "large": (6, 20), "negative": (-20, 0)}
     parts = {"overall": list(range(len(true_s)))}
     for name, (low, high) in ranges.items():

@@ -46,7 +46,7 @@ def offline(data: bytes, truth: evaluator.GroundTruth) -> dict[str, float | None
     scores = {}
     for name in evaluator.SCORE_NAMES:
         metric, _, interval = name.partition("_")
-        scores[name] = evaluator.published(getattr(report.scores[interval or "overall"], metric), decimals=1)
+        scores[name] = evaluator.rounded(getattr(report.scores[interval or "overall"], metric), decimals=1)
     return scores
 
 

@@ -52,7 +52,7 @@ def own_scores(kitti: Path, data: bytes, *, protocol: str) -> dict[str, float | 
         evaluator.read_predictions(data, manifest=truth.manifest), truth, protocol=protocol
     )
     return {
-        name: evaluator.published(getattr(report.scores[interval or "overall"], metric))
+        name: evaluator.rounded(getattr(report.scores[interval or "overall"], metric))
         for name in evaluator.SCORE_NAMES
         for metric, _, interval in [name.partition("_")]
     }

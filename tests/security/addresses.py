@@ -5,7 +5,7 @@ from itertools import product
 from typing import Any
 from urllib.parse import urlencode
 
-from leaderboard.boards.query import SORTABLE
+from leaderboard.boards.listing import SORTABLE
 from tests.security.people import ABSENT
 from tests.security.routes import Route, operations, routes
 from tests.security.worlds import HIDDEN_METHODS, HIDDEN_SUBMISSIONS, HIDDEN_TEAM, Scene

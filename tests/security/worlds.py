@@ -78,7 +78,7 @@ class Scene:
 
     stranger: User
     methods: list[UUID] = field(default_factory=list)
-    intake: list[UUID] = field(default_factory=list)
+    submissions: list[UUID] = field(default_factory=list)
     teams: list[UUID] = field(default_factory=list)
 
 

@@ -62,7 +62,7 @@ def test_real_drives_give_the_means_of_the_toolkit(
     )
     found = read_predictions((tmp_path / "p.json").read_bytes(), manifest=truth.manifest)
     scores = evaluate(found, truth, protocol=protocol).scores
-    for interval, expected in json.loads((kitti / "expected.json").read_text())[name].items():
-        assert scores[interval].count == expected["count"]
-        assert scores[interval].mid == pytest.approx(expected["mid"], rel=1e-9)
-        assert scores[interval].rte == pytest.approx(expected["rte"], rel=1e-9)
+    for range_name, expected in json.loads((kitti / "expected.json").read_text())[name].items():
+        assert scores[range_name].count == expected["count"]
+        assert scores[range_name].mid == pytest.approx(expected["mid"], rel=1e-9)
+        assert scores[range_name].rte == pytest.approx(expected["rte"], rel=1e-9)

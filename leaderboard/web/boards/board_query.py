@@ -8,9 +8,9 @@ from urllib.parse import urlencode
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import known_metrics
-from leaderboard.boards import filters, query
+from leaderboard.boards import filters, listing
 from leaderboard.boards.filters import FILTERS, Filters
-from leaderboard.boards.query import Board
+from leaderboard.boards.listing import Board
 from leaderboard.statistics import comparisons
 from leaderboard.web.formatting import grouped
 
@@ -30,7 +30,7 @@ class BadView(ValueError):
 
 
 # What is wrong with an address; each is a sentence for the reader.
-FAULTS: Final = (query.UnknownColumn, query.BadTime, filters.BadFilter, BadView)
+FAULTS: Final = (listing.UnknownColumn, listing.BadTime, filters.BadFilter, BadView)
 
 
 @dataclass(frozen=True)
@@ -77,11 +77,11 @@ def parse(query: Mapping[str, str], *, now: datetime, has_time: bool = True) -> 
     `has_time` is False for the board of an edition, which is as it is. Raises one of `FAULTS`.
     """
     given = {name: query[name].strip() for name in NAMES if query.get(name, "").strip()}
-    at = query.parse_time(given["at"]) if has_time and "at" in given else None
+    at = listing.parse_time(given["at"]) if has_time and "at" in given else None
     if at is None:
         given.pop("at", None)
     sort = given.get("sort", "rank")
-    query.require_column(sort)
+    listing.require_column(sort)
     return BoardQuery(
         sort=sort,
         at=at if at and at < now else None,  # what has not come yet is as it is now

@@ -10,7 +10,7 @@ from django.utils.functional import SimpleLazyObject
 from django.views.decorators.http import require_safe
 
 from leaderboard.boards import snapshots
-from leaderboard.boards.query import Board, UnknownColumn
+from leaderboard.boards.listing import Board, UnknownColumn
 from leaderboard.editions import history
 from leaderboard.models import Edition, Split
 from leaderboard.web.boards import board_query, edition_tables, export_views, tables

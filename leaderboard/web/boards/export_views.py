@@ -20,7 +20,7 @@ from django.views.decorators.http import require_safe
 from evaluator.tables import formats
 from evaluator.tables.formats import Format
 from leaderboard.boards import snapshots
-from leaderboard.boards.query import Board
+from leaderboard.boards.listing import Board
 from leaderboard.boards.results import Result
 from leaderboard.exports import bibtex, tables
 from leaderboard.models import Edition, Split

@@ -116,12 +116,12 @@ def score_groups(names: Iterable[str], *, n_whiskers: int = 0) -> tuple[Group, .
 
 def score_heading(name: str, query: BoardQuery | None = None, scale: WhiskerScale | None = None) -> Heading:
     """The head of a score's column."""
-    metric, interval = metric_of(name), range_of(name)
-    seconds = f"{interval.name} {interval.seconds}" if interval else OVERALL
+    metric, ttc_range = metric_of(name), range_of(name)
+    seconds = f"{ttc_range.name} {ttc_range.seconds}" if ttc_range else OVERALL
     return Heading(
         name=name,
-        symbol=interval.seconds if interval else metric.symbol,
-        is_overall=interval is None,
+        symbol=ttc_range.seconds if ttc_range else metric.symbol,
+        is_overall=ttc_range is None,
         caption=split_name(name)[1],
         unit=metric.unit,
         spoken=f"{metric.symbol}, {seconds}",

@@ -14,7 +14,7 @@ from django.core.paginator import Page, Paginator
 from evaluator.metrics.protocol import PRIMARY, Protocol, TTCRange, grouped_names, range_of
 from evaluator.scoring.scores import floor_sentence
 from leaderboard.boards import movement
-from leaderboard.boards.query import Board
+from leaderboard.boards.listing import Board
 from leaderboard.boards.rows import ConfidenceInterval, Entry
 from leaderboard.exports.tables import team_of
 from leaderboard.models import Edition, Visibility

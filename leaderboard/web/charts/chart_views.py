@@ -6,7 +6,7 @@ from django.views.decorators.http import require_safe
 
 from evaluator.tables import sentences
 from leaderboard.boards import snapshots
-from leaderboard.boards.query import Board
+from leaderboard.boards.listing import Board
 from leaderboard.http_caching import cacheable
 from leaderboard.statistics import comparisons
 from leaderboard.statistics.comparisons import Pair

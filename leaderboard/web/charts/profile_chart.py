@@ -98,7 +98,7 @@ def _profile_series(
     spans = [
         (x, interval.low, interval.high)
         for x, _, name in places
-        for ttc_range in [entry.ranges.get(name, ConfidenceInterval())]
+        for interval in [entry.intervals.get(name, ConfidenceInterval())]
         if interval.low is not None and interval.high is not None
     ]
     legend = _legend_name(k, entry)
@@ -108,7 +108,7 @@ def _profile_series(
 
 def _range_words(name: str) -> str:
     ttc_range = range_of(name)
-    return f"{ttc_range.seconds}\n{ttc_range.name}" if interval else OVERALL
+    return f"{ttc_range.seconds}\n{ttc_range.name}" if ttc_range else OVERALL
 
 
 def _named(name: str) -> str:

@@ -26,8 +26,8 @@ def test_sums_per_recording_are_those_of_a_loop_and_add_up_to_the_report() -> No
     }
     for row, tau in enumerate(truth.ttc_s):
         for column, name in enumerate(SCORE_NAMES):
-            metric, _, interval = name.partition("_")
-            low, high = ranges.get(interval, (-np.inf, np.inf))
+            metric, _, range_name = name.partition("_")
+            low, high = ranges.get(range_name, (-np.inf, np.inf))
             if low <= tau <= high:
                 expected[int(truth.manifest.bag_stamp[row]), column] += report.sequences[metric][row]
                 counts[int(truth.manifest.bag_stamp[row]), column] += 1

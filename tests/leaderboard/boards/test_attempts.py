@@ -6,7 +6,7 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.boards.rows import Entry
 from leaderboard.methods import visibility
 from leaderboard.models import Edition, Method, Split, User
@@ -19,7 +19,7 @@ ANYBODY = AnonymousUser()
 
 def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:
     split = Split.objects.select_related("published_edition__ground_truth").get(pk="test")
-    return {entry.method: entry for entry in query.board(split=split, viewer=viewer).entries}
+    return {entry.method: entry for entry in listing.board(split=split, viewer=viewer).entries}
 
 
 def test_attempts_are_those_of_what_the_team_shows_and_of_an_anonymous_method_its_own(

@@ -6,7 +6,7 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.utils import timezone
 
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.models import Edition, Method, PublishedResult, Split, Submission, User, Visibility
 from tests import builders
 
@@ -19,13 +19,13 @@ def split_called(name: str = "test") -> Split:
     return Split.objects.select_related("published_edition").get(pk=name)
 
 
-def ranks(board: query.Board) -> list[tuple[int | None, str]]:
+def ranks(board: listing.Board) -> list[tuple[int | None, str]]:
     return [(entry.rank, entry.method) for entry in board.entries]
 
 
 @pytest.mark.usefixtures("benchmark")
 def test_published_rows_stand_in_rank_order_before_any_submission() -> None:
-    board = query.board(split=split_called(), viewer=ANYBODY)
+    board = listing.board(split=split_called(), viewer=ANYBODY)
     assert ranks(board) == [
         (1, "Deep Scale"),
         (2, "Deep Scale (NeRF)"),
@@ -40,7 +40,7 @@ def test_published_rows_stand_in_rank_order_before_any_submission() -> None:
 def test_best_and_second_of_each_column_are_marked(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition, factor=1.0000001), method="Near")
     builders.score_all()
-    near, deep, *_ = query.board(split=split_called(), viewer=ANYBODY).entries
+    near, deep, *_ = listing.board(split=split_called(), viewer=ANYBODY).entries
     assert (near.method, near.rank) == ("Near", 1)
     assert "mid" in near.best
     assert "mid" in deep.second
@@ -50,7 +50,7 @@ def test_equal_published_values_share_a_rank_and_the_next_is_skipped(edition: Ed
     for method, factor in (("A", 1.0000001), ("B", 1.0000002)):
         builders.submit(owner, builders.predictions(edition, factor=factor), method=method)
     builders.score_all()
-    board = query.board(split=split_called(), viewer=ANYBODY)
+    board = listing.board(split=split_called(), viewer=ANYBODY)
     assert ranks(board)[:3] == [(1, "A"), (1, "B"), (3, "Deep Scale")]
 
 
@@ -58,7 +58,7 @@ def test_waiting_and_rejected_submissions_are_not_on_the_board(edition: Edition,
     builders.submit(owner, b"{}", method="Broken")
     builders.score_all()
     builders.submit(owner, builders.predictions(edition), method="Waiting")
-    board = query.board(split=split_called(), viewer=owner)
+    board = listing.board(split=split_called(), viewer=owner)
     assert board.n_submissions == 0
     assert len(board.entries) == 5
 
@@ -69,7 +69,7 @@ def test_a_method_is_represented_by_its_best_standing_submission(edition: Editio
     builders.score_all()
 
     def shown() -> list[object]:
-        entries = query.board(split=split_called(), viewer=ANYBODY).entries
+        entries = listing.board(split=split_called(), viewer=ANYBODY).entries
         return [entry.submission_id for entry in entries if entry.kind == "submission"]
 
     assert shown() == [best.pk]
@@ -84,11 +84,11 @@ def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_place(
     builders.submit(owner, builders.predictions(edition, factor=1.0000001), method="Secret")
     builders.score_all()
     Method.objects.update(visibility=Visibility.PRIVATE)
-    without = query.board(split=split_called(), viewer=ANYBODY)
+    without = listing.board(split=split_called(), viewer=ANYBODY)
     for viewer in (stranger, maintainer):
-        assert query.board(split=split_called(), viewer=viewer).entries == without.entries
+        assert listing.board(split=split_called(), viewer=viewer).entries == without.entries
     for viewer in (owner, teammate):
-        board = query.board(split=split_called(), viewer=viewer)
+        board = listing.board(split=split_called(), viewer=viewer)
         assert ranks(board)[:2] == [(1, "Secret"), (1, "Deep Scale")]
         secret = next(entry for entry in board.entries if entry.method == "Secret")
         assert secret.is_mine
@@ -100,12 +100,12 @@ def test_private_method_is_seen_by_its_team_alone_and_takes_nobodys_place(
 def test_every_column_sorts_and_ranks_do_not_change(edition: Edition, owner: User) -> None:
     builders.submit(owner, builders.predictions(edition))
     builders.score_all()
-    expected = sorted(ranks(query.board(split=split_called(), viewer=ANYBODY)))
-    for column in query.SORTS:
-        board = query.board(split=split_called(), viewer=ANYBODY, sort=column)
+    expected = sorted(ranks(listing.board(split=split_called(), viewer=ANYBODY)))
+    for column in listing.SORTS:
+        board = listing.board(split=split_called(), viewer=ANYBODY, sort=column)
         assert sorted(ranks(board)) == expected
         name = column.removeprefix("-")
-        if name not in query.TEXT_COLUMNS:
+        if name not in listing.TEXT_COLUMNS:
             values = [entry.scores[name] for entry in board.entries]
             assert values == sorted(values, reverse=column.startswith("-"))  # type: ignore[type-var]  # all have values
 
@@ -117,7 +117,7 @@ def test_a_row_without_the_value_is_last_in_either_direction_and_has_no_rank(
     result.scores = {**result.scores, "mid": None}
     result.save()
     for sort in ("mid", "-mid", "rank"):
-        last = query.board(split=split_called(), viewer=ANYBODY, sort=sort).entries[-1]
+        last = listing.board(split=split_called(), viewer=ANYBODY, sort=sort).entries[-1]
         assert (last.method, last.rank) == ("SOT", None)
 
 
@@ -130,10 +130,10 @@ def test_a_row_without_the_value_is_last_in_either_direction_and_has_no_rank(
     ],
 )
 def test_date_means_its_end_and_a_time_its_moment(text: str, moment: datetime) -> None:
-    assert query.parse_time(text) == moment
+    assert listing.parse_time(text) == moment
 
 
 @pytest.mark.parametrize("text", ["", "soon", "2026-13-40", "0001-01-01T00:00:00+14:00", "2026-11-20T25:00"])
 def test_what_is_no_moment_is_named_as_such(text: str) -> None:
-    with pytest.raises(query.BadTime, match="is not a date or a time; expected one such as 2026-11-20"):
-        query.parse_time(text)
+    with pytest.raises(listing.BadTime, match="is not a date or a time; expected one such as 2026-11-20"):
+        listing.parse_time(text)

@@ -7,7 +7,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.boards import movement, query
+from leaderboard.boards import listing, movement
 from leaderboard.models import Edition, Evaluation, Method, Publication, Split, Submission, User
 from tests import board_rows, builders, pages
 from tests.caching import forget_boards
@@ -30,9 +30,9 @@ def months(edition: Edition, owner: User) -> list[Method]:
     return methods
 
 
-def board_of(*, days_ago: int = 0) -> query.Board:
+def board_of(*, days_ago: int = 0) -> listing.Board:
     at = timezone.now() - timedelta(days=days_ago) if days_ago else None
-    return query.board(split=Split.objects.get(pk="test"), viewer=AnonymousUser(), at=at)
+    return listing.board(split=Split.objects.get(pk="test"), viewer=AnonymousUser(), at=at)
 
 
 def test_ranks_have_moved_as_the_two_boards_say(months: list[Method]) -> None:

@@ -11,7 +11,7 @@ from django.test.utils import CaptureQueriesContext
 from django.utils import timezone
 
 from leaderboard import board_versions
-from leaderboard.boards import query, snapshots
+from leaderboard.boards import listing, snapshots
 from leaderboard.methods import editing, visibility
 from leaderboard.models import (
     Edition,
@@ -63,7 +63,7 @@ def n_queries(client: Client, address: str) -> int:
 def test_what_is_kept_is_what_the_database_says(edition: Edition, filled: list[Method]) -> None:
     for _ in range(2):  # read, and kept
         shown = snapshots.shown(split=edition.split, edition=edition)
-        assert shown.entries == query.public_rows(split=edition.split, edition=edition)
+        assert shown.entries == listing.public_rows(split=edition.split, edition=edition)
         assert len(shown.entries) == 12 + edition.split.published_results.count()
         assert {attempt.method_id for attempt in shown.attempts} == {method.pk for method in filled}
 

@@ -11,7 +11,7 @@ from django.core.management import CommandError, call_command
 from pytest_django.fixtures import Settings
 
 import evaluator
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.demo import seed
 from leaderboard.demo.runs import N_RECORDINGS, N_SEQUENCES, demo_split
 from leaderboard.editions import ground_truth
@@ -56,7 +56,7 @@ def test_the_worker_decides_what_the_seed_submits(benchmark: None, tmp_path: Pat
         Status.SCORED: n_scored,
         Status.REJECTED: 1,
     }
-    board = query.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
+    board = listing.board(split=Split.objects.get(pk="demo"), viewer=AnonymousUser())
     assert [entry.rank for entry in board.entries] == [*range(1, n_scored + 1)]
     assert board.entries[0].method == "Deep Scale features, own fit"
     assert board.split.is_simulated

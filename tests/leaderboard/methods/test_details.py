@@ -7,7 +7,7 @@ import pytest
 from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 
-from leaderboard.boards import filters, query
+from leaderboard.boards import filters, listing
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import editing
 from leaderboard.models import AuditEvent, BoardVersion, Edition, Method, Split, Submission, User
@@ -220,12 +220,12 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
     split = Split.objects.select_related("published_edition").get(pk="test")
 
     def names(**params: str) -> list[str]:
-        board = query.board(split=split, viewer=ANYBODY, filters=filters.parse(params))
+        board = listing.board(split=split, viewer=ANYBODY, filters=filters.parse(params))
         assert all(ranks[entry.method] == entry.rank for entry in board.entries)
         assert board.n_in_all == 7
         return [entry.method for entry in board.entries if entry.kind == "submission"]
 
-    ranks = {entry.method: entry.rank for entry in query.board(split=split, viewer=ANYBODY).entries}
+    ranks = {entry.method: entry.rank for entry in listing.board(split=split, viewer=ANYBODY).entries}
     both = ["Foo", veiled.pseudonym]
     for params, expected in (
         ({}, both),
@@ -246,7 +246,7 @@ def test_the_board_is_filtered_by_what_rows_say_and_ranks_stay(
         ({"q": "anonymous"}, [veiled.pseudonym]),
         ({"frames": "", "q": " "}, both),
     ):
-        assert sorted(names(**params)) == sorted(expected), query
+        assert sorted(names(**params)) == sorted(expected), params
 
 
 def test_a_filter_tells_nothing_of_what_an_anonymous_row_hides(

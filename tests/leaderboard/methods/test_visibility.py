@@ -11,7 +11,7 @@ from django.contrib.auth.models import AnonymousUser
 from django.test import Client
 from django.utils import timezone
 
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.boards.rows import Entry
 from leaderboard.errors.refusals import Refused
 from leaderboard.methods import visibility
@@ -44,7 +44,7 @@ def split() -> Split:
 
 
 def rows(viewer: Any = ANYBODY) -> dict[str, Entry]:
-    return {entry.method: entry for entry in query.board(split=split(), viewer=viewer).entries}
+    return {entry.method: entry for entry in listing.board(split=split(), viewer=viewer).entries}
 
 
 def change(method: Method, to: str, actor: User, **options: Any) -> Method:
@@ -107,12 +107,12 @@ def test_a_board_as_of_a_time_shows_what_was_shown_then(method: Method, owner: U
     after = timezone.now()
 
     def names(viewer: Any, at: Any) -> list[str]:
-        return [entry.method for entry in query.board(split=split(), viewer=viewer, at=at).entries]
+        return [entry.method for entry in listing.board(split=split(), viewer=viewer, at=at).entries]
 
     for reader in (ANYBODY, stranger):
         assert "Secret sauce" not in names(reader, before)
         assert "Secret sauce" in names(reader, after)
-    own = query.board(split=split(), viewer=owner, at=before).entries
+    own = listing.board(split=split(), viewer=owner, at=before).entries
     assert [entry.visibility for entry in own if entry.method == "Secret sauce"] == [Visibility.PRIVATE]
 
 

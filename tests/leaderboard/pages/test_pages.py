@@ -12,7 +12,7 @@ from leaderboard.errors.refusals import NotMaintainer, Refused
 from leaderboard.models import AuditEvent, PageVersion, User
 from leaderboard.pages import texts
 from leaderboard.web.account import shown_once
-from tests import texts as html
+from tests import pages as html
 from tests.leaderboard.web.test_every_page import assert_sound
 
 RULES = "/maintain/pages/rules/"

@@ -13,7 +13,7 @@ from scipy import stats
 
 from evaluator import SCORE_NAMES
 from evaluator.scoring import uncertainty
-from leaderboard.boards import query
+from leaderboard.boards import listing
 from leaderboard.models import (
     BoardVersion,
     Edition,
@@ -28,7 +28,7 @@ from leaderboard.models import (
 from leaderboard.statistics import confidence, disclosure, recording_sums
 from leaderboard.statistics.confidence import Entries
 from leaderboard.storage import files, truth_values
-from leaderboard.submissions import intake, status_text
+from leaderboard.submissions import intake
 from leaderboard.upkeep import backlog
 from tests import builders
 from tests.editions import ANYBODY, board_now, corrected, open_edition
@@ -118,7 +118,7 @@ def test_an_edition_without_enough_recordings_has_no_interval_and_says_why(
     assert {row[3:] for row in everything()} == {(None, None)}
     edition.refresh_from_db()
     assert edition.inferred_at is not None
-    assert status_text.why_no_interval(edition) == (
+    assert confidence.why_no_interval(edition) == (
         "There are no confidence intervals: too few recordings (effective number 6.9; at least 8 needed)."
     )
 
@@ -207,7 +207,7 @@ def test_a_range_that_does_not_hold_the_rank_any_more_is_left_out(
 def test_a_board_as_of_a_time_has_intervals_and_no_ranges_of_today(
     inferred: list[Submission], edition: Edition
 ) -> None:
-    then = query.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
+    then = listing.board(split=edition.split, viewer=ANYBODY, at=timezone.now())
     rows = [entry for entry in then.entries if entry.kind == "submission"]
     assert len(rows) == len(inferred)
     for entry in rows:
@@ -278,7 +278,7 @@ def test_an_edition_that_is_being_scored_has_patience_but_not_for_ever(
 
 def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submission], edition: Edition) -> None:
     chosen = {row.evaluation_id for row in confidence.ranked(confidence.active_entries(edition))}
-    board = query.board(split=edition.split, viewer=ANYBODY)
+    board = listing.board(split=edition.split, viewer=ANYBODY)
     assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
 
 
