@@ -236,7 +236,7 @@ def _with_ends(row: GroupScores, *, with_intervals: bool) -> dict[str, float | N
 def rounded(value: float | None, *, decimals: int = 2) -> float | None:
     """`value` as it is published: correctly rounded, half to even on its exact binary value. None stays None.
 
-    >>> published(14.296), published(0.125), published(None)
+    >>> rounded(14.296), rounded(0.125), rounded(None)
     (14.3, 0.12, None)
     """
     if value is None:

@@ -45,8 +45,8 @@ def offline(data: bytes, truth: evaluator.GroundTruth) -> dict[str, float | None
     report = evaluator.evaluate(evaluator.read_predictions(data, manifest=truth.manifest), truth)
     scores = {}
     for name in evaluator.SCORE_NAMES:
-        metric, _, interval = name.partition("_")
-        scores[name] = evaluator.rounded(getattr(report.scores[interval or "overall"], metric), decimals=1)
+        metric, _, range_name = name.partition("_")
+        scores[name] = evaluator.rounded(getattr(report.scores[range_name or "overall"], metric), decimals=1)
     return scores
 
 

@@ -39,9 +39,9 @@ def toolkit_scores(kitti: Path, estimator: str) -> dict[str, float]:
     """The toolkit's means, rounded as they are published."""
     means = json.loads((kitti / "expected.json").read_text())[estimator]
     return {
-        name: round(means[interval or "overall"][metric], 2)
+        name: round(means[range_name or "overall"][metric], 2)
         for name in evaluator.SCORE_NAMES
-        for metric, _, interval in [name.partition("_")]
+        for metric, _, range_name in [name.partition("_")]
     }
 
 
@@ -52,9 +52,9 @@ def own_scores(kitti: Path, data: bytes, *, protocol: str) -> dict[str, float | 
         evaluator.read_predictions(data, manifest=truth.manifest), truth, protocol=protocol
     )
     return {
-        name: evaluator.rounded(getattr(report.scores[interval or "overall"], metric))
+        name: evaluator.rounded(getattr(report.scores[range_name or "overall"], metric))
         for name in evaluator.SCORE_NAMES
-        for metric, _, interval in [name.partition("_")]
+        for metric, _, range_name in [name.partition("_")]
     }
 
 

@@ -177,7 +177,7 @@ def test_page_adds_a_challenge_and_says_what_is_wrong_at_the_field(keeper: Clien
     for field, value, sentence in (
         ("name", "Test 2", "The name 'Test 2' cannot be used"),
         ("name", "challenge-2027", "There is a split 'challenge-2027' already"),
-        ("name", "audit", "and none of add, announcement"),
+        ("name", "audit", "and none of actions, add, announcement"),
         ("title", "", "No title was given"),
         ("closes_at", "2020-01-01 00:00 UTC", "is in the past"),
         ("opens_at", "2099-03-01 10:00", "has no time zone"),

@@ -151,7 +151,7 @@ def test_outcome_that_the_database_refuses_is_a_strike_and_leaves_nothing(
     edition: Edition, owner: User, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     submission = builders.submit(owner, builders.predictions(edition))
-    monkeypatch.setattr(worker, "published", lambda value, *, decimals: -1.0)
+    monkeypatch.setattr(worker, "rounded", lambda value, *, decimals: -1.0)
     assert run_next()
     assert strikes(submission) == (1, 0)
     assert evaluation_of(submission).scores.count() == 0

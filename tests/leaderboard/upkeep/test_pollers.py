@@ -93,7 +93,7 @@ def test_a_sweep_that_breaks_is_not_written_down_and_keeps_nothing_else_waiting(
     def break_off(*, now: datetime) -> int:
         raise OSError("no space left on device")
 
-    monkeypatch.setattr(board_versions, "times_passed", break_off)
+    monkeypatch.setattr(board_versions, "bump_passed_deadlines", break_off)
     with pytest.raises(OSError, match="no space"):
         pollers.keep_up(rng=random.Random(0), stopping=threading.Event())
     assert health.sweep_age_s() is None, "so that /readyz goes on saying that nobody sweeps"
