@@ -1,6 +1,5 @@
 """Serializers of submissions. A field once here stays."""
 
-from dataclasses import asdict
 from typing import Any
 
 from rest_framework import serializers
@@ -137,7 +136,7 @@ class SubmissionSerializer(serializers.Serializer[SubmissionView]):
             "scores": progress.scores,
             "decimals": progress.decimals,
             "intervals": {
-                name: asdict(instance.intervals[name])
+                name: UncertaintySerializer(instance.intervals[name]).data
                 for name in progress.scores or ()
                 if name in instance.intervals
             },

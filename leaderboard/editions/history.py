@@ -77,7 +77,9 @@ def history(split: Split, publications: Iterable[Publication]) -> tuple[EditionR
     """Every edition that was ever published, the newest first; `publications` are the split's changelog."""
     published = split.editions.exclude(published_at=None).select_related("ground_truth")
     # All at once, since each edition that followed another asks for one.
-    compared = list(TruthComparison.objects.filter(new__split=split.truth_split_id).order_by("pk"))
+    rows = TruthComparison.objects.filter(new__split=split.truth_split_id).order_by("pk")
+    has_followed = any(publication.replaced_id for publication in publications)
+    compared = list(rows) if has_followed else []
     return tuple(record_of(each, publications, compared) for each in published.order_by("-number"))
 
 

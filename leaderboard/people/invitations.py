@@ -44,7 +44,7 @@ def make(*, team: Team, actor: User, now: datetime) -> tuple[Invitation, str]:
     """A new invitation into one's team, and its secret, which is told this once. Raises `Refused`."""
     secret = secrets.token_urlsafe(32)
     with transaction.atomic():
-        row = teams.locked(team)[0]
+        row = teams.locked_team(team)
         teams.require_owner(row, actor, doing="invites")
         n_standing = open_invitations(team=row, now=now).count()
         if n_standing >= MAX_STANDING:
@@ -85,7 +85,7 @@ def state_of(invitation: Invitation, *, now: datetime) -> str:
 def revoke(*, invitation: Invitation, actor: User, now: datetime) -> bool:
     """End an invitation that nobody has used. Returns False if it had ended. Raises `Refused`."""
     with transaction.atomic():
-        row = teams.locked(invitation.team)[0]
+        row = teams.locked_team(invitation.team)
         teams.require_owner(row, actor, doing="revokes invitations")
         fresh = Invitation.objects.filter(pk=invitation.pk, accepted_at=None, revoked_at=None)
         if not fresh.update(revoked_at=now):

@@ -51,7 +51,7 @@ def rename(*, team: Team, name: str, actor: User, now: datetime) -> Team:
     """Call the team something else, on every board at once. Its owner does, once a day. Raises `Refused`."""
     name = clean_name("name", name)
     with transaction.atomic():
-        row = locked(team)[0]
+        row = locked_team(team)
         require_owner(row, actor, doing="renames it")
         if row.name == name:
             return row
@@ -131,7 +131,7 @@ def leave(*, user: User) -> Team:
 def remove(*, team: Team, member: User, actor: User) -> None:
     """Remove a member, as the owner. Raises `Refused`."""
     with transaction.atomic():
-        row = locked(team)[0]
+        row = locked_team(team)
         require_owner(row, actor, doing="removes members")
         if member == actor:
             raise Refused("not-yourself", "You cannot remove yourself; expected another member of your team.")
@@ -145,7 +145,7 @@ def remove(*, team: Team, member: User, actor: User) -> None:
 def hand_over(*, team: Team, to: User, actor: User) -> None:
     """Let another member own the team. Raises `Refused`."""
     with transaction.atomic():
-        row = locked(team)[0]
+        row = locked_team(team)
         require_owner(row, actor, doing="hands it over")
         if to == actor:
             raise Refused("not-yourself", "You own the team already; expected another member.")
@@ -159,7 +159,7 @@ def appoint(*, team: Team, to: User, reason: str, actor: User | None) -> None:
     """Make a member the owner, where the owner is gone. Raises `NotMaintainer` and `Refused`."""
     require_maintainer(actor, to="appoint owners of teams")
     with transaction.atomic():
-        row = locked(team)[0]
+        row = locked_team(team)
         heir = _membership_in(row, to)
         before = list(row.memberships.filter(is_owner=True).values_list("user", flat=True))
         row.memberships.exclude(pk=heir.pk).update(is_owner=False)
@@ -187,6 +187,14 @@ def locked(*teams: Team | None) -> list[Team]:
     """These teams as they are now, which stay so until the transaction ends, in the order of their ids."""
     ids = [team.pk for team in teams if team is not None]
     return list(Team.objects.select_for_update(no_key=True).filter(pk__in=ids).order_by("pk"))
+
+
+def locked_team(team: Team) -> Team:
+    """The team as it is now, locked. Raises `Refused` if it was deleted meanwhile."""
+    rows = locked(team)
+    if not rows:
+        raise Refused("changed-meanwhile", f"The team {team.name!r} was just deleted; reload the page.")
+    return rows[0]
 
 
 def current_membership(user: User, *also: Team) -> Membership | None:

@@ -329,7 +329,7 @@ def progress(submission: Submission) -> Progress:
     """How far a submission is, and what came of it."""
     evaluation = evaluation_of(submission)
     report = evaluation.report or {}
-    counts = report.get("counts", {})
+    rules, counts, truncated = evaluation.edition.rules, report.get("counts", {}), report.get("truncated", {})
     scored = scored_of(evaluation) if evaluation.status == Status.SCORED else None
     return Progress(
         state=evaluation.status,
@@ -343,8 +343,8 @@ def progress(submission: Submission) -> Progress:
         scores=scored.values if scored else None,
         intervals=scored.intervals if scored else {},
         # PostgreSQL gives JSON back in an order of its own.
-        counts={name: counts[name] for name in evaluation.edition.rules.range_names if name in counts},
-        truncated=report.get("truncated", {}),
+        counts={name: counts[name] for name in rules.range_names if name in counts},
+        truncated={name: truncated[name] for name in rules.boundaries if name in truncated},
         n_out_of_range=report.get("n_out_of_range"),
         warnings=report.get("warnings", []),
         problems=evaluation.problems,

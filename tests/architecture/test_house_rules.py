@@ -79,7 +79,11 @@ def writes_a_status(call: ast.Call) -> bool:
         if "status" in texts:
             return True
     writers = {"update", "create", "get_or_create", "update_or_create", "Evaluation"}
-    return name in writers and "status" in {keyword.arg for keyword in call.keywords}
+    names: set[object] = {keyword.arg for keyword in call.keywords}
+    for keyword in call.keywords:
+        if keyword.arg == "defaults" and isinstance(keyword.value, ast.Dict):
+            names |= {key.value for key in keyword.value.keys if isinstance(key, ast.Constant)}
+    return name in writers and "status" in names
 
 
 def test_only_lifecycle_writes_a_status() -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 import pytest
 import schemathesis
-from django.db import transaction
+from django.core.signals import request_finished, request_started
+from django.db import close_old_connections, transaction
 from hypothesis import HealthCheck, Phase, given, strategies
 from hypothesis import settings as with_settings
 from hypothesis.errors import Unsatisfiable
@@ -43,6 +44,16 @@ def operations() -> Iterator[Any]:
 @pytest.fixture(autouse=True)
 def no_quotas(settings: Settings) -> None:
     settings.QUOTAS = False
+
+
+@pytest.fixture(autouse=True)
+def connection_stays() -> Iterator[None]:
+    """As Django's own test client has it: the connection has a transaction that goes on after a request."""
+    for signal in (request_started, request_finished):
+        signal.disconnect(close_old_connections)
+    yield
+    for signal in (request_started, request_finished):
+        signal.connect(close_old_connections)
 
 
 def headers_of(world: World, role: str, method: str) -> dict[str, str]:

@@ -31,9 +31,10 @@ def sentence_of(row: QuotaRules) -> str:
     """Rules as part of a sentence.
 
     >>> from datetime import timedelta
-    >>> sentence_of(QuotaOverride(quota_limit=3, quota_window=timedelta(days=30), quota_rejected_limit=None))
+    >>> from leaderboard.models import Split
+    >>> sentence_of(Split(quota_limit=3, quota_window=timedelta(days=30), quota_rejected_limit=None))
     '3 submissions within 30 days; any number of rejected or cancelled files'
-    >>> sentence_of(QuotaOverride(quota_min_gap=timedelta(hours=1), quota_rejected_limit=20))
+    >>> sentence_of(Split(quota_limit=None, quota_min_gap=timedelta(hours=1), quota_rejected_limit=20))
     'any number of submissions, at least 1 hour apart; 20 rejected or cancelled files within 24 hours'
     """
     sent = turned_away = "any number of"

@@ -5,6 +5,7 @@ The reference is the evaluator alone, given each file's values by natural key.
 
 import json
 import random
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -74,7 +75,7 @@ def offline(said: Said, path: Path) -> dict[str, float | None]:
     return {name: rounded(value, decimals=1) for name, value in report(said, path).flat().items()}
 
 
-def scores(submission: Submission, edition: Edition) -> dict[str, float | None]:
+def scores(submission: Submission, edition: Edition) -> Mapping[str, float | None]:
     found = submission.evaluations.get(edition=edition)
     assert found.status == Status.SCORED, found.problems
     return flat_scores(found)

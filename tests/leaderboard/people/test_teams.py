@@ -265,3 +265,11 @@ def test_administration_shows_no_secret_of_an_invitation_or_an_account_and_delet
     assert owner.email in shown
     assert owner.password not in shown
     assert keeper.post(f"/admin/leaderboard/user/{stranger.pk}/delete/", {"post": "yes"}).status_code == 403
+
+
+def test_a_team_that_was_deleted_meanwhile_is_a_refusal(owner: User) -> None:
+    team = teams.team_of(user=owner)
+    Team.objects.filter(pk=team.pk).delete()
+    with pytest.raises(Refused, match="was just deleted") as refusal:
+        teams.rename(team=team, name="Later", actor=owner, now=timezone.now())
+    assert refusal.value.code == "changed-meanwhile"

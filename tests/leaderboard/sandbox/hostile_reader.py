@@ -18,16 +18,16 @@ _SITE = """
 import ctypes, errno, json, mmap, os, resource, signal, socket, struct, sys, time
 sys.path.insert(0, {repository!r})
 from evaluator import system_calls
-from evaluator.predictions import predictions
+from evaluator.predictions import loading
 from evaluator.problems import Problem, Rejected
-honest = predictions.read_sent
+honest = loading.read_sent
 
 def read_sent(data, *, manifest):
     if data.startswith({mark!r}):
         exec(data.decode(), dict(globals(), data=data, manifest=manifest))
     return honest(data, manifest=manifest)
 
-predictions.read_sent = read_sent
+loading.read_sent = read_sent
 {more}
 """
 ANNOTATIONS = f"""

@@ -210,15 +210,9 @@ def test_an_address_that_has_an_account_opens_nothing(
     assert owner.check_password(PASSWORD)
 
 
-@pytest.mark.parametrize("squat", ["added", "signed up"])
-def test_an_address_that_nobody_proved_here_is_its_owners(
-    provider: Provider, client: Client, owner: User, squat: str
-) -> None:
-    if squat == "added":
-        EmailAddress.objects.create(user=owner, email=NEW, verified=False)
-    else:
-        squatter = User.objects.create_user(NEW, PASSWORD)
-        EmailAddress.objects.create(user=squatter, email=NEW, verified=False, primary=True)
+def test_an_address_that_nobody_proved_here_is_its_owners(provider: Provider, client: Client) -> None:
+    squatter = User.objects.create_user(NEW, PASSWORD)
+    EmailAddress.objects.create(user=squatter, email=NEW, verified=False, primary=True)
     arrive(client)
     made = client.post("/accounts/3rdparty/signup/", {"email": NEW, "name": "Owls"})
     assert made.status_code == 302
