@@ -196,8 +196,8 @@ class Compared(msgspec.Struct, frozen=True, kw_only=True):
 
     def differences(self) -> dict[str, Difference]:
         """Those of the first pair that there are, by score name."""
-        found = (self.pairs[0].differences or {}) if self.pairs else {}
-        return {name: difference for name, difference in found.items() if difference is not None}
+        by_name = (self.pairs[0].differences or {}) if self.pairs else {}
+        return {name: difference for name, difference in by_name.items() if difference is not None}
 
 
 class Quota(msgspec.Struct, frozen=True, kw_only=True):
@@ -253,10 +253,10 @@ class BadAnswer(ClientError):
     """
 
     url: str
-    found: str
+    content: str
 
     def __str__(self) -> str:
-        return f"{self.url} gave an unexpected answer: {self.found}"
+        return f"{self.url} gave an unexpected answer: {self.content}"
 
 
 @dataclass(kw_only=True, eq=False)
