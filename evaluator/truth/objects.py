@@ -1,4 +1,4 @@
-"""What annotations say of the object of a sequence beside its time to contact, in the target frame.
+"""What annotations state about the object of a sequence in the target frame, except its time to contact.
 
 `occ_ratio` (how much of it is occluded, 0 to 1), `same_lane` (whether it drives in the lane of the camera's
 car) and `box2d` (x1, y1, x2, y2 as parts of the image's width and height). No score and no digest depends on

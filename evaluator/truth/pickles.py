@@ -174,7 +174,7 @@ _ALLOWED: Final[dict[tuple[str, str], type]] = {
 
 class _Unpickler(pickle.Unpickler):
     def find_class(self, module: str, name: str) -> type:
-        """What a name stands for; raises `Rejected` for anything that is not data."""
+        """The class of a name; raises `Rejected` for anything that is not data."""
         allowed = _ALLOWED.get((_ALIASES.get(module, module), name))
         if allowed is not None:
             return allowed
