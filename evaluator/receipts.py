@@ -148,7 +148,7 @@ def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
                 f"The receipt has the version {document['version']}; expected at most {VERSION}, the last "
                 "that this release of tsttc knows.",
             )
-        return _said(document, named)
+        return _verified(document, named)
     except (KeyError, TypeError, ValueError, AttributeError, RecursionError):
         raise _malformed("it cannot be read; expected what the leaderboard wrote") from None
 
@@ -188,7 +188,7 @@ def _malformed(what: str) -> NotVerified:
     return NotVerified("receipt-malformed", f"This is not a receipt: {what}.")
 
 
-def _said(document: Document, named: str) -> Verified:
+def _verified(document: Document, named: str) -> Verified:
     """A signed document, in the order of its protocol; of one that is newer, in the order of names."""
     rules = PROTOCOLS.get(document["protocol"])
     names = rules.score_names if rules else sorted(document["scores"])

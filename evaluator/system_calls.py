@@ -88,13 +88,13 @@ def program_for(machine: str) -> bytes:
 
 def _instructions(machine: str) -> Iterator[tuple[int, int, int, int]]:
     """Operation, instructions to skip where the words are equal and where they are not, operand."""
-    place, architecture = _ARCHITECTURES[machine]
+    column, architecture = _ARCHITECTURES[machine]
     yield _LOAD, 0, 0, 4
     yield _JUMP_IF_EQUAL, 1, 0, architecture
     yield _RETURN, 0, 0, _KILL
     yield _LOAD, 0, 0, 0
     for numbers in ALLOWED.values():
-        yield _JUMP_IF_EQUAL, 0, 1, numbers[place]
+        yield _JUMP_IF_EQUAL, 0, 1, numbers[column]
         yield _RETURN, 0, 0, _ALLOW
     yield _RETURN, 0, 0, _REFUSE
 

@@ -79,11 +79,11 @@ def kept_token(url: str) -> str | None:
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()
-    found = None
+    token = None
     if backend is not None:
         with suppress(KeyringError, OSError):
-            found = backend.get_password(SERVICE, account(url))
-    return found or _kept_in_file().get(account(url))
+            token = backend.get_password(SERVICE, account(url))
+    return token or _kept_in_file().get(account(url))
 
 
 def keep_token(url: str, token: str) -> str:
@@ -133,21 +133,21 @@ def usable_keyring() -> KeyringBackend | None:
 
 
 def tokens_file() -> Path:
-    """The file of tokens by server, beside that of settings."""
+    """The file of tokens by server, next to that of settings."""
     return settings_file().with_name("tokens.json")
 
 
 def _kept_in_file() -> dict[str, str]:
     """The tokens of the file; none where there is none, or it is not what was written."""
     try:
-        found = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
+        tokens = json.loads(tokens_file().read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RuntimeError):  # no file, no JSON, no home directory
         return {}
-    return {str(name): str(token) for name, token in found.items()} if isinstance(found, dict) else {}
+    return {str(name): str(token) for name, token in tokens.items()} if isinstance(tokens, dict) else {}
 
 
 def _keep_in_file(kept: dict[str, str]) -> str:
-    """Write the file so that nobody else could ever read it; gives its name. Without tokens there is none."""
+    """Write the file, readable for its owner only, and return its name; without tokens, delete it."""
     path = tokens_file()
     try:
         if not kept:

@@ -210,7 +210,7 @@ def grouped_names(names: Iterable[str]) -> dict[Metric, list[str]]:
     >>> {metric.symbol: names for metric, names in grouped_names(["mid", "mid_small", "rte"]).items()}
     {'MiD': ['mid', 'mid_small'], 'RTE': ['rte']}
     """
-    found: dict[Metric, list[str]] = {}
+    groups: dict[Metric, list[str]] = {}
     for name in names:
-        found.setdefault(metric_of(name), []).append(name)
-    return found
+        groups.setdefault(metric_of(name), []).append(name)
+    return groups

@@ -76,7 +76,7 @@ class Metric:
 
     @property
     def unit_of_value(self) -> str:
-        """What stands behind a value in a sentence, with its space; nothing for a power of ten.
+        """The unit that follows a value in a sentence, with its space; empty for a power of ten.
 
         >>> MID.unit_of_value, RTE.unit_of_value
         ('', ' %')

@@ -116,14 +116,14 @@ def _names(table: PublishedTable) -> list[tuple[str, Callable[[PublishedRow], st
     """Heading and text of the columns before the values: what the rows differ in."""
     if not table.is_result:
         return [(_FIRST_HEADINGS.get(table.name, ""), lambda row: _LABELS.get(str(row.key), str(row.key)))]
-    found: list[tuple[str, Callable[[PublishedRow], str]]] = []
+    name_columns: list[tuple[str, Callable[[PublishedRow], str]]] = []
     if len({row.split for row in table.rows}) > 1:
-        found.append(("Split", lambda row: row.split or ""))
+        name_columns.append(("Split", lambda row: row.split or ""))
     if table.parameter is None or len({row.method for row in table.rows}) > 1:
-        found.append(("Method", method_name))
+        name_columns.append(("Method", method_name))
     if table.parameter is not None:
-        found.append((_SETTINGS.get(table.parameter, table.parameter), setting_text))
-    return found
+        name_columns.append((_SETTINGS.get(table.parameter, table.parameter), setting_text))
+    return name_columns
 
 
 def method_name(row: PublishedRow) -> str:
