@@ -1,4 +1,4 @@
-"""Ablations of Pixel MSE: one setting varied, everything else as in the paper, scores beside the paper's.
+"""Ablations of Pixel MSE: one setting varied, everything else as in the paper, scores next to the paper's.
 
     rows = scores_of_settings(get_ablation("frame-gap"), folder=folder, truth=truth)
 

@@ -83,7 +83,7 @@ def run_method(
     key = _key(folder, method, filled, frame_gap)
     began_s = time.perf_counter()
     with Journal(out.with_name(out.name + ".part"), key=key) as journal:
-        outcomes = {outcome.row: outcome for outcome in journal.found}
+        outcomes = {outcome.row: outcome for outcome in journal.outcomes}
         n_resumed = len(outcomes)
         progress(n_resumed)
         rows = [row for row in folder.rows_in_time().tolist() if row not in outcomes]

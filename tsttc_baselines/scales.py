@@ -58,9 +58,9 @@ def at_best_shifts(errors: Floats) -> tuple[Floats, NDArray[np.int_]]:
     """
     n_shifts = errors.shape[2]
     flat = errors.reshape(len(errors), -1)
-    places = np.argmin(flat, axis=1)
-    shifts = np.stack([places % n_shifts, places // n_shifts], axis=1) - n_shifts // 2
-    return flat[np.arange(len(errors)), places], shifts
+    indices = np.argmin(flat, axis=1)
+    shifts = np.stack([indices % n_shifts, indices // n_shifts], axis=1) - n_shifts // 2
+    return flat[np.arange(len(errors)), indices], shifts
 
 
 def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:

@@ -232,7 +232,7 @@ def _assemble(rng: np.random.Generator, tracks: list[Track], *, n_recordings: in
             for window in range(tracks[index].ttc_s.size)
         ]
     rows.sort(key=lambda row: row[0])
-    keys, places = [row[0] for row in rows], [row[1:] for row in rows]
+    keys, windows = [row[0] for row in rows], [row[1:] for row in rows]
     bag_stamps, cam_ids, ts_ns, track_ids = (list(column) for column in zip(*keys, strict=True))
     return Split(
         table=Table(
@@ -241,10 +241,10 @@ def _assemble(rng: np.random.Generator, tracks: list[Track], *, n_recordings: in
             cam_id=cam_ids,
             ts_ns=ts_ns,
             track_id=track_ids,
-            ttc_s=[round(float(tracks[index].ttc_s[window]), 6) for index, window in places],
+            ttc_s=[round(float(tracks[index].ttc_s[window]), 6) for index, window in windows],
         ),
-        vehicle=tuple(tracks[index].vehicle for index, _ in places),
-        gap_m=np.stack([tracks[index].gap_m[window] for index, window in places]),
-        lateral_m=np.stack([tracks[index].lateral_m[window] for index, window in places]),
-        ego_mps=np.array([tracks[index].ego_mps[window] for index, window in places]),
+        vehicle=tuple(tracks[index].vehicle for index, _ in windows),
+        gap_m=np.stack([tracks[index].gap_m[window] for index, window in windows]),
+        lateral_m=np.stack([tracks[index].lateral_m[window] for index, window in windows]),
+        ego_mps=np.array([tracks[index].ego_mps[window] for index, window in windows]),
     )

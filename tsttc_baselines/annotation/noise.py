@@ -84,13 +84,13 @@ def label_noise(earlier_s: Floats, later_s: Floats, *, n_frames: int = 10) -> li
     is_defined = np.isfinite(jitter)
     jitter, later_s = jitter[is_defined], later_s[is_defined]
     ranges = [(OVERALL, -math.inf, math.inf), *((r.name, r.low_s, r.high_s) for r in TTC_RANGES)]
-    found = []
+    noises = []
     for name, low_s, high_s in ranges:
         inside = jitter[(later_s >= low_s) & (later_s <= high_s)]
         mean = float(inside.mean()) if inside.size else None
         noise = None if mean is None else mean / jitter_of_noise(n_frames)
-        found.append(LabelNoise(name, int(inside.size), mean, noise))
-    return found
+        noises.append(LabelNoise(name, int(inside.size), mean, noise))
+    return noises
 
 
 def jitter_of_noise(n_frames: int) -> float:

@@ -79,8 +79,8 @@ def annotate(
     """
     if source.is_dir() != (input_format == "kitti"):
         expected = "a folder of labels" if input_format == "kitti" else "a table (folders: --format kitti)"
-        found = "a folder" if source.is_dir() else "a file"
-        message = f"{source} is {found}; --format {input_format} expects {expected}."
+        kind = "a folder" if source.is_dir() else "a file"
+        message = f"{source} is {kind}; --format {input_format} expects {expected}."
         raise click.UsageError(message)
     from tsttc_baselines.annotation import pipeline  # noqa: PLC0415 -- numpy, which --help can do without
 

@@ -119,8 +119,8 @@ def network_logits(operations: Operations, pairs: Sequence[CropPair], *, use: Us
         )
         for pair in pairs
     ]
-    found = similarities(operations, target, reference, sampling, similarity=use.similarity)
-    return operations.linear("head.scale_preds", found)
+    head_input = similarities(operations, target, reference, sampling, similarity=use.similarity)
+    return operations.linear("head.scale_preds", head_input)
 
 
 def stacked(crops: Sequence[Crop]) -> Pixels:

@@ -75,23 +75,23 @@ class Operations(Protocol):
         """The linear layer on the last axis."""
         ...
 
-    def values(self, found: Array) -> NDArray[np.float32]:
+    def values(self, array: Array) -> NDArray[np.float32]:
         """An array's numbers, for numpy."""
         ...
 
 
 def features(operations: Operations, images: Array) -> Array:
     """(b, 24, h, w): the features of `images` (b, 3, h, w); h and w are even."""
-    found = operations.block("backbone.stem", images, stride=2)
-    found = operations.block("backbone.stage2.0", found)
-    deep = operations.block("backbone.stage2.1.conv1", found)
+    maps = operations.block("backbone.stem", images, stride=2)
+    maps = operations.block("backbone.stage2.0", maps)
+    deep = operations.block("backbone.stage2.1.conv1", maps)
     for number in range(_N_BOTTLENECKS):
         name = f"backbone.stage2.1.m.{number}"
         deep = operations.block(f"{name}.conv2", operations.block(f"{name}.conv1", deep)) + deep
-    flat = operations.block("backbone.stage2.1.conv2", found)
-    found = operations.block("backbone.stage2.1.conv3", operations.joined(deep, flat))
-    found = operations.upsampled("backbone.upsample", found)
-    return operations.block("backbone.stage3.1", operations.block("backbone.stage3.0", found))
+    flat = operations.block("backbone.stage2.1.conv2", maps)
+    maps = operations.block("backbone.stage2.1.conv3", operations.joined(deep, flat))
+    maps = operations.upsampled("backbone.upsample", maps)
+    return operations.block("backbone.stage3.1", operations.block("backbone.stage3.0", maps))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

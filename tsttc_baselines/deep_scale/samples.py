@@ -153,7 +153,7 @@ def usable_pair(source: Source, row: int, *, scale_ratio: float) -> Pair:
 def batches(
     source: Source, *, use: Use, size: int, rng: np.random.Generator, fitting: Operations | None = None
 ) -> Iterator[tuple[int, list[Sample]]]:
-    """Batches of an epoch, each with the number of sequences it stands for: all rows once, in a random order.
+    """Batches of an epoch, each with its number of sequences: all rows once, in a random order.
 
     Sequences that cannot be used, or whose α the network cannot say, are left out. With the network as
     `fitting`, samples have what the fit learns from.
@@ -170,9 +170,9 @@ def batches(
         samples.sort(key=lambda sample: sample.crops.reference.pixels.size)
         starts = range(0, len(samples), size)
         n_rows = len(chosen) / max(1, len(starts))
-        for number, place in enumerate(rng.permutation(len(starts)).tolist()):
+        for number, position in enumerate(rng.permutation(len(starts)).tolist()):
             n_before, n_after = round(number * n_rows), round((number + 1) * n_rows)
-            yield n_after - n_before, samples[starts[place] : starts[place] + size]
+            yield n_after - n_before, samples[starts[position] : starts[position] + size]
 
 
 def _pair(source: Source, row: int, scale_ratio: float, *, rng: np.random.Generator) -> Pair | None:

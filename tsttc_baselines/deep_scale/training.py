@@ -115,8 +115,8 @@ class Validation:
     def scores(self, operations: TorchLayers, *, use: Use) -> dict[str, Any]:
         """The evaluator's report: means by metric, for each TTC range."""
         truth = self.source.truth
-        found = [self._scale_ratio(operations, row, use=use) for row in range(truth.n_sequences)]
-        ttc_s = scale_ratio_to_ttc(found, fps_hz=fps_of_gap(5))
+        scale_ratios = [self._scale_ratio(operations, row, use=use) for row in range(truth.n_sequences)]
+        ttc_s = scale_ratio_to_ttc(scale_ratios, fps_hz=fps_of_gap(5))
         report = evaluate(Predictions.from_arrays(ttc_s=ttc_s, manifest=truth.manifest), truth)
         return {name: score.means for name, score in report.scores.items()}
 
@@ -133,10 +133,10 @@ class Validation:
         frames = pair.reference, pair.target
         with torch.no_grad():
             logits = network_logits(operations, [cut(frames, pair.boxes, use=use)], use=use)
-            found = float(mean_scale_ratio(logits)[0])
+            scale_ratio = float(mean_scale_ratio(logits)[0])
             if use.decoding == "fit":
-                found = fitted_scale_ratio(operations, frames, pair.boxes, near=found)
-        return found
+                scale_ratio = fitted_scale_ratio(operations, frames, pair.boxes, near=scale_ratio)
+        return scale_ratio
 
 
 def mean_scale_ratio(logits: torch.Tensor) -> torch.Tensor:
@@ -383,7 +383,7 @@ def _begun(
 
 
 def _keep(part: Path, *, key: str, network: Network, epochs: Sequence[Epoch]) -> None:
-    """What goes on after an end; the file appears whole."""
+    """Write the state from which a later run continues; the file appears whole."""
     new = part.with_name(part.name + ".new")
     state = {
         "key": key,
