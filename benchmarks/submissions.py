@@ -106,7 +106,7 @@ def infer_again() -> None:
 
 
 def commands(made: Site, token: str, truth: evaluator.GroundTruth, rng: np.random.Generator) -> None:
-    """The command line, started anew for each file."""
+    """The command line, started again for each file."""
     path = made.directory / "predictions.json"
     environment = os.environ | {"TSTTC_URL": made.url, "TSTTC_TOKEN": token, "NO_PROXY": "*"}
     command = [str(BIN / "tsttc"), "submit", str(path), "--split", "test", "--method", "Bench", "--wait"]
