@@ -75,7 +75,7 @@ def change() -> None:
 
 
 def first_reader_s(http: httpx.Client) -> float:
-    """How long the page and the JSON take for the first who asks after a change, the longer of both."""
+    """The time of the page and the JSON for the first reader after a change, the longer of both."""
     taken_s = []
     for address in [ADDRESSES["page"], ADDRESSES["json"]]:
         times_s = []

@@ -92,7 +92,7 @@ def one_by_one(http: httpx.Client, data: bytes) -> float:
 
 
 def n_scored(ids: list[str]) -> int:
-    """How many of these submissions are scored."""
+    """The number of these submissions that are scored."""
     from leaderboard.models import Evaluation, Status  # noqa: PLC0415
 
     return Evaluation.objects.filter(submission__in=map(UUID, ids), status=Status.SCORED).count()

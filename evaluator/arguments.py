@@ -1,4 +1,4 @@
-"""What callers give: a file in any of its forms, and the right thing in the right place."""
+"""Check the arguments of public functions: a file in any of its forms, and objects of the right type."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ class Findings:
 
 
 def n_problems_in_words(n_problems: int, *, n_lines: int) -> str:
-    """How many problems, and why the list below has fewer lines.
+    """The number of problems, and why the list below has fewer lines.
 
     >>> n_problems_in_words(1, n_lines=1), n_problems_in_words(7_000, n_lines=1)
     ('1 problem', '7,000 problems; equal ones share a line')

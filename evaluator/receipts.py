@@ -45,7 +45,7 @@ class NotVerified(Exception):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Verified:
-    """What a receipt says, its signature checked. `method` is the name that it had when it was signed."""
+    """A receipt with a checked signature. `method` is the name that the method had when it was signed."""
 
     site: str
     key_id: str
@@ -137,7 +137,7 @@ def sign(document: Mapping[str, Any], *, private_key: bytes) -> str:
 
 
 def verify(receipt: bytes, keys: Mapping[str, Ed25519PublicKey]) -> Verified:
-    """What the receipt says, if one of these keys (see `read_keys`) signed it so. Raises `NotVerified`."""
+    """Check that one of these keys (see `read_keys`) signed the receipt; read it. Raises `NotVerified`."""
     if len(receipt) > MAX_BYTES:
         raise _malformed(f"it has {len(receipt):,} bytes; expected at most {MAX_BYTES:,}")
     try:

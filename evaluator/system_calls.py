@@ -1,4 +1,4 @@
-"""What a process that reads untrusted bytes may still ask of the kernel: a seccomp filter.
+"""A seccomp filter of the system calls that a process may make while it reads untrusted bytes.
 
 The filter allows what a single thread needs that computes, reads what it has open, and writes its answer. All
 else is answered EPERM, so that a library that asks for more than it needs goes on without; a process of

@@ -29,7 +29,7 @@ _DATE: Final = re.compile(r"((?:19|20)\d\d)([-_]?)(\d\d)\2(\d\d)(?!\d)", re.ASCI
 
 
 def noun_of(kind: str) -> str:
-    """What one unit of this kind is called."""
+    """The noun for one unit of this kind."""
     return _NOUNS.get(kind, kind)
 
 

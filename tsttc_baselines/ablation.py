@@ -34,7 +34,7 @@ FRAME_GAP: Final = 5
 
 @dataclass(frozen=True, slots=True)
 class Ablation:
-    """What is varied: `parameter` of Pixel MSE, or the frame gap where that is None.
+    """The varied setting: `parameter` of Pixel MSE, or the frame gap if that is None.
 
     `table` names the paper's table, and is None where the paper has none.
     """

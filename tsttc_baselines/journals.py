@@ -92,7 +92,7 @@ def _lock(file: IO[bytes]) -> None:
 
 
 def _entry(line: bytes) -> dict[str, Any] | None:
-    """What a line says; None for one that is not whole."""
+    """Parse a line; None for one that is not whole."""
     if not line.endswith(b"\n"):
         return None
     try:

@@ -198,7 +198,7 @@ class Comparison:
 
     @property
     def variance(self) -> float:
-        """That of the patch, in squared grey levels."""
+        """The variance of the patch, in squared grey levels."""
         return self._energy / self.patch.size
 
     @property

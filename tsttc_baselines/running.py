@@ -43,7 +43,7 @@ Progress = Callable[[int], None]
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """What a run has done. `scale_ratio` is (n,) in the manifest's order.
+    """The estimates of a run. `scale_ratio` is (n,) in the manifest's order.
 
     `n_fallback` counts by reason, the most frequent first, and `examples` has a problem for each reason.
     `n_resumed` values come from an earlier run that was ended. `seconds` are those of all of them.
@@ -159,7 +159,7 @@ def _key(folder: SequenceFolder, method: Method, parameters: Mapping[str, Value]
 
 
 def _plain(parameters: Mapping[str, Value]) -> dict[str, object]:
-    """The parameters as JSON has them; of a file its name, for its folder is nobody's business."""
+    """The parameters for JSON; a file by its name alone, because its folder is private."""
     return {name: value.name if isinstance(value, Path) else value for name, value in parameters.items()}
 
 

@@ -75,7 +75,7 @@ def weighted_scale_ratio(scales: Floats, errors: Floats) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Match:
-    """What a search over scale bins found.
+    """The matches of a search over scale bins.
 
     `scales` (n,) are the scale ratios that were tried, ascending; `errors` (n,) their mean squared errors,
     each at its best shift, in squared grey levels; `shifts` (n, 2) these shifts, x and y, in cells of the

@@ -147,7 +147,7 @@ def _closing_runs(closed: bool) -> Iterator[Run]:
 
 @dataclass(frozen=True, slots=True)
 class State:
-    """Where ego and vehicle are at some times: arrays of one shape, NaN after the end of a run."""
+    """The positions of ego and vehicle at some times: arrays of one shape, NaN after the end of a run."""
 
     gap_m: Floats
     lateral_m: Floats

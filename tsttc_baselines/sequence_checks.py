@@ -1,4 +1,4 @@
-"""What is wrong with the boxes of a sequence, in a few words to be counted and in a sentence."""
+"""Faults of a sequence's boxes, each with a short reason for counting and a sentence."""
 
 from __future__ import annotations
 

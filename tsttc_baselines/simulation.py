@@ -44,7 +44,7 @@ class Split:
 
     @property
     def n_sequences(self) -> int:
-        """How many sequences the split has; their anno_ids are 0 … n − 1."""
+        """The number of sequences of the split; their anno_ids are 0 … n − 1."""
         return len(self.vehicle)
 
     @cached_property
@@ -76,7 +76,7 @@ SHAPES: Final = {
 
 
 def range_counts(*, n_sequences: int, shape: Shape) -> dict[str, int]:
-    """How many sequences each TTC range has, and how many lie beyond ±20 s; they add up to `n_sequences`.
+    """The number of sequences of each TTC range, and of those beyond ±20 s; they add up to `n_sequences`.
 
     >>> range_counts(n_sequences=28_600, shape=SHAPES["test"])["crucial"]
     3771

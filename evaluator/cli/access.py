@@ -167,7 +167,7 @@ def publish(
 
 
 def _confirm(name: str, visibility: str, foreseen: Foreseen) -> None:
-    """Show what others will see, and ask; where nobody can be asked, say so."""
+    """Show what others will see and ask for confirmation; raises Failure without a terminal."""
     for line in _foreseen_in_words(foreseen):
         click.echo(line, err=True)
     meaning = {

@@ -167,7 +167,7 @@ def _table(board: Board, *, texts: Sequence[str], scores: Sequence[str]) -> list
 
 
 def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
-    """The places of the best and the second of a column, among the rows that everybody sees."""
+    """The rows with the best and the second value of a column, among those that everybody sees."""
     from evaluator.metrics.registry import best_and_second  # noqa: PLC0415 -- only once there is a board to mark
 
     return best_and_second(

@@ -49,7 +49,7 @@ class Condition:
         return f"{self.name} {self.operator} {self.number:g}"
 
     def holds(self, scores: Scores) -> bool | None:
-        """Whether it holds; None where there is no such value."""
+        """Whether the condition holds; None if there is no such value."""
         value = scores.get(self.name)
         return None if value is None else OPERATORS[self.operator](round(value, 2), self.number)
 

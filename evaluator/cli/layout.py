@@ -35,7 +35,7 @@ def short_name(score: str) -> str:
 
 
 def units(scores: Iterable[str]) -> str:
-    """What the headings of these scores mean.
+    """The units and TTC ranges of these scores' headings.
 
     >>> units(["mid", "mid_crucial", "mid_negative", "rte"])
     'MiD ×10⁻⁴, RTE %, lower is better; TTC ranges in s: c 0–3, n −20–0'

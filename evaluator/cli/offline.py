@@ -151,7 +151,7 @@ def manifest(
 
 
 def _manifest_of_split(split: str, edition: int | None, url: str) -> tuple[Manifest, Numbering | None]:
-    """What the leaderboard gives, checked."""
+    """Get the manifest of a split from the leaderboard and check it."""
     from evaluator import read_manifest  # noqa: PLC0415 -- numpy, as above
 
     with connect(url, with_token=False) as client, naming(Path(f"{url.rstrip('/')}: {split}")):

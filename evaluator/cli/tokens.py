@@ -41,7 +41,7 @@ def token_for(url: str) -> str:
 
 
 def has_token(url: str) -> bool:
-    """Whether there is a token, for commands that can do without."""
+    """Whether there is a token, for commands that also work without one."""
     is_named = os.environ.get(TOKEN_VARIABLE, "").strip() or os.environ.get(TOKEN_FILE_VARIABLE)
     return bool(is_named) or kept_token(url) is not None
 
@@ -75,7 +75,7 @@ def _no_token(words: str, url: str) -> Failure:
 
 
 def kept_token(url: str) -> str | None:
-    """What the keyring has for `url`, or the file; None also where the keyring stays locked."""
+    """The token for `url` in the keyring or the file; None also if the keyring stays locked."""
     from keyring.errors import KeyringError  # noqa: PLC0415 -- as the module says
 
     backend = usable_keyring()

@@ -20,7 +20,7 @@ def authors_or_team(entry: BoardEntry) -> str:
 
 
 def overall_of(names: Iterable[str]) -> list[str]:
-    """Of these scores the overall ones, each once.
+    """The overall scores among these, each once.
 
     >>> overall_of(["mid", "mid_small", "rte", "mid"])
     ['mid', 'rte']

@@ -180,7 +180,7 @@ class Client:
         return self._asked_by_anybody("splits", split, "manifest", accept="text/csv, */*", **query).content
 
     def quota(self) -> list[Quota]:
-        """What one's own team has left, split by split."""
+        """The submissions that the own team has left, by split."""
         return rows(self._asked("quota"), Quota)
 
     def compare(self, split: str, methods: Sequence[str], *, timeout_s: float = 120.0) -> Compared:
@@ -226,7 +226,7 @@ class Client:
         return self._get(Method, "methods", method_id)
 
     def foreseen(self, method_id: str, visibility: str) -> Foreseen:
-        """What everybody would see of a method of one's own, were it "PUBLIC" or "ANONYMOUS"."""
+        """Preview what everybody would see of an own method if it were "PUBLIC" or "ANONYMOUS"."""
         return self._get(Foreseen, "methods", method_id, "visibility", params={"as": visibility})
 
     def show_method(self, method_id: str, visibility: str, *, reveal_at: str | None = None) -> Method:
@@ -303,7 +303,7 @@ class Client:
         return self._retry(lambda: self._http.get(self._address(*path), params=params))
 
     def _asked_by_anybody(self, *path: str, accept: str, **query: int) -> httpx.Response:
-        """What everybody may read is read without the token, which may not be good for reading."""
+        """Read public pages without the token, which may lack the right to read."""
         headers = {"Accept": accept}
         request = self._http.build_request("GET", self._address(*path), params=query, headers=headers)
         request.headers.pop("Authorization", None)

@@ -81,7 +81,7 @@ def split_name(name: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class Protocol:
-    """How a predicted time to contact is prepared before its errors are taken, and what is made of these.
+    """The rules by which predicted times to contact become scores.
 
     Predictions outside [−limit_s, limit_s] are truncated to its ends. With `near_zero_s = (low, high)`,
     predictions in (low, 0) become `low` and those in (0, high) become `high`; with None they stay, and those

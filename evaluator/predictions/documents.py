@@ -107,7 +107,7 @@ def parse(data: bytes, *, max_members: int | None = None) -> object:
 
 
 def _hint(data: bytes) -> str:
-    """What a file is that begins so, in a sentence; empty where its first bytes say nothing."""
+    """A sentence on the kind of a file that begins with these bytes; empty if they are of no known kind."""
     kind = next((kind for start, kind in _LOOKS_LIKE.items() if data.startswith(start)), "")
     return f" The file looks like {kind}." if kind else ""
 
@@ -151,7 +151,7 @@ def read_document(value: object) -> Document:
 
 
 def kind_of(value: object) -> str:
-    """What a JSON value is, for messages, with the value where it is short.
+    """The kind of a JSON value for messages, with the value if it is short.
 
     >>> kind_of("5.3"), kind_of(None), kind_of([1])
     ('the string "5.3"', 'null', 'a list')

@@ -259,7 +259,7 @@ def _checked(rows: Iterator[list[str]], *, n_fields: int) -> Iterator[list[str]]
 
 
 def columns_of(header: Sequence[str]) -> tuple[Sequence[str], str, str | None]:
-    """Of the columns of a table, those of the key, that of the value and, of scale ratios, that of the rate.
+    """The key columns, the value column and, for scale ratios, the rate column of a table.
 
     Raises `Rejected` for a table without the columns that it needs.
     """

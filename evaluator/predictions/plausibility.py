@@ -44,13 +44,13 @@ Pairs = NDArray[np.intp]
 
 
 def warnings_of(predictions: Predictions) -> list[FileWarning]:
-    """What the file and its manifest tell, without any true value."""
+    """Warnings from the file and its manifest, without any true value."""
     manifest, ttc_s = predictions.manifest, predictions.ttc_s
     return [*unit_warnings(ttc_s), *_sign_warnings(manifest, ttc_s), *_order_warnings(manifest, ttc_s)]
 
 
 def unit_warnings(ttc_s: Floats) -> list[FileWarning]:
-    """What the values tell by themselves, (n,): whether they look like another unit than seconds."""
+    """Warnings from the values alone, (n,): whether they look like another unit than seconds."""
     n = len(ttc_s)
     if n < MIN_VALUES:
         return []

@@ -77,7 +77,7 @@ class PrintedTable:
 
     @property
     def n_results(self) -> int:
-        """How many measured numbers it has."""
+        """The number of measured values."""
         return sum(len(row.values) for row in self.table.rows) if self.table.is_result else 0
 
     @property
@@ -87,7 +87,7 @@ class PrintedTable:
 
     @property
     def units(self) -> str:
-        """What its headings mean; empty for a table without results."""
+        """The units of its headings; empty for a table without results."""
         if not self.table.is_result:
             return ""
         metrics = dict.fromkeys(metric_of(name) for name in self.table.columns if name in SCORE_NAMES)
@@ -269,7 +269,7 @@ def document(shown: PrintedTable) -> dict[str, Any]:
 
 
 def about(shown: PrintedTable, tables: PublishedTables | None = None) -> tuple[str, ...]:
-    """Where a table comes from, in a line or two."""
+    """The source of a table, in one or two lines."""
     source = (tables or published_tables()).source
     default = " The paper's default is bold." if any(row.is_default for row in shown.rows) else ""
     return (

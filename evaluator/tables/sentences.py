@@ -15,7 +15,7 @@ _DECIMALS_IN_WORDS: Final = {1: "one decimal", 2: "two decimals"}
 
 
 def p_text(p: float | None, below: float | None = None) -> str:
-    """A p-value in words, with four decimals; where p itself is not told, the class that it is below.
+    """A p-value in words, with four decimals; the class that it is below if p itself is withheld.
 
     >>> p_text(0.0496), p_text(0.3), p_text(1.0)
     ('p = 0.0496', 'p = 0.3000', 'p = 1')
@@ -43,7 +43,7 @@ def p_cell(p: float | None, below: float | None) -> str:
 def sentence(
     first: str, second: str, *, name: str, difference: Difference, decimals: int = 2, withheld: str = ""
 ) -> str:
-    """What a difference in one column means, in words; `decimals` are those in which values are published.
+    """A difference in one column as a sentence; `decimals` are those of published values.
 
     `withheld` says why there is no interval, in a sentence, where it is not for too few units.
 
@@ -104,7 +104,7 @@ def _amount(value: float, digits: int) -> str:
 
 
 def _digits(difference: Difference, decimals: int) -> int:
-    """As many as give the half width two digits, enough to tell the difference, never more than published."""
+    """The decimals that give the half width two digits and show the difference; at most `decimals`."""
     if difference.low is None or difference.high is None:
         return decimals
     half = (difference.high - difference.low) / 2
@@ -139,7 +139,7 @@ def influence(first: str, second: str, *, difference: Difference) -> str:
 
 
 def selection(n_tried: Mapping[str, int]) -> str:
-    """What it is worth to be the best of several, for methods and their numbers of scored submissions.
+    """A sentence on selection among several submissions, for methods and their numbers of scored submissions.
 
     Empty where nothing was chosen.
 
@@ -189,7 +189,7 @@ def resolution(pairs: Sequence[Mapping[str, Difference]], *, decimals: int = 2) 
 
 
 def others(differences: Mapping[str, Difference]) -> str:
-    """How many columns besides overall MiD differ significantly; empty where no column has a p.
+    """The number of columns besides overall MiD that differ significantly; empty if no column has a p.
 
     >>> alike, far = Difference(0.1, -0.2, 0.4, 0.5), Difference(-4.1, -5.3, -2.9, 0.0003)
     >>> others({"mid": far, "mid_small": alike, "rte": alike})

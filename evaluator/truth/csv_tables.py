@@ -160,7 +160,7 @@ def read_csv(source: Source, *, with_ttc: bool) -> Table:
 
 
 def _of_objects(header: list[str], columns: tuple[str, ...]) -> dict[str, int]:
-    """Where the columns of objects are; of a manifest, nobody asks for them."""
+    """The positions of the object columns; empty for a manifest."""
     return {name: header.index(name) for name in OBJECT_COLUMNS if name in header and "ttc" in columns}
 
 

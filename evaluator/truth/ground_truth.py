@@ -168,7 +168,7 @@ class Manifest:
 
     @cached_property
     def _columns(self) -> dict[str, NDArray[Any]]:
-        """What `save` writes, and that of the ground truth as well."""
+        """The arrays that `save` writes, here and in the ground truth."""
         return {
             "anno_id": self.anno_id,
             "bag_stamp": np.array(self.bag_stamp, dtype=np.str_),

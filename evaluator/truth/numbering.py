@@ -29,7 +29,7 @@ class Numbering:
 
     @property
     def n_renumbered(self) -> int:
-        """How many anno_ids name another sequence in the toolkit's numbering than in the manifest's."""
+        """The number of anno_ids for which the toolkit and the manifest name different sequences."""
         return int(np.count_nonzero(self.manifest.anno_id[self.rows] != np.arange(len(self.rows))))
 
     @cached_property

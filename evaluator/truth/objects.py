@@ -83,7 +83,7 @@ def _floats(column: Sequence[Any]) -> Floats | None:
 
 
 def occ_ratio_of(text: str) -> float | None:
-    """How much is occluded.
+    """The occluded part.
 
     >>> occ_ratio_of("0.25"), occ_ratio_of("")
     (0.25, None)
@@ -101,7 +101,7 @@ def occ_ratio_of(text: str) -> float | None:
 
 
 def same_lane_of(text: str) -> bool | None:
-    """Whether the lane is the same.
+    """Whether the object drives in the same lane.
 
     >>> same_lane_of("1"), same_lane_of("False"), same_lane_of("")
     (True, False, None)
@@ -153,7 +153,7 @@ def text_of(value: float | bool | Sequence[float] | None) -> str:
 
 
 def is_box(box: Sequence[float]) -> bool:
-    """Whether these are the corners of a box in parts of an image."""
+    """Whether these four numbers are a box in parts of an image."""
     if len(box) != 4 or not all(abs(number) <= _FARTHEST for number in box):  # NaN is not either
         return False
     x1, y1, x2, y2 = box

@@ -58,7 +58,7 @@ class Attributes(dict[Any, Any]):
 
 
 class FewNumbers:
-    """An array of numbers; those of a short one, a box, are kept, and nobody asks for those of others."""
+    """An array of numbers; only a short one, such as a box, keeps its values."""
 
     __slots__ = ("_dtype", "_raw")
     _raw: bytes

@@ -42,7 +42,7 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class FrameTtc:
-    """What is known of each of n observations: `ttc_s` is NaN where no velocity is.
+    """The estimates for each of n observations: `ttc_s` is NaN without a velocity.
 
     `ttc_s` = −`depth_m` / velocity, of the window `q`, which had `n_frames`, of which `n_inliers` agree;
     `choice` is a key of `REASONS`.

@@ -1,4 +1,4 @@
-"""How far a run is: a bar with rate and time left on a terminal, elsewhere a line every few seconds."""
+"""The progress of a run: a bar with rate and time left on a terminal, elsewhere a line every few seconds."""
 
 from __future__ import annotations
 

@@ -123,7 +123,7 @@ class _Storage:
 
 @dataclass(frozen=True, slots=True)
 class _Tensor:
-    """What the pickle says of a tensor; nothing of it is believed before `fault` has looked."""
+    """The pickle's entry for a tensor, untrusted until `fault` has checked it."""
 
     storage: Any
     offset: Any
@@ -131,7 +131,7 @@ class _Tensor:
     stride: Any
 
     def fault(self, expected: Shape) -> str | None:
-        """What is wrong with it, to follow its name; None where it has this shape and lies in one piece."""
+        """The fault, to follow its name; None if it has this shape and is contiguous."""
         if self.shape != expected:
             return f"has the shape {self.shape}; expected {expected}"
         if not isinstance(self.storage, _Storage) or self.storage.kind != "FloatStorage":

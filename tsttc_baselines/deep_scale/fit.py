@@ -123,7 +123,7 @@ class Grid:
         return np.asarray(down.weights @ pixels @ across.weights.T)
 
     def offsets(self) -> tuple[Floats, Floats]:
-        """Of the rows and of the columns from the middle of the box, in pixels of the grid."""
+        """The offsets of the rows and the columns from the middle of the box, in pixels of the grid."""
         rows, columns = (np.arange(length, dtype=np.float64) - (length - 1) / 2 for length in self.shape)
         return rows, columns
 
@@ -181,7 +181,7 @@ def _fits(
     *,
     box_px: float,
 ) -> list[Fit]:
-    """Where the steps on a grid over the target's box lead from each of the views of the reference frame."""
+    """Fit each view of the reference frame by steps on a grid over the target's box."""
     reference, target = frames
     grid = Grid.over(box, box_px=box_px)
     wanted = _features(operations, grid.cut(target, View(1.0, centre_of(box))))
@@ -235,7 +235,7 @@ def _shifted(part: slice, by: int) -> slice:
 
 
 def weighting(xp: Any, design: Array, errors: Array) -> tuple[Array, Array]:
-    """How the equations count: (24, 24), by which features are multiplied, and (p,), the pixels' weights."""
+    """The weights of the equations: (24, 24), by which features are multiplied, and (p,) of the pixels."""
     weights = _weights(xp, errors)
     covariance = (errors * weights) @ errors.T / weights.sum()
     ones = xp.ones_like(covariance[0])

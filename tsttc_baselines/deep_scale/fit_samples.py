@@ -1,4 +1,4 @@
-"""What the fit learns from (`fit`): two crops of a pair on one grid, and how far they are apart."""
+"""Training samples of the fit (`fit`): two crops of a pair on one grid, and how far they are apart."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ Similarity = Literal["dot", "cosine"]
 
 
 class Operations(Protocol):
-    """What the network needs of numpy or torch. Names are those of the weights; images are (b, c, h, w)."""
+    """The operations, by numpy or torch. Names are those of the weights; images are (b, c, h, w)."""
 
     def block(self, name: str, images: Array, *, stride: int = 1) -> Array:
         """Convolution, batch normalisation and SiLU. The size is kept, or halved and rounded up."""
@@ -96,7 +96,7 @@ def features(operations: Operations, images: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """Where the features of one pair are sampled: matrices as `roi_align.sampling_matrix` makes them.
+    """The sampling of one pair's features: matrices as `roi_align.sampling_matrix` makes them.
 
     The target's are (3 · 52, h) and (3 · 52, w), for the three shifts one below the other: 50 cells with a
     border of zeros, whose place is the shift. The reference's are (n, 52, h) and (n, 52, w), one for each

@@ -92,7 +92,7 @@ class Recipe:
 
 @dataclass(frozen=True, slots=True)
 class Epoch:
-    """What an epoch came to: the mean loss of a pair, and the evaluator's scores on the other sequences.
+    """The figures of an epoch: the mean loss of a pair, and the evaluator's scores on the other sequences.
 
     `n_left_out` counts the sequences that nothing was learned from: a frame or a box is missing or too small,
     or the network has no such scale ratio. Number 0 has the scores before epoch 1, and no loss.
@@ -247,7 +247,7 @@ class Network:
 
 @contextmanager
 def _one_thread_each() -> Iterator[int]:
-    """What torch does within takes one thread. Gives the number of those that it may take."""
+    """Limit torch to one thread inside; yields the number of threads that it had."""
     n_threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:
@@ -266,7 +266,7 @@ def _loss(logits: torch.Tensor, scale_ratios: Sequence[float], *, ratio_weight: 
 
 
 def fit_error(operations: TorchLayers, sample: FitSample) -> torch.Tensor:
-    """How far a step of the fit is from what is lacking, in MiD; large errors count less."""
+    """The error of a step of the fit, in MiD; large errors count less."""
     target, reference = (evened(maps) for maps in features(operations, operations.constant(sample.pixels)))
     rows, columns = (operations.constant(offsets) for offsets in sample.grid.offsets())
     design, errors = equations(torch, target, reference, grid=sample.grid, offsets=(rows, columns))
@@ -346,7 +346,7 @@ def _epoch(scores: dict[str, Any], *, number: int, losses: Sequence[float], n_le
 
 
 def card_of(recipe: Recipe, source: Source, epochs: Sequence[Epoch]) -> dict[str, Any]:
-    """What the file of the weights says of its making."""
+    """The training record in the weights' file."""
     return {
         "recipe": {name: value for name, value in asdict(recipe).items() if name != "use"},
         "data": {"sequences": int(source.truth.n_sequences), "digest": source.truth.digest},

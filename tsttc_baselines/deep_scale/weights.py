@@ -164,7 +164,7 @@ def _read_card(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def _read_use(entry: object) -> Use:
-    """How the card says that the weights are to be used; raises `Rejected`."""
+    """Read the card's settings for using the weights; raises `Rejected`."""
     # Cards that were written before there was a choice have no decoding.
     known = {each.name for each in fields(Use)}
     if isinstance(entry, dict) and known - {"decoding"} <= entry.keys() <= known:

@@ -234,7 +234,7 @@ class _Canvas:
 
     @property
     def image(self) -> Image:
-        """What has been drawn, in colour."""
+        """The drawn image, in colour."""
         return np.asarray(cv2.cvtColor(self._pixels, cv2.COLOR_BGRA2BGR), dtype=np.uint8)
 
     def _project(self, x_m: Floats, y_m: Floats, depth_m: Floats) -> Floats:
