@@ -212,7 +212,7 @@ def put_more_documented_answers(site: RecordedSite) -> None:
 
 def published_board(split: str, scores: Mapping[str, float]) -> dict[str, object]:
     """The paper's five baselines and one submission, by rank."""
-    source = REPOSITORY / "leaderboard" / "benchmark" / "published" / "tsttc-2023.json"
+    source = REPOSITORY / "leaderboard" / "editions" / "published" / "tsttc-2023.json"
     paper = json.loads(source.read_text())
     names = {method["slug"]: method["name"] for method in paper["methods"]}
     table = published_tables().table(paper["results_of"])

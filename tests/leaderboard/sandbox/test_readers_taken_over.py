@@ -150,7 +150,7 @@ def rejected(n_problems: object = 1, problems: object = None, **changes: object)
 TRUTHFUL = (
     MARK
     + b"""
-digest = predictions.sha256_digest(data)
+digest = loading.sha256_digest(data)
 line = json.dumps({"verdict": "good", "digest": digest, "unit": "ttc", "keys": "anno_id", "enveloped": False})
 values = [5.0] * manifest.n_sequences
 CHANGE
