@@ -166,9 +166,9 @@ def score_cells(
 def interval_words(found: ConfidenceInterval, *, decimals: int = SCORED_DECIMALS) -> str:
     """From where to where a value may lie; empty where that is not known.
 
-    >>> interval_words(Interval(low=13.9, high=14.523)), interval_words(Interval())
+    >>> interval_words(ConfidenceInterval(low=13.9, high=14.523)), interval_words(ConfidenceInterval())
     ('13.90 to 14.52', '')
-    >>> interval_words(Interval(low=13.9, high=14.5), decimals=1)
+    >>> interval_words(ConfidenceInterval(low=13.9, high=14.5), decimals=1)
     '13.9 to 14.5'
     """
     if found.low is None or found.high is None:
