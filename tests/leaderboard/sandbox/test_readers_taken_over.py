@@ -85,9 +85,9 @@ def table_of(read: Read, targets: dict[str, str | int]) -> dict[str, str]:
     with socket.create_server(("127.0.0.1", 0)) as database:
         numbers = {"port": database.getsockname()[1], "address": ctypes.addressof(secret)}
         data = attempts(worker=os.getpid(), targets=targets | numbers)
-        with pytest.raises(Rejected) as rejected:
+        with pytest.raises(Rejected) as refusal:
             read(data)
-    return {problem.where: problem.message for problem in rejected.value.problems}
+    return {problem.where: problem.message for problem in refusal.value.problems}
 
 
 @needs_a_filter
@@ -277,9 +277,9 @@ def test_reader_of_annotations_that_is_taken_over_reaches_nothing(
     read_folder: Callable[[bytes], Manifest], targets: dict[str, str | int]
 ) -> None:
     numbers = {"port": 5432, "address": 4096}
-    with pytest.raises(Rejected) as rejected:
+    with pytest.raises(Rejected) as refusal:
         read_folder(attempts(worker=os.getpid(), targets=targets | numbers))
-    table = {problem.where: problem.message for problem in rejected.value.problems}
+    table = {problem.where: problem.message for problem in refusal.value.problems}
     assert len(table) == 27
     # Its own limits it may lower, file by file; not raise, but for root.
     assert table.pop("raise its own limits") in {"EPERM", "reached"}
