@@ -72,7 +72,7 @@ def forgiving(
 
 
 def parse(query: Mapping[str, str], *, now: datetime, has_time: bool = True) -> BoardQuery:
-    """The view that an address asks for; what it names beside is not looked at.
+    """Return the view that an address asks for; other parameters are ignored.
 
     `has_time` is False for the board of an edition, which is as it is. Raises one of `FAULTS`.
     """
@@ -118,7 +118,7 @@ def tools(
     faults: Mapping[str, str],
     latest_day: date | None,
 ) -> dict[str, Any]:
-    """What stands above this board: links of columns, and the form of the search and the filters.
+    """Return what is above this board: links of columns, and the form of the search and the filters.
 
     `asked` is the address' query, and `faults` what is wrong with it, by parameter. `latest_day` is the last
     day as of which there is a board to be asked for; None where there is no other time.

@@ -118,7 +118,7 @@ def _mid(evaluation: Evaluation | None) -> str:
 
 
 def running(edition: Edition, progress: RescoringProgress) -> dict[str, Any]:
-    """How far the re-scoring of an edition is; a waiting page sends `seen` along, to be told what is new."""
+    """Return how far the re-scoring of an edition is; a waiting page sends `seen` to ask what is new."""
     parts = [f"{grouped(progress.n_done)} of {grouped(progress.n_total)}"]
     if progress.n_rejected:
         parts.append(f"{grouped(progress.n_rejected)} rejected")
@@ -148,19 +148,19 @@ def rate_words(rate_per_s: float) -> str:
     return f"{rate_per_s:.1f} per second" if rate_per_s >= 1 else f"{60 * rate_per_s:.0f} per minute"
 
 
-def change_table(found: Preview) -> dict[str, Any]:
+def change_table(preview: Preview) -> dict[str, Any]:
     """A preview, as the comparison's template places it."""
     return {
-        "headings": [score_heading(name) for name in found.names],
-        "rows": [_change_row(change, found.names) for change in found.entries],
-        "n_rejected_in_both": len(found.changes) - len(found.entries),
-        "truth": _change_words(found.truth, found.published, found.edition),
-        "totals": _totals(found),
+        "headings": [score_heading(name) for name in preview.names],
+        "rows": [_change_row(change, preview.names) for change in preview.entries],
+        "n_rejected_in_both": len(preview.changes) - len(preview.entries),
+        "truth": _change_words(preview.truth, preview.published, preview.edition),
+        "totals": _totals(preview),
     }
 
 
-def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
-    truth = found.truth
+def _totals(preview: Preview) -> tuple[tuple[str, str], ...]:
+    truth = preview.truth
     sequences: tuple[tuple[str, str], ...] = (("sequences", "not compared"),)
     if truth is not None:
         sequences = (
@@ -171,10 +171,10 @@ def _totals(found: Preview) -> tuple[tuple[str, str], ...]:
         )
     return (
         *sequences,
-        ("entries", grouped(len(found.entries))),
-        ("entries changed", grouped(found.n_changed)),
-        ("ranks changed", grouped(found.n_moved)),
-        ("newly rejected", grouped(found.n_newly_rejected)),
+        ("entries", grouped(len(preview.entries))),
+        ("entries changed", grouped(preview.n_changed)),
+        ("ranks changed", grouped(preview.n_moved)),
+        ("newly rejected", grouped(preview.n_newly_rejected)),
     )
 
 

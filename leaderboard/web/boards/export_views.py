@@ -1,6 +1,6 @@
 """Exports of a board: the view of its page as CSV, LaTeX, Markdown and BibTeX.
 
-They hold what everybody sees, whoever takes them, since they end up in papers. `mine=1` adds the rows of
+They contain what everybody sees, for every user, since they end up in papers. `mine=1` adds the rows of
 one's own that others do not see, or not under their name, each marked.
 """
 
@@ -41,10 +41,10 @@ class FormatConverter(StringConverter):
 
     def to_python(self, value: str) -> Format:  # type: ignore[override]  # Django takes any type
         """The format of this suffix; ValueError, for Django, where there is none."""
-        found = next((each for each in formats.FORMATS if each.suffix == value), None)
-        if found is None:
+        match = next((each for each in formats.FORMATS if each.suffix == value), None)
+        if match is None:
             raise ValueError(value)
-        return found
+        return match
 
 
 @require_safe
@@ -60,8 +60,8 @@ def edition(request: HttpRequest, split: str, number: int, chosen: Format) -> Ht
     """The board of an edition, for ever."""
     if chosen.write is None:
         return _api_document(request, "api-edition-board", split, number)
-    found = get_object_or_404(snapshots.editions(), split=split, number=number)
-    return _answer(request, chosen, chosen.write, split=found.split, edition=found)
+    row = get_object_or_404(snapshots.editions(), split=split, number=number)
+    return _answer(request, chosen, chosen.write, split=row.split, edition=row)
 
 
 def _api_document(request: HttpRequest, name: str, *of: object) -> HttpResponse:
@@ -146,7 +146,7 @@ def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str
     def links(label: str, about: str, **more: str) -> Iterator[dict[str, Any]]:
         for each in formats.FORMATS:
             if each.has_values or not label:
-                # The API's document has the rows of whoever asks, unless it is asked for without.
+                # The API's document has the rows of the user who asks, unless it is asked for without.
                 public = {"mine": "0"} if has_own and each.write is None and "mine" not in more else {}
                 yield {
                     "format": each,
