@@ -94,11 +94,11 @@ def _page(request: HttpRequest, *, status: int = 200, **more: Any) -> HttpRespon
 
 
 def _context(request: HttpRequest, asked: QueueFilter) -> dict[str, Any]:
-    found = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
-    number = found["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
+    table = queue_table(**asked.cleaned_data, number=request.GET.get("page"))
+    number = table["sections"][0]["page"].number if asked.cleaned_data["state"] else 1
     return {
         "form": asked,
-        "shown": found,
+        "shown": table,
         "query": asked.query(),
         "split_query": asked.query(state=""),
         "page_query": asked.query(page=number if number > 1 else ""),
