@@ -64,11 +64,11 @@ def _field_of(detail: Detail) -> forms.CharField:
 
 
 def _stated(method: Method) -> dict[str, Any]:
-    found = {name: getattr(method, name) for name in editing.FIELDS}
+    values = {name: getattr(method, name) for name in editing.FIELDS}
     for detail in DETAILS:
         texts = {option.value: option.text for option in detail.kind.options}
-        found[detail.name] = texts.get(found[detail.name], found[detail.name])
-    return found
+        values[detail.name] = texts.get(values[detail.name], values[detail.name])
+    return values
 
 
 class ShowForm(SiteForm):

@@ -124,8 +124,8 @@ def _reason(evaluation: Evaluation) -> str:
         return "An error on our side; a maintainer will retry it."
     if evaluation.status != Status.REJECTED or not evaluation.problems:
         return ""
-    # What was found says enough here; what was expected stands on the submission's page.
-    found = evaluation.problems[0]["message"].partition("; expected")[0]
+    # The fault says enough here; what was expected is on the submission's page.
+    message = evaluation.problems[0]["message"].partition("; expected")[0]
     # Cut between words: the half of a number is another number.
-    first = shorten(found, _MAX_REASON, placeholder=" …")
+    first = shorten(message, _MAX_REASON, placeholder=" …")
     return f"{evaluation.n_problems:,} problems: {first}" if evaluation.n_problems > 1 else first
