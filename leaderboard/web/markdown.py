@@ -34,7 +34,7 @@ class TextHeading:
 
 @dataclass(frozen=True)
 class Part:
-    """What stands below one heading, as plain text, its blocks of code last: what a search looks through."""
+    """The plain text below one heading, its blocks of code last, for the search."""
 
     heading: TextHeading
     text: str
@@ -156,9 +156,9 @@ def _anchor(words: str, taken: set[str]) -> str:
     ('who-sees-a-method', 'check_1')
     """
     first = slugify(words) or "part"
-    found, n_before = first, 0
-    while found in taken:
+    anchor, n_before = first, 0
+    while anchor in taken:
         n_before += 1
-        found = f"{first}_{n_before}"
-    taken.add(found)
-    return found
+        anchor = f"{first}_{n_before}"
+    taken.add(anchor)
+    return anchor

@@ -92,8 +92,8 @@ class _ProviderViews(OAuth2Adapter):
         """The addresses that the provider has verified, the primary one first."""
         raise NotImplementedError
 
-    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        """What of the provider's words is kept, beside its number of the person."""
+    def kept(self, profile: Mapping[str, Any]) -> dict[str, str]:
+        """Return what is kept of the provider's profile, next to its number of the person."""
         return {}
 
 
@@ -114,8 +114,8 @@ class GitHubViews(_ProviderViews, GitHubOAuth2Adapter):
         rows = [row for row in login.email_addresses if row.verified is True]
         return _sorted(_address(row.email, is_primary=row.primary is True) for row in rows)
 
-    def kept(self, said: Mapping[str, Any]) -> dict[str, str]:
-        return {"login": str(said.get("login", ""))[:100]}
+    def kept(self, profile: Mapping[str, Any]) -> dict[str, str]:
+        return {"login": str(profile.get("login", ""))[:100]}
 
 
 def _address(text: str, *, is_primary: bool) -> EmailAddress:

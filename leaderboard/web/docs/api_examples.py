@@ -70,7 +70,7 @@ class Example:
     by: str = "owner"  # who asks: "maintainer" has a token of theirs
 
     def script(self, site: str) -> str:
-        """The Python that runs as it stands; empty where there is none."""
+        """Return the Python to run; empty where there is none."""
         if not self.python:
             return ""
         token = ', token=os.environ["TSTTC_TOKEN"]' if self.call.has_token else ""

@@ -59,8 +59,8 @@ def sitemap(request: HttpRequest) -> HttpResponse:
         *(_absolute("guide", name) for name in guides.files()),
         *(_absolute("api_operation", name) for name in api_examples.EXAMPLES),
     ]
-    found = [*((address, None) for address in fixed), *_of_boards(splits_of(request))]
-    return HttpResponse(feeds.sitemap(found), content_type="application/xml; charset=utf-8")
+    addresses = [*((address, None) for address in fixed), *_of_boards(splits_of(request))]
+    return HttpResponse(feeds.sitemap(addresses), content_type="application/xml; charset=utf-8")
 
 
 def _of_boards(splits: Sequence[Split]) -> Iterator[tuple[str, datetime | None]]:

@@ -71,7 +71,7 @@ def _dates(
 
 
 def _leading(main: Split) -> dict[str, Any]:
-    """What the page tells of the main board: only what everybody sees, whoever reads."""
+    """Return what the page shows of the main board: for every reader only what everybody sees."""
     board = snapshots.board(split=main, viewer=AnonymousUser())
     progress = chart_views.progress(board)
     return {

@@ -16,7 +16,7 @@ MIDDLEWARE: Final = [
     "django.middleware.clickjacking.XFrameOptionsMiddleware",
     # Around what is kept, so that an answer is whole where it is remembered and a 304 only for who has it.
     "leaderboard.api.middleware.ApiHeadersMiddleware",
-    # Before sessions and accounts, which somebody without either should not pay for.
+    # Before sessions and accounts, which a visitor without either should not pay for.
     "leaderboard.web.middleware.public_answers.PublicAnswersMiddleware",
     "django.contrib.sessions.middleware.SessionMiddleware",
     "django.middleware.common.CommonMiddleware",

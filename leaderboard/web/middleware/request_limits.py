@@ -38,7 +38,7 @@ class UploadLimitMiddleware:
 
 
 class SendThrottle(rate_limits.Throttle):
-    """What somebody sends, of one account, else of one address."""
+    """Requests that send something, of one account, else of one address."""
 
     rates, scope, cache = "PAGE_RATES", "send", cache
 

@@ -32,7 +32,7 @@ class SecondFactorMiddleware:
         self._get_response = get_response
 
     def __call__(self, request: HttpRequest) -> HttpResponse:
-        """Look at the session as soon as somebody asks for its user."""
+        """Check the session as soon as its user is read."""
         if settings.REQUIRE_SECOND_FACTOR:
             user = request.user
             request.user = SimpleLazyObject(lambda: _marked(request, user))  # type: ignore[assignment]  # it is lazy, as Django's own
