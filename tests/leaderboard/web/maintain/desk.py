@@ -16,7 +16,7 @@ def get(client: Client, address: str) -> pages.Element:
     return assert_sound(response)
 
 
-def said(client: Client, address: str) -> str:
+def main_text(client: Client, address: str) -> str:
     return get(client, address).one("main").text
 
 
