@@ -150,7 +150,7 @@ def _cell(token: Token) -> str:
 
 
 def _anchor(words: str, taken: set[str]) -> str:
-    """What links to a heading name, as most programs that draw Markdown make it.
+    """Return the anchor of a heading, as most programs that draw Markdown make it.
 
     >>> _anchor("Who sees a method?", set()), _anchor("`check`", {"check"})
     ('who-sees-a-method', 'check_1')

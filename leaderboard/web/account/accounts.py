@@ -85,7 +85,7 @@ class AccountAdapter(DefaultAccountAdapter):
         return user
 
     def is_login_by_code_required(self, login: Login) -> bool:
-        """Whether a mailed code is needed: else who knows a maintainer's password sets up their own app."""
+        """Whether a mailed code is needed: a maintainer's password alone must not set up a new app."""
         user = login.user
         if not isinstance(user, User) or not second_factor.is_required(user):
             return False

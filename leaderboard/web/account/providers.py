@@ -51,7 +51,7 @@ class MalformedAnswer(OAuth2Error):
 
 @contextmanager
 def _malformed_answers() -> Iterator[None]:
-    """What allauth raises for an answer of another shape than it expects, as an error of the provider."""
+    """Turn what allauth raises for an answer of an unexpected shape into an error of the provider."""
     try:
         yield
     except requests.RequestException:
@@ -79,7 +79,7 @@ class _ProviderViews(OAuth2Adapter):
             return super().parse_token(data)
 
     def complete_login(self, request: HttpRequest, app: Any, token: Any, **kwargs: Any) -> SocialLogin:
-        """Who signs in, with at most one address, which is verified."""
+        """Return the login with at most one address, which is verified."""
         with _malformed_answers():
             login = super().complete_login(request, app, token, **kwargs)
             verified = self.verified(login)

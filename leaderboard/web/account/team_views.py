@@ -108,7 +108,7 @@ def _done(request: HttpRequest, action: Callable[[], object], *, flash_message: 
 
 @own_form
 def team(request: HttpRequest) -> HttpResponse:
-    """Who is in it and who may come in. A name that is sent founds the team, or renames it."""
+    """Show the members and invitations of the team. A name that is sent founds the team, or renames it."""
     if request.method != "POST":
         return _page(request)
     user = cast("User", request.user)

@@ -17,7 +17,7 @@ from leaderboard.web.formatting import grouped
 PER_PAGE: Final = 100
 ALL_COLUMNS: Final = "both"
 NAMES: Final = ("at", "sort", "columns", *filters.FILTERS, "page")
-"""What a view of a board reads of its address."""
+"""The parameters that a view of a board reads from its address."""
 _MAX_PAGE_DIGITS: Final = 6
 
 
@@ -54,7 +54,7 @@ class BoardQuery:
         return "?" + urlencode({name: wanted[name] for name in NAMES if wanted.get(name)})
 
     def kept(self, *names: str) -> tuple[tuple[str, str], ...]:
-        """What a form that asks for the rest has to send along."""
+        """Return the parameters that a form for the others has to send along."""
         return tuple((name, self.given[name]) for name in names if name in self.given)
 
 

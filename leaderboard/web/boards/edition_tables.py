@@ -20,7 +20,7 @@ _STATUS_LABELS: Final = {**dict(Status.choices), ABSENT: "not evaluated"}
 
 
 def truth_words(change: history.TruthChange | None) -> str:
-    """What differs between two ground truths, in words; empty if nothing does.
+    """Return the difference of two ground truths in words; empty if nothing differs.
 
     >>> truth_words(history.TruthChange(n_added=3, n_removed=0, n_changed=12, n_renumbered=0))
     '12 labels corrected, 3 sequences added'
@@ -58,7 +58,7 @@ def _change_words(change: history.TruthChange | None, old: Edition, new: Edition
 
 
 def news(split: Split) -> str:
-    """What last changed on a board, for its head; empty while it has its first edition."""
+    """Return the last change of a board, for its head; empty while it has its first edition."""
     publication = history.latest_change(split)
     if publication is None or publication.replaced is None:
         return ""
@@ -69,12 +69,12 @@ def news(split: Split) -> str:
 
 
 def past_change(past: history.EditionRecord) -> str:
-    """What changed since the edition that this one followed."""
+    """Return the change from the edition that this one followed."""
     return _change_words(past.change, past.followed, past.edition) if past.followed else "the first"
 
 
 def rescored_notice(rescored: history.Rescored | None) -> dict[str, Any] | None:
-    """What the last change of the board did to a submission; None where it changed nothing for it."""
+    """Return the effect of the board's last change on a submission; None where it had none."""
     if rescored is None:
         return None
     old, new, publication = rescored.old, rescored.new, rescored.publication

@@ -107,7 +107,7 @@ def _answer(
 
 
 def address(board: Board, query: BoardQuery) -> str:
-    """Where this very table can be found again: at its edition's page, or as of its time."""
+    """Return the lasting address of this table: its edition's page, or the board as of its time."""
     if board.edition is None or query.at is not None:
         path = reverse("board", args=[board.split.pk])
     else:
@@ -131,7 +131,7 @@ def of_method(results: Sequence[Result]) -> dict[str, str]:
 
 
 def offers(board: Board, edition: Edition | None, query: BoardQuery) -> dict[str, Any]:
-    """What a board's page offers to take along: what everybody sees, and for a team its own rows as well.
+    """Return the exports that a board's page offers: the public rows, and for a team its own as well.
 
     All are of the same view: labels, each with its links. `board` is it as the reader sees it.
     """

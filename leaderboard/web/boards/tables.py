@@ -65,7 +65,7 @@ class BoardRow:
 
     @property
     def is_hypothetical(self) -> bool:
-        """Whether its rank is one that it would have, if others saw it."""
+        """Whether its rank is the one that it would have if it were public."""
         return self.entry.rank is not None and not self.entry.is_visible_to_all
 
     @property
@@ -81,7 +81,7 @@ class BoardRow:
 
     @property
     def can_be_compared(self) -> bool:
-        """Whether there is something of it to be compared: papers print no values per recording."""
+        """Whether it can be compared: papers print no values per recording."""
         return self.entry.method_id is not None and self.entry.scores[PRIMARY] is not None
 
 

@@ -49,7 +49,7 @@ class Chart:
         return any("href" in mark for each in series for mark in each["data"])
 
     def __bool__(self) -> bool:
-        """Whether there is anything to be drawn: an empty chart is never shown."""
+        """Whether there is anything to draw: an empty chart is never shown."""
         return bool(self.rows)
 
 

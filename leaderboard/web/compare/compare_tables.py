@@ -25,7 +25,7 @@ _NUMBERS: Final = {3: "three", 4: "four", 5: "five"}
 
 
 def comparison(compared: Compared, *, n_tried: Mapping[UUID, int]) -> dict[str, Any]:
-    """What was compared, as the compare page places it; `n_tried` are scored submissions by method."""
+    """Return a comparison for the compare page; `n_tried` are scored submissions by method."""
     return {
         "compared": compared,
         "verdict": verdict(compared),

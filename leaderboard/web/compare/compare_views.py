@@ -67,7 +67,7 @@ def _drawn(request: HttpRequest, compared: comparisons.Compared) -> HttpResponse
 
 
 def _choice(request: HttpRequest, split: Split, refusal: Exception | None = None) -> dict[str, object]:
-    """What can be compared on this board, the best first."""
+    """Return the methods that can be compared on this board, the best first."""
     board = snapshots.board(split=split, viewer=request.user)
     entries = [entry for entry in board.entries if entry.method_id and entry.scores["mid"] is not None]
     # A method's page asks for the choice of others beside it.

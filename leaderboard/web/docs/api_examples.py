@@ -214,7 +214,7 @@ EXAMPLES: Final[Mapping[str, Example]] = {
 
 
 def shown(operation_id: str) -> dict[str, Any]:
-    """What the page of an operation shows: the requests as commands, and their answers."""
+    """Return the examples of an operation for its page: the requests as commands, and their answers."""
     example, recorded = EXAMPLES[operation_id], json.loads(_ANSWERS.read_text(encoding="utf-8"))[operation_id]
     return {
         "curl": example.call.curl(settings.SITE_URL),

@@ -21,7 +21,7 @@ _BARE_CHOICE: Final = re.compile(r"^\* `([^`]+)` - \1$", re.MULTILINE)
 
 @cache
 def reference() -> Node:
-    """What `api_reference.html` shows; the schema cannot change while the process lives."""
+    """Return the context of `api_reference.html`, cached: the schema is constant in a process."""
     schema = SchemaGenerator().get_schema(request=None, public=True)
     named = schema["components"]["schemas"]
     schemas = _inline_enums(named, named)

@@ -124,7 +124,7 @@ def guide(name: str) -> Document:
 
 
 def _link(address: str, *, source: Path) -> str:
-    """Where a link in a file leads on the site. Raises `DeadLink`."""
+    """Return the address on the site that a link in a file leads to. Raises `DeadLink`."""
     parts = urlsplit(address)
     if parts.scheme in _SCHEMES or address.startswith("#"):
         return address

@@ -35,7 +35,7 @@ _NOT_FOR_CRAWLERS: Final = (
 
 @require_safe
 def robots(request: HttpRequest) -> HttpResponse:
-    """What crawlers need not look at."""
+    """Return robots.txt: the pages that crawlers leave alone."""
     lines = [
         "User-agent: *",
         *(f"Disallow: {path}" for path in _NOT_FOR_CRAWLERS),

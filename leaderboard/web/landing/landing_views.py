@@ -44,7 +44,7 @@ def home(request: HttpRequest) -> HttpResponse:
 
 @require_safe
 def main_board(request: HttpRequest) -> HttpResponse:
-    """To the main board, as the address asks for it."""
+    """Redirect to the main board with the query of the address."""
     main = main_split(splits_of(request))
     if main is None:
         raise Http404("There is no board yet.")

@@ -41,7 +41,7 @@ def _ranked(board: Board) -> list[Entry]:
 
 
 def lead_words(board: Board) -> str:
-    """Whether the lead is certain, from the rank ranges of the board's rows; empty where nobody leads.
+    """Say in a sentence how certain the lead is, by the rows' rank ranges; empty for fewer than two rows.
 
     A rank range holds the ranks that a row may have at 95 % confidence for all rows together.
     """

@@ -68,7 +68,7 @@ DIGEST: Final = re.compile(r"(sha256:[0-9a-f]{8})[0-9a-f]{56}")
 @maintainers_only
 @require_safe
 def events(request: HttpRequest) -> HttpResponse:
-    """Who did what to what, the newest first."""
+    """List the audit events that fit the filter, the newest first."""
     asked = AuditFilter(request.GET)
     if not asked.is_valid():
         return render(request, "maintain/audit.html", {"form": asked}, status=400)

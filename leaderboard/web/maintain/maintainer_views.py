@@ -61,7 +61,7 @@ def maintainers_form(view: View) -> View:
 @maintainers_only
 @require_safe
 def hub(request: HttpRequest) -> HttpResponse:
-    """What else there is to look after, and every split: its board, what is being prepared, what failed."""
+    """Show the maintainers' overview: every split with its board, editions in preparation and failures."""
     splits = Split.objects.select_related("published_edition__ground_truth")
     desks = [
         (desk, [edition_tables.running(*each) for each in desk["in_preparation"]])
@@ -97,7 +97,7 @@ def open_edition(request: HttpRequest, split: str) -> HttpResponse:
 @maintainers_only
 @require_safe
 def edition(request: HttpRequest, split: str, number: int) -> HttpResponse:
-    """What publishing an edition would change, and how far its re-scoring is."""
+    """Show what publishing an edition would change, and how far its re-scoring is."""
     row = _edition(split, number)
     context = {**_comparison(row), "predecessor": corrections.predecessor(row.split)}
     return render(request, "maintain/edition.html", context)

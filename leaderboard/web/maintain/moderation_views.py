@@ -221,7 +221,7 @@ def _with_states(sent: Iterable[Submission]) -> list[Submission]:
 
 @maintainers_form
 def action(request: HttpRequest, action_name: str, subject_id: str) -> HttpResponse:
-    """Say what an action does, ask for the reason, and do it."""
+    """Show what an action does, ask for the reason, and do it."""
     if action_name not in ACTIONS:
         raise Http404
     chosen = ACTIONS[action_name]

@@ -56,7 +56,7 @@ def queue(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_safe
 def queue_state(request: HttpRequest) -> HttpResponse:
-    """What an open page asks for: nothing new, or what the queue is now."""
+    """Answer an open page: nothing new, or the present queue."""
     asked = QueueFilter(request.GET)
     if not asked.is_valid():
         return HttpResponse(status=400)

@@ -92,7 +92,7 @@ class OverrideForm(QuotaRulesForm):
         }
 
     def rules(self) -> dict[str, Any]:
-        """What was filled in, under the names of `rules.override`."""
+        """Return the cleaned fields under the names of `rules.override`."""
         return {name.removeprefix("quota_"): value for name, value in self.cleaned_data.items()}
 
 

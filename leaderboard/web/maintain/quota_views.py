@@ -51,7 +51,7 @@ def quota_rules(request: HttpRequest) -> HttpResponse:
 @maintainers_only
 @require_safe
 def team_quotas(request: HttpRequest, team_id: UUID) -> HttpResponse:
-    """What a team has spent and has left on every split, and by whose rules."""
+    """Show what a team has used and has left on every split, and the rules that apply."""
     team = get_object_or_404(Team, pk=team_id)
     rows = quota_tables.team_rows(team, viewer=maintainer_of(request), now=timezone.now())
     context = {"team": team, "people": team.members.order_by("email"), "rows": rows}

@@ -144,7 +144,7 @@ class NewSplitForm(PolicyForm):
         ]
 
     def wanted(self) -> dict[str, Any]:
-        """What was filled in, under the names of `new_splits.add_split`."""
+        """Return the cleaned fields under the names of `new_splits.add_split`."""
         truth = self.cleaned_data["truth"]
         is_own = not truth.startswith("as ")
         return {

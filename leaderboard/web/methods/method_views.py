@@ -60,7 +60,7 @@ def _own(request: HttpRequest, method_id: UUID) -> Method:
 
 @own_form
 def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Say something else of a method."""
+    """Change the details of a method."""
     own = _own(request, method_id)
     form = MethodForm.of_method(request, method=own)
     if form.is_valid():
@@ -75,7 +75,7 @@ def edit(request: HttpRequest, method_id: UUID) -> HttpResponse:
 
 @own_form
 def delete(request: HttpRequest, method_id: UUID) -> HttpResponse:
-    """Say what deleting an empty method does, and do it; of any other say why it stays."""
+    """Delete an empty method after a page that explains it; for any other method say why it stays."""
     own = _own(request, method_id)
     refusal = None
     if request.method == "POST":

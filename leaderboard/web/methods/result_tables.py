@@ -42,7 +42,7 @@ class ResultGroup:
 
     @property
     def has_intervals(self) -> bool:
-        """Whether any of the values has one: else the row for them is left out."""
+        """Whether any of the values has one: without any, the row for them is left out."""
         return any(cell.interval for _, cell, _ in self.columns)
 
     @property
@@ -71,7 +71,7 @@ def edition_groups(entry: Entry, edition: Edition) -> tuple[ResultGroup, ...]:
 
 
 def method_result(result: Result) -> dict[str, Any]:
-    """What a method achieved on a split, for its page; nothing to compare with: no `compare_href`."""
+    """Return the result of a method on a split for its page; `compare_href` is empty without others."""
     entry = result.entry
     return {
         "result": result,

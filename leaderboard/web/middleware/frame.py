@@ -1,4 +1,4 @@
-"""What each request passes, and what browsers may load."""
+"""The middleware that each request passes, and the content that browsers may load."""
 
 from collections.abc import Iterable
 from typing import Any, Final
@@ -35,7 +35,7 @@ _PROVIDERS: Final = {"orcid": "https://orcid.org", "github": "https://github.com
 
 
 def content_security_policy(providers: Iterable[str]) -> dict[str, Any]:
-    """What browsers may load and where forms may lead: to this site, and to the providers that it offers."""
+    """Return the content security policy: content from this site, forms to it and to these providers."""
     return {
         "DIRECTIVES": {
             "default-src": [NONE],

@@ -53,7 +53,7 @@ class DrawThrottle(rate_limits.Throttle):
 
 
 class DrawAsOfThrottle(rate_limits.Throttle):
-    """Of these, boards as of a time."""
+    """Pages drawn of boards as of a time, for one address."""
 
     rates, scope = "PAGE_RATES", "as_of"
 

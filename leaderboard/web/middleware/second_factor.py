@@ -1,4 +1,4 @@
-"""Where `TSTTC_REQUIRE_SECOND_FACTOR` is on, only a second factor makes a session that of a maintainer."""
+"""With `TSTTC_REQUIRE_SECOND_FACTOR` on, a session is a maintainer's only after a second factor."""
 
 from collections.abc import Callable
 from typing import Any, Final

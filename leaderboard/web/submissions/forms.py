@@ -123,7 +123,7 @@ class SubmissionForm(DetailsForm):
         return not self.methods or any(field.value() or field.errors for field in fields)
 
     def submission(self) -> dict[str, Any]:
-        """What was filled in, under the domain function's names."""
+        """Return the cleaned fields under the domain function's names."""
         fields = self.cleaned_data
         return {
             "split_name": fields["split"],
@@ -174,7 +174,7 @@ class SearchForm(forms.Form):
         return form
 
     def wanted(self) -> dict[str, Any]:
-        """What was understood, by the names of `search.matching`."""
+        """Return the valid fields under the names of `search.matching`."""
         fields = self.cleaned_data
         method = self.chosen_method.pk if self.chosen_method else None
         return {

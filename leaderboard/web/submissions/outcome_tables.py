@@ -111,7 +111,7 @@ def _comparison_row(entry: Entry, other: Entry) -> dict[str, Any]:
 
 
 def rejected_sentence(quota: Quota | None) -> str:
-    """What a rejected file costs, and how many more are taken; `quota` None: it is no question of that.
+    """Return what a rejected file costs, and how many more are accepted; empty without a quota.
 
     >>> from leaderboard.models import QuotaOverride
     >>> rejected_sentence(Quota("test", QuotaOverride(quota_rejected_limit=20), 0, 3, True, None, ""))

@@ -32,7 +32,7 @@ class Step:
 
 @dataclass(frozen=True)
 class StateLine:
-    """What the template places. `seen` changes exactly when the line of state does.
+    """The state of a submission for the template. `seen` changes exactly when the line of state does.
 
     `is_moving`: there is more to come, and the page asks for it by itself.
     """

@@ -85,7 +85,7 @@ def template(request: HttpRequest, split: str) -> HttpResponseBase:
 
 @own_page
 def submission_list(request: HttpRequest) -> HttpResponse:
-    """What the reader's own team has sent."""
+    """List the submissions of the reader's own team."""
     evaluations = Evaluation.objects.select_related("edition").prefetch_related("scores")
     sent = (
         Submission.objects.of(cast("User", request.user))

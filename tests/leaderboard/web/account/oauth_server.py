@@ -20,7 +20,7 @@ HANGS = object()
 
 @dataclass
 class Provider:
-    """What it answers at each path, and what it was sent."""
+    """Its answers by path, and the requests that it got."""
 
     url: str
     answers: dict[str, Any] = field(default_factory=dict)
@@ -75,7 +75,7 @@ def running() -> Iterator[Provider]:
             self.wfile.write(body)
 
         def log_message(self, *args: object) -> None:
-            """Nobody reads it."""
+            """Keep the log of requests out of the tests' output."""
 
     with ThreadingHTTPServer(("127.0.0.1", 0), Handler) as server:
         provider = Provider(f"http://127.0.0.1:{server.server_port}")

@@ -29,7 +29,7 @@ def rows(client: Client, chart: str) -> list[list[str]]:
 
 
 def options_of(figure: pages.Element) -> Any:
-    """What the script draws, as ECharts takes it."""
+    """Return the options that the script draws, as ECharts takes them."""
     return json.loads(figure.one("script").raw_text)["baseOption"]
 
 

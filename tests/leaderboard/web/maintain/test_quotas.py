@@ -73,7 +73,7 @@ def visible_text(cell: pages.Element) -> str:
 
 
 def wrong(client: Client, where: str, data: dict[str, str]) -> list[str]:
-    """What a refused form says at its fields."""
+    """Return the errors of a refused form at its fields."""
     answer = client.post(where, data)
     assert answer.status_code == 422
     root = assert_sound(answer)

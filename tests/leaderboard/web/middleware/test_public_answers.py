@@ -1,4 +1,4 @@
-"""What everybody is answered from the cache: nothing that an address, a host or a reader adds to it."""
+"""Answers from the cache contain nothing that an address, a host or a reader adds."""
 
 from typing import Any
 

@@ -104,7 +104,7 @@ def intervals(root: pages.Element) -> list[str]:
 
 
 def stops(client: Client, submission: Submission) -> str:
-    """What a page says whose polling has come to its end, from whatever state it was in."""
+    """Return the text of a page whose polling has ended."""
     assert client.get(STATE.format(submission.pk), {"seen": "SCORED"}).status_code == 286
     root = get(client, PAGE, submission)
     assert "hx-get" not in root.one("div", id="state").attributes

@@ -1,4 +1,4 @@
-"""What a team finds on its submission: that its board was corrected, and how to withdraw."""
+"""A team sees on its submission that the board was corrected, and how to withdraw."""
 
 from pathlib import Path
 
