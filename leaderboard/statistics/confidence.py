@@ -1,7 +1,7 @@
 """Uncertainty of an edition: a confidence interval for every value, a rank range for every rank.
 
 Workers make them from sums per unit (day or recording), which never leave their private directory. An
-interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made anew when
+interval belongs to one evaluation and stays; ranges belong to all entries of a board and are made again when
 those change, which a digest tells. `docs/uncertainty.md` says how and why.
 """
 
@@ -43,7 +43,7 @@ log = structlog.get_logger(__name__)
 
 Floats = NDArray[np.float64]
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
-PATIENCE = timedelta(minutes=1)
+MAX_DELAY = timedelta(minutes=1)
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
@@ -71,7 +71,7 @@ def generator_of(edition: Edition, *, purpose: str) -> np.random.Generator:
 
 
 def active_entries(edition: Edition) -> list[ScoredEntry]:
-    """Everything that stands in an edition, private methods included: one query."""
+    """The scored, active entries of an edition, private methods included: one query."""
     rows = Score.objects.filter(
         evaluation__edition=edition,
         evaluation__status=Status.SCORED,
@@ -111,7 +111,7 @@ def _printed(edition: Edition) -> list[tuple[float, ...]]:
 
 @dataclass(frozen=True)
 class Entries:
-    """What stands in an edition, read once for all that a worker does with it."""
+    """The entries of an edition, read once for all that a worker does with them."""
 
     edition: Edition
     rows: tuple[ScoredEntry, ...]
@@ -129,13 +129,13 @@ class Entries:
 
     @cached_property
     def digest(self) -> str:
-        """Names what intervals and ranges are made of. It knows of private entries: for nobody's eyes."""
+        """The digest of the inputs of intervals and ranges. It depends on private entries: never show it."""
         rivals = {row.evaluation_id for row in self.ranked}
         return self._digest([f"{row.evaluation_id} {row.evaluation_id in rivals}" for row in self.rows])
 
     @cached_property
     def ranked_digest(self) -> str:
-        """Names what ranges are made of: nothing that is private is in it."""
+        """The digest of the inputs of ranges, public entries only."""
         return self._digest([str(row.evaluation_id) for row in self.ranked])
 
     def _digest(self, lines: Sequence[str]) -> str:
@@ -145,25 +145,25 @@ class Entries:
 
     @property
     def have_ranges(self) -> bool:
-        """Whether all that workers make of an edition beside its scores is there, and of these entries."""
+        """Whether floor and ranges of the edition are there, and made of these entries."""
         return self.edition.floor is not None and self.edition.inference_digest == self.digest
 
 
-def stale(*, now: datetime, held: Collection[str]) -> Iterator[Entries]:
-    """The entries of editions whose ranges were made of others, each read when it is asked for.
+def stale(*, now: datetime, readable_truths: Collection[str]) -> Iterator[Entries]:
+    """The entries of editions whose ranges are out of date, read one edition at a time.
 
-    Only those whose ground truth is `held`, among these digests: what this worker can do. An edition in
-    which something is still to be scored has patience.
+    Only those whose ground truth is among `readable_truths` (digests). An edition in which something is still
+    to be scored waits for `MAX_DELAY`.
     """
     undecided = Evaluation.objects.filter(edition=OuterRef("pk"), status__in=[Status.QUEUED, Status.RUNNING])
-    found = (
-        Edition.objects.filter(discarded_at=None, ground_truth__in=held)
+    editions = (
+        Edition.objects.filter(discarded_at=None, ground_truth__in=readable_truths)
         .select_related("ground_truth", "split")
         .annotate(is_busy=Exists(undecided))
         .order_by("pk")
     )
-    for edition in found:
-        if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < PATIENCE:
+    for edition in editions:
+        if edition.is_busy and now - (edition.inferred_at or edition.opened_at) < MAX_DELAY:
             continue
         entries = Entries.of(edition)
         if not entries.have_ranges:
@@ -223,7 +223,7 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
     sums = np.empty((len(rivals), *counts.shape))
     for i, row in enumerate(rivals):
         sums[i] = recording_sums.unit_sums_of(edition, file=row.file)
-    found = rank_ranges(
+    ranks = rank_ranges(
         sums,
         published=_published_values(edition, [row.evaluation_id for row in rivals]),
         usable=uncertainty.usable_columns(counts),
@@ -231,7 +231,7 @@ def _ranges(entries: Entries, *, between: Callable[[], None]) -> tuple[str, Rang
         quoted=_quoted(entries, counts),
         between=between,
     )
-    ends = np.stack([found.low, found.high], axis=2).tolist()
+    ends = np.stack([ranks.low, ranks.high], axis=2).tolist()
     return digest, {
         str(row.evaluation_id): [pair if pair[0] else None for pair in columns]
         for row, columns in zip(rivals, ends, strict=True)
@@ -280,7 +280,7 @@ def _bootstrap(seed: str, counts: bytes, shape: tuple[int, ...]) -> uncertainty.
 def _write(
     entries: Entries, *, intervals: list[Score], ranges: tuple[str, Ranges] | None, now: datetime
 ) -> bool:
-    """Write what was made, all or nothing, if the entries are still the same.
+    """Write intervals and ranges, all or none, if the entries are still the same.
 
     They are read for the second time here, with the edition locked: the comparison of compare-and-set. Scores
     need not be: a score does not change, and only who has the edition locked writes beside it.

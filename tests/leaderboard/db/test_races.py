@@ -83,7 +83,7 @@ def test_twenty_submissions_at_once_take_exactly_the_five_slots_there_are(
 
 
 def test_tokens_made_at_once_stay_within_their_number(owner: User) -> None:
-    for number in range(tokens.MAX_STANDING - 5):
+    for number in range(tokens.MAX_ACTIVE - 5):
         tokens.create(user=owner, name=f"Old {number}", now=FIRST_DAY)
 
     def make(number: int) -> bool:

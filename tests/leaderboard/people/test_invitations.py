@@ -82,7 +82,7 @@ def test_owner_alone_invites_and_not_without_end(
     for other in (teammate, stranger):
         with refused("not-the-owner"):
             invite(team, other)
-    for _ in range(invitations.MAX_STANDING):
+    for _ in range(invitations.MAX_OPEN):
         invite(team, owner)
     with refused("too-many-invitations"):
         invite(team, owner)

@@ -149,7 +149,7 @@ def test_the_last_use_is_noted_once_a_minute(owner: User, secret: str) -> None:
 
 
 def test_nobody_piles_up_tokens(owner: User) -> None:
-    for number in range(tokens.MAX_STANDING):
+    for number in range(tokens.MAX_ACTIVE):
         tokens.create(user=owner, name=str(number), now=timezone.now())
     with pytest.raises(Refused, match="50 tokens in use"):
         builders.token(owner)

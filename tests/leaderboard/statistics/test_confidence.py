@@ -42,7 +42,7 @@ def hide(submission: Submission) -> None:
 
 
 def stale(*, now: datetime, readable_truths: Collection[str]) -> list[Edition]:
-    return [entries.edition for entries in confidence.stale(now=now, held=readable_truths)]
+    return [entries.edition for entries in confidence.stale(now=now, readable_truths=readable_truths)]
 
 
 def version() -> int:
@@ -255,7 +255,7 @@ def test_live_submissions_are_decided_before_the_work_behind_them_goes_on(
     entries: list[Submission], edition: Edition, stranger: User
 ) -> None:
     late = builders.submit(stranger, builders.predictions(edition, factor=1.02), method="Late")
-    later = timezone.now() + 2 * confidence.PATIENCE
+    later = timezone.now() + 2 * confidence.MAX_DELAY
     assert backlog.work_off(now=later, rng=random.Random(0)) == 1
     assert Evaluation.objects.get(submission=late).status == "SCORED"
 
@@ -272,8 +272,8 @@ def test_an_edition_that_is_being_scored_is_waited_for_but_not_for_ever(
     readable_truths = truth_values.readable_digests()
     now = timezone.now()
     assert prepared not in stale(now=now, readable_truths=readable_truths)
-    assert prepared in stale(now=now + 2 * confidence.PATIENCE, readable_truths=readable_truths)
-    assert prepared not in stale(now=now + 2 * confidence.PATIENCE, readable_truths=set())
+    assert prepared in stale(now=now + 2 * confidence.MAX_DELAY, readable_truths=readable_truths)
+    assert prepared not in stale(now=now + 2 * confidence.MAX_DELAY, readable_truths=set())
 
 
 def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submission], edition: Edition) -> None:

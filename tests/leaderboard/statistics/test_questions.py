@@ -53,7 +53,7 @@ def ask(
 
 def upcoming() -> tuple[Any, Any]:
     """The pair whose turn it is, which has had it with that."""
-    row = questions.waiting(held=truth_values.readable_digests())[0]
+    row = questions.waiting(readable_truths=truth_values.readable_digests())[0]
     questions.begin(row, now=timezone.now())
     Comparison.objects.filter(pk=row.pk).update(computed_at=timezone.now(), differences={})
     return row.first_id, row.second_id
@@ -76,7 +76,7 @@ def test_what_nobody_waits_for_comes_last_until_a_reader_does(edition: Edition, 
 def test_a_pair_that_cannot_be_computed_keeps_nothing_else_waiting(edition: Edition, pairs: Pairs) -> None:
     ask(edition, pairs[0], ago_s=9)
     ask(edition, pairs[1], ago_s=5)
-    row = questions.waiting(held=truth_values.readable_digests())[0]
+    row = questions.waiting(readable_truths=truth_values.readable_digests())[0]
     questions.begin(row, now=timezone.now())
     assert upcoming() == pairs[1]
 

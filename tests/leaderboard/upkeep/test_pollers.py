@@ -172,7 +172,7 @@ def polling(act: Callable[..., object]) -> Iterator[Poller]:
     poller = Poller(act, every_s=0.01, rng=random.Random(0))
     poller.start()
     yield poller
-    pollers.stop_pollers([poller], patience_s=TIMEOUT_S)
+    pollers.stop_pollers([poller], timeout_s=TIMEOUT_S)
     assert not poller.is_alive()
 
 
@@ -201,7 +201,7 @@ def test_poller_finishes_what_is_in_hand_before_it_stops() -> None:
     with polling(look) as poller:
         assert begun.wait(TIMEOUT_S)
         stop = threading.Thread(
-            target=pollers.stop_pollers, args=([poller],), kwargs={"patience_s": TIMEOUT_S}
+            target=pollers.stop_pollers, args=([poller],), kwargs={"timeout_s": TIMEOUT_S}
         )
         stop.start()
         assert not finished.is_set()
