@@ -16,7 +16,8 @@ from uuid import UUID
 import numpy as np
 import structlog
 from django.db import transaction
-from django.db.models import Exists, OuterRef
+from django.db.models import Exists, OuterRef, Q
+from django.db.models.functions import Now
 from numpy.typing import NDArray
 
 from evaluator import rounded
@@ -26,6 +27,7 @@ from evaluator.scoring.ranges import Quoted, rank_ranges
 from evaluator.scoring.significance import MIN_DEGREES, cut_off, too_few_units
 from leaderboard import board_versions
 from leaderboard.boards.rows import printed_decimals
+from leaderboard.db import clock
 from leaderboard.models import (
     Edition,
     EditionRanges,
@@ -44,6 +46,8 @@ log = structlog.get_logger(__name__)
 Floats = NDArray[np.float64]
 # While an edition is being scored its entries change all the time; its ranges follow once a minute.
 MAX_DELAY = timedelta(minutes=1)
+# A worker that dies while it computes leaves the work to others after this time.
+CLAIM_S = 300.0
 # By the evaluation's id, of every column both ends, or None where there is no range.
 Ranges = dict[str, list[list[int] | None]]
 
@@ -176,17 +180,27 @@ def stale(*, now: datetime, readable_truths: Collection[str]) -> Iterator[Entrie
 def infer(entries: Entries, *, now: datetime, between: Callable[[], None] = lambda: None) -> bool:
     """Make what is missing of an edition's intervals and, of other entries, its rank ranges. Whether it did.
 
-    False: they hold already, or the entries have changed since they were read, or another worker has written
-    theirs meanwhile. `between` is called every fraction of a second. Raises what `recording_sums.sums_of`
-    raises.
+    False: they hold already, another worker computes them, or the entries have changed since they were read.
+    `between` is called every fraction of a second. Raises what `recording_sums.sums_of` raises.
     """
-    if entries.have_ranges:
+    if entries.have_ranges or not _claim(entries.edition):
         return False
-    intervals = _intervals(entries, between=between)
-    ranges = _ranges(entries, between=between)
-    is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
+    try:
+        intervals = _intervals(entries, between=between)
+        ranges = _ranges(entries, between=between)
+        is_written = _write(entries, intervals=intervals, ranges=ranges, now=now)
+    finally:
+        EditionRanges.objects.filter(edition=entries.edition).update(claimed_until=None)
     log.info("inferred", edition=str(entries.edition), n_entries=len(entries.rows), is_written=is_written)
     return is_written
+
+
+def _claim(edition: Edition) -> bool:
+    """Let no other worker compute the edition's: of a thousand entries it takes a processor for minutes."""
+    row, _ = EditionRanges.objects.get_or_create(edition=edition)
+    is_free = Q(claimed_until=None) | Q(claimed_until__lte=Now())
+    ends = clock.after(CLAIM_S)
+    return bool(EditionRanges.objects.filter(is_free, pk=row.pk).update(claimed_until=ends))
 
 
 def _intervals(entries: Entries, *, between: Callable[[], None]) -> list[Score]:

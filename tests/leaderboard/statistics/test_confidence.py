@@ -2,7 +2,7 @@
 
 import random
 from collections.abc import Collection
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from leaderboard.boards import listing
 from leaderboard.models import (
     BoardVersion,
     Edition,
+    EditionRanges,
     Evaluation,
     Method,
     PublishedResult,
@@ -280,6 +281,16 @@ def test_a_digest_and_the_board_choose_the_same_entries(inferred: list[Submissio
     chosen = {row.evaluation_id for row in confidence.ranked(confidence.active_entries(edition))}
     board = listing.board(split=edition.split, viewer=ANYBODY)
     assert chosen == {entry.evaluation_id for entry in board.entries if entry.evaluation_id}
+
+
+def test_one_worker_at_a_time_computes_an_edition(entries: list[Submission], edition: Edition) -> None:
+    edition.refresh_from_db()
+    now = timezone.now()
+    EditionRanges.objects.create(edition=edition, claimed_until=now + timedelta(minutes=1))
+    assert not confidence.infer(Entries.of(edition), now=now)
+    EditionRanges.objects.update(claimed_until=now - timedelta(minutes=1))  # its worker has died
+    assert confidence.infer(Entries.of(edition), now=now)
+    assert EditionRanges.objects.get().claimed_until is None
 
 
 def test_of_two_workers_that_made_the_same_the_second_writes_nothing(
