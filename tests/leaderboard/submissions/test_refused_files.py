@@ -164,7 +164,7 @@ class TestAtOnce:
                     return found == number
 
                 outcome = meet(first, second, at=is_here)
-                was_held = outcome.was_held
+                was_held = outcome.was_paused
                 assert outcome.faults == (None, None)
                 [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)
                 assert kept.digest in stored(tmp_path), f"held at statement {number}"
