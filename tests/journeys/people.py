@@ -6,7 +6,7 @@ from typing import Any
 
 import httpx
 
-from tests.journeys.production import PATIENCE_S, Site, await_that
+from tests.journeys.production import TIMEOUT_S, Site, await_that
 
 FINAL = {"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"}
 PASSWORD = "journey-of-a-thousand-miles"
@@ -21,7 +21,7 @@ class Visitor:
         self.site = site
         # Loopback is never reached through a proxy that the environment names.
         self.http = httpx.Client(
-            base_url=site.url, follow_redirects=True, timeout=PATIENCE_S, trust_env=False
+            base_url=site.url, follow_redirects=True, timeout=TIMEOUT_S, trust_env=False
         )
 
     def get(self, path: str) -> httpx.Response:
@@ -96,7 +96,7 @@ class Program:
         self.http = httpx.Client(
             base_url=site.url,
             headers={"Authorization": f"Bearer {token}"},
-            timeout=PATIENCE_S,
+            timeout=TIMEOUT_S,
             trust_env=False,
         )
 

@@ -17,7 +17,7 @@ import pytest
 from leaderboard.demo.seed import ENTRIES
 from leaderboard.management.commands.demo import names_of
 from tests.journeys.people import Visitor
-from tests.journeys.production import PATIENCE_S, REPOSITORY, Site, await_that, free_port, get
+from tests.journeys.production import REPOSITORY, TIMEOUT_S, Site, await_that, free_port, get
 from tests.leaderboard.sandbox.child_processes import kernel_says
 from tests.services import environment_of_its_own
 from tests.signals import default_signals
@@ -51,7 +51,7 @@ def demo(directory: Path, *, port: int) -> Iterator[subprocess.Popen[str]]:
         finally:
             if supervisor.poll() is None:
                 supervisor.terminate()
-            supervisor.wait(timeout=PATIENCE_S)
+            supervisor.wait(timeout=TIMEOUT_S)
 
 
 def banner(supervisor: subprocess.Popen[str]) -> str:
@@ -121,7 +121,7 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
 
         (second,) = workers(supervisor)
         supervisor.send_signal(signal.SIGINT)
-        assert supervisor.wait(timeout=PATIENCE_S) == 0
+        assert supervisor.wait(timeout=TIMEOUT_S) == 0
         assert not is_alive(first)
         assert not is_alive(second)
     with pytest.raises(httpx.ConnectError):
@@ -141,7 +141,7 @@ def test_a_port_in_use_is_said_in_a_sentence_and_nothing_is_made(tmp_path: Path)
     with socket.create_server(("127.0.0.1", port)), demo(tmp_path, port=port) as supervisor:
         assert supervisor.stdout is not None
         said = supervisor.stdout.read()
-        assert supervisor.wait(timeout=PATIENCE_S) == 1
+        assert supervisor.wait(timeout=TIMEOUT_S) == 1
     assert f"Port {port} on 127.0.0.1 is in use" in said
     assert "Traceback" not in said
     assert not (tmp_path / "leaderboard.sqlite3").exists()

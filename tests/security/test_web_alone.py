@@ -11,7 +11,7 @@ import pytest
 
 import evaluator
 from tests import builders
-from tests.journeys.production import PATIENCE_S, Site, free_port, web_process
+from tests.journeys.production import TIMEOUT_S, Site, free_port, web_process
 from tests.prepared import put_sqlite, static_files
 from tests.security.crawler import crawl
 from tests.security.hostile_files import corpus
@@ -46,7 +46,7 @@ class Alone:
 
     def client(self) -> httpx.Client:
         headers = {"Authorization": f"Bearer {self.token}"}
-        return httpx.Client(base_url=self.site.url, headers=headers, timeout=PATIENCE_S, trust_env=False)
+        return httpx.Client(base_url=self.site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
 
     def memory_mb(self, what: str) -> float:
         """`VmRSS`: what the process has in memory now; `VmHWM`: the most that it ever had."""
@@ -119,7 +119,7 @@ PLACES = ("/x", "/board", "//evil.example", "/does-not-fit")
 @pytest.mark.parametrize("name", ["SCRIPT_NAME", "Script-Name", "PATH_INFO", "X-Forwarded-Prefix"])
 def test_no_header_moves_the_site(alone: Alone, name: str) -> None:
     # Without cookies and tokens: what is answered is kept for others. We ask from loopback, as a proxy may.
-    with httpx.Client(base_url=alone.site.url, timeout=PATIENCE_S, trust_env=False) as client:
+    with httpx.Client(base_url=alone.site.url, timeout=TIMEOUT_S, trust_env=False) as client:
         for path in ("/", "/board/test/", "/board/test/?sort=-mid", "/docs/", "/api/v1/splits"):
             for place in PLACES:
                 moved = client.get(path, headers={name: place})
