@@ -64,9 +64,9 @@ class Demo:
 def demo() -> Iterator[Demo]:
     """A running site with the demo's seed, all of it scored, with intervals, and two methods compared."""
     with tempfile.TemporaryDirectory() as directory, web_alone(Path(directory), TSTTC_THROTTLES="0") as site:
-        said = site.manage("seed_demo")
-        login = re.search(r"Sign in as (\S+) with the password (\S+)", said)
-        assert login, said
+        output = site.manage("seed_demo")
+        login = re.search(r"Sign in as (\S+) with the password (\S+)", output)
+        assert login, output
         with worker(site):
             await_that(lambda: nothing_waits(site), what="the demo is scored", timeout_s=TIMEOUT_S)
             two = json.loads(site.manage("shell", "-v0", "-c", COMPARE).splitlines()[-1])
