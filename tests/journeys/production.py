@@ -19,13 +19,13 @@ from tests.signals import default_signals
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
-# Of whoever waits for something that must come: a busy machine is no fault, so only a hung one ends it.
+# For what must come: a busy machine is no fault, so only a hung one ends the wait.
 TIMEOUT_S = 180.0
 POLL_S = 0.05
 
 
 class NeverHappened(AssertionError):
-    """What was waited for did not come about in time."""
+    """What was waited for did not happen in time."""
 
 
 def await_that(condition: Callable[[], bool], *, what: str, timeout_s: float = TIMEOUT_S) -> None:
@@ -38,7 +38,7 @@ def await_that(condition: Callable[[], bool], *, what: str, timeout_s: float = T
 
 
 def get(url: str, **headers: str) -> httpx.Response:
-    """What is answered there, however long that takes within `TIMEOUT_S`; no proxy is asked on the way."""
+    """The answer at an address, within `TIMEOUT_S`; no proxy is asked on the way."""
     return httpx.get(url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
 
 
