@@ -79,7 +79,7 @@ def correct(truth: evaluator.GroundTruth, directory: Path) -> float:
     started_s = time.perf_counter()
     edition = corrections.open_edition(split_name="test", path=path, now=timezone.now(), actor=None)
     scored = Evaluation.objects.filter(edition=edition, status=Status.SCORED)
-    await_that(lambda: scored.count() == N, what="all are scored", patience_s=300)
+    await_that(lambda: scored.count() == N, what="all are scored", timeout_s=300)
     taken_s = time.perf_counter() - started_s
     leave_intervals()
     return taken_s

@@ -34,14 +34,14 @@ def answers(
     clients: Mapping[str, Client], known: Mapping[str, str], *, file: bytes, prepare: Callable[[str], None]
 ) -> dict[str, Any]:
     """Send every example in its order. `known` maps ids of this run to those of the examples."""
-    found = {}
+    answers_by_name = {}
     for name, example in EXAMPLES.items():
         prepare(name)
-        found[name] = {
+        answers_by_name[name] = {
             "answer": send(example.call, clients[example.by], known, file=file),
             "refused": send(example.refused, clients[example.by], known, file=file),
         }
-    return found
+    return answers_by_name
 
 
 def send(call: Call, client: Client, known: Mapping[str, str], *, file: bytes) -> dict[str, Any]:
@@ -73,7 +73,7 @@ def send(call: Call, client: Client, known: Mapping[str, str], *, file: bytes) -
 
 
 def stood_for(text: str, known: Mapping[str, str]) -> str:
-    """The text with what differs between runs replaced by what always stands for it."""
+    """Replace what differs between runs by fixed text."""
     text = UUIDS.sub(lambda match: known.get(match[0], api_examples.NOBODYS), text)
     text = DAYS.sub(MOMENT[:10], TIMES.sub(MOMENT, text))
     return PSEUDONYM.sub("Anonymous 16fd27", text)

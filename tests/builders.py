@@ -86,8 +86,8 @@ def override(team: Team, *, split: str = "test", **options: Any) -> QuotaOverrid
     """Rules of a team's own, without any limit that `options` does not give; by the command line."""
     rules = {"limit": None, "window": timedelta(days=1), "min_gap": timedelta(0), "rejected_limit": None}
     row = Split.objects.get(pk=split)
-    said = {"reason": "R", "actor": None, "now": timezone.now()}
-    return limits.override(team=team, split=row, **{**rules, **said, **options})
+    audit_fields = {"reason": "R", "actor": None, "now": timezone.now()}
+    return limits.override(team=team, split=row, **{**rules, **audit_fields, **options})
 
 
 def quote(name: str, scores: dict[str, float]) -> PublishedResult:

@@ -106,8 +106,8 @@ def offline(submission: Submission, truth: GroundTruth, *, decimals: int = 1) ->
     own = read_manifest(Path(files.store().path(files.manifest_name(submission.manifest_digest))))
     with files.opened_predictions(submission.digest) as kept:
         sent = read_predictions(kept.read(), manifest=own)
-    said = dict(zip(own.natural_keys, sent.ttc_s.tolist(), strict=True))
-    file = json.dumps({key: said[key] for key in truth.manifest.natural_keys}).encode()
+    ttc_s_by_key = dict(zip(own.natural_keys, sent.ttc_s.tolist(), strict=True))
+    file = json.dumps({key: ttc_s_by_key[key] for key in truth.manifest.natural_keys}).encode()
     values = evaluate(read_predictions(file, manifest=truth.manifest), truth).flat()
     return {name: rounded(value, decimals=decimals) for name, value in values.items()}
 

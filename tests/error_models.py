@@ -104,8 +104,8 @@ def _pareto(n_recordings: int, n: int, rng: Random) -> Drawn:
 def _zero(n_recordings: int, n: int, rng: Random) -> Drawn:
     counts = np.ceil(_lengths(n_recordings, n, rng) / 5)
     n_filled = rng.integers(20, 32, size=n)
-    place = rng.permuted(np.broadcast_to(np.arange(n_recordings)[:, None], counts.shape), axis=0)
-    counts = np.where(place < n_filled, counts, 0.0)
+    position = rng.permuted(np.broadcast_to(np.arange(n_recordings)[:, None], counts.shape), axis=0)
+    counts = np.where(position < n_filled, counts, 0.0)
     return Drawn(counts, *_log_normal(counts, rng))
 
 

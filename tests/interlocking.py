@@ -16,8 +16,8 @@ from django.db import connection
 
 Action = Callable[[], object]
 # Whether a statement is where to hold: by its number within the action's transactions, and by its text.
-Place = Callable[[int, str], bool]
-PATIENCE_S = 180.0
+PausePoint = Callable[[int, str], bool]
+TIMEOUT_S = 180.0
 LOOK_EVERY_S = 0.001
 
 
@@ -25,9 +25,9 @@ LOOK_EVERY_S = 0.001
 class Hold:
     """Holds a transaction after the first statement that `is_here` knows; keeps the text of all of them."""
 
-    is_here: Place
+    is_here: PausePoint
     statements: list[str] = field(default_factory=list)
-    is_held: bool = False
+    is_paused: bool = False
     reached: Event = field(default_factory=Event)
     may_go_on: Event = field(default_factory=Event)
 
@@ -36,26 +36,26 @@ class Hold:
         result = execute(sql, *rest)
         if connection.in_atomic_block:
             self.statements.append(sql)
-            if not self.is_held and self.is_here(len(self.statements), sql):
-                self.is_held = True
+            if not self.is_paused and self.is_here(len(self.statements), sql):
+                self.is_paused = True
                 self.reached.set()
-                assert self.may_go_on.wait(PATIENCE_S)
+                assert self.may_go_on.wait(TIMEOUT_S)
         return result
 
 
 class Outcome(NamedTuple):
-    """What came of two actions: the fault of each or None, and how they met."""
+    """The fault of each of two actions, or None, and how they met."""
 
     faults: tuple[BaseException | None, ...]
-    was_held: bool  # the first
+    was_paused: bool  # the first
     has_waited: bool  # the second
 
 
-def meet(first: Action, second: Action, *, at: Place) -> Outcome:
+def meet(first: Action, second: Action, *, at: PausePoint) -> Outcome:
     """Hold `first` where `at` says, let `second` run until it ends or waits, and let both end."""
     hold, pids = Hold(at), SimpleQueue[int]()
 
-    def held() -> None:
+    def run_first() -> None:
         try:
             with connection.execute_wrapper(hold):
                 first()
@@ -63,7 +63,7 @@ def meet(first: Action, second: Action, *, at: Place) -> Outcome:
             hold.reached.set()
             connection.close()
 
-    def meeting() -> None:
+    def run_second() -> None:
         try:
             with connection.cursor() as cursor:
                 cursor.execute("SELECT pg_backend_pid()")
@@ -73,15 +73,15 @@ def meet(first: Action, second: Action, *, at: Place) -> Outcome:
             connection.close()
 
     with ThreadPoolExecutor(2) as threads:
-        actions = [threads.submit(held)]
-        assert hold.reached.wait(PATIENCE_S)
-        actions.append(threads.submit(meeting))
-        pid = pids.get(timeout=PATIENCE_S)
+        actions = [threads.submit(run_first)]
+        assert hold.reached.wait(TIMEOUT_S)
+        actions.append(threads.submit(run_second))
+        pid = pids.get(timeout=TIMEOUT_S)
         while not actions[1].done() and not _is_waiting(pid):
             wait(actions[1:], timeout=LOOK_EVERY_S)
         has_waited = not actions[1].done()
         hold.may_go_on.set()
-        return Outcome(tuple(action.exception(PATIENCE_S) for action in actions), hold.is_held, has_waited)
+        return Outcome(tuple(action.exception(TIMEOUT_S) for action in actions), hold.is_paused, has_waited)
 
 
 def _is_waiting(pid: int) -> bool:

@@ -59,12 +59,12 @@ def is_kept(name: str) -> bool:
 
 
 def has_people() -> bool:
-    """Whether the owner is there: somebody has sent what the world has."""
+    """Whether the world has an owner with submissions."""
     return _world is not None and _world.name != "edition"
 
 
 def copy_files(tmp_path: Path) -> None:
-    """Put what was made beside the rows where this test has its own."""
+    """Copy the files of the world into the folders of this test."""
     assert _world is not None
     for part, target in (("files", settings.FILES_DIR), ("ground-truth", settings.GROUND_TRUTH_DIR)):
         if (_world.folder / part).exists():
@@ -77,8 +77,8 @@ def prepare(item: pytest.Item, *, blocker: DjangoDbBlocker) -> None:
     """Before a test's own savepoint or transaction: hold the world that it asks for, and no other."""
     global _world  # noqa: PLW0603 - there is one connection, which has one transaction
     wanted = _wanted(item)
-    held = (_world.file, _world.name) if _world is not None and connection.in_atomic_block else None
-    if held == (item.path, wanted):
+    current = (_world.file, _world.name) if _world is not None and connection.in_atomic_block else None
+    if current == (item.path, wanted):
         return
     let_go()
     if wanted is None:
@@ -129,12 +129,12 @@ def _wanted(item: pytest.Item) -> str | None:
     is_committed = (marker is not None and marker.kwargs) or {"transactional_db", "live_server"} & names
     if is_committed or _OF_ITS_OWN & names:
         return None
-    found = [name for name in MAKERS if name in names and _is_shared(item, name)]
+    shared = [name for name in MAKERS if name in names and _is_shared(item, name)]
     # What is there beside an edition has one.
-    return next((name for name in found if name != "edition"), "edition" if found else None)
+    return next((name for name in shared if name != "edition"), "edition" if shared else None)
 
 
 def _is_shared(item: pytest.Item, name: str) -> bool:
     """Whether the fixture is that of a `conftest.py`, and not one of the file's own by the same name."""
-    found = getattr(item, "_fixtureinfo").name2fixturedefs  # noqa: B009 - pytest's own, as pytest-django does
-    return all(part in found and ".py" not in found[part][-1].baseid for part in ("edition", name))
+    fixtures = getattr(item, "_fixtureinfo").name2fixturedefs  # noqa: B009 - pytest's own, as pytest-django does
+    return all(part in fixtures and ".py" not in fixtures[part][-1].baseid for part in ("edition", name))

@@ -31,20 +31,20 @@ class Element:
     def all(self, tag: str, **attributes: str) -> "list[Element]":
         """Every descendant with this tag and these attributes (`class_` asks for one of the classes)."""
         wanted_class = attributes.pop("class_", None)
-        found = []
+        matches = []
         for child in self.children:
             if (
                 child.tag == tag
                 and all(child.attributes.get(name) == value for name, value in attributes.items())
                 and (wanted_class is None or wanted_class in child.classes)
             ):
-                found.append(child)
-            found.extend(child.all(tag, **attributes, **({"class_": wanted_class} if wanted_class else {})))
-        return found
+                matches.append(child)
+            matches.extend(child.all(tag, **attributes, **({"class_": wanted_class} if wanted_class else {})))
+        return matches
 
     def one(self, tag: str, **attributes: str) -> "Element":
-        (found,) = self.all(tag, **attributes)
-        return found
+        (match,) = self.all(tag, **attributes)
+        return match
 
     def everything(self) -> "list[Element]":
         return [each for child in self.children for each in (child, *child.everything())]

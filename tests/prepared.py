@@ -42,7 +42,7 @@ _ROOM_BYTES = 4 << 30
 
 
 def begin() -> None:
-    """Make the folder, unless whoever started this process has one; it goes with this process.
+    """Make the folder, unless the parent process has one; it is removed when this process ends.
 
     What is compiled is kept, even on a machine that says otherwise: a run starts hundreds of processes, and
     each would compile the leaderboard for half a second, and the tests for ten.
@@ -152,7 +152,7 @@ def dump() -> Path:
 
 @contextmanager
 def migrated_database() -> Iterator[str]:
-    """The URL of a PostgreSQL database with all tables, dropped at the end, whoever is still connected.
+    """The URL of a PostgreSQL database with all tables, dropped at the end even if clients are connected.
 
     Raises `ServiceMissing`.
     """

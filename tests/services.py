@@ -25,7 +25,7 @@ REDIS_URL = os.environ.get("TSTTC_TEST_REDIS_URL", "redis://127.0.0.1:6379/15")
 REQUIRED = os.environ.get("TSTTC_REQUIRE_SERVICES", "") == "1"
 REPOSITORY = Path(__file__).resolve().parent.parent
 # Of a server that is there and busy. One that is not there refuses at once.
-PATIENCE_S = 30
+TIMEOUT_S = 30
 
 # The mark on a Redis database that a test run has taken; it fades if the run dies.
 _MARK = "tsttc-test-run"
@@ -61,7 +61,7 @@ def shown(url: str) -> str:
 def check_postgres() -> None:
     """Raise `ServiceMissing` unless the administrative database answers."""
     try:
-        psycopg.connect(POSTGRES_ADMIN_URL, connect_timeout=PATIENCE_S).close()
+        psycopg.connect(POSTGRES_ADMIN_URL, connect_timeout=TIMEOUT_S).close()
     except psycopg.OperationalError as fault:
         reason = str(fault).splitlines()[0]
         raise ServiceMissing(
@@ -82,7 +82,7 @@ def database_url(name: str) -> str:
 
 @contextmanager
 def throwaway_database() -> Iterator[str]:
-    """The URL of an empty PostgreSQL database, which is dropped at the end, whoever is still connected.
+    """The URL of an empty PostgreSQL database, dropped at the end even if clients are connected.
 
     Raises `ServiceMissing`.
     """
@@ -107,7 +107,7 @@ def crowd_on_postgres() -> Iterator[None]:
 
 @contextmanager
 def throwaway_redis() -> Iterator[str]:
-    """The URL of an empty Redis database that nobody else's test run uses; emptied again at the end.
+    """The URL of an empty Redis database that no other test run uses; emptied again at the end.
 
     Looks for one downwards from the number in the configured URL. Raises `ServiceMissing`.
     """
@@ -115,9 +115,7 @@ def throwaway_redis() -> Iterator[str]:
     highest = int(parts.path.strip("/") or 0)
     for number in range(highest, -1, -1):
         url = parts._replace(path=f"/{number}").geturl()
-        with redis.Redis.from_url(
-            url, socket_timeout=PATIENCE_S, socket_connect_timeout=PATIENCE_S
-        ) as client:
+        with redis.Redis.from_url(url, socket_timeout=TIMEOUT_S, socket_connect_timeout=TIMEOUT_S) as client:
             try:
                 is_ours = client.dbsize() == 0 and client.set(_MARK, os.getpid(), nx=True, ex=_MARK_S)
             except redis.RedisError as fault:
@@ -133,7 +131,7 @@ def throwaway_redis() -> Iterator[str]:
 
 
 def free_port() -> int:
-    """A port on loopback that nothing listens on, and that nobody else is given while this process lives.
+    """A port on loopback that nothing listens on, and that no other process gets while this one lives.
 
     Its address is taken here and shared: a server that reuses addresses, as they all do, may listen there.
     """
@@ -154,9 +152,7 @@ def chromium() -> str:
 
 
 def environment_of_its_own() -> dict[str, str]:
-    """This process's environment without anything that sets up this project or Django: for a process to be
-    told everything anew.
-    """
+    """The environment of this process without the variables of this project and of Django."""
     ours = ("TSTTC_", "DJANGO_")
     return {name: value for name, value in os.environ.items() if not name.startswith(ours)}
 

@@ -26,12 +26,12 @@ def sort(items: list[pytest.Item]) -> None:
     """Long files first, the others by their number of tests; within a file nothing changes."""
     n_tests = Counter(_file_of(item) for item in items)
 
-    def place(item: pytest.Item) -> tuple[int, int, str]:
+    def sort_key(item: pytest.Item) -> tuple[int, int, str]:
         name = _file_of(item)
-        found = [i for i, long in enumerate(LONG) if name.startswith(long)]
-        return (found[0] if found else len(LONG), -n_tests[name], name)
+        matches = [i for i, long in enumerate(LONG) if name.startswith(long)]
+        return (matches[0] if matches else len(LONG), -n_tests[name], name)
 
-    items.sort(key=place)
+    items.sort(key=sort_key)
 
 
 def asks_database(item: pytest.Item) -> bool:

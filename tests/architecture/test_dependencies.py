@@ -17,12 +17,12 @@ PROJECT = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())
 
 def pins(lock: str) -> dict[str, set[Version]]:
     """Every package of a lock file with its versions (one for each range of Pythons)."""
-    found: dict[str, set[Version]] = defaultdict(set)
+    versions: dict[str, set[Version]] = defaultdict(set)
     for line in (REPOSITORY / lock).read_text().splitlines():
         match = re.match(r"([A-Za-z0-9._-]+)==([^ ;\\]+)", line)
         if match:
-            found[canonicalize_name(match[1])].add(Version(match[2]))
-    return found
+            versions[canonicalize_name(match[1])].add(Version(match[2]))
+    return versions
 
 
 def wanted(*, dev: bool) -> list[Requirement]:

@@ -69,8 +69,8 @@ def test_every_service_is_without_privileges_and_has_limits(name: str) -> None:
 
 
 def test_networks_are_for_one_purpose_each_and_workers_have_no_way_out() -> None:
-    found = {name: set(service["networks"]) for name, service in SERVICES.items()}
-    assert found == {
+    networks = {name: set(service["networks"]) for name, service in SERVICES.items()}
+    assert networks == {
         "proxy": {"pages"},
         "web": {"pages", "database", "broker"},
         "worker": {"database", "broker"},
@@ -127,7 +127,7 @@ _DEFAULT = re.compile(r"\$\{\w+:-([^}]*)\}$")
 @pytest.mark.parametrize("name", sorted(OURS))
 def test_each_process_starts_with_the_variables_that_compose_gives_it(name: str) -> None:
     defaults = {key: _DEFAULT.search(str(text)) for key, text in OURS[name]["environment"].items()}
-    given = {key: found[1] if found else "x" * 43 for key, found in defaults.items()} | {
+    given = {key: match[1] if match else "x" * 43 for key, match in defaults.items()} | {
         "TSTTC_PROFILE": "production",
         "TSTTC_PROCESS": OURS[name]["environment"]["TSTTC_PROCESS"],
         "TSTTC_DATABASE_URL": "postgres://u:p@db/tsttc",
@@ -145,7 +145,7 @@ def test_each_process_starts_with_the_variables_that_compose_gives_it(name: str)
 
 
 def python(statement: str, environment: dict[str, str]) -> str:
-    """What a program prints that has these variables and none of ours beside them."""
+    """Run a statement with these variables and none of ours; return what it prints."""
     usual = {name: text for name, text in os.environ.items() if name in {"PATH", "HOME"}}
     done = subprocess.run(
         [sys.executable, "-c", statement],

@@ -124,8 +124,8 @@ def locks_with_the_key(module: ast.Module) -> list[int]:
 
 
 def test_no_row_is_locked_with_its_key() -> None:
-    found = {path: locks_with_the_key(tree(path)) for path in written_by_hand("leaderboard")}
-    assert {path: lines for path, lines in found.items() if lines} == {}
+    locks = {path: locks_with_the_key(tree(path)) for path in written_by_hand("leaderboard")}
+    assert {path: lines for path, lines in locks.items() if lines} == {}
     assert locks_with_the_key(ast.parse("Split.objects.select_for_update(of=('self',)).get()")) == [1]
 
 
@@ -133,23 +133,23 @@ def test_no_row_is_locked_with_its_key() -> None:
 
 
 def bad_habits(module: ast.Module, *, is_model: bool) -> set[str]:
-    found = set()
+    habits = set()
     for node in ast.walk(module):
         if isinstance(node, ast.ImportFrom) and node.module in {
             "django.db.models.signals",
             "django.dispatch",
         }:
-            found.add("signals")
+            habits.add("signals")
         if isinstance(node, ast.FunctionDef) and node.name == "save" and is_model:
-            found.add("save() override")
-    return found
+            habits.add("save() override")
+    return habits
 
 
 def test_no_signal_is_connected_and_no_save_is_overridden() -> None:
-    found = {
+    habits_by_path = {
         path: bad_habits(tree(path), is_model="models" in path.parts) for path in python_files(*PROGRAMS)
     }
-    assert {path: habits for path, habits in found.items() if habits} == {}
+    assert {path: habits for path, habits in habits_by_path.items() if habits} == {}
 
 
 def test_every_ignore_carries_its_reason() -> None:

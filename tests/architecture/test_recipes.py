@@ -1,4 +1,4 @@
-"""The command is installed from a repository that somebody named, never by a name that anybody may take."""
+"""The command is installed from a repository that a person named, never by a name that anyone may take."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ BARE_NAME = re.compile(r"pip install\b[^\n`]*?[ \"']tsttc(?![\w.-]|(?:\[[\w,-]*\
 
 def texts() -> list[Path]:
     """Everything that tells people what to type."""
-    found = [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md"]
+    paths = [REPOSITORY / "README.md", REPOSITORY / "CONTRIBUTING.md"]
     for folder, pattern in (
         ("docs", "*.md"),
         ("examples", "*"),
@@ -25,20 +25,20 @@ def texts() -> list[Path]:
         ("evaluator", "*.py"),
         ("tsttc_baselines", "*.py"),
     ):
-        found += [path for path in (REPOSITORY / folder).rglob(pattern) if path.is_file()]
-    return [path for path in found if path.suffix not in {".jpg", ".pyc"}]
+        paths += [path for path in (REPOSITORY / folder).rglob(pattern) if path.is_file()]
+    return [path for path in paths if path.suffix not in {".jpg", ".pyc"}]
 
 
 def test_nothing_that_we_tell_people_to_type_installs_by_the_bare_name() -> None:
     for bad in ("pip install tsttc", "pip install -U 'tsttc[frames]'", 'pip install "tsttc==0.1.0"'):
         assert BARE_NAME.search(bad), bad
     assert not BARE_NAME.search('pip install "tsttc @ git+https://example.org/x@1"')
-    bare = {path.name: found[0] for path in texts() if (found := BARE_NAME.search(path.read_text("utf-8")))}
+    bare = {path.name: match[0] for path in texts() if (match := BARE_NAME.search(path.read_text("utf-8")))}
     assert bare == {}
 
 
 @RECIPES
-def test_recipe_has_a_place_for_repository_and_commit_that_fetches_nothing_as_it_stands(
+def test_recipe_has_placeholders_for_repository_and_commit_that_fetch_nothing(
     recipe: recipes.Recipe,
 ) -> None:
     source = recipe.environment["TSTTC_SOURCE"]

@@ -28,9 +28,9 @@ def says(*command: str, environment: dict[str, str] | None = None) -> str:
 
 @pytest.mark.slow
 def test_the_production_profile_passes_the_deployment_checks(production: dict[str, str]) -> None:
-    said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production)
+    output = says(sys.executable, *DEPLOYMENT_CHECK, environment=production)
     # Its services are nowhere, and that is all.
-    assert re.findall(r"\(leaderboard\.(\w+)\) (.*)", said) == [
+    assert re.findall(r"\(leaderboard\.(\w+)\) (.*)", output) == [
         ("E003", "The broker of TSTTC_BROKER_URL does not answer."),
         ("E003", "The database of TSTTC_DATABASE_URL does not answer, or does not know the account."),
         ("I001", "The pages give the sender of mails, leaderboard@localhost, as the contact."),
@@ -38,7 +38,7 @@ def test_the_production_profile_passes_the_deployment_checks(production: dict[st
 
 
 @pytest.mark.slow
-def test_all_that_is_wrong_with_a_deployment_is_said_at_once(production: dict[str, str]) -> None:
+def test_all_that_is_wrong_with_a_deployment_is_reported_at_once(production: dict[str, str]) -> None:
     wrong = {
         "TSTTC_SECRET_KEY": "",
         "TSTTC_MAX_PREDICTIONS_BYTES": "20MB",
@@ -47,17 +47,17 @@ def test_all_that_is_wrong_with_a_deployment_is_said_at_once(production: dict[st
         "TSTTC_EMAIL_URL": "smtp+tls:/swordfish",
         "TSTTC_SECRETKEY": "swordfish",
     }
-    said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
-    assert [name for name in wrong if name not in said] == []
-    assert "Traceback" not in said
-    assert "swordfish" not in said
-    assert "TSTTC_SECRETKEY is read by nothing; did you mean TSTTC_SECRET_KEY?" in said
+    output = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
+    assert [name for name in wrong if name not in output] == []
+    assert "Traceback" not in output
+    assert "swordfish" not in output
+    assert "TSTTC_SECRETKEY is read by nothing; did you mean TSTTC_SECRET_KEY?" in output
     wrong = {"TSTTC_SITE_URL": "foo", "TSTTC_BROKER_URL": "bar", "TSTTC_EMAIL_URL": "", "TSTTC_QUOTA": "1"}
     wrong |= {"TSTTC_FILES_DIR": str(REPOSITORY / "manage.py" / "files")}
-    said = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
-    assert [name for name in wrong if name not in said] == []
-    assert "TSTTC_QUOTA is read by nothing; did you mean TSTTC_QUOTAS?" in said
-    assert "Traceback" not in said
+    output = says(sys.executable, *DEPLOYMENT_CHECK, environment=production | wrong)
+    assert [name for name in wrong if name not in output] == []
+    assert "TSTTC_QUOTA is read by nothing; did you mean TSTTC_QUOTAS?" in output
+    assert "Traceback" not in output
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Files of others that stand in the repository: unchanged, and said where they are from."""
+"""Files of others in the repository are unchanged, and their origin is named."""
 
 import hashlib
 import re
@@ -15,12 +15,12 @@ ROW = re.compile(r"^\| `([^`]+)` \| (\S.*) \|.*\| `([0-9a-f]{64})` \|$", re.MULT
 def test_every_file_of_others_is_the_one_that_its_list_names(folder: str) -> None:
     root = REPOSITORY / folder
     listed = {name: digest for name, _, digest in ROW.findall((root / "README.md").read_text())}
-    found = {
+    digests = {
         path.name: hashlib.sha256(path.read_bytes()).hexdigest()
         for path in root.iterdir()
         if path.name != "README.md"
     }
-    assert found == listed
+    assert digests == listed
 
 
 @pytest.mark.parametrize("folder", FOLDERS)

@@ -90,13 +90,13 @@ def _called(decorator: ast.expr) -> str:
 
 @pytest.mark.parametrize("paths", [PAGES, GUIDES, MESSAGES], ids=["pages", "guides", "messages"])
 def test_people_read_the_words_of_the_field(paths: list[Path]) -> None:
-    found = [
+    faults = [
         f"{path.relative_to(REPOSITORY)}:{line}: {word!r}; say instead: {INSTEAD[word.lower()]}"
         for path in paths
         for line, text in texts(path)
         for word in _BANNED.findall(re.sub(r"\s+", " ", text))
     ]
-    assert not found, "\n".join(found)
+    assert not faults, "\n".join(faults)
 
 
 def test_the_list_finds_what_it_bans() -> None:

@@ -14,5 +14,5 @@ def addresses(samples: Mapping[str, str]) -> list[str]:
     Raises `KeyError` for a parameter without a sample: a new kind of page needs one thing to be shown with.
     """
     # A regular expression is one of the links that allauth sends by mail.
-    found = [each for each in routes() if not each.pattern.startswith(NOT_PAGES) and "^" not in each.pattern]
-    return sorted({route.filled(samples) for route in found})
+    pages = [each for each in routes() if not each.pattern.startswith(NOT_PAGES) and "^" not in each.pattern]
+    return sorted({route.filled(samples) for route in pages})

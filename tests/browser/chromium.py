@@ -40,25 +40,25 @@ def chromium() -> Iterator[Browser]:
 
 @dataclass
 class Complaints:
-    """What a page's console said, what failed in its scripts, and which foreign hosts it asked."""
+    """What a page wrote to its console, what failed in its scripts, and which foreign hosts it asked."""
 
     host: str
-    said: list[str] = field(default_factory=list)
+    messages: list[str] = field(default_factory=list)
 
     def watch(self, context: BrowserContext) -> None:
         """Listen to every page of a context."""
         context.on("console", lambda message: self._note(message.type, message.text))
-        context.on("weberror", lambda error: self.said.append(f"script: {error.error}"))
+        context.on("weberror", lambda error: self.messages.append(f"script: {error.error}"))
         context.on("request", self._request)
 
     def _note(self, kind: str, text: str) -> None:
         if kind in {"error", "warning"}:
-            self.said.append(f"{kind}: {text}")
+            self.messages.append(f"{kind}: {text}")
 
     def _request(self, request: Request) -> None:
         parts = urlsplit(request.url)
         if parts.scheme != "data" and parts.netloc != self.host:
-            self.said.append(f"request: {request.url}")
+            self.messages.append(f"request: {request.url}")
 
 
 @contextmanager
@@ -71,7 +71,7 @@ def timers_at_rest(page: Page) -> Iterator[None]:
 
 
 def tab_to(page: Page, name: str, *, backwards: bool = False) -> None:
-    """Press Tab until what has the focus bears this name, as somebody without a mouse does."""
+    """Press Tab until the element with this name has the focus, as a person without a mouse does."""
     key = "Shift+Tab" if backwards else "Tab"
     passed = []
     for _ in range(80):

@@ -14,7 +14,7 @@ from tests.browser.chromium import WIDE, Complaints, chromium
 from tests.browser.site import PASSWORD, open_split, web_alone
 from tests.journeys.production import Site
 
-PATIENCE_MS = 120_000
+TIMEOUT_MS = 120_000
 MAX_PREDICTIONS_BYTES = 200_000
 
 NewPage = Callable[..., Page]
@@ -72,7 +72,7 @@ def board(site: Site) -> None:
 @pytest.fixture(scope="module")
 def browser(site: Site) -> Iterator[Browser]:
     """A Chromium; closed after each module, because its event loop would be in others' way."""
-    expect.set_options(timeout=PATIENCE_MS)
+    expect.set_options(timeout=TIMEOUT_MS)
     with chromium() as running:
         yield running
 
@@ -85,13 +85,13 @@ def new_page(browser: Browser, site: Site) -> Iterator[NewPage]:
 
         def arrive(**options: object) -> Page:
             context = browser.new_context(**{"base_url": site.url, "viewport": WIDE, **options})  # type: ignore[arg-type]
-            context.set_default_timeout(PATIENCE_MS)
+            context.set_default_timeout(TIMEOUT_MS)
             contexts.callback(context.close)
             complaints.watch(context)
             return context.new_page()
 
         yield arrive
-    assert complaints.said == []
+    assert complaints.messages == []
 
 
 @pytest.fixture

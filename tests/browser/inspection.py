@@ -89,14 +89,14 @@ def _moved(page: Page) -> list[str]:
 
     A busy browser draws a long table in pieces, and its columns settle as they come.
     """
-    found: list[str] = page.evaluate(MOVED)
+    moves: list[str] = page.evaluate(MOVED)
     for _ in range(N_LOADS - 1):
-        if not found:
+        if not moves:
             break
         page.reload()
         draw_all(page)
-        found = page.evaluate(MOVED)
-    return found
+        moves = page.evaluate(MOVED)
+    return moves
 
 
 def _cost(page: Page, document_bytes: int) -> Iterator[str]:
@@ -120,13 +120,13 @@ def _pale(page: Page, *, where: str) -> Iterator[str]:
 
 
 def _overflow(page: Page, where: str) -> Iterator[str]:
-    found = page.evaluate(OVERFLOW_PX)
-    if found > 0:
-        yield f"is {found} px wider than the screen at {where}"
+    overflow_px = page.evaluate(OVERFLOW_PX)
+    if overflow_px > 0:
+        yield f"is {overflow_px} px wider than the screen at {where}"
 
 
 def _large_letters(page: Page) -> Iterator[str]:
-    """Letters of twice the size, as somebody sets them in the browser, and nothing else zoomed."""
+    """Check with letters of twice the size, as a person sets them in the browser, and no other zoom."""
     session = page.context.new_cdp_session(page)
     session.send("Page.enable")
     session.send("Page.setFontSizes", {"fontSizes": LARGE_LETTERS})

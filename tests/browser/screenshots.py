@@ -27,7 +27,7 @@ PICTURES: Final[dict[str, tuple[str, int, Literal["light", "dark"]]]] = {
     "submit-wide-light": ("/submit/", 1440, "light"),
 }
 HEIGHT_PX: Final = 900
-PATIENCE_S: Final = 1200.0
+TIMEOUT_S: Final = 1200.0
 COUNT_WAITING: Final = """
 from leaderboard.models import Comparison, Edition, Evaluation
 print(Evaluation.objects.filter(finished_at=None).count()
@@ -64,13 +64,13 @@ class Demo:
 def demo() -> Iterator[Demo]:
     """A running site with the demo's seed, all of it scored, with intervals, and two methods compared."""
     with tempfile.TemporaryDirectory() as directory, web_alone(Path(directory), TSTTC_THROTTLES="0") as site:
-        said = site.manage("seed_demo")
-        login = re.search(r"Sign in as (\S+) with the password (\S+)", said)
-        assert login, said
+        output = site.manage("seed_demo")
+        login = re.search(r"Sign in as (\S+) with the password (\S+)", output)
+        assert login, output
         with worker(site):
-            await_that(lambda: nothing_waits(site), what="the demo is scored", patience_s=PATIENCE_S)
+            await_that(lambda: nothing_waits(site), what="the demo is scored", timeout_s=TIMEOUT_S)
             two = json.loads(site.manage("shell", "-v0", "-c", COMPARE).splitlines()[-1])
-            await_that(lambda: nothing_waits(site), what="the methods are compared", patience_s=PATIENCE_S)
+            await_that(lambda: nothing_waits(site), what="the methods are compared", timeout_s=TIMEOUT_S)
         yield Demo(site, two, login[1], login[2])
 
 
@@ -81,7 +81,7 @@ def nothing_waits(site: Site) -> bool:
 def photograph(browser: Browser, shown: Demo) -> None:
     """Each page whole, with its charts drawn."""
     page = browser.new_page(base_url=shown.site.url)
-    page.set_default_timeout(PATIENCE_S * 1000)  # a busy machine is no fault
+    page.set_default_timeout(TIMEOUT_S * 1000)  # a busy machine is no fault
     for name, (address, width, scheme) in PICTURES.items():
         if address == "/submit/":
             sign_in(page, shown.email, password=shown.password)

@@ -13,7 +13,7 @@ import numpy as np
 
 import evaluator
 from leaderboard.demo.runs import simulate
-from tests.journeys.production import BIN, PATIENCE_S, Site, end, free_port, start, web_process
+from tests.journeys.production import BIN, TIMEOUT_S, Site, end, free_port, start, web_process
 from tests.prepared import put_sqlite, static_files
 
 PASSWORD = "kestrel-altimeter-9"
@@ -53,10 +53,7 @@ def web_alone(directory: Path, **settings: str) -> Iterator[Site]:
 
 @contextmanager
 def worker(site: Site) -> Iterator[None]:
-    """The site's worker scores what is queued and what comes; afterwards it stands still, as if it were not.
-
-    To start one takes seconds.
-    """
+    """Let the site's worker score what is queued and what comes, and pause it at the end: a start is slow."""
     if "worker" in site.processes:
         os.killpg(site.processes["worker"].pid, signal.SIGCONT)
     else:
@@ -64,8 +61,8 @@ def worker(site: Site) -> Iterator[None]:
     try:
         yield
     finally:
-        # Whoever writes has the lock of the database, so a worker that is stopped meanwhile has it not.
-        with closing(sqlite3.connect(site.directory / DATABASE, timeout=PATIENCE_S)) as database:
+        # While this process has the lock of the database, the worker that is stopped has it not.
+        with closing(sqlite3.connect(site.directory / DATABASE, timeout=TIMEOUT_S)) as database:
             database.execute("BEGIN IMMEDIATE")
             os.killpg(site.processes["worker"].pid, signal.SIGSTOP)
 
@@ -92,8 +89,8 @@ def predictions(truth: evaluator.GroundTruth, *, factor: float) -> bytes:
 
 
 def answered_with_pages(site: Site, candidates: Iterable[str], *, cookies: dict[str, str]) -> list[str]:
-    """Those that are answered with a page to whoever has these cookies."""
-    with httpx.Client(base_url=site.url, timeout=PATIENCE_S, trust_env=False, cookies=cookies) as client:
+    """The addresses that answer with a page to a visitor with these cookies."""
+    with httpx.Client(base_url=site.url, timeout=TIMEOUT_S, trust_env=False, cookies=cookies) as client:
         answers = {address: client.get(address) for address in candidates if not address.endswith(PARTS)}
     return [
         address

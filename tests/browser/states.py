@@ -91,4 +91,4 @@ def failures() -> str:
         "failure-500": ("500.html", {}),
         "failure-503": ("outage.html", {"outage": outages.DATABASE_AWAY}),
     }
-    return json.dumps({name: render_to_string(template, said) for name, (template, said) in pages.items()})
+    return json.dumps({name: render_to_string(path, context) for name, (path, context) in pages.items()})

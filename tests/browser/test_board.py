@@ -27,7 +27,7 @@ HEAD_TOP_PX = """() => {
 
 
 def faults_at_every_width(page: Page) -> list[str]:
-    found = []
+    faults = []
     page.goto(BOARD)
     for width in WIDTHS:
         page.set_viewport_size({"width": width, "height": 800})
@@ -36,8 +36,8 @@ def faults_at_every_width(page: Page) -> list[str]:
         for name, check in checks.items():
             seen = page.evaluate(check)
             if seen:
-                found.append(f"{width}: {name} {seen}")
-    return found
+                faults.append(f"{width}: {name} {seen}")
+    return faults
 
 
 def test_board_fits_every_screen_with_names_of_80_letters_and_its_heads_stay(

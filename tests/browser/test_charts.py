@@ -46,13 +46,13 @@ def _readings(page: Page, figure: Locator) -> Iterator[tuple[str, str]]:
         for name, *lines in card.locator(".entry").evaluate_all(
             "entries => entries.map(entry => [...entry.children].map(part => part.textContent))"
         ):
-            found = re.search(r"MiD ([\d.]+)", " ".join(lines))
-            assert found is not None, lines
-            yield name, found[1]
+            match = re.search(r"MiD ([\d.]+)", " ".join(lines))
+            assert match is not None, lines
+            yield name, match[1]
 
 
 def rows(figure: Locator, name: int, value: int) -> set[tuple[str, str]]:
-    """The same from the table beside it."""
+    """The same from the table next to it."""
     texts = figure.locator("tbody tr").evaluate_all(
         "rows => rows.map(row => [...row.cells].map(cell => cell.textContent.trim()))"
     )
@@ -128,7 +128,7 @@ def test_chart_follows_light_and_dark(page: Page, board: None) -> None:
     expect(legend).not_to_have_attribute("fill", light or "")
 
 
-def test_without_a_script_the_table_stands_in_the_place_of_the_chart(new_page: NewPage, board: None) -> None:
+def test_without_a_script_the_table_replaces_the_chart(new_page: NewPage, board: None) -> None:
     page = new_page(java_script_enabled=False)
     page.goto(CHARTS)
     for kind in ("progress", "latency", "profile"):

@@ -138,18 +138,18 @@ def test_what_looks_for_faults_finds_one_that_is_there(page: Page, site: Site) -
     page.goto("/docs/")
     page.evaluate(AXE)
     page.evaluate("document.querySelector('main').append(document.createElement('button'))")
-    (found,) = axe(page, where="here")
-    assert found.startswith("at here: button-name: critical")
+    (fault,) = axe(page, where="here")
+    assert fault.startswith("at here: button-name: critical")
 
 
 def test_without_scripts_every_public_page_fits_and_nothing_on_it_is_dead(
     new_page: NewPage, public: list[str]
 ) -> None:
     page = new_page(java_script_enabled=False)
-    found = {}
+    faults_at = {}
     for address in public:
         page.goto(address)
         for viewport in (NARROW, WIDE):
             page.set_viewport_size(viewport)  # type: ignore[arg-type]  # a plain dict of the right shape
-            found[address, viewport["width"]] = (max(0, page.evaluate(OVERFLOW_PX)), page.evaluate(DEAD))
-    assert {where: faults for where, faults in found.items() if faults != (0, [])} == {}
+            faults_at[address, viewport["width"]] = (max(0, page.evaluate(OVERFLOW_PX)), page.evaluate(DEAD))
+    assert {where: faults for where, faults in faults_at.items() if faults != (0, [])} == {}

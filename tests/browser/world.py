@@ -42,8 +42,8 @@ METHODS: dict[str, tuple[str, float, float | None]] = {
 
 def populated(site: Site) -> dict[str, str]:
     """Make the board on a running site; one identifier of each kind of thing."""
-    said = site.manage("shell", "-v0", "-c", "from tests.browser import world; print(world.populate())")
-    return dict(json.loads(said.splitlines()[-1]))
+    output = site.manage("shell", "-v0", "-c", "from tests.browser import world; print(world.populate())")
+    return dict(json.loads(output.splitlines()[-1]))
 
 
 def populate() -> str:

@@ -1,4 +1,4 @@
-"""`python -m tests.chaos`: uploads while everything that can fail does, and what came of them.
+"""`python -m tests.chaos`: uploads while everything that can fail does, and their results.
 
 Ends with one line of figures. The exit code says whether nothing was lost, doubled or stuck, and nobody
 waited longer than is allowed.
@@ -25,7 +25,7 @@ from tests.chaos.verdict import Verdict, judge, n_open
 
 TICK_S = 0.1
 MAX_REASONS = 20
-PATIENCE_S = 300.0  # with what was acknowledged, once nothing goes wrong any more
+TIMEOUT_S = 300.0  # with what was acknowledged, once nothing goes wrong any more
 
 
 def arguments() -> argparse.Namespace:
@@ -47,7 +47,7 @@ def say(text: str) -> None:
 
 
 def run(options: argparse.Namespace, directory: Path) -> bool:
-    """The whole run; whether it was good."""
+    """Do the whole run. Returns whether it was good."""
     rng = np.random.default_rng(options.seed)
     truth = simulate(rng=rng, n_sequences=1_000, n_recordings=25)
     uploads = make_uploads(truth, n=options.uploads, n_bombs=options.bombs, seed=options.seed)
@@ -78,8 +78,8 @@ def run(options: argparse.Namespace, directory: Path) -> bool:
 
 
 def _drain(site: Site, faults: Faults) -> None:
-    """Wait, in peace, until everything is decided or patience ends."""
-    deadline_s = time.monotonic() + PATIENCE_S
+    """Wait, without faults, until everything is decided or the time is over."""
+    deadline_s = time.monotonic() + TIMEOUT_S
     while time.monotonic() < deadline_s:
         faults.tick()
         try:
@@ -96,11 +96,11 @@ def _tell(verdict: Verdict, faults: Faults, clients: Clients, site: Site) -> Non
     for reason in [*verdict.reasons, *clients.refused][:MAX_REASONS]:
         say(reason)
     say("faults " + " ".join(f"{name}={n}" for name, n in sorted(faults.counts.items())))
-    said = "".join(worker.said() for worker in site.workers)
+    output = "".join(worker.output() for worker in site.workers)
     n_known = sum(receipt.was_known for receipt in clients.receipts)
     say(
-        f"fenced={len(re.findall('evaluation_lost', said))} "
-        f"struck={len(re.findall('evaluation_struck', said))} most_attempts={verdict.most_attempts} "
+        f"fenced={len(re.findall('evaluation_lost', output))} "
+        f"struck={len(re.findall('evaluation_struck', output))} most_attempts={verdict.most_attempts} "
         f"failed_tries={clients.n_failed_tries} answered_with_the_first={n_known}"
     )
     waits_s = verdict.waits_s or [0.0]

@@ -31,6 +31,6 @@ def truth() -> evaluator.GroundTruth:
 def site(
     installed: None, tmp_path_factory: pytest.TempPathFactory, truth: evaluator.GroundTruth
 ) -> Iterator[Site]:
-    """Web and one worker, with a PostgreSQL and a Redis that nobody else uses."""
+    """Web and one worker, with a PostgreSQL and a Redis of their own."""
     with running_site(tmp_path_factory.mktemp("site"), truth=truth, n_workers=1) as running:
         yield running

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-PATIENCE_S = 120.0
+TIMEOUT_S = 120.0
 
 
 class Process:
@@ -81,23 +81,23 @@ class Process:
 
     def wait(self) -> None:
         if self._child is not None:
-            self._child.wait(PATIENCE_S)
+            self._child.wait(TIMEOUT_S)
 
     def children(self) -> list[int]:
         """Processes that it has started itself, in the order of their numbers."""
         return children_of(self.pid)
 
-    def said(self) -> str:
+    def output(self) -> str:
         return self.log_path.read_text(errors="replace") if self.log_path.exists() else ""
 
 
 def children_of(pid: int) -> list[int]:
     """Processes that this one has started itself, in the order of their numbers."""
-    found: set[int] = set()
+    children: set[int] = set()
     with suppress(FileNotFoundError, ProcessLookupError):
         for task in Path(f"/proc/{pid}/task").iterdir():
-            found |= {int(child) for child in (task / "children").read_text().split()}
-    return sorted(found)
+            children |= {int(child) for child in (task / "children").read_text().split()}
+    return sorted(children)
 
 
 def _guard(user: str | None) -> list[str]:

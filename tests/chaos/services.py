@@ -18,10 +18,10 @@ from tests.services import ServiceMissing
 
 def postgres_folder() -> Path:
     """Where the newest PostgreSQL's programs are. Raises `ServiceMissing`."""
-    found = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda path: float(path.parent.name))
+    folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"), key=lambda path: float(path.parent.name))
     on_path = shutil.which("initdb")
-    if found:
-        return found[-1]
+    if folders:
+        return folders[-1]
     if on_path:
         return Path(on_path).parent
     raise ServiceMissing("no PostgreSQL server is installed (initdb was not found)")
@@ -29,14 +29,14 @@ def postgres_folder() -> Path:
 
 def redis_program() -> str:
     """The Redis server's program. Raises `ServiceMissing`."""
-    found = shutil.which("redis-server")
-    if not found:
+    program = shutil.which("redis-server")
+    if not program:
         raise ServiceMissing("no Redis server is installed (redis-server was not found)")
-    return found
+    return program
 
 
 class Postgres:
-    """A cluster in a temporary folder, removed at the end. It flushes to the disk as in earnest."""
+    """A cluster in a temporary folder, removed at the end. It flushes to the disk as in production."""
 
     def __init__(self, directory: Path) -> None:
         programs = postgres_folder()

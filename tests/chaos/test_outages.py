@@ -12,7 +12,7 @@ import pytest
 import evaluator
 from tests.chaos.site import SPLIT, Site
 from tests.journeys import production
-from tests.journeys.production import GUNICORN, PATIENCE_S, await_that, free_port
+from tests.journeys.production import GUNICORN, TIMEOUT_S, await_that, free_port
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
 
@@ -28,7 +28,7 @@ def token(site: Site) -> str:
 @pytest.fixture
 def http(site: Site, token: str) -> Iterator[httpx.Client]:
     headers = {"Authorization": f"Bearer {token}"}
-    with httpx.Client(base_url=site.url, headers=headers, timeout=PATIENCE_S, trust_env=False) as client:
+    with httpx.Client(base_url=site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False) as client:
         yield client
 
 
@@ -158,7 +158,7 @@ def test_full_disk_is_a_507_and_leaves_no_row(
     too_much = new_file() + b" " * 3_000_000
     with (
         another_web(site, **{where: str(tmp_path)}) as url,
-        httpx.Client(base_url=url, timeout=PATIENCE_S, trust_env=False) as http,
+        httpx.Client(base_url=url, timeout=TIMEOUT_S, trust_env=False) as http,
     ):
         http.headers["Authorization"] = f"Bearer {token}"
         # gunicorn ends a connection whose body was left unread, and does not say so in the answer: a request

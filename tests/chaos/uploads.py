@@ -123,7 +123,7 @@ class Clients:
     n_failed_tries: int = 0
 
     def start(self, uploads: Sequence[Upload], *, n_clients: int, seconds: float) -> list[threading.Thread]:
-        """Send everything over about so many seconds. Returns the clients, to be joined."""
+        """Send everything over about `seconds`. Returns the clients, to be joined."""
         pace_s = seconds * n_clients / max(len(uploads), 1)
         threads = [
             threading.Thread(target=self._send_all, args=(uploads[i::n_clients], pace_s), name=f"client-{i}")

@@ -1,4 +1,4 @@
-"""Redis as compose starts it, and somebody beside who sees everything."""
+"""Redis as compose starts it, and a client that sees all commands."""
 
 import os
 import shutil
@@ -34,7 +34,7 @@ class Broker:
         return redis.Redis(port=self.port, username=user, password=password, decode_responses=True)
 
     def watcher(self) -> "redis.Redis":
-        """Of whoever may do everything."""
+        """A connection with all rights."""
         return self.client("watcher", "watching")
 
 

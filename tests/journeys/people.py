@@ -6,7 +6,7 @@ from typing import Any
 
 import httpx
 
-from tests.journeys.production import PATIENCE_S, Site, await_that
+from tests.journeys.production import TIMEOUT_S, Site, await_that
 
 FINAL = {"SCORED", "REJECTED", "SYSTEM_ERROR", "CANCELLED"}
 PASSWORD = "journey-of-a-thousand-miles"
@@ -20,9 +20,7 @@ class Visitor:
     def __init__(self, site: Site) -> None:
         self.site = site
         # Loopback is never reached through a proxy that the environment names.
-        self.http = httpx.Client(
-            base_url=site.url, follow_redirects=True, timeout=PATIENCE_S, trust_env=False
-        )
+        self.http = httpx.Client(base_url=site.url, follow_redirects=True, timeout=TIMEOUT_S, trust_env=False)
 
     def get(self, path: str) -> httpx.Response:
         answer = self.http.get(path)
@@ -65,9 +63,9 @@ class Visitor:
         """Upload a file through the form; returns the submission's id."""
         fields = {"split": split, "method": method, **more}
         answer = self.post_form("/submit/", fields, file=("predictions.json", data))
-        found = re.fullmatch(r"/submissions/([0-9a-f-]{36})/", answer.url.path)
-        assert found, answer.text
-        return found[1]
+        match = re.fullmatch(r"/submissions/([0-9a-f-]{36})/", answer.url.path)
+        assert match, answer.text
+        return match[1]
 
     def show(self, submission: str) -> None:
         """Make a submission's method public: look at what others will see, say that one knows, confirm."""
@@ -96,7 +94,7 @@ class Program:
         self.http = httpx.Client(
             base_url=site.url,
             headers={"Authorization": f"Bearer {token}"},
-            timeout=PATIENCE_S,
+            timeout=TIMEOUT_S,
             trust_env=False,
         )
 

@@ -19,27 +19,27 @@ from tests.signals import default_signals
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BIN = Path(sys.executable).parent
-# Of whoever waits for something that must come: a busy machine is no fault, so only a hung one ends it.
-PATIENCE_S = 180.0
+# For what must come: a busy machine is no fault, so only a hung one ends the wait.
+TIMEOUT_S = 180.0
 POLL_S = 0.05
 
 
 class NeverHappened(AssertionError):
-    """What was waited for did not come about in time."""
+    """What was waited for did not happen in time."""
 
 
-def await_that(condition: Callable[[], bool], *, what: str, patience_s: float = PATIENCE_S) -> None:
+def await_that(condition: Callable[[], bool], *, what: str, timeout_s: float = TIMEOUT_S) -> None:
     """Return as soon as the condition holds; it is asked from outside, so there is no event to wait for."""
-    deadline_s = time.monotonic() + patience_s
+    deadline_s = time.monotonic() + timeout_s
     while not condition():
         if time.monotonic() > deadline_s:
-            raise NeverHappened(f"{what}: not within {patience_s:g} s")
+            raise NeverHappened(f"{what}: not within {timeout_s:g} s")
         time.sleep(POLL_S)
 
 
 def get(url: str, **headers: str) -> httpx.Response:
-    """What is answered there, however long that takes within `PATIENCE_S`; no proxy is asked on the way."""
-    return httpx.get(url, headers=headers, timeout=PATIENCE_S, trust_env=False)
+    """The answer at an address, within `TIMEOUT_S`; no proxy is asked on the way."""
+    return httpx.get(url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
 
 
 @dataclass(frozen=True)
@@ -120,7 +120,7 @@ def end(process: subprocess.Popen[bytes]) -> None:
     """Ask it to finish, and make it if it does not."""
     process.terminate()
     with suppress(subprocess.TimeoutExpired):
-        process.wait(timeout=PATIENCE_S)
+        process.wait(timeout=TIMEOUT_S)
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()

@@ -9,7 +9,7 @@ from pathlib import Path
 from tests.journeys.production import REPOSITORY
 
 EXAMPLES = REPOSITORY / "examples"
-PATIENCE_S = 180
+TIMEOUT_S = 180
 
 Done = subprocess.CompletedProcess[str]
 Tsttc = Callable[..., Done]
@@ -39,7 +39,7 @@ def command(url: str, token: str | Path, *, home: Path) -> Tsttc:
             check=False,
             cwd=EXAMPLES,
             env=surroundings,
-            timeout=PATIENCE_S,
+            timeout=TIMEOUT_S,
         )
 
     return run

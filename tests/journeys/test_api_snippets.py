@@ -1,4 +1,4 @@
-"""Every request on the pages of the API runs as it stands there: the curl line, and the Python."""
+"""Every request on the pages of the API runs as it is printed there: the curl line, and the Python."""
 
 import os
 import shutil

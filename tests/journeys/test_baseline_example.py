@@ -32,11 +32,11 @@ def test_the_example_goes_from_frames_to_a_row_in_four_commands(
     ground_truth.import_truth(split_name="val", path=EXAMPLES / "baseline" / "truth.csv", now=timezone.now())
     tsttc = command(live_server.url, builders.token(owner), home=tmp_path)
     run, check, score, submit = commands_of("Four commands")
-    places = {"examples/baseline": "baseline", "alignment.json": str(tmp_path / "alignment.json")}
+    replacements = {"examples/baseline": "baseline", "alignment.json": str(tmp_path / "alignment.json")}
 
     def here(arguments: list[str]) -> list[str]:
-        for place, path in places.items():
-            arguments = [argument.replace(place, path) for argument in arguments]
+        for old, new in replacements.items():
+            arguments = [argument.replace(old, new) for argument in arguments]
         return [argument for argument in arguments if argument != "--wait"]  # no worker runs here
 
     done = [tsttc(*here(arguments)) for arguments in (run, check, score, submit)]

@@ -56,9 +56,9 @@ def tokens(site: Site) -> Iterator[str]:
         f"for i in range({N_JOBS}):\n"
         "    call_command('create_token', f'job-{i}@example.org', name='CI')\n"
     )
-    found = site.manage("shell", "--no-imports", "--command", program).split()
-    assert len(found) == N_JOBS
-    return iter(found)
+    lines = site.manage("shell", "--no-imports", "--command", program).split()
+    assert len(lines) == N_JOBS
+    return iter(lines)
 
 
 @pytest.fixture
@@ -82,11 +82,11 @@ def test_job_waits_for_its_scores_and_can_prove_them(job: Job) -> None:
     assert verified.stdout.startswith("The receipt is valid.\n"), verified.stderr
     keys.write_text(get(f"{job.site.url}/.well-known/tsttc-receipt-keys.json").text)
     offline_url = f"http://127.0.0.1:{free_port()}"
-    said = json.loads(job.at(offline_url)("verify", receipt, "--keys", keys, "--json").stdout)
-    assert (said["submission"], said["scores"]["mid"]) == (scored["id"], scored["scores"]["mid"])
+    claims = json.loads(job.at(offline_url)("verify", receipt, "--keys", keys, "--json").stdout)
+    assert (claims["submission"], claims["scores"]["mid"]) == (scored["id"], scored["scores"]["mid"])
     header, payload, signature = receipt.read_text().strip().split(".")
-    said = receipts.decode(payload).decode().replace(f'"{scored["scores"]["mid"]:.1f}"', '"0.01"')
-    receipt.write_text(f"{header}.{receipts.encode(said.encode())}.{signature}")
+    forged_text = receipts.decode(payload).decode().replace(f'"{scored["scores"]["mid"]:.1f}"', '"0.01"')
+    receipt.write_text(f"{header}.{receipts.encode(forged_text.encode())}.{signature}")
     forged = job.tsttc("verify", receipt)
     assert (forged.returncode, forged.stdout) == (1, "")
     assert "The signature does not fit what the receipt says" in forged.stderr

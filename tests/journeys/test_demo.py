@@ -1,4 +1,4 @@
-"""The demo as somebody meets it: one process to start, a board in the browser, Ctrl-C to end it."""
+"""The demo as a person meets it: one process to start, a board in the browser, Ctrl-C to end it."""
 
 import os
 import re
@@ -17,7 +17,7 @@ import pytest
 from leaderboard.demo.seed import ENTRIES
 from leaderboard.management.commands.demo import names_of
 from tests.journeys.people import Visitor
-from tests.journeys.production import PATIENCE_S, REPOSITORY, Site, await_that, free_port, get
+from tests.journeys.production import REPOSITORY, TIMEOUT_S, Site, await_that, free_port, get
 from tests.leaderboard.sandbox.child_processes import kernel_says
 from tests.services import environment_of_its_own
 from tests.signals import default_signals
@@ -51,7 +51,7 @@ def demo(directory: Path, *, port: int) -> Iterator[subprocess.Popen[str]]:
         finally:
             if supervisor.poll() is None:
                 supervisor.terminate()
-            supervisor.wait(timeout=PATIENCE_S)
+            supervisor.wait(timeout=TIMEOUT_S)
 
 
 def banner(supervisor: subprocess.Popen[str]) -> str:
@@ -85,13 +85,13 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
     port = free_port()
     url = f"http://127.0.0.1:{port}"
     with demo(tmp_path, port=port) as supervisor:
-        said = banner(supervisor)
-        assert url in said
+        output = banner(supervisor)
+        assert url in output
         n_scored = sum(entry.run is not None for entry in ENTRIES)
         await_that(lambda: len(entries(url)) == n_scored, what="every demo submission is scored")
 
-        login = re.search(r"Sign in as (\S+) with the password (\S+)", said)
-        assert login, said
+        login = re.search(r"Sign in as (\S+) with the password (\S+)", output)
+        assert login, output
         site = Site(url=url, directory=tmp_path, environment={})
         visitor = Visitor(site)
         answer = visitor.post_form("/accounts/login/", {"login": login[1], "password": login[2]})
@@ -121,7 +121,7 @@ def test_the_demo_shows_scored_submissions_survives_a_dead_worker_and_ends_clean
 
         (second,) = workers(supervisor)
         supervisor.send_signal(signal.SIGINT)
-        assert supervisor.wait(timeout=PATIENCE_S) == 0
+        assert supervisor.wait(timeout=TIMEOUT_S) == 0
         assert not is_alive(first)
         assert not is_alive(second)
     with pytest.raises(httpx.ConnectError):
@@ -136,12 +136,12 @@ def test_the_names_of_the_demo_are_those_of_this_machine_and_the_chosen_one(
     assert names_of("0.0.0.0") == ["*"]
 
 
-def test_a_port_in_use_is_said_in_a_sentence_and_nothing_is_made(tmp_path: Path) -> None:
+def test_a_port_in_use_is_reported_in_a_sentence_and_nothing_is_made(tmp_path: Path) -> None:
     port = free_port()
     with socket.create_server(("127.0.0.1", port)), demo(tmp_path, port=port) as supervisor:
         assert supervisor.stdout is not None
-        said = supervisor.stdout.read()
-        assert supervisor.wait(timeout=PATIENCE_S) == 1
-    assert f"Port {port} on 127.0.0.1 is in use" in said
-    assert "Traceback" not in said
+        output = supervisor.stdout.read()
+        assert supervisor.wait(timeout=TIMEOUT_S) == 1
+    assert f"Port {port} on 127.0.0.1 is in use" in output
+    assert "Traceback" not in output
     assert not (tmp_path / "leaderboard.sqlite3").exists()

@@ -123,17 +123,17 @@ def lines(site: Site, name: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in text if name == "web" or line.startswith("{")]
 
 
-def said(site: Site, name: str, event: str, submission: str) -> dict[str, Any]:
-    """The one line in which a process says that of a submission, which it may do after it was seen."""
-    found: list[dict[str, Any]] = []
+def log_line(site: Site, name: str, event: str, submission: str) -> dict[str, Any]:
+    """Wait for the one log line of a process about this event of a submission."""
+    matches: list[dict[str, Any]] = []
 
     def is_written() -> bool:
-        found[:] = [line for line in lines(site, name) if line.get("submission_id") == submission]
-        found[:] = [line for line in found if line["event"] == event]
-        return bool(found)
+        matches[:] = [line for line in lines(site, name) if line.get("submission_id") == submission]
+        matches[:] = [line for line in matches if line["event"] == event]
+        return bool(matches)
 
     await_that(is_written, what=f"{name} says {event}")
-    [line] = found
+    [line] = matches
     return line
 
 
@@ -149,8 +149,8 @@ def test_a_submission_can_be_followed_through_every_process_and_nothing_secret_i
     submission = program.submit(split="test", method="Followed", data=data)
     assert program.outcome(submission)["state"] == "SCORED"
 
-    queued = said(site, "web", "evaluation_queued", submission)
-    finished = said(site, "worker", "evaluation_finished", submission)
+    queued = log_line(site, "web", "evaluation_queued", submission)
+    finished = log_line(site, "worker", "evaluation_finished", submission)
     assert finished["evaluation_id"] == queued["evaluation_id"]
     assert finished["status"] == "SCORED"
     if "task_id" in finished:  # found by the message, and not by the worker's own look
@@ -166,7 +166,7 @@ def test_no_value_of_the_ground_truth_leaves_the_workers(
     site: Site, broker: Broker, people: People, programs: Programs, truth: evaluator.GroundTruth
 ) -> None:
     pia = people(site)
-    with said_to(broker) as traffic:
+    with recorded_traffic(broker) as traffic:
         pia.sign_up(email="pia@example.org", name="Pia")
         good = predictions(truth, factor=1.23)
         sent = [
@@ -181,9 +181,9 @@ def test_no_value_of_the_ground_truth_leaves_the_workers(
     dump = subprocess.run(["pg_dump", database], capture_output=True, check=True).stdout
     kept = canaries.files_below(site.directory, but=site.directory / "ground-truth")
     table = kept.pop("truth.csv")
-    haystacks = {**answers, **kept, "dump": dump, "what was said to Redis": b"".join(traffic)}
+    haystacks = {**answers, **kept, "dump": dump, "what was sent to Redis": b"".join(traffic)}
     assert b"leaderboard_score" in dump
-    assert b"leaderboard.tasks.nudge" in haystacks["what was said to Redis"]
+    assert b"leaderboard.tasks.nudge" in haystacks["what was sent to Redis"]
     assert {"web.log", "worker.log"} <= set(haystacks)
     search = canaries.Search(truth.ttc_s.tolist())
     assert search.in_all(haystacks) == []
@@ -191,8 +191,8 @@ def test_no_value_of_the_ground_truth_leaves_the_workers(
 
 
 @contextmanager
-def said_to(broker: Broker) -> Iterator[list[bytes]]:
-    """Everything that any client says to it meanwhile."""
+def recorded_traffic(broker: Broker) -> Iterator[list[bytes]]:
+    """Record everything that clients send to the broker meanwhile."""
     chunks: list[bytes] = []
     with socket.create_connection(("127.0.0.1", broker.port)) as connection:
 
@@ -244,7 +244,7 @@ def test_a_working_site_says_so_and_a_stranger_reads_no_figures_through_a_proxy(
         assert get(f"{site.url}/metrics", **{header: "127.0.0.1"}).status_code == 403
 
 
-def test_a_backup_of_the_running_site_comes_back_byte_for_byte_in_a_fresh_place(
+def test_a_backup_of_the_running_site_comes_back_byte_for_byte_on_a_fresh_site(
     site: Site, people: People, truth: evaluator.GroundTruth, tmp_path: Path
 ) -> None:
     folder = tmp_path / "backup"
@@ -266,10 +266,10 @@ def test_a_backup_of_the_running_site_comes_back_byte_for_byte_in_a_fresh_place(
     assert {name for name in kept["files"] if name.startswith("predictions/")} == sent
     assert kept["missing"] == []
     with migrated_database() as url:
-        place = {"TSTTC_DATABASE_URL": url, "TSTTC_DATA_DIR": str(tmp_path / "new")}
-        said = replace(site, environment=site.environment | place).manage("restore", str(folder))
+        target = {"TSTTC_DATABASE_URL": url, "TSTTC_DATA_DIR": str(tmp_path / "new")}
+        output = replace(site, environment=site.environment | target).manage("restore", str(folder))
         with psycopg.connect(url) as database:
             assert database.execute(FACTORS).fetchall() == factors
     # It holds every file, the audit log and each published board against the backup, and fails otherwise.
-    assert "1 board is the same byte for byte" in said
-    assert "cannot be checked here" not in said
+    assert "1 board is the same byte for byte" in output
+    assert "cannot be checked here" not in output

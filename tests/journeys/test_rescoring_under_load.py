@@ -24,7 +24,7 @@ from leaderboard.demo.runs import simulate
 from tests import crowd
 from tests.chaos.services import postgres_folder, redis_program
 from tests.chaos.site import SPLIT, Site, running_site
-from tests.journeys.production import PATIENCE_S, REPOSITORY, await_that
+from tests.journeys.production import REPOSITORY, TIMEOUT_S, await_that
 from tests.services import ServiceMissing, skip_or_fail
 
 pytestmark = [pytest.mark.services, pytest.mark.slow]
@@ -138,7 +138,7 @@ class Readers:
         await_that(have_come, what=f"every reader has {n} more answers")
 
     def _read(self, reader: int) -> None:
-        with httpx.Client(base_url=self._site.url, timeout=PATIENCE_S, trust_env=False) as http:
+        with httpx.Client(base_url=self._site.url, timeout=TIMEOUT_S, trust_env=False) as http:
             while not self._stopping.is_set():
                 asked_s = time.monotonic()
                 response = http.get(BOARD)
@@ -194,13 +194,13 @@ def test_readers_see_whole_boards_only_and_nothing_is_doubled(
         site.workers[0].start()  # as its supervisor does
         readers.await_answers(2, asked_after_s=time.monotonic())
         await_that(lambda: n_undecided(site) == 0, what="everything is decided in both editions")
-        before = httpx.get(site.url + BOARD, trust_env=False, timeout=PATIENCE_S).content
+        before = httpx.get(site.url + BOARD, trust_env=False, timeout=TIMEOUT_S).content
 
         forward = timed(lambda: correct(site, PUBLISH))
         readers.await_answers(3, asked_after_s=forward[1])
         back = timed(lambda: correct(site, ROLL_BACK))
         readers.await_answers(3, asked_after_s=back[1])
-        after = httpx.get(site.url + BOARD, trust_env=False, timeout=PATIENCE_S).content
+        after = httpx.get(site.url + BOARD, trust_env=False, timeout=TIMEOUT_S).content
 
     assert n_left > 0, "the worker was killed when all was done"
     assert readers.failures == []

@@ -61,18 +61,18 @@ OF_THE_MACHINE = {"readyz", "healthy", "metrics"}
 
 def addresses(scene: Scene) -> list[str]:
     """Every address, without those of maintainers and of accounts beyond one each."""
-    found: dict[str, None] = {}
+    paths: dict[str, None] = {}
     described = {path: methods.get("GET", {}) for path, methods in operations().items()}
     for route in routes():
         if route.name in OF_THE_MACHINE:
             continue
         for path in _filled(route, scene):
-            found[path] = None
+            paths[path] = None
             if route.is_admin or path.startswith(("/maintain/", "/accounts/")):
                 break
             for query in _queries(route, scene, described):
-                found[f"{path}?{query}"] = None
-    return list(found)
+                paths[f"{path}?{query}"] = None
+    return list(paths)
 
 
 def _filled(route: Route, scene: Scene) -> Iterator[str]:

@@ -68,7 +68,7 @@ def digits(value: float) -> bytes:
 
 
 def _inner(data: bytes, shift: int, encoded: bytes) -> bytes:
-    """The characters of base64 that depend on nothing but the data, whatever stands around it."""
+    """The characters of base64 that depend on the data alone, whatever is around it."""
     first = -(-8 * shift // 6)
     last = (8 * (shift + len(data))) // 6
     return encoded[first:last]
@@ -89,21 +89,21 @@ class Search:
         self._keys = np.array(sorted(self._by_key), dtype="<u8")
 
     def in_bytes(self, data: bytes, *, where: str) -> list[Hit]:
-        found: list[Hit] = []
+        hits: list[Hit] = []
         for offset in range(8):
             n_words = (len(data) - offset) // 8
             if n_words <= 0:
                 break
             words = np.frombuffer(data, dtype="<u8", count=n_words, offset=offset)
-            places = np.minimum(np.searchsorted(self._keys, words), len(self._keys) - 1)
-            for index in np.flatnonzero(self._keys[places] == words):
+            indices = np.minimum(np.searchsorted(self._keys, words), len(self._keys) - 1)
+            for index in np.flatnonzero(self._keys[indices] == words):
                 at = offset + 8 * int(index)
-                found += [
+                hits += [
                     (where, how, data[max(0, at - 40) : at + 40])
                     for how, pattern in self._by_key[int(words[index])]
                     if data.startswith(pattern, at)
                 ]
-        return found
+        return hits
 
     def in_all(self, haystacks: Mapping[str, bytes]) -> list[Hit]:
         return [hit for where, data in haystacks.items() for hit in self.in_bytes(data, where=where)]

@@ -13,11 +13,11 @@ NOT_FOLLOWED = re.compile(r"/logout/|/static/|/delete/|[?&](?:o|sort|next|_to_fi
 def crawl(get: Callable[[str], bytes], *, start: list[str], limit: int) -> dict[str, bytes]:
     """What is answered at these addresses, and at those that they name: at most `limit` of them."""
     waiting = list(start)
-    found: dict[str, bytes] = {}
+    bodies: dict[str, bytes] = {}
     known = set(waiting)
-    while waiting and len(found) < limit:
+    while waiting and len(bodies) < limit:
         path = waiting.pop(0)
-        found[path] = body = get(path)
+        bodies[path] = body = get(path)
         for raw in LINK.findall(body):
             target = urlsplit(urljoin(path, html.unescape(raw.decode("utf-8", "replace"))))
             if target.netloc and target.netloc != "testserver":
@@ -26,4 +26,4 @@ def crawl(get: Callable[[str], bytes], *, start: list[str], limit: int) -> dict[
             if address.startswith("/") and address not in known and not NOT_FOLLOWED.search(address):
                 known.add(address)
                 waiting.append(address)
-    return found
+    return bodies

@@ -40,17 +40,17 @@ class Coverage:
 
 def coverage(delta: float, *, power: int, n: int, rng: np.random.Generator) -> Coverage:
     """Publish `n` differences of two methods that truly differ by `delta`."""
-    told = [told for _ in range(0, n, CHUNK) for told in _published(delta, power, rng)][:n]
-    holds = np.array([_holds(each, delta) for each in told])
-    is_significant = np.array([each.is_significant for each in told])
+    published = [each for _ in range(0, n, CHUNK) for each in _published(delta, power, rng)][:n]
+    holds = np.array([_holds(each, delta) for each in published])
+    is_significant = np.array([each.is_significant for each in published])
     of_significant = float(holds[is_significant].mean()) if is_significant.any() else float("nan")
     return Coverage(float(holds.mean()), of_significant, float(is_significant.mean()), n)
 
 
-def _holds(told: Difference, delta: float) -> bool:
-    assert told.low is not None
-    assert told.high is not None
-    return told.low <= delta <= told.high
+def _holds(difference: Difference, delta: float) -> bool:
+    assert difference.low is not None
+    assert difference.high is not None
+    return difference.low <= delta <= difference.high
 
 
 def _published(delta: float, power: int, rng: np.random.Generator) -> Iterator[Difference]:
@@ -63,12 +63,12 @@ def _published(delta: float, power: int, rng: np.random.Generator) -> Iterator[D
     total = counts.sum(axis=0)
     spread = delta / POWERS[power] * total / np.sqrt((counts**2).sum(axis=0))
     gaps = counts * (delta + spread * rng.standard_normal(counts.shape))
-    found = sign_flips(gaps, counts, rng=rng, n_flips=N_SIGN_FLIPS)
+    flips = sign_flips(gaps, counts, rng=rng, n_flips=N_SIGN_FLIPS)
     # Where a value lies between two that can be published is chance.
     others = rng.uniform(14.0, 15.0, CHUNK)
     means = gaps.sum(axis=0) / total
     for i in range(CHUNK):
-        gap = Difference(float(means[i]), float(found.low[i]), float(found.high[i]), float(found.p[i]))
+        gap = Difference(float(means[i]), float(flips.low[i]), float(flips.high[i]), float(flips.p[i]))
         first, second = float(others[i] + means[i]), float(others[i])
         shown = rounded_difference(gap, first=first, second=second, decimals=DECIMALS)
         yield disclosure.published_difference(gap, shown, edition=edition)
@@ -85,8 +85,8 @@ def main(n: int = 4_000) -> None:
     for delta in DELTAS:
         for power in POWERS:
             rng = np.random.default_rng([int(1e3 * delta), power])
-            found = coverage(delta, power=power, n=n, rng=rng)
-            shares = (found.significant, found.of_all, found.of_significant)
+            figures = coverage(delta, power=power, n=n, rng=rng)
+            shares = (figures.significant, figures.of_all, figures.of_significant)
             cells = " | ".join(f"{100 * share:.1f}" for share in shares)
             sys.stdout.write(f"| {delta} | {power} % | {cells} |\n")
             sys.stdout.flush()

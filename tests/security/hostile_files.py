@@ -1,4 +1,4 @@
-"""Files that somebody who means harm, or is careless, might send as predictions: each has a name."""
+"""Files that a person who means harm, or is careless, might send as predictions: each has a name."""
 
 import gzip
 import io

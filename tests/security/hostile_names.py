@@ -1,4 +1,4 @@
-"""Names and texts that somebody might give a method, a team, a file or a token to do harm with them."""
+"""Names and texts that a person might give a method, a team, a file or a token to do harm with them."""
 
 from itertools import product
 

@@ -52,7 +52,7 @@ def line(
 ) -> Line:
     """A line: `line(GET=OPEN)`, `line(GET=OWN, POST="in 404 302 302 404 in in", sends={"name": "x"})`."""
     split = {method: tuple(text.split()) for method, text in answers.items()}
-    assert all(len(found) == len(ROLES) for found in split.values()), answers
+    assert all(len(codes) == len(ROLES) for codes in split.values()), answers
     return Line(answers=split, at=at or {}, sends=sends or {}, is_json=is_json)
 
 

@@ -41,7 +41,7 @@ class World:
 
     @property
     def method(self) -> Method:
-        """The owner's, which nobody else may see."""
+        """The owner's, which no other user may see."""
         return self.submission.method
 
     def parameters(self) -> dict[str, object]:

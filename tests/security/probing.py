@@ -41,7 +41,7 @@ SPREAD: Final = 128.0
 
 @dataclass(frozen=True)
 class World:
-    """A hidden truth of G recordings, and K sequences of which somebody wants to know the ranges.
+    """A hidden truth of G recordings, and K sequences whose ranges an attacker wants to know.
 
     `counts` are the sequences per recording and range, (G, 4); `base` and `rival` the sums of MiD of file 0
     and of a method of another team. Sequence i is in recording i, is moved by `amounts[i]`, and is in the
@@ -64,9 +64,9 @@ class World:
 
     def moved(self, masks: Masks) -> Floats:
         """What file 1 adds to the sums of a range, if these are the chosen sequences in it: (G, masks)."""
-        found = np.zeros((len(self.counts), len(masks)))
-        found[: self.n_chosen] = ((masks >> np.arange(self.n_chosen)[:, None]) & 1) * self.amounts[:, None]
-        return found
+        added = np.zeros((len(self.counts), len(masks)))
+        added[: self.n_chosen] = ((masks >> np.arange(self.n_chosen)[:, None]) & 1) * self.amounts[:, None]
+        return added
 
 
 def world(*, n_chosen: int, n_sequences: int, n_recordings: int, rng: np.random.Generator) -> World:
@@ -95,9 +95,9 @@ Channel = Callable[[World, int, Masks], Answers]
 
 
 def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
-    """All that is told, to somebody who knows the secret and every other label: more than there can be.
+    """All that is published, for a reader who knows the secret and every other label: more than anyone knows.
 
-    The mean and its interval, and difference, interval and class of p beside another team's public method.
+    The mean and its interval, and difference, interval and class of p next to another team's public method.
     """
     from leaderboard.models import Edition, Split  # noqa: PLC0415 - needs Django's settings
     from leaderboard.statistics import disclosure  # noqa: PLC0415 - likewise
@@ -108,20 +108,20 @@ def all_that_is_left(world: World, column: int, masks: Masks) -> Answers:
     low, high = Bootstrap(counts, rng=np.random.default_rng(2)).intervals(sums.T[:, :, None])
     ends = np.concatenate(disclosure.published_ends(low, high, edition=edition), axis=1)
     gaps = sums - world.rival[:, [column]]
-    found = sign_flips(gaps, np.repeat(counts, len(masks), axis=1), rng=np.random.default_rng(3))
+    flips = sign_flips(gaps, np.repeat(counts, len(masks), axis=1), rng=np.random.default_rng(3))
     answers = []
     for i, total in enumerate(sums.sum(axis=0).tolist()):
         gap = Difference(
             float(gaps[:, i].sum() / counts.sum()),
-            float(found.low[i]),
-            float(found.high[i]),
-            float(found.p[i]),
+            float(flips.low[i]),
+            float(flips.high[i]),
+            float(flips.p[i]),
         )
         mean, other = total / counts.sum(), world.rival[:, column].sum() / counts.sum()
         shown = rounded_difference(gap, first=mean, second=other, decimals=1)
-        told = disclosure.published_difference(gap, shown, edition=edition)
+        public = disclosure.published_difference(gap, shown, edition=edition)
         answers.append(
-            (*map(repr, ends[i].tolist()), rounded(mean, decimals=1), told.low, told.high, told.p_below)
+            (*map(repr, ends[i].tolist()), rounded(mean, decimals=1), public.low, public.high, public.p_below)
         )
     return answers
 
@@ -138,7 +138,7 @@ class Readout:
 
 
 def read(world: World, *, decimals: int, channel: Channel | None = None) -> Readout:
-    """Decode one readout: the means of both files with so many decimals, and what a channel tells beside."""
+    """Decode one readout: the means of both files with `decimals`, and what a channel adds."""
     masks = np.arange(1 << world.n_chosen, dtype=np.int64)
     n_set = np.bitwise_count(masks).astype(np.int64)
     weights = [
@@ -187,11 +187,11 @@ def _either(one: Floats, other: Floats) -> Floats:
     ones, others = np.flatnonzero(one), np.flatnonzero(other)
     if len(ones) > len(others):
         return _either(other, one)
-    found = np.zeros_like(one)
+    weights = np.zeros_like(one)
     for mask in ones.tolist():
         disjoint = others[(others & mask) == 0]
-        found[disjoint | mask] += one[mask] * other[disjoint]
-    return found
+        weights[disjoint | mask] += one[mask] * other[disjoint]
+    return weights
 
 
 # --- the table -------------------------------------------------------------------------------------------
@@ -222,15 +222,15 @@ def measured(
     *, n_chosen: int, n_sequences: int, n_recordings: int, n_readouts: int, seed: int = 0
 ) -> dict[str, tuple[Mean, Mean]]:
     """For each way the sequences named rightly and the bits, each with its mean and its standard error."""
-    found: dict[str, list[Readout]] = {name: [] for name in WAYS}
+    readouts_by_way: dict[str, list[Readout]] = {name: [] for name in WAYS}
     for k in range(n_readouts):
         rng = np.random.default_rng((seed, k))
         of = world(n_chosen=n_chosen, n_sequences=n_sequences, n_recordings=n_recordings, rng=rng)
         for name, (decimals, channel) in WAYS.items():
-            found[name].append(read(of, decimals=decimals, channel=channel))
+            readouts_by_way[name].append(read(of, decimals=decimals, channel=channel))
     return {
         name: (_mean([each.n_right for each in readouts]), _mean([each.bits for each in readouts]))
-        for name, readouts in found.items()
+        for name, readouts in readouts_by_way.items()
     }
 
 

@@ -63,11 +63,11 @@ def moved(metric: str, true_s: Floats) -> Floats:
 def draw(name: str, n: int, rng: np.random.Generator) -> Floats:
     """True values of a range, with sizes as log-normal as those of a drive: a median of 9 s."""
     low, high = sorted(np.abs(RANGES[name]))
-    found = np.empty(0)
-    while len(found) < n:
+    drawn = np.empty(0)
+    while len(drawn) < n:
         sizes = rng.lognormal(np.log(9), 0.8, 20 * n)
-        found = np.append(found, sizes[(sizes > max(low, NEAREST_S)) & (sizes < high)])
-    return found[:n] * (-1 if name == "negative" else 1)
+        drawn = np.append(drawn, sizes[(sizes > max(low, NEAREST_S)) & (sizes < high)])
+    return drawn[:n] * (-1 if name == "negative" else 1)
 
 
 def median_error(
@@ -79,21 +79,21 @@ def median_error(
     missed = []
     for true_s in draw(name, n_readouts, rng).tolist():
         weights = np.ones(N_GRID)
-        for metric, places in decimals.items():
+        for metric, n_decimals in decimals.items():
             amounts, amount = moved(metric, grid), float(moved(metric, np.array(true_s)))
             for n in (SHARES[name] * n_sequences, n_sequences):
                 before = rng.uniform(100, 200)
-                steps = _published(before + amount / n, places) - _published(before, places)
+                steps = _published(before + amount / n, n_decimals) - _published(before, n_decimals)
                 # Where between two published values the mean lies is chance.
-                weights *= np.maximum(0.0, 1 - np.abs(amounts / n - steps) * 10.0**places)
+                weights *= np.maximum(0.0, 1 - np.abs(amounts / n - steps) * 10.0**n_decimals)
         total = np.cumsum(weights)
         named = grid[int(np.searchsorted(total, total[-1] / 2))]
         missed.append(abs(named - true_s))
     return float(np.median(missed))
 
 
-def _published(mean: float, places: int) -> float:
-    shown = rounded(mean, decimals=places)
+def _published(mean: float, n_decimals: int) -> float:
+    shown = rounded(mean, decimals=n_decimals)
     assert shown is not None
     return shown
 

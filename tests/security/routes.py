@@ -1,6 +1,6 @@
 """Every address that the leaderboard answers to, read from the URLconf and from the OpenAPI schema.
 
-Nothing here is a list kept by hand: a route that somebody adds is found, and each proof in this folder that
+Nothing here is a list kept by hand: a new route is found, and each proof in this folder that
 does not know what to expect of it fails.
 """
 
@@ -42,8 +42,8 @@ class Route:
         path = "/" + self.pattern
         for name in self.parameters:
             value = str(values[name])
-            place = re.compile(rf"<(?:\w+:)?{name}>|\(\?P<{name}>(?:[^()]|\([^()]*\))*\)")
-            path = place.sub(value.replace("\\", r"\\"), path)
+            placeholder = re.compile(rf"<(?:\w+:)?{name}>|\(\?P<{name}>(?:[^()]|\([^()]*\))*\)")
+            path = placeholder.sub(value.replace("\\", r"\\"), path)
         return path.replace("^", "").removesuffix("$")
 
 

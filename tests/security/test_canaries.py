@@ -147,7 +147,7 @@ def _live(edition: Edition, owner: User) -> None:
 
 
 def _correct(edition: Edition, private: Path, keeper: User) -> Edition:
-    """A second edition beside the board, all of it scored, after two corrections that are refused."""
+    """A second edition next to the board, all of it scored, after two refused corrections."""
     path = private / "corrected.csv"
     canaries.corrected(private / "truth.csv", to=path)
     table = path.read_text().splitlines()
@@ -175,7 +175,7 @@ def _look(people: list[User]) -> dict[str, bytes]:
     for pk in Evaluation.objects.values_list("submission", flat=True):
         start += [f"/api/v1/submissions/{pk}", f"/submissions/{pk}/"]
     start += [path for path in plain if "logout" not in path]
-    found: dict[str, bytes] = {}
+    bodies: dict[str, bytes] = {}
     for user in (None, *people):
         client = Client(raise_request_exception=False)
         if user is not None:
@@ -187,8 +187,8 @@ def _look(people: list[User]) -> dict[str, bytes]:
             return body + repr(response.headers).encode()
 
         limit = 160 if user is not None and user.is_staff else 90
-        found |= {f"{user} {path}": body for path, body in crawl(get, start=start, limit=limit).items()}
-    return found
+        bodies |= {f"{user} {path}": body for path, body in crawl(get, start=start, limit=limit).items()}
+    return bodies
 
 
 def _database(directory: Path) -> bytes:

@@ -64,7 +64,7 @@ def test_every_answer_has_the_headers_of_a_careful_site(answers: Answers) -> Non
         assert "Server" not in response.headers, about
 
 
-def test_what_somebody_is_shown_is_kept_by_nobody(answers: Answers) -> None:
+def test_what_a_user_is_shown_is_never_cached(answers: Answers) -> None:
     for role, path, response in answers:
         if role == "anonymous":
             continue
@@ -76,23 +76,23 @@ def test_what_anybody_is_shown_may_be_kept_and_asked_for_again(answers: Answers)
     for role, path, response in answers:
         if role != "anonymous":
             continue
-        said = response.headers["Cache-Control"]
+        cache_control = response.headers["Cache-Control"]
         if response.status_code >= 400 or PERSONAL.match(path):
-            assert "no-store" in said or ANYBODYS.fullmatch(said), path
-        elif said != "private, no-store":
-            assert ANYBODYS.fullmatch(said), f"{path}: {said}"
+            assert "no-store" in cache_control or ANYBODYS.fullmatch(cache_control), path
+        elif cache_control != "private, no-store":
+            assert ANYBODYS.fullmatch(cache_control), f"{path}: {cache_control}"
             n_public += 1
     assert n_public > 10
 
 
 def test_every_answer_says_what_it_depends_on_and_says_the_same_to_everybody(answers: Answers) -> None:
-    said: dict[str, set[frozenset[str]]] = {}
+    varies: dict[str, set[frozenset[str]]] = {}
     for role, path, response in answers:
         vary = frozenset(name.strip().lower() for name in response.headers["Vary"].split(","))
         assert {"cookie", "authorization"} <= vary, f"{role} {path}"
         if response.status_code == 200:
-            said.setdefault(path, set()).add(vary - {"accept-encoding", "hx-request", "accept"})
-    assert {path: found for path, found in said.items() if len(found) > 1} == {}
+            varies.setdefault(path, set()).add(vary - {"accept-encoding", "hx-request", "accept"})
+    assert {path: variants for path, variants in varies.items() if len(variants) > 1} == {}
 
 
 def test_cookies_are_for_this_site_and_no_script(client: Client, owner: User) -> None:

@@ -73,7 +73,7 @@ def test_every_file_is_taken_or_refused_in_words(edition: Edition, owner: User, 
 
 
 @pytest.mark.parametrize("name", [name for name in CORPUS if "30 MB" not in name])
-def test_every_file_is_read_or_its_problems_are_told(name: str) -> None:
+def test_every_file_is_read_or_its_problems_are_reported(name: str) -> None:
     """In this process: the reader itself, without the child that it usually lives in."""
     data = CORPUS[name](READABLE)
     for problem in problems_of(data):
@@ -102,7 +102,7 @@ def test_a_worker_rejects_it_and_its_team_reads_why(
 
 
 def reject(owner: User, name: str, data: bytes) -> str:
-    """Send a file, have it read, look at what its team is told. Returns the state it ended in."""
+    """Send a file, have it read, look at what its team sees. Returns the state it ended in."""
     Split.objects.update(quota_limit=None, quota_rejected_limit=None)
     submission = builders.submit(owner, data, method=f"M {zlib.crc32(name.encode())}", visibility="PRIVATE")
     builders.score_all()

@@ -1,4 +1,4 @@
-"""Whatever somebody calls something: refused in words, or shown as a name and as nothing else, everywhere."""
+"""Any name that a person gives: refused in words, or shown as a name and as nothing else, everywhere."""
 
 import csv
 import io
@@ -73,7 +73,7 @@ def named(edition: Edition, owner: User, settings: Settings) -> Named:
         assert response.status_code in {200, 201, 302, 400, 422}, (name, response.status_code)
         if response.status_code in {400, 422}:
             refused.append(name)
-            said(response)
+            check_refusal(response)
     leases = lifecycle.claim(lease_s=60, wall_s=60, limit=1000)
     outcome = RunResult(status=Status.SCORED, scores=SCORES, report={"counts": {}, "truncated": {}})
     lifecycle.finalise_many([(lease, outcome) for lease in leases])
@@ -81,8 +81,8 @@ def named(edition: Edition, owner: User, settings: Settings) -> Named:
     return Named(owner=owner, names=list(Method.objects.values_list("name", flat=True)), refused=refused)
 
 
-def said(response: object) -> None:
-    """A refusal is a problem, or a page, that says what was found and expected."""
+def check_refusal(response: object) -> None:
+    """Check that a refusal is a problem, or a page, that says what was found and expected."""
     kind = response.headers["Content-Type"]  # type: ignore[attr-defined]  # a response of any client
     body: bytes = response.content  # type: ignore[attr-defined]  # as above
     if kind.startswith("application/problem+json"):
@@ -222,19 +222,19 @@ def test_forms_take_any_text(
         assert response.status_code < 500, (path, name)
 
 
-@pytest.mark.parametrize("place", ["query", "path", "header"])
-def test_addresses_and_headers_take_any_text(edition: Edition, place: str) -> None:
+@pytest.mark.parametrize("part", ["query", "path", "header"])
+def test_addresses_and_headers_take_any_text(edition: Edition, part: str) -> None:
     visitor = Client(raise_request_exception=False)
     for name in SOME:
         text = raw(name[:2000])
-        if place == "query":
+        if part == "query":
             encoded = "".join(f"%{byte:02X}" for byte in text)
             paths = [f"/board/test/?q={encoded}&sort={encoded}", f"/api/v1/splits/test/board?at={encoded}"]
         else:
             encoded = "".join(f"%{byte:02X}" for byte in text[:200])
             paths = [f"/board/{encoded}/", f"/methods/{encoded}/", f"/api/v1/splits/{encoded}/board"]
         headers = {}
-        if place == "header":
+        if part == "header":
             paths = ["/", "/api/v1/submissions"]
             line = text.decode("latin-1").replace("\r", "").replace("\n", "")
             headers = dict.fromkeys(

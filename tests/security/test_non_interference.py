@@ -1,4 +1,4 @@
-"""Nobody can tell from anything they are shown whether somebody else has something to hide."""
+"""What a person is shown does not tell whether another person has something to hide."""
 
 import os
 import re
@@ -66,16 +66,16 @@ def looked_at(directory: Path, *, has_secrets: bool, limit: int | None) -> dict[
         stranger.force_login(scene.stranger)
         # Signing in reads the clock, and people may ask for what is kept of them.
         User.objects.filter(pk=scene.stranger.pk).update(last_login=START)
-        found = {}
+        answers = {}
         for path in paths:
             visitor = Client(raise_request_exception=False, REMOTE_ADDR=ADDRESS)
             for role, client in (("anonymous", visitor), ("stranger", stranger)):
-                found[role, path] = seen(client.get(path))
+                answers[role, path] = seen(client.get(path))
                 if path.partition("?")[0] == OWN_DATA:
-                    body = OWN_ACTION_AT.sub(b"...", found[role, path].body)
-                    found[role, path] = replace(found[role, path], body=body)
+                    body = OWN_ACTION_AT.sub(b"...", answers[role, path].body)
+                    answers[role, path] = replace(answers[role, path], body=body)
         transaction.set_rollback(True)
-    return found
+    return answers
 
 
 def thinned(paths: list[str], limit: int) -> list[str]:
@@ -93,13 +93,13 @@ def thinned(paths: list[str], limit: int) -> list[str]:
 
 def somewhere(asked: list[str]) -> Iterator[str]:
     """Every question at one of the addresses that take it, a board's if there is one, each at the next."""
-    places: dict[str, list[str]] = {}
+    takers_by_question: dict[str, list[str]] = {}
     for path in asked:
-        place, question = path.split("?", maxsplit=1)
-        places.setdefault(question, []).append(place)
-    for number, (question, takers) in enumerate(places.items()):
-        found = [place for place in takers if is_of_a_board(place)] or takers
-        yield f"{found[number % len(found)]}?{question}"
+        address, question = path.split("?", maxsplit=1)
+        takers_by_question.setdefault(question, []).append(address)
+    for number, (question, takers) in enumerate(takers_by_question.items()):
+        candidates = [address for address in takers if is_of_a_board(address)] or takers
+        yield f"{candidates[number % len(candidates)]}?{question}"
 
 
 def is_of_a_board(address: str) -> bool:
@@ -111,15 +111,15 @@ def differences(directory: Path, *, limit: int | None) -> tuple[list[str], int, 
     without = looked_at(directory / "without", has_secrets=False, limit=limit)
     with_them = looked_at(directory / "with", has_secrets=True, limit=limit)
     assert without.keys() == with_them.keys()
-    told = []
+    differing = []
     for key, one in without.items():
         other = with_them[key]
         if one != other:
-            told.append(f"{key}: {first_difference(one, other)}")
+            differing.append(f"{key}: {first_difference(one, other)}")
     statuses: dict[int, int] = {}
     for one in without.values():
         statuses[one.status] = statuses.get(one.status, 0) + 1
-    return told, len(without) // 2, statuses
+    return differing, len(without) // 2, statuses
 
 
 def first_difference(one: Seen, other: Seen) -> str:
@@ -131,13 +131,13 @@ def first_difference(one: Seen, other: Seen) -> str:
         return f"cookies {one.cookies} and {other.cookies}"
     pairs = zip(one.body, other.body, strict=False)
     at = next((n for n, pair in enumerate(pairs) if pair[0] != pair[1]), 0)
-    found = [seen.body[max(0, at - 60) : at + 60] for seen in (one, other)]
-    return f"bytes {at}: {found[0]!r} and {found[1]!r}"
+    excerpts = [seen.body[max(0, at - 60) : at + 60] for seen in (one, other)]
+    return f"bytes {at}: {excerpts[0]!r} and {excerpts[1]!r}"
 
 
 def test_nobody_sees_what_is_hidden_at_any_address(db: None, tmp_path: Path) -> None:
-    told, n_addresses, statuses = differences(tmp_path, limit=None if WHOLE else ADDRESSES_IN_THE_SUITE)
-    assert not told, f"{len(told)} differ:\n" + "\n".join(told[:20])
+    differing, n_addresses, statuses = differences(tmp_path, limit=None if WHOLE else ADDRESSES_IN_THE_SUITE)
+    assert not differing, f"{len(differing)} differ:\n" + "\n".join(differing[:20])
     assert n_addresses >= 400
     assert {200, 302, 400, 401, 404} <= set(statuses)
     assert not [status for status in statuses if status >= 500]

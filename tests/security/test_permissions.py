@@ -59,28 +59,28 @@ def once(world: World, role: str, method: str, path: str, line: Line, **options:
 
 
 def suggestion(route: Route, world: World) -> str:
-    """What a route answers now, as a line of the table. Whether that is right somebody has to say."""
+    """What a route answers now, as a line of the table; a person has to judge whether that is right."""
     bare = Line({})
     try:
         path = address(route, world, bare)
     except KeyError as missing:
         return f"{route.name!r}: … has the parameter {missing}; say with at= what it stands for"
-    found = {
+    outcomes = {
         method: " ".join(
             answer(once(world, role, method, path, bare, as_program=route.is_api)) for role in ROLES
         )
         for method in METHODS
     }
-    asked = [f'{method}="{text}"' for method, text in found.items() if not set(text.split()) <= REFUSALS]
+    asked = [f'{method}="{text}"' for method, text in outcomes.items() if not set(text.split()) <= REFUSALS]
     return f'"{route.name}": line({", ".join(asked)}),'
 
 
 def test_every_route_has_a_line_and_every_line_a_route(world: World) -> None:
-    found = routes()
-    assert len(found) > 100
-    without = [suggestion(route, world) for route in found if line_of(route) is None]
+    all_routes = routes()
+    assert len(all_routes) > 100
+    without = [suggestion(route, world) for route in all_routes if line_of(route) is None]
     assert not without, "\n".join(["add to tests/security/matrix.py, if it is right:", *without])
-    assert set(LINES) - {route.name for route in found} == set()
+    assert set(LINES) - {route.name for route in all_routes} == set()
 
 
 def test_every_operation_of_the_schema_has_an_answer_and_every_answer_an_operation() -> None:
@@ -104,11 +104,11 @@ def test_every_route_answers_each_role_as_its_line_says(world: World) -> None:
             for role, expected in zip(ROLES, line.answers[method], strict=True):
                 ways = (True, False) if route.is_api and role in world.users else (False,)
                 for as_program in ways:
-                    found = answer(once(world, role, method, path, line, as_program=as_program))
+                    actual = answer(once(world, role, method, path, line, as_program=as_program))
                     n_asked += 1
-                    if found != expected:
+                    if actual != expected:
                         how = "program" if as_program else "visitor"
-                        wrong.append(f"{route.name} {method} {role} ({how}): {found}, expected {expected}")
+                        wrong.append(f"{route.name} {method} {role} ({how}): {actual}, expected {expected}")
     assert not wrong, "\n".join(wrong)
     assert n_asked > 1000
 
@@ -125,14 +125,14 @@ def test_a_method_that_a_line_does_not_name_is_refused_to_everybody(world: World
                 continue
             allowed = REFUSALS | EMPTY_FORM if route.name.startswith(("account_", "mfa_")) else REFUSALS
             for role in ("owner", "maintainer"):
-                found = answer(once(world, role, method, path, line, as_program=route.is_api))
-                if found not in allowed:
-                    done.append(f"{route.name} {method} {role}: {found}")
+                actual = answer(once(world, role, method, path, line, as_program=route.is_api))
+                if actual not in allowed:
+                    done.append(f"{route.name} {method} {role}: {actual}")
     assert not done, "\n".join(done)
 
 
 def test_what_is_forbidden_looks_like_what_is_not_there(world: World) -> None:
-    told, n_compared = [], 0
+    differing, n_compared = [], 0
     for route in routes():
         line = line_of(route)
         if line is None or route.is_admin or not any(name.endswith("_id") for name in route.parameters):
@@ -155,8 +155,8 @@ def test_what_is_forbidden_looks_like_what_is_not_there(world: World) -> None:
                 )
                 assert isinstance(real, HttpResponse)
                 if seen(real) != seen(none):
-                    told.append(f"{route.name} {method} {role}")
-    assert not told, "\n".join(told)
+                    differing.append(f"{route.name} {method} {role}")
+    assert not differing, "\n".join(differing)
     assert n_compared > 5
 
 

@@ -8,15 +8,15 @@ SIZE = {"n_sequences": 28_600, "n_recordings": 100}
 
 
 def test_a_decimal_less_tells_less_of_the_chosen_labels() -> None:
-    found = probing.measured(n_chosen=8, n_readouts=2, **SIZE)
-    n_right, bits = zip(*([mean.value for mean in means] for means in found.values()), strict=True)
+    means_by_way = probing.measured(n_chosen=8, n_readouts=2, **SIZE)
+    n_right, bits = zip(*([mean.value for mean in means] for means in means_by_way.values()), strict=True)
     fine, published, bound = range(len(probing.WAYS))
     assert n_right[published] < n_right[fine]
     assert bits[published] <= bits[fine] - 3
     assert bits[published] <= bits[bound] <= bits[fine]
 
 
-def test_the_decoder_reads_everything_where_everything_is_told() -> None:
+def test_the_decoder_reads_everything_where_everything_is_published() -> None:
     world = probing.world(n_chosen=6, rng=np.random.default_rng(1), n_sequences=2_000, n_recordings=50)
     assert probing.read(world, decimals=6).n_right == 6
     assert probing.read(world, decimals=-6).bits < 0.01

@@ -36,9 +36,9 @@ NOT_CHECKED = ["positive_data_acceptance", "negative_data_rejection"]
 def operations() -> Iterator[Any]:
     """Every operation of the schema, by its own account of itself."""
     schema = schemathesis.openapi.from_wsgi("/api/v1/schema", application)
-    for found in schema.get_all_operations():
-        assert isinstance(found, Ok), found
-        yield found.ok()
+    for operation in schema.get_all_operations():
+        assert isinstance(operation, Ok), operation
+        yield operation.ok()
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +48,7 @@ def no_quotas(settings: Settings) -> None:
 
 @pytest.fixture(autouse=True)
 def connection_stays() -> Iterator[None]:
-    """As Django's own test client has it: the connection has a transaction that goes on after a request."""
+    """Keep the connection's transaction open after a request, as Django's test client does."""
     for signal in (request_started, request_finished):
         signal.disconnect(close_old_connections)
     yield

@@ -21,18 +21,18 @@ def test_no_template_takes_text_for_markup() -> None:
     assert len(TEMPLATES) > 40
     script = r"<script(?![^>]*\bsrc=)(?! type=\"application/ld\+json\">)"
     trusting = re.compile(rf"\|\s*safe\b|\|\s*safeseq\b|autoescape\s+off|{script}|javascript:")
-    found = {
+    matches = {
         str(path.relative_to(REPOSITORY)): trusting.findall(path.read_text())
         for path in TEMPLATES
         if trusting.search(path.read_text())
     }
-    assert found == {}
+    assert matches == {}
 
 
 def test_every_text_in_data_for_search_engines_is_escaped_for_a_script() -> None:
     data = re.compile(r'<script type="application/ld\+json">(.*?)</script>', re.DOTALL)
-    found = [text for path in TEMPLATES for text in data.findall(path.read_text())]
-    filled = [name for text in found for name in re.findall(r"{{(.*?)}}", text)]
+    blocks = [text for path in TEMPLATES for text in data.findall(path.read_text())]
+    filled = [name for text in blocks for name in re.findall(r"{{(.*?)}}", text)]
     assert filled
     assert [name for name in filled if not name.strip().endswith("|escapejs")] == []
 
@@ -49,7 +49,7 @@ def test_no_code_takes_text_for_markup() -> None:
     not_empty = re.compile(r"\bSafeString\((?!\"\"\)).*")
     texts = {str(path.relative_to(REPOSITORY)): path.read_text() for path in CODE}
     assert [path for path, text in texts.items() if trusting.search(text)] == []
-    assert {path: found for path, text in texts.items() if (found := not_empty.findall(text))} == TRUSTING
+    assert {path: matches for path, text in texts.items() if (matches := not_empty.findall(text))} == TRUSTING
 
 
 def test_every_attribute_that_a_template_fills_in_is_quoted() -> None:

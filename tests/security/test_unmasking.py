@@ -1,4 +1,4 @@
-"""Whether an anonymous method can be told for the successor of a named one, from what a visitor gets."""
+"""A visitor cannot link an anonymous method to the named method that it succeeds."""
 
 from pathlib import Path
 from uuid import UUID
@@ -34,8 +34,8 @@ def correlation(client: Client, *methods: UUID) -> float | None:
         builders.infer_all()
         answer = client.get(ADDRESS, query).json()
     board = client.get("/api/v1/splits/test/board?intervals=1").json()
-    found = {row["method_id"]: row["intervals"]["mid"] for row in board["entries"] if row["intervals"]}
-    widths = [found[str(pk)]["high"] - found[str(pk)]["low"] for pk in methods]
+    intervals = {row["method_id"]: row["intervals"]["mid"] for row in board["entries"] if row["intervals"]}
+    widths = [intervals[str(pk)]["high"] - intervals[str(pk)]["low"] for pk in methods]
     gap = answer["pairs"][0]["differences"]["mid"]
     assert gap["difference"] is not None
     if gap["low"] is None:
@@ -46,7 +46,7 @@ def correlation(client: Client, *methods: UUID) -> float | None:
     return float((widths[0] ** 2 + widths[1] ** 2 - between**2) / (2 * widths[0] * widths[1]))
 
 
-def test_an_anonymous_successor_is_not_told_from_its_predecessor(
+def test_an_anonymous_successor_is_not_linked_to_its_predecessor(
     client: Client, benchmark: None, owner: User, tmp_path: Path
 ) -> None:
     Split.objects.filter(pk="test").update(is_hidden=False, decimals=2)

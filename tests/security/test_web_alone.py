@@ -11,7 +11,7 @@ import pytest
 
 import evaluator
 from tests import builders
-from tests.journeys.production import PATIENCE_S, Site, free_port, web_process
+from tests.journeys.production import TIMEOUT_S, Site, free_port, web_process
 from tests.prepared import put_sqlite, static_files
 from tests.security.crawler import crawl
 from tests.security.hostile_files import corpus
@@ -46,7 +46,7 @@ class Alone:
 
     def client(self) -> httpx.Client:
         headers = {"Authorization": f"Bearer {self.token}"}
-        return httpx.Client(base_url=self.site.url, headers=headers, timeout=PATIENCE_S, trust_env=False)
+        return httpx.Client(base_url=self.site.url, headers=headers, timeout=TIMEOUT_S, trust_env=False)
 
     def memory_mb(self, what: str) -> float:
         """`VmRSS`: what the process has in memory now; `VmHWM`: the most that it ever had."""
@@ -57,7 +57,7 @@ class Alone:
 
 @pytest.fixture(scope="module")
 def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Alone]:
-    """gunicorn with one process; the private directory is somewhere that it is not told of."""
+    """gunicorn with one process, without the path of the private directory."""
     directory = tmp_path_factory.mktemp("alone")
     url = f"http://127.0.0.1:{free_port()}"
     maintainers = environment_of_its_own() | {
@@ -76,8 +76,8 @@ def alone(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Alone]:
     (directory / "data").mkdir()
     put_sqlite(directory / "data" / "leaderboard.sqlite3")
     builders.truth_csv(directory / "truth.csv")
-    told = keeper.manage("shell", "-v0", "-c", SET_UP.format(truth=str(directory / "truth.csv")))
-    token = json.loads(told.splitlines()[-1])
+    output = keeper.manage("shell", "-v0", "-c", SET_UP.format(truth=str(directory / "truth.csv")))
+    token = json.loads(output.splitlines()[-1])
     webs = maintainers | {"TSTTC_GROUND_TRUTH_DIR": str(directory / "not-there")}
     site = Site(url=url, directory=directory, environment=webs)
     truth = evaluator.read_truth(directory / "truth.csv")
@@ -113,26 +113,26 @@ def test_pages_and_uploads_need_no_ground_truth(alone: Alone) -> None:
     assert not (alone.site.directory / "not-there").exists()
 
 
-PLACES = ("/x", "/board", "//evil.example", "/does-not-fit")
+PREFIXES = ("/x", "/board", "//evil.example", "/does-not-fit")
 
 
 @pytest.mark.parametrize("name", ["SCRIPT_NAME", "Script-Name", "PATH_INFO", "X-Forwarded-Prefix"])
 def test_no_header_moves_the_site(alone: Alone, name: str) -> None:
     # Without cookies and tokens: what is answered is kept for others. We ask from loopback, as a proxy may.
-    with httpx.Client(base_url=alone.site.url, timeout=PATIENCE_S, trust_env=False) as client:
+    with httpx.Client(base_url=alone.site.url, timeout=TIMEOUT_S, trust_env=False) as client:
         for path in ("/", "/board/test/", "/board/test/?sort=-mid", "/docs/", "/api/v1/splits"):
-            for place in PLACES:
-                moved = client.get(path, headers={name: place})
+            for prefix in PREFIXES:
+                moved = client.get(path, headers={name: prefix})
                 plain = client.get(path)
-                assert (moved.status_code, moved.content) == (200, plain.content), (path, place)
-                assert place.encode() + b"/board" not in plain.content
+                assert (moved.status_code, moved.content) == (200, plain.content), (path, prefix)
+                assert prefix.encode() + b"/board" not in plain.content
                 # Where the header was believed, the page was one below it.
-                below = client.get(f"/x{path}", headers={name: place})
-                assert below.status_code == 404, (path, place)
+                below = client.get(f"/x{path}", headers={name: prefix})
+                assert below.status_code == 404, (path, prefix)
 
 
 def test_hostile_files_and_names_are_answered_and_leave_no_memory_behind(alone: Alone) -> None:
-    found: dict[int, int] = {}
+    counts: dict[int, int] = {}
     with alone.client() as client:
         for n in range(20):
             assert send(client, alone.good + b" " * n, method=f"Warm {n}").status_code in {200, 201}
@@ -141,15 +141,15 @@ def test_hostile_files_and_names_are_answered_and_leave_no_memory_behind(alone: 
         for name, make in corpus():
             status = send(client, make(alone.good), method="Hostile").status_code
             assert status in {200, 201, 413}, name
-            found[status] = found.get(status, 0) + 1
+            counts[status] = counts.get(status, 0) + 1
         for name in NAMES_SENT:
             text = name.encode("utf-8", "surrogatepass").decode("latin-1") if _is_broken(name) else name
             answer = send(client, alone.good, method=text, description=text, note=text)
             assert answer.status_code < 500, repr(name)
-            found[answer.status_code] = found.get(answer.status_code, 0) + 1
+            counts[answer.status_code] = counts.get(answer.status_code, 0) + 1
     grown_mb = alone.memory_mb("VmRSS") - before_mb
     peak_mb = alone.memory_mb("VmHWM") - before_mb
-    print(f"web process: {before_mb:.0f} MB, {grown_mb:+.0f} MB after, {peak_mb:+.0f} MB at most; {found}")  # noqa: T201 - the figure
+    print(f"web process: {before_mb:.0f} MB, {grown_mb:+.0f} MB after, {peak_mb:+.0f} MB at most; {counts}")  # noqa: T201 - the figure
     assert grown_mb < MAX_GROWTH_MB
     assert peak_mb < MAX_GROWTH_MB
 

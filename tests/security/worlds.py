@@ -54,7 +54,7 @@ PUBLIC = (
     ("Strangers", "Their secret", 1.15, "PRIVATE"),
 )
 # What methods say of themselves, one after the other: so that each filter lets something through.
-SAID: tuple[dict[str, Any], ...] = (
+DETAILS: tuple[dict[str, Any], ...] = (
     {
         "n_frames": 6,
         "cameras": "ONE",
@@ -135,7 +135,7 @@ def build(directory: Path, *, has_secrets: bool) -> Scene:
 
 
 def _larks(*, has_secrets: bool) -> User:
-    """Who is behind the anonymous method: in each world somebody else."""
+    """The user behind the anonymous method: another one in each world."""
     name = "Hidden Larks" if has_secrets else "Larks"
     user = User.objects.create_user(f"{name.replace(' ', '')}@example.org", "correct horse", name=name)
     teams.team_of(user=user)
@@ -153,7 +153,7 @@ def _enter(
         visibility.change(method=sent.method, visibility=shown, actor=user, now=now + timedelta(hours=1))
     scene.methods.append(sent.method_id)
     scene.submissions.append(sent.pk)
-    Method.objects.filter(pk=sent.method_id).update(**SAID[number % len(SAID)])
+    Method.objects.filter(pk=sent.method_id).update(**DETAILS[number % len(DETAILS)])
     if shown == "ANONYMOUS":
         # What an anonymous method says of itself beyond choices and numbers is nobody's business either.
         Method.objects.filter(pk=sent.method_id).update(
@@ -165,14 +165,14 @@ def _enter(
 
 
 class Secrets:
-    """What goes on in the second world alone."""
+    """What happens in the second world alone."""
 
     def __init__(self, edition: Edition) -> None:
         self._edition = edition
         self._n = 0
 
     def someone_comes(self) -> User:
-        """Somebody signs up, in a team of their own, and makes a token."""
+        """Sign a user up, in a team of their own, with a token."""
         self._n += 1
         user = User.objects.create_user(
             f"secret{self._n}@example.org", "correct horse", name=f"Secret {self._n}"
@@ -192,8 +192,8 @@ class Secrets:
         now = START + timedelta(days=1 + number, hours=-3)
         good = builders.predictions(self._edition, factor=1.01 + number / 100)
         made = self._kept(submit(user, good, method=f"Secret Method {number}", now=now), number)
-        said = SAID[number % len(SAID)] | {"pretraining": "Secret corpus", "hardware": "Secret GPU"}
-        Method.objects.filter(pk=made.method_id).update(**said)
+        details = DETAILS[number % len(DETAILS)] | {"pretraining": "Secret corpus", "hardware": "Secret GPU"}
+        Method.objects.filter(pk=made.method_id).update(**details)
         submit(user, b"{}" + b" " * number, method=f"Secret Method {number}", now=now)
         builders.score_all()
         if number == 2:
@@ -206,7 +206,7 @@ class Secrets:
         self._kept(submit(insider, good, method="Secret and waiting", now=now), 7)
 
     def _kept(self, made: Submission, number: int) -> Submission:
-        """Under ids that somebody may guess."""
+        """Give a submission and its method ids that a person may guess."""
         if HIDDEN_SUBMISSIONS[number] not in _ids(Submission):
             made = _renamed(made, HIDDEN_SUBMISSIONS[number])
         if HIDDEN_METHODS[number] not in _ids(Method):

@@ -122,7 +122,7 @@ def test_what_once_waited_for_each_other_for_ever_does_not(
     last = BOARD if first in {"submit", "finalise", "withdraw"} else EVENT
     with crowd_on_postgres():
         outcome = meet(verbs[first], verbs[second], at=lambda number, sql: last in sql)
-    assert outcome.was_held
+    assert outcome.was_paused
     assert outcome.faults == (None, None)
 
 

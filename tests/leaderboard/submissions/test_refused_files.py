@@ -164,7 +164,7 @@ class TestAtOnce:
                     return n_statements == number
 
                 outcome = meet(first, second, at=is_here)
-                was_paused = outcome.was_held
+                was_paused = outcome.was_paused
                 assert outcome.faults == (None, None)
                 [kept] = Submission.objects.filter(digest=files.measure(file_of(data)).digest)
                 assert kept.digest in stored(tmp_path), f"held at statement {number}"
