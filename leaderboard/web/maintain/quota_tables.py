@@ -3,7 +3,7 @@
 from datetime import datetime
 from typing import Any
 
-from django.db.models import Q, QuerySet
+from django.db.models import Prefetch, Q, QuerySet
 
 from leaderboard.models import Split, Team, User
 from leaderboard.models.quotas import QuotaRules
@@ -72,7 +72,8 @@ def teams_like(text: str) -> list[Team]:
     look = names.skeleton(text)
     if look:
         fits |= Q(look__contains=look)
-    return list(Team.objects.filter(fits).prefetch_related("members").order_by("name")[: MAX_MATCHES + 1])
+    members = Prefetch("members", User.objects.order_by("email"))
+    return list(Team.objects.filter(fits).prefetch_related(members).order_by("name")[: MAX_MATCHES + 1])
 
 
 def people_alone(text: str) -> QuerySet[User]:
