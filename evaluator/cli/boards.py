@@ -177,7 +177,7 @@ def _marks_of(board: Board, name: str) -> tuple[frozenset[int], frozenset[int]]:
 
 def _interval_text(entry: BoardEntry, name: str) -> str:
     """Where a value may lie, to stand behind it; empty where that is not known."""
-    from evaluator.scoring.report import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
+    from evaluator.scoring.results import format_rounded  # noqa: PLC0415 -- loads numpy, which --help can do without
 
     found = entry.interval(name)
     low, high = (format_rounded(end, decimals=entry.decimals, missing="") for end in (found.low, found.high))

@@ -208,8 +208,9 @@ def plot(
     names = [Path(one.name).stem for one in found]
     if len(set(names)) < len(names):
         names = [one.name for one in found]
+    details = [one.report.require_details() for one in found]
     try:
-        plots.draw(kind, dict(zip(names, (one.report for one in found), strict=True)), path=output)
+        plots.draw(kind, dict(zip(names, details, strict=True)), path=output)
     except OSError as error:
         raise click.BadParameter(f"{output} cannot be written: {error.strerror}.", param_hint="-o") from None
     if as_json:
@@ -255,12 +256,11 @@ def _rows(found: _Scored, *, by: str | None, taken: Units | None) -> Iterator[Re
             ends = one.intervals if taken else {}
             yield ResultRow(found.name, one.group, one.n_sequences, one.n_recordings, one.scores, ends, drawn)
         return
-    assert report.details is not None  # noqa: S101 -- it was asked for
     yield ResultRow(
         found.name,
         None,
         report.n_sequences,
-        report.details.truth.manifest.n_recordings,
+        report.require_details().truth.manifest.n_recordings,
         report.flat(),
         _intervals(report, taken) if taken else {},
         drawn,
@@ -270,8 +270,7 @@ def _rows(found: _Scored, *, by: str | None, taken: Units | None) -> Iterator[Re
 def _intervals(report: Report, taken: Units) -> dict[str, tuple[float, float] | None]:
     from evaluator import confidence_intervals  # noqa: PLC0415 -- numpy, as above
 
-    assert report.details is not None  # noqa: S101 -- it was asked for
-    details = report.details
+    details = report.require_details()
     return confidence_intervals(
         details.predictions, details.truth, protocol=details.protocol, unit=taken.kind
     )

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.metrics.protocol import OVERALL, Protocol, score_name
+from evaluator.metrics.protocol import OVERALL, score_name
 from evaluator.metrics.scale import Floats
+from evaluator.scoring.results import Details, GroupScores
+from evaluator.scoring.uncertainty import bootstrap_of, by_units
 from evaluator.truth.ground_truth import GroundTruth
-
-if TYPE_CHECKING:
-    from evaluator.predictions.loading import Predictions
 
 CURVE_EDGES_S: Final = (
     -20,
@@ -51,37 +49,8 @@ Rows = NDArray[np.intp]
 Ends = tuple[float, float]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Details:
-    """What a report was computed from; of a hidden split it never leaves the worker.
-
-    `predicted_ttc_s` is (n,), truncated by the protocol, in the truth's order.
-    """
-
-    truth: GroundTruth
-    predictions: Predictions
-    predicted_ttc_s: Floats
-    protocol: Protocol
-
-
-@dataclass(frozen=True, slots=True)
-class GroupScores:
-    """The scores of one group by their names: None where it has no sequence of a TTC range.
-
-    `intervals` are the 95 % confidence intervals; None where there are too few days or recordings, or none
-    were asked for.
-    """
-
-    group: str
-    n_sequences: int
-    n_recordings: int
-    scores: Mapping[str, float | None]
-    intervals: Mapping[str, Ends | None]
-
-
 def scores_of(
     details: Details,
-    errors: Mapping[str, Floats],
     *,
     groups: Mapping[str, Rows],
     has_ranges: bool = True,
@@ -89,7 +58,7 @@ def scores_of(
     unit: str | None = None,
 ) -> list[GroupScores]:
     """The scores of groups of sequences, given as the rows of each by its name."""
-    manifest, ttc_s = details.truth.manifest, details.truth.ttc_s
+    manifest, ttc_s, errors = details.truth.manifest, details.truth.ttc_s, details.errors
     masks = {OVERALL: np.ones(len(ttc_s), dtype=bool)}
     for ttc_range in details.protocol.ranges if has_ranges else ():
         masks[ttc_range.name] = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)
@@ -129,8 +98,6 @@ def _intervals(
     """The interval of each column, all by the same weights."""
     if not sums:
         return []
-    from evaluator.scoring.uncertainty import bootstrap_of, by_units  # noqa: PLC0415 -- a circle
-
     units = truth.manifest.units_by(unit)
     columns, rows = (by_units(np.stack(each, axis=1), units) for each in (counts, sums))
     low, high = bootstrap_of(truth.digest, columns).intervals(rows[None])

@@ -16,7 +16,7 @@ import numpy as np
 from evaluator.metrics.protocol import DEFAULT_PROTOCOL, PRIMARY, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
 from evaluator.predictions.loading import Predictions
-from evaluator.scoring.report import rounded
+from evaluator.scoring.results import rounded
 from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import SIGNIFICANT, Difference, Influence, cut_off, p_below
 from evaluator.scoring.uncertainty import by_units, degrees_of, generator_of, usable_columns

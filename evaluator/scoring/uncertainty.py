@@ -23,13 +23,8 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from evaluator.metrics.protocol import DEFAULT_PROTOCOL, Protocol, get_protocol
 from evaluator.metrics.scale import Floats
-from evaluator.predictions.loading import Predictions
-from evaluator.scoring.report import RecordingSums
-from evaluator.scoring.scores import Scorer
 from evaluator.scoring.significance import MIN_DEGREES
-from evaluator.truth.ground_truth import GroundTruth
 from evaluator.units import RECORDING, Units
 
 CONFIDENCE: Final = 0.95
@@ -201,36 +196,3 @@ def _ends(deviations: Weights, *, tail: float) -> Floats:
 def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
     """The weights that belong to a ground truth's revision."""
     return Bootstrap(counts, rng=generator_of(truth_digest, purpose="weights"))
-
-
-def recording_sums(
-    predictions: Predictions, truth: GroundTruth, *, protocol: str | Protocol = DEFAULT_PROTOCOL
-) -> RecordingSums:
-    """Sums per recording of one set of predictions; raises as `evaluator.evaluate` does."""
-    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
-    bags = Scorer(truth, rules).report(predictions, keep_bags=True).bags
-    assert bags is not None  # noqa: S101 - they were asked for
-    return bags
-
-
-def confidence_intervals(
-    predictions: Predictions,
-    truth: GroundTruth,
-    *,
-    protocol: str | Protocol = DEFAULT_PROTOCOL,
-    unit: str | None = None,
-) -> dict[str, tuple[float, float] | None]:
-    """The 95 % interval of each number, as the board shows it; None where there is none.
-
-    `unit` is recording, day or given; None: by the rule, `truth.manifest.units`. Raises `ValueError` for a
-    unit that the recordings do not have.
-    """
-    rules = get_protocol(protocol) if isinstance(protocol, str) else protocol
-    units = truth.manifest.units_by(unit)
-    bags = recording_sums(predictions, truth, protocol=rules)
-    sums, counts = (by_units(each, units) for each in (bags.sums, bags.counts))
-    low, high = (ends[0] for ends in bootstrap_of(truth.digest, counts).intervals(sums[None]))
-    return {
-        name: (float(low[i]), float(high[i])) if np.isfinite(low[i]) else None
-        for i, name in enumerate(rules.score_names)
-    }

@@ -10,7 +10,7 @@ from django.utils.text import get_text_list
 
 from evaluator import Difference
 from evaluator.metrics.protocol import PRIMARY, grouped_names
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from evaluator.scoring.significance import told_apart, too_few_units
 from evaluator.tables import sentences
 from evaluator.tables.sentences import p_cell

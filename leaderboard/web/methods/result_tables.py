@@ -10,7 +10,7 @@ from urllib.parse import urlencode
 from django.urls import reverse
 
 from evaluator.metrics.protocol import OVERALL, PRIMARY
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from evaluator.tables import sentences
 from leaderboard.boards.results import Result
 from leaderboard.boards.rows import Entry, flat_scores

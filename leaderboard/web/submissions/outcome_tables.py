@@ -8,7 +8,7 @@ from django.urls import reverse
 
 from evaluator.counting import counted
 from evaluator.metrics.protocol import grouped_names, split_name
-from evaluator.scoring.report import format_rounded
+from evaluator.scoring.results import format_rounded
 from leaderboard.boards.rows import Entry
 from leaderboard.exports import tables
 from leaderboard.models import Submission, Visibility
