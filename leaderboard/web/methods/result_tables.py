@@ -16,7 +16,7 @@ from leaderboard.boards.results import Result
 from leaderboard.boards.rows import Entry, flat_scores
 from leaderboard.models import Edition, Evaluation, Status, Submission
 from leaderboard.statistics.comparisons import MIN_METHODS
-from leaderboard.submissions.intake import evaluation_of
+from leaderboard.submissions.progress import evaluation_of
 from leaderboard.web.boards.score_columns import (
     Cell,
     Group,
