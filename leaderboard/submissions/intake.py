@@ -1,9 +1,9 @@
 """Submissions: one file for one split, acknowledged only once it can no longer be lost."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from datetime import datetime
-from typing import Any
+from typing import Any, NamedTuple
 
 import structlog
 from django.conf import settings
@@ -25,94 +25,38 @@ from leaderboard.storage import files, orphans
 log = structlog.get_logger(__name__)
 
 
-@dataclass(frozen=True)
-class Submitted:
-    """The answer to a submission; `is_new` is False when the same bytes had come before."""
-
-    submission: Submission
-    is_new: bool
-
-
-def submit(
-    *,
-    user: User,
-    split_name: str,
-    method_name: str,
-    upload: File | None,
-    via: str,
-    now: datetime,
-    filename: str = "",
-    description: str = "",
-    paper_url: str = "",
-    code_url: str = "",
-    method_details: Mapping[str, object] | None = None,
-    note: str = "",
-    commit: str = "",
-    may_edit: bool = True,
-) -> Submitted:
-    """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
-
-    The same bytes again, for the same split, method and manifest, are answered with the first submission and
-    change nothing. Details that differ from the method's own replace them; without `may_edit` they are
-    refused. Raises `Refused` or `limits.QuotaExceeded` (nothing is kept then).
-    """
-    split = _open_split(split_name, now=now)
-    asked = _Asked(
-        user=user,
-        split=split,
-        method_name=clean_name("method", method_name),
-        details=editing.cleaned(
-            {
-                "description": description,
-                "paper_url": paper_url,
-                "code_url": code_url,
-                **(method_details or {}),
-            }
-        ),
-        row={
-            "via": via,
-            "filename": _clean_filename(filename),
-            "note": clean_text("note", note, limit=500, required=False),
-            "commit": clean_text("commit", commit, limit=64, required=False),
-        },
-        upload=_checked(upload),
-        now=now,
-        may_edit=may_edit,
-    )
-    file = files.measure(asked.upload)
-    first = _admit(asked, file)
-    if first is not None:
-        return Submitted(submission=first, is_new=False)
-    files.save_predictions(asked.upload, measured=file, now=now)
-    with orphans.unless_refused(Refused, limits.QuotaExceeded, digest=file.digest), transaction.atomic():
-        submitted = _record(asked, file)
-    if submitted.is_new:
-        log.info(
-            "submission_received",
-            submission_id=str(submitted.submission.pk),
-            split=split.pk,
-            via=via,
-            digest=file.digest,
-            size_bytes=file.size_bytes,
-        )
-    return submitted
-
-
-@dataclass(frozen=True)
-class _Asked:
-    """A request to submit, its texts clean."""
+@dataclass(frozen=True, kw_only=True)
+class SubmissionRequest:
+    """A file to submit, as it was sent; empty `details` of the method change nothing."""
 
     user: User
-    split: Split
+    split_name: str
     method_name: str
-    details: Mapping[str, Any]  # of the method; an empty one says nothing, and changes nothing
-    row: Mapping[str, str]  # what stands in the submission's row as it came
-    upload: "File[bytes]"
+    upload: "File[bytes] | None"
+    via: str
     now: datetime
-    may_edit: bool
+    filename: str = ""
+    details: Mapping[str, Any] = field(default_factory=dict)
+    note: str = ""
+    commit: str = ""
+    may_edit: bool = True
 
-    def changes_of(self, method: Method) -> dict[str, Any]:
-        """What the request changes of the method. Raises `Refused`."""
+    def cleaned(self) -> "SubmissionRequest":
+        """The request with clean texts and details. Raises `Refused`."""
+        return replace(
+            self,
+            method_name=clean_name("method", self.method_name),
+            details=editing.cleaned(self.details),
+            filename=_clean_filename(self.filename),
+            note=clean_text("note", self.note, limit=500, required=False),
+            commit=clean_text("commit", self.commit, limit=64, required=False),
+        )
+
+    def changes_of(self, method: Method | None) -> dict[str, Any]:
+        """The details that the request changes; none of a method yet to be made. Raises `Refused`."""
+        if method is None:
+            editing.require_hardware(self.details, method=None)
+            return {}
         given = {name: value for name, value in self.details.items() if value not in (None, "")}
         changes = {name: value for name, value in given.items() if getattr(method, name) != value}
         if changes and not self.may_edit:
@@ -121,58 +65,107 @@ class _Asked:
         return changes
 
 
-def _admit(asked: _Asked, file: files.StoredFile) -> Submission | None:
-    """Refuse what cannot be taken, before its bytes are written; `_record` decides under locks.
+@dataclass(frozen=True)
+class Submitted:
+    """The answer to a submission; `is_new` is False when the same bytes had come before."""
 
-    Returns the submission that had the same bytes before. Raises `Refused` or `limits.QuotaExceeded`.
+    submission: Submission
+    is_new: bool
+
+
+def submit(request: SubmissionRequest) -> Submitted:
+    """Take a prediction file. On return it is durable: bytes on the disk, rows committed, evaluation queued.
+
+    The same bytes again, for the same split, method and manifest, are answered with the first submission and
+    change nothing. Details that differ from the method's own replace them; without `may_edit` they are
+    refused. Raises `Refused` or `limits.QuotaExceeded` (nothing is kept then).
     """
-    team = teams.current_team_of(user=asked.user)
-    admissions.require(team=team, split=asked.split)
-    method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
-    first = _sent_before(file, split=asked.split, method=method) if method else None
-    if first is not None:
-        return first
-    limits.require(team=team, user=asked.user, split=asked.split, size_bytes=file.size_bytes, now=asked.now)
-    if method is not None:
-        asked.changes_of(method)
-    else:
-        editing.require_hardware(asked.details, method=None)
-        if team is not None:
-            editing.require_distinct_name(asked.method_name, team=team, field="method", may_exist=True)
-    return None
+    split = _open_split(request.split_name, now=request.now)
+    request = request.cleaned()
+    upload = _checked(request.upload)
+    file = files.measure(upload)
+    team = teams.current_team_of(user=request.user)
+    answers = _answers(request, file, split=split, team=team)
+    if answers.sent_before is not None:
+        return Submitted(submission=answers.sent_before, is_new=False)
+    files.save_predictions(upload, measured=file, now=request.now)
+    with orphans.unless_refused(Refused, limits.QuotaExceeded, digest=file.digest), transaction.atomic():
+        orphans.lock(file.digest)
+        files.require_unchanged(upload, digest=file.digest)
+        submitted = _record(request, file, split=split)
+    if submitted.is_new:
+        log.info(
+            "submission_received",
+            submission_id=str(submitted.submission.pk),
+            split=split.pk,
+            via=request.via,
+            digest=file.digest,
+            size_bytes=file.size_bytes,
+        )
+    return submitted
 
 
-def _record(asked: _Asked, file: files.StoredFile) -> Submitted:
-    """Write the rows of a stored file and queue it. Raises `Refused` or `limits.QuotaExceeded`."""
-    orphans.lock(file.digest)
-    files.require_unchanged(asked.upload, digest=file.digest)
-    # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
-    split = Split.objects.select_related("published_edition__ground_truth").lock_shared(asked.split.pk)
-    team = _held_team(asked.user)
+class _Answers(NamedTuple):
+    """The team's method of that name, its submission of the same bytes, and the changes of its details."""
+
+    method: Method | None
+    sent_before: Submission | None
+    changes: Mapping[str, Any]
+
+
+def _answers(
+    request: SubmissionRequest, file: files.StoredFile, *, split: Split, team: Team | None
+) -> _Answers:
+    """Ask what decides on a file, in this order: admission, same bytes, quota, changes, name.
+
+    Asked twice: before the bytes are written, to spare the disk, and with split and team locked, for certain.
+    Raises `Refused` or `limits.QuotaExceeded`.
+    """
     admissions.require(team=team, split=split)
-    method = _method(asked, team=team)
-    first = _sent_before(file, split=split, method=method)
-    if first is not None:
-        return Submitted(submission=first, is_new=False)
-    changes = asked.changes_of(method)
-    limits.require(team=team, user=asked.user, split=split, size_bytes=file.size_bytes, now=asked.now)
+    method = Method.objects.existing().filter(team=team, name=request.method_name).first()
+    sent_before = _sent_before(file, split=split, method=method) if method else None
+    if sent_before is not None:
+        return _Answers(method, sent_before, {})
+    limits.require(team=team, user=request.user, split=split, size_bytes=file.size_bytes, now=request.now)
+    changes = request.changes_of(method)
+    if method is None and team is not None:
+        # Without the lock another request may be making this very method, which is no other name.
+        editing.require_distinct_name(request.method_name, team=team, field="method", may_exist=True)
+    return _Answers(method, None, changes)
+
+
+def _record(request: SubmissionRequest, file: files.StoredFile, *, split: Split) -> Submitted:
+    """Write the rows of a stored file and queue it. Raises `Refused` or `limits.QuotaExceeded`."""
+    # From here on the board stays, so the file is queued in an edition with the manifest that its row names.
+    split = Split.objects.select_related("published_edition__ground_truth").lock_shared(split.pk)
+    team = _locked_team(request.user)
+    method, sent_before, changes = _answers(request, file, split=split, team=team)
+    if sent_before is not None:
+        return Submitted(submission=sent_before, is_new=False)
+    if method is None:
+        method = Method.objects.create(
+            team=team, name=request.method_name, created_at=request.now, **request.details
+        )
     submission = Submission.objects.create(
         split=split,
         method=method,
-        submitted_by=asked.user,
-        submitted_at=asked.now,
+        submitted_by=request.user,
+        submitted_at=request.now,
         **_sent_file(file, split)._asdict(),
         size_bytes=file.size_bytes,
-        **asked.row,
+        via=request.via,
+        filename=request.filename,
+        note=request.note,
+        commit=request.commit,
     )
     _queue(submission, split=split)
     if changes:
-        submission.method = editing.edit(method=method, changes=changes, actor=asked.user)
-    audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=asked.user)
+        submission.method = editing.edit(method=method, changes=changes, actor=request.user)
+    audit.record(verb="submitted", noun="Submission", noun_id=submission.pk, actor=request.user)
     return Submitted(submission=submission, is_new=True)
 
 
-def _held_team(user: User) -> Team:
+def _locked_team(user: User) -> Team:
     """The person's team, new if there is none, locked until the transaction ends."""
     limits.hold_accounts(user=user)
     team = teams.team_of(user=user)
@@ -225,26 +218,15 @@ def _checked(upload: "File[bytes] | None") -> "File[bytes]":
     if upload.size == 0:
         raise Refused("not-json", EMPTY_MESSAGE, field="file")
     if upload.size > settings.MAX_PREDICTIONS_BYTES:
-        raise Refused("too-large", too_large(found_bytes=upload.size), field="file")
+        raise Refused("too-large", too_large(n_bytes=upload.size), field="file")
     return upload
 
 
-def too_large(*, found_bytes: int) -> str:
+def too_large(*, n_bytes: int) -> str:
     return (
-        f"The file has {found_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
+        f"The file has {n_bytes:,} bytes; expected at most {settings.MAX_PREDICTIONS_BYTES:,} "
         f"({settings.MAX_PREDICTIONS_BYTES / 1e6:g} MB)."
     )
-
-
-def _method(asked: _Asked, *, team: Team) -> Method:
-    """The team's method of that name, made if there is none, in a locked team. Raises `Refused`."""
-    method = Method.objects.existing().filter(team=team, name=asked.method_name).first()
-    if method is None:
-        editing.require_distinct_name(asked.method_name, team=team, field="method")
-        method = Method.objects.create(
-            team=team, name=asked.method_name, created_at=asked.now, **asked.details
-        )
-    return method
 
 
 def _clean_filename(name: str) -> str:

@@ -50,7 +50,7 @@ def submit(request: HttpRequest) -> HttpResponse:
     form = SubmissionForm(user, request)
     if request.method == "POST" and form.is_valid():
         try:
-            submitted = intake.submit(user=user, now=timezone.now(), **form.submission())
+            submitted = intake.submit(form.submission_request(now=timezone.now()))
         except (intake.Refused, limits.QuotaExceeded) as refusal:
             form.refuse(refusal)
         else:
