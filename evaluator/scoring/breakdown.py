@@ -63,7 +63,7 @@ def scores_of(
     for ttc_range in details.protocol.ranges if has_ranges else ():
         masks[ttc_range.name] = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)
     names = [score_name(metric, name) for metric in errors for name in masks]
-    found = []
+    group_means = []
     sums, counts = list[Floats](), list[Floats]()
     for group, rows in groups.items():
         parts = {name: rows[mask[rows]] for name, mask in masks.items()}
@@ -72,7 +72,7 @@ def scores_of(
             for metric, values in errors.items()
             for name, part in parts.items()
         }
-        found.append((group, rows, means))
+        group_means.append((group, rows, means))
         if with_intervals:
             for values in errors.values():
                 for part in parts.values():
@@ -88,7 +88,7 @@ def scores_of(
             means,
             dict(zip(names, ends[number * len(names) :], strict=False)) or dict.fromkeys(names),
         )
-        for number, (group, rows, means) in enumerate(found)
+        for number, (group, rows, means) in enumerate(group_means)
     ]
 
 
@@ -121,25 +121,25 @@ def curve_of(details: Details) -> dict[Ends, Rows]:
     """The rows of every bin [low, high) of true times that has some, by its ends in seconds."""
     bins = np.digitize(details.truth.ttc_s, CURVE_EDGES_S)
     ends = itertools.pairwise(CURVE_EDGES_S)
-    found = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}
-    return {pair: rows for pair, rows in found.items() if len(rows)}
+    rows_of_bin = {pair: np.flatnonzero(bins == number) for number, pair in enumerate(ends, 1)}
+    return {pair: rows for pair, rows in rows_of_bin.items() if len(rows)}
 
 
 def _by_name(names: Sequence[str]) -> dict[str, Rows]:
-    found, index = np.unique(np.array(names), return_inverse=True)
+    groups, index = np.unique(np.array(names), return_inverse=True)
     order = np.argsort(index, kind="stable")
     ends = np.cumsum(np.bincount(index))[:-1]
-    return dict(zip(found.tolist(), np.split(order, ends), strict=True))
+    return dict(zip(groups.tolist(), np.split(order, ends), strict=True))
 
 
 def _by_range(details: Details) -> dict[str, Rows]:
     ttc_s, left = details.truth.ttc_s, np.ones(details.truth.n_sequences, dtype=bool)
-    found = {}
+    groups = {}
     for ttc_range in details.protocol.ranges:
         inside = (ttc_s >= ttc_range.low_s) & (ttc_s <= ttc_range.high_s)  # both ends, as in the scores
-        found[f"{ttc_range.name} {ttc_range.seconds}"] = np.flatnonzero(inside)
+        groups[f"{ttc_range.name} {ttc_range.seconds}"] = np.flatnonzero(inside)
         left &= ~inside
-    return found | {"in no range": np.flatnonzero(left)}
+    return groups | {"in no range": np.flatnonzero(left)}
 
 
 def _by_occlusion(details: Details) -> dict[str, Rows]:

@@ -64,12 +64,12 @@ def _error(figure: Figure, scored: Mapping[str, Details]) -> None:
     for number, (name, details) in enumerate(scored.items()):
         curve = curve_of(details)
         groups = {f"{low}": rows for (low, _), rows in curve.items()}
-        found = scores_of(details, groups=groups, has_ranges=False, with_intervals=True)
+        bins = scores_of(details, groups=groups, has_ranges=False, with_intervals=True)
         middles = np.array([(low + high) / 2 for low, high in curve])
         for axis, metric in zip(axes, metrics, strict=True):
             style = {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
-            means = np.array([row.scores[metric.name] for row in found], dtype=float)
-            ends = np.array([row.intervals[metric.name] or (np.nan, np.nan) for row in found])
+            means = np.array([row.scores[metric.name] for row in bins], dtype=float)
+            ends = np.array([row.intervals[metric.name] or (np.nan, np.nan) for row in bins])
             # No line leads over 0, where nothing is approached or left.
             for side in (middles < 0, middles > 0):
                 label = name if side[-1] else None

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Report:
-    """What the predictions scored: means per TTC range, counts, and what was truncated at which boundary.
+    """Means per TTC range, counts, and the number of predictions that were truncated to each boundary.
 
     `scores` runs as the protocol's `range_names`: overall, crucial, …. Only on request, and no part of the
     JSON: `sequences`, by metric the errors of every sequence, float64 (n,) in the manifest's order, `details`
@@ -192,9 +192,9 @@ class Report:
 
 
 def _with_ends(row: GroupScores, *, with_intervals: bool) -> dict[str, float | None]:
-    found: dict[str, float | None] = {}
+    columns: dict[str, float | None] = {}
     for name, value in row.scores.items():
-        found[name] = value
+        columns[name] = value
         if with_intervals:
-            found[f"{name}_low"], found[f"{name}_high"] = row.intervals[name] or (None, None)
-    return found
+            columns[f"{name}_low"], columns[f"{name}_high"] = row.intervals[name] or (None, None)
+    return columns

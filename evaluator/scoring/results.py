@@ -1,4 +1,4 @@
-"""What scoring returns, and the one way in which a number is rounded."""
+"""The types that scoring returns, and the one way in which a number is rounded."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class RecordingSums:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Details:
-    """What a report was computed from; of a hidden split it never leaves the worker.
+    """The inputs and the errors of each sequence of a report; of a hidden split they never leave the worker.
 
     `predicted_ttc_s`, truncated by the protocol, and the `errors` by metric are (n,), in the truth's order.
     """

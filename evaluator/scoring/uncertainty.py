@@ -145,7 +145,7 @@ class Bootstrap:
 
 
 def _tail(n_effective: float, *, degrees: float) -> float:
-    """The share of resamples beyond either end of a 95 % interval of so many units of equal size.
+    """The share of resamples beyond either end of a 95 % interval of `n_effective` units of equal size.
 
     Bare percentiles are those of a normal distribution whose variance is known, and n units scatter a
     little less about their own mean than about the true one: Φ(−t(97.5 %) · √(n / (n − 1))), the expanded
@@ -182,15 +182,15 @@ def _student(degrees: float) -> float:
 def _ends(deviations: Weights, *, tail: float) -> Floats:
     """The quantiles `tail` and 1 − `tail` of every row, (2, rows), as `numpy.quantile` takes them."""
     last = deviations.shape[1] - 1
-    places = [tail * last, (1 - tail) * last]
-    indices = sorted({i for place in places for i in (int(place), min(int(place) + 1, last))})
+    positions = [tail * last, (1 - tail) * last]
+    indices = sorted({i for position in positions for i in (int(position), min(int(position) + 1, last))})
     parted = np.partition(deviations, indices, axis=1)
-    found = []
-    for place in places:
-        i = int(place)
+    quantiles = []
+    for position in positions:
+        i = int(position)
         lower, upper = parted[:, i].astype(np.float64), parted[:, min(i + 1, last)].astype(np.float64)
-        found.append(lower + (upper - lower) * (place - i))
-    return np.stack(found)
+        quantiles.append(lower + (upper - lower) * (position - i))
+    return np.stack(quantiles)
 
 
 def bootstrap_of(truth_digest: str, counts: Floats) -> Bootstrap:
